@@ -1,0 +1,19 @@
+# Every third-party library, in one place. All are Debian 12 packages; the version is the least we accept.
+find_package(Threads REQUIRED)
+find_package(glm 0.9.9 REQUIRED)             # vectors, matrices, quaternions
+find_package(TBB 2021 REQUIRED)              # threads
+find_package(hwy 1.0 REQUIRED)               # SIMD
+find_package(OpenImageIO 2.4 REQUIRED)       # image files, resizing
+find_package(ZLIB REQUIRED)                  # spz versions 1 to 3
+find_package(zstd REQUIRED)                  # spz version 4
+find_package(nlohmann_json 3.11 REQUIRED)    # JSON
+find_package(tomlplusplus 3.3 REQUIRED)      # settings file
+find_package(CLI11 2.1 REQUIRED)             # command line
+find_package(spdlog 1.10 REQUIRED)           # logs
+find_package(tl-expected REQUIRED)           # Result
+if(SPLATDRAG_TESTS)
+  find_package(GTest 1.12 REQUIRED)
+endif()
+if(SPLATDRAG_BENCHMARKS)
+  find_package(benchmark 1.7 REQUIRED)
+endif()

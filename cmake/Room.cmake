@@ -1,0 +1,60 @@
+# One room is one static library with its warnings and its tests.
+#
+#   engine_room(render SOURCES forward.cc ... USES scene core LINKS hwy::hwy
+#               TESTS project_test.cc GOLDEN_TESTS ... SLOW_TESTS ...)
+#
+# USES are the room's arrows: the only rooms whose headers it may include (tests/house holds the #include lines
+# against them). LINKS are third-party libraries. Tests live in tests/<folder>/ and carry the label of their list:
+# unit (milliseconds each), golden (reference vectors and real captures), slow.
+
+add_library(splatdrag_warnings INTERFACE)
+target_compile_options(splatdrag_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
+                       -Wimplicit-fallthrough -Wno-unknown-pragmas -Werror)
+# -ffp-contract=off: whether a*b+c is fused must be written in the source, not left to the compiler, or the bytes of a
+# result would change with the optimiser. Fused operations are asked for by name (Highway's MulAdd).
+target_compile_options(splatdrag_warnings INTERFACE -ffp-contract=off -fno-math-errno)
+if(SPLATDRAG_SANITIZE)
+  add_compile_options(-fsanitize=${SPLATDRAG_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  add_link_options(-fsanitize=${SPLATDRAG_SANITIZE})
+endif()
+
+set_property(GLOBAL PROPERTY SPLATDRAG_ARROWS "")
+
+function(splatdrag_tests target label folder library)
+  if(NOT SPLATDRAG_TESTS OR NOT ARGN)
+    return()
+  endif()
+  list(TRANSFORM ARGN PREPEND ${CMAKE_SOURCE_DIR}/tests/${folder}/)
+  add_executable(${target} ${ARGN})
+  target_link_libraries(${target} PRIVATE ${library} splatdrag_test_support splatdrag_warnings GTest::gtest_main)
+  include(GoogleTest)
+  gtest_discover_tests(${target} DISCOVERY_TIMEOUT 60 PROPERTIES LABELS ${label} TIMEOUT 900)
+endfunction()
+
+function(splatdrag_room kind folder name)
+  cmake_parse_arguments(ROOM "" "" "SOURCES;USES;LINKS;TEST_LINKS;TESTS;GOLDEN_TESTS;SLOW_TESTS" ${ARGN})
+  if(ROOM_UNPARSED_ARGUMENTS)
+    message(FATAL_ERROR "room ${name}: unknown arguments ${ROOM_UNPARSED_ARGUMENTS}")
+  endif()
+  add_library(${name} STATIC ${ROOM_SOURCES})
+  target_include_directories(${name} PUBLIC ${CMAKE_SOURCE_DIR})
+  target_link_libraries(${name} PRIVATE splatdrag_warnings PUBLIC ${ROOM_LINKS})
+  foreach(used ${ROOM_USES})
+    target_link_libraries(${name} PUBLIC ${used})
+  endforeach()
+  string(REPLACE ";" " " arrows "${ROOM_USES}")
+  set_property(GLOBAL APPEND_STRING PROPERTY SPLATDRAG_ARROWS "${folder}: ${arrows}\n")
+  add_library(${name}_test_deps INTERFACE)
+  target_link_libraries(${name}_test_deps INTERFACE ${name} ${ROOM_TEST_LINKS})
+  splatdrag_tests(${name}_test unit ${folder} ${name}_test_deps ${ROOM_TESTS})
+  splatdrag_tests(${name}_golden_test golden ${folder} ${name}_test_deps ${ROOM_GOLDEN_TESTS})
+  splatdrag_tests(${name}_slow_test slow ${folder} ${name}_test_deps ${ROOM_SLOW_TESTS})
+endfunction()
+
+function(engine_room name)
+  cmake_parse_arguments(ROOM "" "" "SOURCES;USES;LINKS;TEST_LINKS;TESTS;GOLDEN_TESTS;SLOW_TESTS" ${ARGN})
+  list(TRANSFORM ROOM_USES PREPEND engine_)
+  splatdrag_room(engine engine/${name} engine_${name} SOURCES ${ROOM_SOURCES} USES ${ROOM_USES} LINKS ${ROOM_LINKS}
+                 TEST_LINKS ${ROOM_TEST_LINKS} TESTS ${ROOM_TESTS} GOLDEN_TESTS ${ROOM_GOLDEN_TESTS}
+                 SLOW_TESTS ${ROOM_SLOW_TESTS})
+endfunction()

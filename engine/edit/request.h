@@ -1,0 +1,60 @@
+// What a drag edit is asked to do: handles, targets, parameters. Names as in the wire contract.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/core/vec.h"
+
+namespace engine::edit {
+
+enum class Mode {
+  move,    ///< The dragged part leaves its place.
+  extend,  ///< It is drawn out: the original and the trail stay.
+};
+
+/// How the rotation of a pair of handles becomes a quaternion (paper, appendix "Additional Deformation Details").
+enum class Rotation { shortest_arc, paper, none };
+
+/// How a Gaussian follows the handles near it.
+enum class Interpolation { paper, smooth, rigid };
+
+/// A point of the scene and where it should go.
+struct Handle {
+  DVec3 source{0.0};            ///< World units, the file's own frame.
+  std::optional<DVec3> target;  ///< Nothing: an anchor, which holds its surroundings in place.
+  double radius = 0;            ///< World units: Gaussians closer to `source` than this are dragged.
+  int group = 0;                ///< Handles and Gaussians interpolate within a group only.
+};
+
+/// Axis-aligned box that limits what may be dragged.
+struct Region {
+  DVec3 center{0.0}, size{0.0};  ///< World units; size is the full edge length.
+};
+
+struct Params {
+  int intervals = 0;                                   ///< T, 1 to 20; 0: from the longest drag over its radius.
+  Rotation rotation = Rotation::shortest_arc;
+  Interpolation interpolation = Interpolation::paper;
+  bool rotate_sh = true;                               ///< Turn SH bands 1 to 3 with their Gaussian.
+  int views = 50;                                      ///< Most views an edit looks through.
+  std::vector<std::string> exclude_views;              ///< Names held back from the choice.
+  int max_image_side = 512;                            ///< Pixels, of the pictures an edit works on.
+  std::uint64_t seed = 0;
+};
+
+struct Request {
+  Mode mode = Mode::move;
+  std::vector<Handle> handles;
+  std::optional<Region> region;
+  Params params;
+};
+
+/// Ranges and finiteness of every field.
+///   errors  invalid_argument: `where` is the address, such as "handles[2].radius" or "params.views"
+[[nodiscard]] Result<void> validate(const Request& request);
+
+}  // namespace engine::edit

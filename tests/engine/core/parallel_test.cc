@@ -1,0 +1,50 @@
+#include "engine/core/parallel.h"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+#include <stdexcept>
+#include <vector>
+
+namespace engine {
+namespace {
+
+TEST(ParallelFor, VisitsEveryIndexOnce) {
+  std::vector<int> visits(1003, 0);
+  parallel_for(visits.size(), 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) ++visits[i];
+  });
+  EXPECT_EQ(visits, std::vector<int>(1003, 1));
+}
+
+TEST(ParallelFor, MakesTheSameChunksForAnyNumberOfThreads) {
+  auto sums_with = [](int threads) {
+    std::vector<float> partial(chunk_count(10'000, 128));
+    WorkArena arena(threads);
+    arena.run([&] {
+      parallel_for(10'000, 128, [&](std::size_t begin, std::size_t end) {
+        float sum = 0;
+        for (std::size_t i = begin; i < end; ++i) sum += 1.0f / float(i + 1);
+        partial[begin / 128] = sum;
+      });
+    });
+    return std::accumulate(partial.begin(), partial.end(), 0.0f);
+  };
+  const float one = sums_with(1);
+  EXPECT_EQ(one, sums_with(2));
+  EXPECT_EQ(one, sums_with(4));
+}
+
+TEST(ParallelFor, DoesNothingForNoItems) {
+  parallel_for(0, 16, [](std::size_t, std::size_t) { FAIL() << "called"; });
+}
+
+TEST(ParallelFor, LetsAnExceptionOut) {
+  EXPECT_THROW(parallel_for(100, 1, [](std::size_t begin, std::size_t) {
+                 if (begin == 57) throw std::runtime_error("57");
+               }),
+               std::runtime_error);
+}
+
+}  // namespace
+}  // namespace engine
