@@ -4,10 +4,13 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
+#include "engine/core/result.h"
 #include "engine/core/vec.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/gaussian_cloud.h"
@@ -26,8 +29,8 @@ enum class Backend {
   reference,  ///< Plain scalar code, one thread: slow, obvious, the judge of the other one.
 };
 
-/// What a ray blends. All share: splats by view depth (ties by row), alpha = min(0.99, opacity * falloff), contributions
-/// below 1/255 skipped.
+/// What a ray blends. All share: splats by view depth (ties by row), alpha = min(0.99, opacity * falloff),
+/// contributions below 1/255 skipped.
 enum class Semantics {
   dense_stop,    ///< A splat that would bring transmittance below 1e-4 is not blended and ends the ray. The default.
   dense_nostop,  ///< No such end. Reference backend only.
@@ -35,12 +38,12 @@ enum class Semantics {
 };
 
 struct ForwardOptions {
-  Vec3 background{0.0f};                    ///< Colour behind everything, display-referred.
-  bool color = true;                        ///< Compute Rendering::color.
-  bool depth = false;                       ///< Compute Rendering::depth and median_depth.
-  int max_sh_degree = scene::max_sh_degree; ///< Bands above this one are ignored.
-  std::optional<scene::Rect> rect;          ///< Render only these pixels; pictures have the rectangle's size.
-  std::vector<std::uint32_t> tiles;         ///< Not empty: render only these tiles (ascending); the rest stays zero.
+  Vec3 background{0.0f};                     ///< Colour behind everything, display-referred.
+  bool color = true;                         ///< Compute Rendering::color.
+  bool depth = false;                        ///< Compute Rendering::depth and median_depth.
+  int max_sh_degree = scene::max_sh_degree;  ///< Bands above this one are ignored.
+  std::optional<scene::Rect> rect = {};      ///< Render only these pixels; pictures have the rectangle's size.
+  std::vector<std::uint32_t> tiles = {};     ///< Not empty: render only these tiles (ascending); the rest stays zero.
   Backend backend = Backend::simd;
   Semantics semantics = Semantics::dense_stop;
 };
@@ -62,6 +65,26 @@ struct Rendering {
 /// Precondition: validate(camera) holds; options.rect lies inside the picture; tiles and rect are not both given.
 [[nodiscard]] Rendering forward(const scene::GaussianCloud& cloud, const scene::Camera& camera,
                                 const ForwardOptions& options = {}, std::span<const float> weight = {});
+
+/// Memory that a sequence of renderings shares. Not for two threads at once.
+class Workspace {
+ public:
+  Workspace();
+  ~Workspace();
+  Workspace(Workspace&&) noexcept;
+  Workspace& operator=(Workspace&&) noexcept;
+
+ private:
+  friend void forward(const scene::GaussianCloud&, const scene::Camera&, const ForwardOptions&, std::span<const float>,
+                      Workspace&, Rendering&);
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// The same, into pictures and memory of an earlier call, which a frame of the same size then does not allocate again:
+/// a fifth of the time of a small scene.
+void forward(const scene::GaussianCloud& cloud, const scene::Camera& camera, const ForwardOptions& options,
+             std::span<const float> weight, Workspace& workspace, Rendering& out);
 
 /// Instruction sets compiled in and supported by this processor, best first ("AVX2", "SSE4", ...).
 [[nodiscard]] std::vector<std::string> simd_targets();

@@ -1,0 +1,156 @@
+// Depth order, and which splats reach which tiles.
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <utility>
+
+#include "engine/core/parallel.h"
+#include "engine/render/splats.h"
+
+namespace engine::render {
+namespace {
+
+constexpr std::size_t bin_block = 2048;  // splats per unit of parallel work
+
+using Keyed = ForwardBuffers::Keyed;
+
+/// Stable radix sort by key, 11 bits at a time, least significant first. Returns whichever buffer holds the result.
+Keyed* radix_sort(Keyed* from, Keyed* to, std::size_t n) {
+  constexpr int bits = 11;
+  constexpr std::size_t buckets = std::size_t{1} << bits;
+  constexpr int passes = 3;  // the sign bit is never set: 31 bits in 33
+  std::vector<std::uint32_t> counts(passes * buckets, 0);
+  for (std::size_t i = 0; i < n; ++i)
+    for (int pass = 0; pass < passes; ++pass)
+      ++counts[std::size_t(pass) * buckets + ((from[i].key >> (pass * bits)) & (buckets - 1))];
+  for (int pass = 0; pass < passes; ++pass) {
+    std::uint32_t* next = counts.data() + std::size_t(pass) * buckets;
+    std::uint32_t sum = 0;
+    for (std::size_t b = 0; b < buckets; ++b) sum += std::exchange(next[b], sum);
+    for (std::size_t i = 0; i < n; ++i) to[next[(from[i].key >> (pass * bits)) & (buckets - 1)]++] = from[i];
+    std::swap(from, to);
+  }
+  return from;
+}
+
+/// The ellipse q <= q_max of a splat, for asking where it lies within a band of pixel rows.
+class Ellipse {
+ public:
+  explicit Ellipse(const Splat& splat) : x_(splat.x), y_(splat.y) {
+    // u = l1 dx + l2 dy and v = l3 dy run over a disc of this radius. The margin covers rounding here and in the blend.
+    const float radius = std::sqrt(std::max(0.0f, splat.log2_opacity + log2_255 + 1e-3f));
+    const float inverse_l1 = 1 / splat.l1;
+    slope_ = -splat.l2 * inverse_l1;
+    half_y_ = radius / splat.l3;
+    inverse_half_y_ = splat.l3 / radius;
+    radius_over_l1_ = radius * inverse_l1;
+    const float tilt = splat.l2 / splat.l3;
+    rightmost_dy_ = -tilt / std::sqrt(1 + tilt * tilt) * half_y_;
+    margin_ = 0.01f + 1e-5f * (radius_over_l1_ + std::abs(slope_) * half_y_);
+  }
+  struct Extent {
+    float left, right;
+  };
+  /// Smallest and largest x of the ellipse over the pixel rows [row0, row1].
+  [[nodiscard]] Extent over_rows(float row0, float row1) const {
+    const float low = std::clamp(row0 - y_, -half_y_, half_y_), high = std::clamp(row1 - y_, -half_y_, half_y_);
+    return {x_ - reach(std::clamp(rightmost_dy_, -high, -low)), x_ + reach(std::clamp(rightmost_dy_, low, high))};
+  }
+
+ private:
+  /// x of the right edge at height dy, relative to the mean; concave in dy. The left edge is its point reflection.
+  [[nodiscard]] float reach(float dy) const {
+    const float t = dy * inverse_half_y_;
+    return slope_ * dy + radius_over_l1_ * std::sqrt(std::max(0.0f, 1 - t * t)) + margin_;
+  }
+  float x_, y_, slope_, half_y_, inverse_half_y_, radius_over_l1_, rightmost_dy_, margin_;
+};
+
+/// Calls visit(tile) for every tile that holds a pixel within reach of the splat (and rarely for one that just misses).
+template <class Visit>
+void visit_tiles(const Splat& splat, TileBox box, int columns, Visit&& visit) {
+  if (box.first_column == box.last_column || box.first_row == box.last_row) {  // here the bounding box is tight
+    for (int ty = box.first_row; ty <= box.last_row; ++ty)
+      for (int tx = box.first_column; tx <= box.last_column; ++tx) visit(std::uint32_t(ty * columns + tx));
+    return;
+  }
+  const Ellipse ellipse(splat);
+  for (int ty = box.first_row; ty <= box.last_row; ++ty) {
+    const auto extent = ellipse.over_rows(float(ty * tile_size), float(ty * tile_size + tile_size - 1));
+    // Tile tx holds the pixel centres 16 tx to 16 tx + 15. Clamped before conversion: a splat may reach past any int.
+    const float low = std::max(extent.left, float(box.first_column * tile_size));
+    const float high = std::min(extent.right, float(box.last_column * tile_size + tile_size - 1));
+    if (!(low <= high)) continue;
+    const int first = (int(low) + (float(int(low)) < low ? 1 : 0)) / tile_size, last = int(high) / tile_size;
+    for (int tx = first; tx <= last; ++tx) visit(std::uint32_t(ty * columns + tx));
+  }
+}
+
+}  // namespace
+
+void sort_by_depth(ForwardBuffers& buffers) {
+  const auto& blocks = buffers.block_sizes;
+  std::vector<std::size_t> begin(blocks.size() + 1, 0);
+  for (std::size_t b = 0; b < blocks.size(); ++b) begin[b + 1] = begin[b] + blocks[b];
+  buffers.count = begin.back();
+  Keyed* keys = buffers.keys.reserve(buffers.count);
+  Keyed* scratch = buffers.keys_scratch.reserve(buffers.count);
+  parallel_for(blocks.size(), 8, [&](std::size_t first, std::size_t last) {
+    for (std::size_t b = first; b < last; ++b)
+      for (std::size_t k = 0; k < blocks[b]; ++k) {
+        const std::size_t index = b * project_block + k;
+        keys[begin[b] + k] = {std::bit_cast<std::uint32_t>(buffers.projected[index].depth), std::uint32_t(index)};
+      }
+  });
+  const Keyed* order = radix_sort(keys, scratch, buffers.count);
+  Splat* splats = buffers.splats.reserve(buffers.count);
+  TileBox* boxes = buffers.boxes.reserve(buffers.count);
+  parallel_for(buffers.count, bin_block, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      splats[i] = buffers.projected[order[i].index];
+      boxes[i] = buffers.projected_boxes[order[i].index];
+    }
+  });
+}
+
+void bin(const TileGrid& grid, ForwardBuffers& buffers) {
+  const std::size_t tiles = std::size_t(grid.columns) * std::size_t(grid.rows);
+  const std::size_t blocks = chunk_count(buffers.count, bin_block);
+  if (buffers.bin_blocks.size() < blocks) buffers.bin_blocks.resize(blocks);
+
+  // Each block lists the tiles of its splats, and counts them per tile.
+  parallel_for(buffers.count, bin_block, [&](std::size_t first, std::size_t last) {
+    auto& block = buffers.bin_blocks[first / bin_block];
+    block.position.assign(tiles, 0);
+    block.reached.clear();
+    block.tiles.clear();
+    for (std::size_t i = first; i < last; ++i) {
+      const std::size_t before = block.tiles.size();
+      visit_tiles(buffers.splats[i], buffers.boxes[i], grid.columns, [&](std::uint32_t tile) {
+        if (!grid.wanted.empty() && grid.wanted[tile] == 0) return;
+        block.tiles.push_back(tile);
+        ++block.position[tile];
+      });
+      block.reached.push_back(std::uint32_t(block.tiles.size() - before));
+    }
+  });
+
+  buffers.tile_begin.resize(tiles + 1);
+  std::uint32_t sum = 0;
+  for (std::size_t tile = 0; tile < tiles; ++tile) {
+    buffers.tile_begin[tile] = sum;
+    for (std::size_t b = 0; b < blocks; ++b) sum += std::exchange(buffers.bin_blocks[b].position[tile], sum);
+  }
+  buffers.tile_begin[tiles] = sum;
+
+  std::uint32_t* entries = buffers.entries.reserve(sum);
+  parallel_for(buffers.count, bin_block, [&](std::size_t first, std::size_t last) {
+    auto& block = buffers.bin_blocks[first / bin_block];
+    const std::uint32_t* tile = block.tiles.data();
+    for (std::size_t i = first; i < last; ++i)
+      for (std::uint32_t k = 0; k < block.reached[i - first]; ++k)
+        entries[block.position[*tile++]++] = std::uint32_t(i);
+  });
+}
+
+}  // namespace engine::render

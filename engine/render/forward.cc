@@ -1,0 +1,205 @@
+#include "engine/render/forward.h"
+
+#include <hwy/targets.h>
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+#include "engine/core/parallel.h"
+#include "engine/render/reference.h"
+#include "engine/render/splats.h"
+
+namespace engine::render {
+namespace {
+
+/// Gives a picture its shape; memory of the right size is kept. Only parts that nobody writes need to be zero.
+void shape(scene::Image& image, bool wanted, int width, int height, int channels, bool zero) {
+  if (!wanted) {
+    image = {};
+  } else if (image.width != width || image.height != height || image.channels != channels) {
+    image = scene::Image(width, height, channels);
+  } else if (zero) {
+    std::fill(image.data.begin(), image.data.end(), 0.0f);
+  }
+}
+
+void shape(const ForwardOptions& options, bool weighted, int width, int height, Rendering& out) {
+  const bool zero = !options.tiles.empty();
+  shape(out.alpha, true, width, height, 1, zero);
+  shape(out.color, options.color, width, height, 3, zero);
+  shape(out.depth, options.depth, width, height, 1, zero);
+  shape(out.median_depth, options.depth, width, height, 1, zero);
+  shape(out.weight, weighted, width, height, 1, zero);
+}
+
+scene::Rect rect_of(const ForwardOptions& options, const scene::Camera& camera) {
+  return options.rect.value_or(scene::Rect{0, 0, camera.width, camera.height});
+}
+
+/// Copies the pixels of a finished tile that lie within `area` to the pictures, whose first pixel is area's.
+void store_tile(const TilePixels& tile, int x0, int y0, scene::Rect area, Vec3 background, Rendering& out) {
+  const int first_x = std::max(x0, area.x0), last_x = std::min(x0 + tile_size, area.x1);
+  const int first_y = std::max(y0, area.y0), last_y = std::min(y0 + tile_size, area.y1);
+  for (int y = first_y; y < last_y; ++y) {
+    const std::size_t from = std::size_t(y - y0) * tile_size + std::size_t(first_x - x0);
+    const std::size_t to = std::size_t(y - area.y0) * std::size_t(area.width()) + std::size_t(first_x - area.x0);
+    const auto n = std::size_t(last_x - first_x);
+    for (std::size_t i = 0; i < n; ++i) out.alpha.data[to + i] = 1 - std::abs(tile.transmittance[from + i]);
+    if (out.color.channels != 0) {
+      const float* sums[3] = {tile.red, tile.green, tile.blue};
+      for (int c = 0; c < 3; ++c) {
+        float* plane = out.color.plane(c).data() + to;
+        for (std::size_t i = 0; i < n; ++i)
+          plane[i] = sums[c][from + i] + std::abs(tile.transmittance[from + i]) * background[c];
+      }
+    }
+    if (out.depth.channels != 0) {
+      std::copy_n(tile.depth + from, n, out.depth.data.begin() + std::ptrdiff_t(to));
+      std::copy_n(tile.median_depth + from, n, out.median_depth.data.begin() + std::ptrdiff_t(to));
+    }
+    if (out.weight.channels != 0) std::copy_n(tile.weight + from, n, out.weight.data.begin() + std::ptrdiff_t(to));
+  }
+}
+
+void forward_simd(const scene::GaussianCloud& cloud, const scene::Camera& camera, const ForwardOptions& options,
+                  std::span<const float> weight, ForwardBuffers& buffers, Rendering& out) {
+  TileGrid grid{.columns = tile_columns(camera.width),
+                .rows = tile_rows(camera.height),
+                .pixels = rect_of(options, camera),
+                .wanted = {}};
+  std::vector<std::uint32_t> tiles = options.tiles;
+  if (!tiles.empty()) {
+    grid.wanted.assign(std::size_t(grid.columns) * std::size_t(grid.rows), 0);
+    for (const std::uint32_t tile : tiles) grid.wanted[tile] = 1;
+  } else {
+    for (int ty = grid.pixels.y0 / tile_size; ty * tile_size < grid.pixels.y1; ++ty)
+      for (int tx = grid.pixels.x0 / tile_size; tx * tile_size < grid.pixels.x1; ++tx)
+        tiles.push_back(std::uint32_t(ty * grid.columns + tx));
+  }
+
+  const auto view = view_params<float>(camera);
+  const int sh_degree = options.color ? std::min(cloud.sh_degree, options.max_sh_degree) : -1;
+  Splat* projected = buffers.projected.reserve(cloud.size());
+  TileBox* boxes = buffers.projected_boxes.reserve(cloud.size());
+  buffers.block_sizes.resize(chunk_count(cloud.size(), project_block));
+  parallel_for(cloud.size(), project_block, [&](std::size_t begin, std::size_t end) {
+    buffers.block_sizes[begin / project_block] =
+        project_rows(cloud, view, sh_degree, weight.empty() ? nullptr : weight.data(), grid.pixels, begin, end,
+                     projected + begin, boxes + begin);
+  });
+  sort_by_depth(buffers);
+  bin(grid, buffers);
+
+  shape(options, !weight.empty(), grid.pixels.width(), grid.pixels.height(), out);
+  const Channels channels{.color = options.color, .depth = options.depth, .weight = !weight.empty()};
+  parallel_for(tiles.size(), 1, [&](std::size_t begin, std::size_t end) {
+    TilePixels pixels;
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::uint32_t tile = tiles[i];
+      const int x0 = int(tile) % grid.columns * tile_size, y0 = int(tile) / grid.columns * tile_size;
+      const std::uint32_t first = buffers.tile_begin[tile], last = buffers.tile_begin[tile + 1];
+      composite_tile(buffers.splats.data(), {buffers.entries.data() + first, last - first}, x0, y0, channels, pixels);
+      store_tile(pixels, x0, y0, grid.pixels, options.background, out);
+    }
+  });
+}
+
+/// Copies `area` of a whole plane, or only the wanted tiles of it.
+void copy_wanted(const std::vector<float>& from, int width, const ForwardOptions& options, scene::Rect area,
+                 std::span<float> to) {
+  std::vector<std::uint8_t> wanted;
+  const int columns = tile_columns(width);
+  if (!options.tiles.empty()) {
+    wanted.assign(std::size_t(columns) * std::size_t(tile_rows(area.y1)), 0);
+    for (const std::uint32_t tile : options.tiles) wanted[tile] = 1;
+  }
+  for (int y = area.y0; y < area.y1; ++y)
+    for (int x = area.x0; x < area.x1; ++x)
+      if (wanted.empty() || wanted[std::size_t(y / tile_size * columns + x / tile_size)])
+        to[std::size_t(y - area.y0) * std::size_t(area.width()) + std::size_t(x - area.x0)] =
+            from[std::size_t(y) * std::size_t(width) + std::size_t(x)];
+}
+
+void forward_scalar(const scene::GaussianCloud& cloud, const scene::Camera& camera, const ForwardOptions& options,
+                    std::span<const float> weight, Rendering& out) {
+  const auto whole = forward_reference<float>(cloud, camera, options, weight);
+  const scene::Rect area = rect_of(options, camera);
+  shape(options, !weight.empty(), area.width(), area.height(), out);
+  auto copy = [&](const std::vector<float>& from, scene::Image& to, int plane = 0) {
+    if (to.channels != 0) copy_wanted(from, camera.width, options, area, to.plane(plane));
+  };
+  for (int c = 0; c < 3; ++c) copy(whole.color[std::size_t(c)], out.color, c);
+  copy(whole.alpha, out.alpha);
+  copy(whole.depth, out.depth);
+  copy(whole.median_depth, out.median_depth);
+  copy(whole.weight, out.weight);
+}
+
+}  // namespace
+
+struct Workspace::Impl {
+  ForwardBuffers buffers;
+};
+
+Workspace::Workspace() : impl_(std::make_unique<Impl>()) {}
+Workspace::~Workspace() = default;
+Workspace::Workspace(Workspace&&) noexcept = default;
+Workspace& Workspace::operator=(Workspace&&) noexcept = default;
+
+void forward(const scene::GaussianCloud& cloud, const scene::Camera& camera, const ForwardOptions& options,
+             std::span<const float> weight, Workspace& workspace, Rendering& out) {
+  assert(scene::validate(camera));
+  assert(weight.empty() || weight.size() == cloud.size());
+  assert(options.tiles.empty() || !options.rect);
+  assert(options.semantics == Semantics::dense_stop || options.backend == Backend::reference);
+  if (options.backend == Backend::reference) {
+    forward_scalar(cloud, camera, options, weight, out);
+  } else {
+    forward_simd(cloud, camera, options, weight, workspace.impl_->buffers, out);
+  }
+}
+
+Rendering forward(const scene::GaussianCloud& cloud, const scene::Camera& camera, const ForwardOptions& options,
+                  std::span<const float> weight) {
+  Workspace workspace;
+  Rendering out;
+  forward(cloud, camera, options, weight, workspace, out);
+  return out;
+}
+
+namespace {
+
+std::vector<std::int64_t> supported_targets() {
+  std::vector<std::int64_t> bits;  // Highway gives better instruction sets lower bits
+  for (std::int64_t rest = hwy::SupportedTargets() & HWY_TARGETS; rest != 0; rest &= rest - 1)
+    bits.push_back(rest & -rest);
+  return bits;
+}
+
+}  // namespace
+
+std::vector<std::string> simd_targets() {
+  std::vector<std::string> names;
+  for (const std::int64_t target : supported_targets()) names.emplace_back(hwy::TargetName(target));
+  return names;
+}
+
+std::string simd_target() { return simd_targets().front(); }
+
+Result<void> pin_simd_target(const std::string& name) {
+  hwy::DisableTargets(0);
+  std::string known;
+  for (const std::int64_t target : supported_targets()) {
+    if (hwy::TargetName(target) == name) {
+      hwy::DisableTargets(~target);
+      hwy::GetChosenTarget().DeInit();  // the next pass chooses again
+      return {};
+    }
+    known += std::string(known.empty() ? "" : ", ") + hwy::TargetName(target);
+  }
+  return fail(ErrorCode::invalid_argument, "instruction set '" + name + "' is not one of this machine's: " + known,
+              "simd");
+}
+
+}  // namespace engine::render

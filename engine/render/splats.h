@@ -1,0 +1,125 @@
+// What the stages of the SIMD forward pass hand to each other: project -> sort -> bin -> composite.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "engine/render/forward.h"
+#include "engine/render/project.h"
+
+namespace engine::render {
+
+/// One splat, ready to blend. Its alpha at offset (dx, dy) from the mean, in pixels, is
+///   min(0.99, exp2(log2_opacity - (l1 dx + l2 dy)^2 - (l3 dy)^2)),
+/// so l1..l3 are those of Projection times sqrt(log2(e) / 2).
+struct Splat {
+  float x, y;  ///< Mean, pixel-index units.
+  float l1, l2, l3;
+  float log2_opacity;
+  float red, green, blue;
+  float depth;  ///< World units along the optical axis.
+  float weight;
+  std::uint32_t row;  ///< Of the Gaussian in its cloud.
+};
+static_assert(sizeof(Splat) == 48);
+
+/// The tiles that a splat's bounding box meets; the ranges include their ends.
+struct TileBox {
+  std::uint16_t first_column, last_column, first_row, last_row;
+};
+
+/// exp2(log2_opacity - q) >= 1/255 exactly where q <= log2_opacity + log2_255.
+constexpr float log2_255 = 7.99435343685886f;
+
+/// Memory that is kept from frame to frame. Elements start uninitialised: the stages fill them, and zeroing or faulting
+/// in fresh pages each frame costs as much as a stage.
+template <class T>
+class Buffer {
+ public:
+  /// Room for n elements; what was in it is lost.
+  T* reserve(std::size_t n) {
+    if (n > capacity_) {
+      data_ = std::make_unique_for_overwrite<T[]>(n);
+      capacity_ = n;
+    }
+    return data_.get();
+  }
+  [[nodiscard]] T* data() const { return data_.get(); }
+  T& operator[](std::size_t i) const { return data_[i]; }
+
+ private:
+  std::unique_ptr<T[]> data_;
+  std::size_t capacity_ = 0;
+};
+
+/// Which tiles of a picture are wanted, and the pixels that they can reach.
+struct TileGrid {
+  int columns = 0, rows = 0;         ///< Tiles of the whole picture.
+  scene::Rect pixels;                ///< Nothing outside is needed.
+  std::vector<std::uint8_t> wanted;  ///< [rows * columns], or empty: all those that `pixels` meets.
+};
+
+/// What a forward pass works in. The stages fill it from top to bottom.
+struct ForwardBuffers {
+  // project: block b of the cloud's rows writes its survivors from b * project_block on
+  Buffer<Splat> projected;
+  Buffer<TileBox> projected_boxes;
+  std::vector<std::size_t> block_sizes;
+  // sort: by depth, ties by row
+  struct Keyed {
+    std::uint32_t key;    ///< Bits of the depth: positive floats order as their bits.
+    std::uint32_t index;  ///< Into projected.
+  };
+  Buffer<Keyed> keys, keys_scratch;
+  Buffer<Splat> splats;
+  Buffer<TileBox> boxes;
+  std::size_t count = 0;  ///< Of splats.
+  // bin: for each tile the splats that reach it, in their order
+  struct BinBlock {
+    std::vector<std::uint32_t> tiles;     ///< Those reached, splat by splat.
+    std::vector<std::uint32_t> reached;   ///< How many tiles each splat reaches.
+    std::vector<std::uint32_t> position;  ///< Per tile: count, then where the block's next entry goes.
+  };
+  std::vector<BinBlock> bin_blocks;
+  Buffer<std::uint32_t> entries;          ///< Indices into splats.
+  std::vector<std::uint32_t> tile_begin;  ///< [tiles + 1] into entries.
+};
+
+/// Projects the rows [begin, end) and writes those that can be seen within `pixels` to `out`, in row order.
+///   weight  [N] or null
+///   sh_degree  bands used; -1: colours are not needed
+///   out, boxes room for end - begin
+///   returns    how many were written
+std::size_t project_rows(const scene::GaussianCloud& cloud, const ViewParams<float>& view, int sh_degree,
+                         const float* weight, scene::Rect pixels, std::size_t begin, std::size_t end, Splat* out,
+                         TileBox* boxes);
+
+/// Most rows project_rows() takes at once.
+constexpr std::size_t project_block = 1024;
+
+/// Which sums composite_tile() keeps.
+struct Channels {
+  bool color = false, depth = false, weight = false;
+};
+
+/// The pixels of one tile while it is blended; row-major 16 x 16.
+struct alignas(64) TilePixels {
+  static constexpr std::size_t count = std::size_t(tile_size) * tile_size;
+  float transmittance[count];  ///< Its sign is the ray's state: negative once the ray has ended.
+  float red[count], green[count], blue[count];
+  float depth[count], median_depth[count];
+  float weight[count];
+};
+
+/// Blends the listed splats, nearest first, into the tile whose first pixel is (x0, y0). Starts from empty pixels.
+void composite_tile(const Splat* splats, std::span<const std::uint32_t> list, int x0, int y0, Channels channels,
+                    TilePixels& tile);
+
+/// The stages between projection and blending.
+void sort_by_depth(ForwardBuffers& buffers);
+void bin(const TileGrid& grid, ForwardBuffers& buffers);
+
+}  // namespace engine::render

@@ -1,0 +1,41 @@
+// The real spherical harmonics in which a 3D Gaussian scene stores its view-dependent colour.
+// Source: Ramamoorthi and Hanrahan 2001 for the functions; order and signs are those of 3DGS files (Kerbl et al. 2023).
+#pragma once
+
+#include <concepts>
+
+namespace engine::scene {
+
+/// The (degree + 1)^2 basis values Y_k(d), coefficient order of the files.
+///   degree   0..3
+///   x, y, z  the direction d, of unit length: from the camera centre to the Gaussian's mean, world axes
+///   out      room for (degree + 1)^2 values; those beyond stay as they are
+/// The colour of a Gaussian in channel c is max(0, 0.5 + sum_k sh[c][k] Y_k(d)).
+template <std::floating_point Real>
+constexpr void sh_basis(int degree, Real x, Real y, Real z, Real* out) noexcept {
+  out[0] = Real(0.28209479177387814);
+  if (degree < 1) return;
+  constexpr Real c1 = Real(0.4886025119029199);
+  out[1] = -c1 * y;
+  out[2] = c1 * z;
+  out[3] = -c1 * x;
+  if (degree < 2) return;
+  const Real xx = x * x, yy = y * y, zz = z * z;
+  constexpr Real c2 = Real(1.0925484305920792);
+  out[4] = c2 * (x * y);
+  out[5] = -c2 * (y * z);
+  out[6] = Real(0.31539156525252005) * (2 * zz - xx - yy);
+  out[7] = -c2 * (x * z);
+  out[8] = Real(0.5462742152960396) * (xx - yy);
+  if (degree < 3) return;
+  constexpr Real c3_outer = Real(0.5900435899266435), c3_inner = Real(0.4570457994644658);
+  out[9] = -c3_outer * y * (3 * xx - yy);
+  out[10] = Real(2.890611442640554) * (x * y) * z;
+  out[11] = -c3_inner * y * (4 * zz - xx - yy);
+  out[12] = Real(0.3731763325901154) * z * (2 * zz - 3 * xx - 3 * yy);
+  out[13] = -c3_inner * x * (4 * zz - xx - yy);
+  out[14] = Real(1.445305721320277) * z * (xx - yy);
+  out[15] = -c3_outer * x * (xx - 3 * yy);
+}
+
+}  // namespace engine::scene

@@ -1,0 +1,345 @@
+#include "engine/render/forward.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "engine/core/finite.h"
+#include "engine/core/parallel.h"
+#include "engine/core/rng.h"
+#include "engine/render/project.h"
+
+namespace engine::render {
+namespace {
+
+scene::Camera test_camera(int width = 70, int height = 50) {
+  scene::Camera camera = scene::look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 1.0, width, height);
+  camera.cx += 3.3;  // off centre: nothing may assume the middle
+  return camera;
+}
+
+/// Gaussians in front of the camera, of all sizes; seeded.
+scene::GaussianCloud random_cloud(std::size_t n, std::uint64_t seed, int degree = 3) {
+  scene::GaussianCloud cloud;
+  cloud.sh_degree = degree;
+  cloud.resize(n);
+  Rng rng(seed);
+  for (std::size_t i = 0; i < n; ++i) {
+    const float z = rng.uniform(0.5f, 6.0f);
+    cloud.mean.set(i, {z * rng.uniform(-0.9f, 0.9f), z * rng.uniform(-0.7f, 0.7f), z});
+    cloud.log_scale.set(i, {rng.uniform(-5.0f, -1.0f), rng.uniform(-5.0f, -1.0f), rng.uniform(-5.0f, -1.0f)});
+    cloud.rotation.set(i, {rng.normal(), rng.normal(), rng.normal(), rng.normal()});
+    cloud.opacity_logit[i] = rng.uniform(-4.0f, 4.0f);
+  }
+  for (float& value : cloud.sh) value = 0.4f * rng.normal();
+  return cloud;
+}
+
+/// One Gaussian, grey with a given brightness (SH degree 0).
+scene::GaussianCloud one_gaussian(Vec3 mean, float log_scale, float opacity_logit, float brightness) {
+  scene::GaussianCloud cloud;
+  cloud.resize(1);
+  cloud.mean.set(0, mean);
+  cloud.log_scale.set(0, Vec3(log_scale));
+  cloud.rotation.set(0, {1, 0, 0, 0});
+  cloud.opacity_logit[0] = opacity_logit;
+  for (float& value : cloud.sh) value = (brightness - 0.5f) / 0.28209479177387814f;
+  return cloud;
+}
+
+ForwardOptions everything(Backend backend = Backend::simd) {
+  return {.background = {0.1f, 0.5f, 0.9f}, .depth = true, .backend = backend};
+}
+
+void expect_finite(const Rendering& seen) {
+  for (const scene::Image* image : {&seen.color, &seen.alpha, &seen.depth, &seen.median_depth, &seen.weight}) {
+    const auto bad = first_not_finite(image->data);
+    EXPECT_FALSE(bad) << "value " << bad.value_or(0);
+  }
+  for (const float alpha : seen.alpha.data) {
+    EXPECT_GE(alpha, 0.0f);
+    EXPECT_LE(alpha, 1.0f);
+  }
+}
+
+bool same_pictures(const Rendering& a, const Rendering& b) {
+  return a.color == b.color && a.alpha == b.alpha && a.depth == b.depth && a.median_depth == b.median_depth &&
+         a.weight == b.weight;
+}
+
+class BackendTest : public testing::TestWithParam<Backend> {};
+INSTANTIATE_TEST_SUITE_P(Backends, BackendTest, testing::Values(Backend::reference, Backend::simd),
+                         [](const auto& backend) { return backend.param == Backend::simd ? "simd" : "reference"; });
+
+TEST_P(BackendTest, AnEmptySceneShowsTheBackground) {
+  const Rendering seen = forward({}, test_camera(), everything(GetParam()));
+  for (int c = 0; c < 3; ++c)
+    for (const float value : seen.color.plane(c)) EXPECT_EQ(value, everything().background[c]);
+  for (const float alpha : seen.alpha.data) EXPECT_EQ(alpha, 0.0f);
+}
+
+TEST_P(BackendTest, OneWideOpaqueGaussianHidesAllButOnePercent) {
+  const auto seen = forward(one_gaussian({0, 0, 2}, 5, 30, 1.0f), test_camera(), everything(GetParam()));
+  EXPECT_NEAR(seen.alpha.at(35, 25), 0.99f, 1e-6f);
+  EXPECT_NEAR(seen.color.at(35, 25, 0), 0.99f * 1.0f + 0.01f * 0.1f, 1e-6f);
+  EXPECT_NEAR(seen.depth.at(35, 25), 0.99f * 2.0f, 1e-5f);
+  EXPECT_EQ(seen.median_depth.at(35, 25), 2.0f);
+}
+
+TEST_P(BackendTest, MedianDepthIsWhereTransmittanceFallsBelowOneHalf) {
+  // Three sheets of alpha 0.354: T is 0.646 after the first, 0.417 after the second.
+  auto cloud = one_gaussian({0, 0, 2}, 5, -0.6f, 0.5f);
+  for (const float z : {3.0f, 4.0f}) {
+    const auto next = one_gaussian({0, 0, z}, 5, -0.6f, 0.5f);
+    scene::append_rows(cloud, next, std::vector<std::uint32_t>{0});
+  }
+  const auto seen = forward(cloud, test_camera(), everything(GetParam()));
+  EXPECT_EQ(seen.median_depth.at(35, 25), 3.0f);
+  cloud = one_gaussian({0, 0, 2}, 5, -0.6f, 0.5f);
+  EXPECT_EQ(forward(cloud, test_camera(), everything(GetParam())).median_depth.at(35, 25), 0.0f)
+      << "never below one half";
+}
+
+TEST_P(BackendTest, WhiteOnWhiteStaysWhite) {
+  auto cloud = random_cloud(300, 3, 0);
+  for (float& value : cloud.sh) value = 0.5f / 0.28209479177387814f;
+  ForwardOptions options = everything(GetParam());
+  options.background = Vec3(1.0f);
+  for (const float value : forward(cloud, test_camera(), options).color.data) EXPECT_NEAR(value, 1.0f, 2e-6f);
+}
+
+TEST_P(BackendTest, AWeightOfOneBlendsToAlphaAndTheSumOfMasksIsTheirUnion) {
+  const auto cloud = random_cloud(200, 4);
+  std::vector<float> one(cloud.size(), 1.0f), odd(cloud.size()), even(cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i) odd[i] = float(i % 2), even[i] = 1 - odd[i];
+  const auto all = forward(cloud, test_camera(), everything(GetParam()), one);
+  const auto a = forward(cloud, test_camera(), everything(GetParam()), odd);
+  const auto b = forward(cloud, test_camera(), everything(GetParam()), even);
+  for (std::size_t i = 0; i < all.alpha.data.size(); ++i) {
+    EXPECT_NEAR(all.weight.data[i], all.alpha.data[i], 2e-6f);
+    EXPECT_NEAR(a.weight.data[i] + b.weight.data[i], all.alpha.data[i], 2e-6f);
+  }
+}
+
+TEST_P(BackendTest, ARectangleIsACutOutOfTheWholePicture) {
+  const auto cloud = random_cloud(400, 5);
+  const std::vector<float> weight(cloud.size(), 0.7f);
+  const auto whole = forward(cloud, test_camera(), everything(GetParam()), weight);
+  ForwardOptions options = everything(GetParam());
+  options.rect = scene::Rect{13, 7, 50, 49};
+  const auto part = forward(cloud, test_camera(), options, weight);
+  ASSERT_EQ(part.color.width, 37);
+  ASSERT_EQ(part.color.height, 42);
+  for (int y = 0; y < part.color.height; ++y)
+    for (int x = 0; x < part.color.width; ++x) {
+      for (int c = 0; c < 3; ++c) ASSERT_EQ(part.color.at(x, y, c), whole.color.at(x + 13, y + 7, c)) << x << ' ' << y;
+      ASSERT_EQ(part.depth.at(x, y), whole.depth.at(x + 13, y + 7));
+      ASSERT_EQ(part.weight.at(x, y), whole.weight.at(x + 13, y + 7));
+    }
+}
+
+TEST_P(BackendTest, WantedTilesAreThoseOfTheWholePictureAndTheRestIsZero) {
+  const auto cloud = random_cloud(400, 6);
+  const auto whole = forward(cloud, test_camera(), everything(GetParam()));
+  ForwardOptions options = everything(GetParam());
+  options.tiles = {1, 7, 19};  // of 5 columns and 4 rows; 19 is cut by the picture's corner
+  const auto part = forward(cloud, test_camera(), options);
+  for (int y = 0; y < 50; ++y)
+    for (int x = 0; x < 70; ++x) {
+      const int tile = y / tile_size * tile_columns(70) + x / tile_size;
+      const bool wanted = tile == 1 || tile == 7 || tile == 19;
+      ASSERT_EQ(part.color.at(x, y, 2), wanted ? whole.color.at(x, y, 2) : 0.0f) << x << ' ' << y;
+      ASSERT_EQ(part.alpha.at(x, y), wanted ? whole.alpha.at(x, y) : 0.0f) << x << ' ' << y;
+    }
+}
+
+TEST_P(BackendTest, AFrameIntoUsedMemoryIsTheSameFrame) {
+  Workspace workspace;
+  Rendering out;
+  forward(random_cloud(900, 7), test_camera(64, 80), everything(GetParam()), {}, workspace, out);
+  const auto cloud = random_cloud(300, 8);
+  forward(cloud, test_camera(), everything(GetParam()), {}, workspace, out);
+  EXPECT_TRUE(same_pictures(out, forward(cloud, test_camera(), everything(GetParam()))));
+  ForwardOptions options = everything(GetParam());
+  options.tiles = {3};
+  forward(cloud, test_camera(), options, {}, workspace, out);
+  EXPECT_TRUE(same_pictures(out, forward(cloud, test_camera(), options)));
+}
+
+TEST_P(BackendTest, EqualDepthsBlendInRowOrder) {
+  auto cloud = one_gaussian({0, 0, 2}, 3, 0, 1.0f);
+  scene::append_rows(cloud, one_gaussian({0, 0, 2}, 3, 0, 0.0f), std::vector<std::uint32_t>{0});
+  ForwardOptions options{.backend = GetParam()};
+  EXPECT_NEAR(forward(cloud, test_camera(), options).color.at(35, 25), 0.5f, 1e-3f);
+  cloud.sh_row(0)[0] = cloud.sh_row(0)[1] = cloud.sh_row(0)[2] = -0.5f / 0.28209479177387814f;  // now black is first
+  cloud.sh_row(1)[0] = cloud.sh_row(1)[1] = cloud.sh_row(1)[2] = 0.5f / 0.28209479177387814f;
+  EXPECT_NEAR(forward(cloud, test_camera(), options).color.at(35, 25), 0.25f, 1e-3f);
+}
+
+TEST_P(BackendTest, FarFromTheOriginThePictureIsThatAtTheOrigin) {
+  // At 2^20 world units a float steps by 1/8: means are put on that grid, so that both scenes hold the same numbers.
+  auto cloud = random_cloud(300, 9);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const Vec3 mean = cloud.mean.get(i) * 20.0f;
+    cloud.mean.set(i, {std::round(mean.x * 8) / 8, std::round(mean.y * 8) / 8, std::round(mean.z * 8) / 8});
+    cloud.log_scale.set(i, cloud.log_scale.get(i) + 3.0f);
+  }
+  const DVec3 offset(1048576, -1048576, 1048576);
+  auto moved = cloud;
+  for (std::size_t i = 0; i < cloud.size(); ++i) moved.mean.set(i, cloud.mean.get(i) + Vec3(offset));
+  const auto near = scene::look_at({1.1, -0.7, -3.3}, {0.3, 0.1, 40}, {0, -1, 0}, 1.0, 70, 50);
+  const auto far =
+      scene::look_at(DVec3(1.1, -0.7, -3.3) + offset, DVec3(0.3, 0.1, 40) + offset, {0, -1, 0}, 1.0, 70, 50);
+  const auto expected = forward(cloud, near, everything(GetParam())),
+             seen = forward(moved, far, everything(GetParam()));
+  for (std::size_t i = 0; i < expected.color.data.size(); ++i)
+    ASSERT_NEAR(seen.color.data[i], expected.color.data[i], 1e-4f) << i;
+}
+
+// What design section 5 lists, and more: each must give finite pictures on both backends. See docs/numerics.md.
+struct Extreme {
+  const char* name;
+  void (*spoil)(scene::GaussianCloud&);
+};
+
+class ExtremeTest : public testing::TestWithParam<Extreme> {};
+
+INSTANTIATE_TEST_SUITE_P(Extremes, ExtremeTest,
+                         testing::Values(Extreme{"NeedlesOfAxisRatioMillion",
+                                                 [](scene::GaussianCloud& c) {
+                                                   for (std::size_t i = 0; i < c.size(); ++i)
+                                                     c.log_scale.set(i, {2.0f, -11.8f, -11.8f});
+                                                 }},
+                                         Extreme{"SubPixelSplats",
+                                                 [](scene::GaussianCloud& c) {
+                                                   for (std::size_t i = 0; i < c.size(); ++i)
+                                                     c.log_scale.set(i, Vec3(-19.0f));
+                                                 }},
+                                         Extreme{"SplatsThatCoverTheScreen",
+                                                 [](scene::GaussianCloud& c) {
+                                                   for (std::size_t i = 0; i < c.size(); ++i)
+                                                     c.log_scale.set(i, Vec3(12.0f));
+                                                 }},
+                                         Extreme{"LogScalesBeyondSaturation",
+                                                 [](scene::GaussianCloud& c) {
+                                                   for (std::size_t i = 0; i < c.size(); ++i)
+                                                     c.log_scale.set(i, {3e38f, -3e38f, 50.0f});
+                                                 }},
+                                         Extreme{"OpacityLogitsBeyondSaturation",
+                                                 [](scene::GaussianCloud& c) {
+                                                   for (std::size_t i = 0; i < c.size(); ++i)
+                                                     c.opacity_logit[i] = i % 2 ? 3e38f : -3e38f;
+                                                 }},
+                                         Extreme{"JustBeyondTheNearPlane",
+                                                 [](scene::GaussianCloud& c) {
+                                                   for (std::size_t i = 0; i < c.size(); ++i) {
+                                                     c.mean.z[i] = std::nextafter(0.2f, 1.0f);
+                                                     c.log_scale.set(i, {10.0f, -10.0f, 15.0f});
+                                                   }
+                                                 }},
+                                         Extreme{"AroundAndBehindTheCamera",
+                                                 [](scene::GaussianCloud& c) {
+                                                   for (std::size_t i = 0; i < c.size(); ++i)
+                                                     c.mean.z[i] = 0.1f - 0.01f * float(i);
+                                                 }},
+                                         Extreme{"MeansAtTheEndOfFloat",
+                                                 [](scene::GaussianCloud& c) {
+                                                   for (std::size_t i = 0; i < c.size(); ++i)
+                                                     c.mean.set(i, {3e38f, i % 2 ? -3e38f : 1.0f, 3e38f});
+                                                 }},
+                                         Extreme{"ZeroQuaternions",
+                                                 [](scene::GaussianCloud& c) {
+                                                   for (std::size_t i = 0; i < c.size(); ++i)
+                                                     c.rotation.set(i, {0, 0, 0, 0});
+                                                 }},
+                                         Extreme{"QuaternionsOfLength1e-20",
+                                                 [](scene::GaussianCloud& c) {
+                                                   for (std::size_t i = 0; i < c.size(); ++i)
+                                                     c.rotation.set(i, c.rotation.get(i) * 1e-20f);
+                                                 }},
+                                         Extreme{"QuaternionsOfLength1e38",
+                                                 [](scene::GaussianCloud& c) {
+                                                   for (std::size_t i = 0; i < c.size(); ++i)
+                                                     c.rotation.set(i, {3e38f, -3e38f, 3e38f, 1e38f});
+                                                 }},
+                                         Extreme{"ColoursAtTheEndOfFloat",
+                                                 [](scene::GaussianCloud& c) {
+                                                   for (std::size_t k = 0; k < c.sh.size(); ++k)
+                                                     c.sh[k] = k % 3 ? 3e38f : -3e38f;
+                                                 }}),
+                         [](const auto& extreme) {
+                           std::string name = extreme.param.name;
+                           std::erase(name, '-');
+                           return name;
+                         });
+
+TEST_P(ExtremeTest, GivesFinitePicturesThatBothBackendsAgreeOn) {
+  auto cloud = random_cloud(97, 11);
+  GetParam().spoil(cloud);
+  const std::vector<float> weight(cloud.size(), 1.0f);
+  const auto expected = forward(cloud, test_camera(), everything(Backend::reference), weight);
+  const auto seen = forward(cloud, test_camera(), everything(), weight);
+  expect_finite(expected);
+  expect_finite(seen);
+  // Splats so close to a cut that rounding decides flip whole contributions; they must stay rare.
+  std::size_t flips = 0;
+  for (std::size_t i = 0; i < seen.alpha.data.size(); ++i)
+    flips += std::abs(seen.alpha.data[i] - expected.alpha.data[i]) > 1e-3f;
+  EXPECT_LE(flips, seen.alpha.data.size() / 200) << "of " << seen.alpha.data.size();
+}
+
+TEST(Forward, BackendsAgreeOnACrowdedScene) {
+  const auto cloud = random_cloud(3000, 12);
+  const auto expected = forward(cloud, test_camera(), everything(Backend::reference));
+  const auto seen = forward(cloud, test_camera(), everything());
+  double sum = 0;
+  for (std::size_t i = 0; i < seen.color.data.size(); ++i) {
+    const double difference = std::abs(double(seen.color.data[i]) - double(expected.color.data[i]));
+    ASSERT_LT(difference, 8e-3) << i;
+    sum += difference;
+  }
+  EXPECT_LT(sum / double(seen.color.data.size()), 2e-6);
+}
+
+TEST(Forward, IsTheSameToTheBitForAnyNumberOfThreads) {
+  const auto cloud = random_cloud(5000, 13);
+  const std::vector<float> weight(cloud.size(), 0.3f);
+  std::vector<Rendering> seen(3);
+  for (const std::size_t k : {0u, 1u, 2u}) {
+    WorkArena arena(1 << k);
+    arena.run([&] { seen[k] = forward(cloud, test_camera(300, 200), everything(), weight); });
+  }
+  EXPECT_TRUE(same_pictures(seen[0], seen[1]));
+  EXPECT_TRUE(same_pictures(seen[0], seen[2]));
+}
+
+TEST(Forward, PinningAnUnknownInstructionSetNamesTheKnownOnes) {
+  const auto pinned = pin_simd_target("AVX1024");
+  ASSERT_FALSE(pinned);
+  EXPECT_EQ(pinned.error().where, "simd");
+  EXPECT_NE(pinned.error().message.find(simd_targets().front()), std::string::npos) << pinned.error().message;
+}
+
+TEST(Project, AZeroQuaternionIsTheIdentity) {
+  const auto r = rotation_matrix(0.0f, 0.0f, 0.0f, 0.0f);
+  EXPECT_EQ(r, (std::array<float, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1}));
+}
+
+TEST(Project, ALongNeedleKeepsItsThicknessInFloat) {
+  // 1000 pixels long at 45 degrees and as thin as the low pass leaves it: float must agree with double along it.
+  const auto camera = test_camera(1280, 1280);
+  const std::array<float, 3> mean{0, 0, 2}, log_scale{2.0f, -12.0f, -12.0f};
+  const std::array<float, 4> rotation{0.92387953f, 0, 0, 0.38268343f};
+  const auto f = project<float>(view_params<float>(camera), mean, log_scale, rotation);
+  const auto d =
+      project<double>(view_params<double>(camera), {0, 0, 2}, {2.0, -12.0, -12.0}, {0.92387953, 0, 0, 0.38268343});
+  for (double t = -500; t <= 500; t += 50) {
+    const double along = d.l1 * t + d.l2 * (t + 1), across = d.l3 * (t + 1);
+    const float along_f = f.l1 * float(t) + f.l2 * float(t + 1), across_f = f.l3 * float(t + 1);
+    EXPECT_NEAR(along_f * along_f + across_f * across_f, along * along + across * across, 5e-3) << t;
+  }
+}
+
+}  // namespace
+}  // namespace engine::render
