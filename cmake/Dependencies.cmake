@@ -4,6 +4,10 @@ find_package(glm 0.9.9 REQUIRED)             # vectors, matrices, quaternions
 find_package(TBB 2021 REQUIRED)              # threads
 find_package(hwy 1.0 REQUIRED)               # SIMD
 find_package(OpenImageIO 2.4 REQUIRED)       # image files, resizing
+# Debian's package names OpenCV's headers, which its own headers need only for a conversion we do not use, and which
+# need not be installed; CMake refuses a folder that does not exist.
+set_target_properties(OpenImageIO::OpenImageIO PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "${OpenImageIO_INCLUDE_DIR}"
+                      INTERFACE_SYSTEM_INCLUDE_DIRECTORIES "")
 find_package(ZLIB REQUIRED)                  # spz versions 1 to 3
 find_package(zstd REQUIRED)                  # spz version 4
 find_package(nlohmann_json 3.11 REQUIRED)    # JSON

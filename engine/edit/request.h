@@ -1,6 +1,7 @@
 // What a drag edit is asked to do: handles, targets, parameters. Names as in the wire contract.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -8,6 +9,7 @@
 
 #include "engine/core/result.h"
 #include "engine/core/vec.h"
+#include "engine/deform/motion.h"
 
 namespace engine::edit {
 
@@ -16,11 +18,12 @@ enum class Mode {
   extend,  ///< It is drawn out: the original and the trail stay.
 };
 
-/// How the rotation of a pair of handles becomes a quaternion (paper, appendix "Additional Deformation Details").
-enum class Rotation { shortest_arc, paper, none };
+using deform::Interpolation;
+using deform::Rotation;
 
-/// How a Gaussian follows the handles near it.
-enum class Interpolation { paper, smooth, rigid };
+constexpr std::size_t max_handles = 256;
+constexpr int max_views = 1000;
+constexpr double max_coordinate = 1e12;  ///< World units; float means would have no digits left for a scene out there.
 
 /// A point of the scene and where it should go.
 struct Handle {
@@ -36,13 +39,13 @@ struct Region {
 };
 
 struct Params {
-  int intervals = 0;                                   ///< T, 1 to 20; 0: from the longest drag over its radius.
+  int intervals = 0;  ///< T, 1 to 20; 0: from the longest drag over its radius.
   Rotation rotation = Rotation::shortest_arc;
   Interpolation interpolation = Interpolation::paper;
-  bool rotate_sh = true;                               ///< Turn SH bands 1 to 3 with their Gaussian.
-  int views = 50;                                      ///< Most views an edit looks through.
-  std::vector<std::string> exclude_views;              ///< Names held back from the choice.
-  int max_image_side = 512;                            ///< Pixels, of the pictures an edit works on.
+  bool rotate_sh = true;                   ///< Turn SH bands 1 to 3 with their Gaussian.
+  int views = 50;                          ///< Most views an edit looks through, 1 to max_views.
+  std::vector<std::string> exclude_views;  ///< Names held back from the choice.
+  int max_image_side = 512;                ///< Pixels, of the pictures an edit works on, 16 to 16384.
   std::uint64_t seed = 0;
 };
 

@@ -18,7 +18,7 @@ constexpr int max_sh_degree = 3;
 constexpr std::size_t sh_coefficients(int degree) { return std::size_t(degree + 1) * std::size_t(degree + 1); }
 
 /// N Gaussians, structure of arrays. Values are as the file stores them; what rendering uses is in brackets.
-/// Invariant: every array has the length that size() and sh_degree say (see validate()).
+/// Invariant: every array has the length that size() and sh_degree say.
 ///
 /// `extra` holds what the rows of the input file contain beside the Gaussian itself, as opaque bytes of fixed length
 /// per row. They travel with the row, a copy inherits them, and the writer puts them back where they were.

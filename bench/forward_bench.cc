@@ -1,0 +1,112 @@
+// How fast the forward pass is, on this machine and against the one CPU program of its kind.
+//
+//   build/release/bench/forward_bench
+//
+// Figures of two machines are compared through the calibrator: the bare arithmetic of blending on all cores. Each frame
+// is timed next to a run of it, so that whatever else the machine does hits both.
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <numeric>
+#include <optional>
+
+#include "bench/calibrator.h"
+#include "engine/io/dataset.h"
+#include "engine/io/scene_file.h"
+#include "engine/procedural/demo_scene.h"
+#include "engine/render/forward.h"
+#include "engine/render/reference.h"
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// OpenSplat's rasteriser on fox, view 0001, 359x640, two threads, and what the calibrator's arithmetic ran at on that
+// machine's two cores (measured once, elsewhere; see README).
+constexpr double peer_forward_s = 0.590;
+constexpr double peer_calibrator_pairs_per_s = 2 * 2.6e9;
+
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+double median(std::vector<double> values) {
+  std::nth_element(values.begin(), values.begin() + std::ptrdiff_t(values.size() / 2), values.end());
+  return values[values.size() / 2];
+}
+
+std::filesystem::path fox() {
+  const char* data = std::getenv("SPLATDRAG_DATA");
+  return (data ? std::filesystem::path(data) : std::filesystem::path(SPLATDRAG_SOURCE_DIR) / "../shared/data") / "fox";
+}
+
+/// Pairs that this view blends, as the reference counts them.
+double blended_pairs(const engine::scene::GaussianCloud& cloud, const engine::scene::Camera& camera) {
+  const auto counts = engine::render::forward_reference<float>(cloud, camera, {}, {}).contributions;
+  return std::accumulate(counts.begin(), counts.end(), 0.0);
+}
+
+/// Times frames next to the calibrator. Counters are medians over the frames.
+void time_frames(benchmark::State& state, const engine::scene::GaussianCloud& cloud,
+                 const engine::scene::Camera& camera, bool against_peer) {
+  const double pairs = blended_pairs(cloud, camera);
+  engine::render::Workspace workspace;
+  engine::render::Rendering frame;
+  std::vector<double> frame_s, calibrator_rate, share, speedup;
+  for (auto _ : state) {
+    auto start = Clock::now();
+    const auto calibrated = double(bench::blend_in_registers(300'000));
+    const double rate = calibrated / seconds_since(start);
+    start = Clock::now();
+    engine::render::forward(cloud, camera, {}, {}, workspace, frame);
+    const double s = seconds_since(start);
+    benchmark::DoNotOptimize(frame.color.data.data());
+    state.SetIterationTime(s);
+    frame_s.push_back(s);
+    calibrator_rate.push_back(rate);
+    share.push_back(pairs / s / rate);
+    speedup.push_back(peer_forward_s * peer_calibrator_pairs_per_s / rate / s);
+  }
+  state.counters["frame_ms"] = 1e3 * median(frame_s);
+  state.counters["frames_per_s"] = 1 / median(frame_s);
+  state.counters["blended_Mpairs"] = pairs * 1e-6;
+  state.counters["blended_Gpairs_per_s"] = pairs / median(frame_s) * 1e-9;
+  state.counters["calibrator_Gpairs_per_s"] = median(calibrator_rate) * 1e-9;
+  state.counters["share_of_calibrator"] = median(share);
+  if (against_peer) state.counters["times_faster_than_peer"] = median(speedup);
+}
+
+void calibrator(benchmark::State& state) {
+  double pairs = 0;
+  for (auto _ : state) pairs += double(bench::blend_in_registers(1'000'000));
+  state.counters["Gpairs_per_s"] = benchmark::Counter(pairs * 1e-9, benchmark::Counter::kIsRate);
+}
+BENCHMARK(calibrator)->UseRealTime()->Unit(benchmark::kMillisecond);
+
+void fox_view_0001_359x640(benchmark::State& state) {
+  const auto scene = engine::io::read_scene(fox() / "point_cloud.ply");
+  const auto dataset = engine::io::read_dataset(fox());
+  if (!scene || !dataset) return state.SkipWithError("the fox capture is not on this machine (SPLATDRAG_DATA)");
+  const auto view = std::find_if(dataset->views.begin(), dataset->views.end(),
+                                 [](const auto& v) { return v.camera.name == "0001.jpg"; });
+  if (view == dataset->views.end()) return state.SkipWithError("view 0001.jpg is missing");
+  time_frames(state, scene->cloud, view->camera, true);
+}
+BENCHMARK(fox_view_0001_359x640)->UseManualTime()->Unit(benchmark::kMillisecond)->Iterations(60);
+
+void demo_scene_1280x720(benchmark::State& state) {
+  const auto scene = engine::procedural::make_demo_scene(
+      {.gaussians = std::size_t(state.range(0)), .seed = 0, .views = 40, .width = 1280, .height = 720});
+  time_frames(state, scene.cloud, scene.cameras.front(), false);
+}
+BENCHMARK(demo_scene_1280x720)
+    ->Arg(150'000)
+    ->Arg(1'000'000)
+    ->UseManualTime()
+    ->Unit(benchmark::kMillisecond)
+    ->Iterations(20);
+
+}  // namespace
+
+BENCHMARK_MAIN();

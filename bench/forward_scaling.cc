@@ -1,0 +1,133 @@
+// Time and peak memory of the forward pass against the number of Gaussians and of pixels, on the demo scene.
+//
+//   build/release/bench/forward_scaling docs
+//
+// writes docs/forward-scaling.md and docs/forward-scaling.svg.
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <stdexcept>
+#include <thread>
+
+#include "bench/svg_plot.h"
+#include "engine/procedural/demo_scene.h"
+#include "engine/render/forward.h"
+
+namespace {
+
+struct Measured {
+  double frame_ms = 0;
+  double scene_mb = 0;  // the cloud
+  double pass_mb = 0;   // peak of the process during rendering, beyond what it held before
+};
+
+double now_ms() {
+  return 1e-6 * double(std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1));
+}
+
+/// A field of /proc/self/status, MB.
+double memory_mb(const std::string& field) {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);)
+    if (line.starts_with(field + ":")) return std::stod(line.substr(field.size() + 1)) / 1024;
+  throw std::runtime_error("no " + field + " in /proc/self/status");
+}
+
+/// Starts the peak (VmHWM) anew.
+void reset_peak() { std::ofstream("/proc/self/clear_refs") << "5"; }
+
+Measured measure(std::size_t gaussians, int width, int height) {
+  auto scene = engine::procedural::make_demo_scene(
+      {.gaussians = gaussians, .seed = 0, .views = 40, .width = width, .height = height});
+  scene.object = {};
+  Measured out;
+  const auto& cloud = scene.cloud;
+  out.scene_mb = double(cloud.size() * (11 + cloud.sh_stride()) * sizeof(float)) / (1 << 20);
+  reset_peak();
+  const double before = memory_mb("VmRSS");
+  engine::render::Workspace workspace;
+  engine::render::Rendering frame;
+  std::vector<double> times;
+  for (int i = 0; i < 15; ++i) {
+    const double start = now_ms();
+    engine::render::forward(cloud, scene.cameras.front(), {}, {}, workspace, frame);
+    times.push_back(now_ms() - start);
+  }
+  std::nth_element(times.begin(), times.begin() + 7, times.end());
+  out.frame_ms = times[7];
+  out.pass_mb = std::max(0.0, memory_mb("VmHWM") - before);
+  return out;
+}
+
+/// In a process of its own, so that peaks do not add up.
+Measured measured_apart(std::size_t gaussians, int width, int height) {
+  int channel[2];
+  if (pipe(channel) != 0) throw std::runtime_error("pipe failed");
+  const pid_t child = fork();
+  if (child == 0) {
+    const Measured result = measure(gaussians, width, height);
+    _exit(write(channel[1], &result, sizeof result) == sizeof result ? 0 : 1);
+  }
+  Measured result;
+  const bool good = read(channel[0], &result, sizeof result) == sizeof result;
+  int status = 0;
+  waitpid(child, &status, 0);
+  close(channel[0]);
+  close(channel[1]);
+  if (!good || status != 0) throw std::runtime_error("a measurement failed");
+  return result;
+}
+
+std::string row(const std::string& what, const Measured& m) {
+  char text[160];
+  std::snprintf(text, sizeof text, "| %s | %.1f | %.0f | %.0f |\n", what.c_str(), m.frame_ms, m.scene_mb, m.pass_mb);
+  return text;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::fprintf(stderr, "usage: forward_scaling FOLDER\n");
+    return 2;
+  }
+  const std::filesystem::path folder = argv[1];
+  bench::Series time_n{"frame, 1280 x 720", {}}, memory_n{"forward pass", {}}, scene_n{"the scene itself", {}};
+  bench::Series time_p{"150 k Gaussians", {}}, memory_p{"forward pass", {}};
+  std::string table =
+      "# Forward pass: cost against size\n\nDemo scene, first view, median of 15 frames, " +
+      std::to_string(std::thread::hardware_concurrency()) +
+      " cores. Made by `build/release/bench/forward_scaling docs`.\nMemory: peak of the process during "
+      "rendering beyond what it held before, pictures included.\n\n![](forward-scaling.svg)\n\n"
+      "| Gaussians at 1280 x 720 | frame, ms | scene, MB | forward pass, MB |\n| --- | --- | --- | --- |\n";
+  for (const std::size_t n : {10'000u, 30'000u, 100'000u, 300'000u, 1'000'000u, 3'000'000u}) {
+    const Measured m = measured_apart(n, 1280, 720);
+    table += row(std::to_string(n), m);
+    time_n.points.emplace_back(double(n), m.frame_ms);
+    memory_n.points.emplace_back(double(n), std::max(m.pass_mb, 1.0));
+    scene_n.points.emplace_back(double(n), m.scene_mb);
+  }
+  table += "\n| picture, 150 k Gaussians | frame, ms | scene, MB | forward pass, MB |\n| --- | --- | --- | --- |\n";
+  for (const auto& [width, height] :
+       {std::pair{160, 90}, {320, 180}, {640, 360}, {1280, 720}, {1920, 1080}, {3840, 2160}}) {
+    const Measured m = measured_apart(150'000, width, height);
+    table += row(std::to_string(width) + " x " + std::to_string(height), m);
+    const double pixels = double(width) * height;
+    time_p.points.emplace_back(pixels, m.frame_ms);
+    memory_p.points.emplace_back(pixels, std::max(m.pass_mb, 1.0));
+  }
+  std::ofstream(folder / "forward-scaling.md") << table;
+  std::ofstream(folder / "forward-scaling.svg")
+      << bench::to_svg({{"Time of a frame", "Gaussians", "ms", {time_n}},
+                        {"Peak memory", "Gaussians", "MB", {memory_n, scene_n}},
+                        {"Time of a frame", "pixels", "ms", {time_p}},
+                        {"Peak memory", "pixels", "MB", {memory_p}}});
+  std::fputs(table.c_str(), stdout);
+}

@@ -1,0 +1,44 @@
+// Which Gaussians a drag takes along.
+// Source: 3DGS-Drag (ICLR 2025), section 3.1, "Drag Deformation"; ties between handles are our decision.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/core/soa.h"
+
+namespace engine::deform {
+
+/// The reach of one handle. World units.
+struct Sphere {
+  DVec3 center{0.0};
+  double radius = 0;
+};
+
+/// Axis-aligned box that limits what may be dragged; `size` is the full edge length. World units.
+struct Box {
+  DVec3 center{0.0}, size{0.0};
+};
+
+/// Row i of the scene belongs to handle handle[i] - 1; 0: it is not dragged.
+using HandleColumn = std::vector<std::uint16_t>;
+
+struct Assignment {
+  HandleColumn handle;             ///< [N]
+  std::vector<std::size_t> count;  ///< [H] Gaussians of each handle, |P_h^i|; never 0.
+};
+
+/// P_h^i = the Gaussians with |mean - center| < radius (strictly, in double), inside `region` (its faces included) if
+/// there is one. A Gaussian in several spheres belongs to the nearest handle, the lower index if the distances tie.
+///   spheres  [H], H < 65536
+///   errors   unprocessable, `where` = "handles[2].radius", the first handle without a Gaussian of its own: the message
+///            says how far the nearest one is, or that the region or other handles take them all
+/// One linear scan, O(N H).
+[[nodiscard]] Result<Assignment> assign(const Array3& mean, std::span<const Sphere> spheres,
+                                        const std::optional<Box>& region = std::nullopt);
+
+}  // namespace engine::deform

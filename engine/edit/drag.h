@@ -1,0 +1,35 @@
+// The deformation of an edit, interval by interval, without a look at any picture.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/deform/assign.h"
+#include "engine/deform/deform.h"
+#include "engine/edit/request.h"
+#include "engine/edit/working_scene.h"
+
+namespace engine::edit {
+
+/// P_h^i of every handle of the request.
+///   errors  unprocessable: a handle without Gaussians; `where` names it
+[[nodiscard]] Result<deform::Assignment> assign(const scene::GaussianCloud& scene, const Request& request);
+
+/// What an interval will do to P_h, before it is done.
+struct Step {
+  std::vector<std::uint32_t> rows;    ///< P_h, ascending.
+  deform::Deformation deformation;    ///< Of `rows`.
+  std::vector<std::uint32_t> moving;  ///< Those of `rows` that move, ascending.
+};
+
+/// The deformation of interval u = 1..intervals, from the handles' present positions.
+[[nodiscard]] Step plan_step(const WorkingScene& working, const Request& request, std::span<const DVec3> positions,
+                             int u, int intervals);
+
+/// All intervals one after the other: deform, copy and paste, relocate.
+///   rotate_sh  false where only shapes matter
+///   returns    the rows of the copies at their final place, ascending
+std::vector<std::uint32_t> drag_through(WorkingScene& working, const Request& request, int intervals, bool rotate_sh);
+
+}  // namespace engine::edit

@@ -1,0 +1,70 @@
+#include "engine/edit/footprint.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "engine/render/forward.h"
+
+namespace engine::edit {
+namespace {
+
+constexpr double near_plane = 0.2;  // the renderer's cull, in camera z
+
+// A splat ends where opacity * exp(-q / 2) < 1 / 255; for opacity 1 that is sqrt(2 ln 255) = 3.33 standard deviations.
+constexpr double extent = 3.34;
+
+struct Box {
+  double x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+  bool empty = true;
+  void add(double left, double top, double right, double bottom) {
+    x0 = empty ? left : std::min(x0, left), y0 = empty ? top : std::min(y0, top);
+    x1 = empty ? right : std::max(x1, right), y1 = empty ? bottom : std::max(y1, bottom);
+    empty = false;
+  }
+};
+
+int whole(double pixel, int limit) { return int(std::clamp(pixel, 0.0, double(limit))); }
+
+}  // namespace
+
+scene::Rect touched_rect(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
+                         const scene::Camera& camera) {
+  Box box;
+  for (const std::uint32_t row : rows) {
+    const DVec3 p = camera.cam_from_world(DVec3(cloud.mean.get(row)));
+    // Rounding in the renderer may put a mean on the other side of the plane.
+    if (p.z <= near_plane * (1 - 1e-4)) continue;
+    const DVec2 center = camera.pixel_from_cam(p);
+    const Vec3 log_scale = cloud.log_scale.get(row);
+    const double log_sigma = std::clamp(double(std::max({log_scale.x, log_scale.y, log_scale.z})), -20.0, 20.0);
+    // |J sigma| for the perspective Jacobian J, plus the 0.3 square pixels of the screen filter.
+    const double slant = 1 + (p.x * p.x + p.y * p.y) / (p.z * p.z);
+    const double size = std::max(camera.fx, camera.fy) / p.z * std::exp(log_sigma);
+    const double radius = extent * std::sqrt(size * size * slant + 0.3) + 1;
+    box.add(center.x - radius, center.y - radius, center.x + radius, center.y + radius);
+  }
+  if (box.empty) return {};
+  const scene::Rect rect{whole(std::floor(box.x0), camera.width), whole(std::floor(box.y0), camera.height),
+                         whole(std::ceil(box.x1), camera.width), whole(std::ceil(box.y1), camera.height)};
+  return rect.empty() ? scene::Rect{} : rect;
+}
+
+scene::Image footprint(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
+                       const scene::Camera& camera) {
+  scene::Image picture(camera.width, camera.height, 1);
+  const scene::Rect rect = touched_rect(cloud, rows, camera);
+  if (rect.empty()) return picture;
+  std::vector<float> member(cloud.size(), 0.0f);
+  for (const std::uint32_t row : rows) member[row] = 1.0f;
+  render::ForwardOptions options;
+  options.color = false;
+  options.rect = rect;
+  const render::Rendering rendering = render::forward(cloud, camera, options, member);
+  for (int y = 0; y < rect.height(); ++y)
+    std::copy_n(rendering.weight.data.begin() + std::ptrdiff_t(y) * rect.width(), rect.width(),
+                picture.data.begin() + std::ptrdiff_t(rect.y0 + y) * picture.width + rect.x0);
+  return picture;
+}
+
+}  // namespace engine::edit

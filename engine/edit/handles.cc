@@ -1,0 +1,56 @@
+#include "engine/edit/handles.h"
+
+#include "engine/deform/intervals.h"
+#include "engine/edit/opacity.h"
+
+namespace engine::edit {
+
+int resolved_intervals(const Request& request) {
+  if (request.params.intervals > 0) return request.params.intervals;
+  std::vector<deform::DragLength> drags;
+  for (const Handle& handle : request.handles)
+    drags.push_back({glm::distance(handle.target.value_or(handle.source), handle.source), handle.radius});
+  return deform::default_intervals(drags);
+}
+
+std::vector<DVec3> handle_sources(const WorkingScene& working, const Request& request) {
+  std::vector<DVec3> positions;
+  for (const Handle& handle : request.handles) positions.push_back(handle.source - working.origin);
+  return positions;
+}
+
+std::vector<deform::Drag> interval_drags(const WorkingScene& working, const Request& request,
+                                         std::span<const DVec3> positions, int u, int intervals) {
+  std::vector<deform::Drag> drags;
+  for (std::size_t i = 0; i < request.handles.size(); ++i) {
+    const Handle& handle = request.handles[i];
+    deform::Drag drag{positions[i], positions[i], handle.group, !handle.target};
+    if (handle.target)
+      drag.target =
+          deform::interval_target(handle.source - working.origin, *handle.target - working.origin, u, intervals);
+    drags.push_back(drag);
+  }
+  return drags;
+}
+
+std::vector<std::size_t> relocate(const WorkingScene& working, const Request& request, std::vector<DVec3>& positions) {
+  std::vector<DVec3> moved(positions.size(), DVec3(0.0));  // weighted sums
+  std::vector<double> weight(positions.size(), 0.0);
+  for (std::size_t row = 0; row < working.handle.size(); ++row) {
+    if (working.handle[row] == 0) continue;
+    const std::size_t i = working.handle[row] - 1u;
+    const double alpha = opacity(working.cloud.opacity_logit[row]);
+    moved[i] += alpha * (DVec3(working.cloud.mean.get(row)) - DVec3(working.mean_at_deform.get(row)));
+    weight[i] += alpha;
+  }
+  std::vector<std::size_t> lost;
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    if (weight[i] == 0)
+      lost.push_back(i);
+    else if (request.handles[i].target)
+      positions[i] += moved[i] / weight[i];
+  }
+  return lost;
+}
+
+}  // namespace engine::edit

@@ -1,0 +1,33 @@
+// The handles of an edit from interval to interval: where they are, where they go, and where their Gaussians took them.
+// Source: 3DGS-Drag (ICLR 2025), section 3.3.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "engine/deform/motion.h"
+#include "engine/edit/request.h"
+#include "engine/edit/working_scene.h"
+
+namespace engine::edit {
+
+/// T as the request sets it, or from the drags.
+[[nodiscard]] int resolved_intervals(const Request& request);
+
+/// Where the handles are before the first interval, in the frame of the working scene.
+[[nodiscard]] std::vector<DVec3> handle_sources(const WorkingScene& working, const Request& request);
+
+/// The drags of interval u = 1..T: from where the handles are now to p_t'(u), which is measured from where the user
+/// placed them. The last one ends on the targets exactly.
+[[nodiscard]] std::vector<deform::Drag> interval_drags(const WorkingScene& working, const Request& request,
+                                                       std::span<const DVec3> positions, int u, int intervals);
+
+/// p_h^i += opacity-weighted mean over the Gaussians of P_h^i of (mean - mean_at_deform): the way they went in this
+/// interval, deformation and optimisation together. That may be less than the handle's own dp, because its Gaussians
+/// follow its neighbours too; the next interval starts from where the part really is.
+/// An anchor marks a place, so it stays. A handle none of whose Gaussians is left stays too.
+///   returns  the handles that have lost all their Gaussians
+std::vector<std::size_t> relocate(const WorkingScene& working, const Request& request, std::vector<DVec3>& positions);
+
+}  // namespace engine::edit

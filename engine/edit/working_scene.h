@@ -1,0 +1,65 @@
+// The scene while it is edited: the input's rows, then the copies an edit makes, with the columns the edit needs.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/core/soa.h"
+#include "engine/deform/assign.h"
+#include "engine/edit/request.h"
+#include "engine/scene/camera.h"
+#include "engine/scene/gaussian_cloud.h"
+
+namespace engine::edit {
+
+/// What a row is to the edit. All but `frozen` make up the 3D mask M.
+enum class Role : std::uint8_t {
+  frozen,    ///< Outside M: is never changed.
+  held,      ///< An input row of P_h that has not moved yet.
+  original,  ///< An input row whose copy has left; its opacity was lowered.
+  copy,      ///< A deformed copy at its latest place, in P_h.
+  trail,     ///< A copy that was copied in turn, in an extend; its opacity was lowered.
+};
+
+/// Rows [0, input_rows) are the input's, in its order; the rest are copies in the order they were made.
+struct WorkingScene {
+  DVec3 origin{0.0};  ///< x_in_world = x_in_cloud + origin. Zero unless the handles are far away.
+  std::size_t input_rows = 0;
+  scene::GaussianCloud cloud;   ///< In the frame of `origin`.
+  deform::HandleColumn handle;  ///< Handle number + 1 for members of P_h, else 0.
+  std::vector<Role> role;
+  std::vector<std::uint32_t> parent;  ///< Input row each row comes from.
+  Array3 mean_at_deform;              ///< Of members of P_h: where they were before the interval's deformation.
+};
+
+/// The input with its rows assigned: one copy of the cloud.
+/// The frame is the world's own, unless the handles lie far from its origin compared with their extent. Then it is
+/// centred on them, at a point with float coordinates, so that the means near the handles carry over exactly.
+[[nodiscard]] WorkingScene begin(const scene::GaussianCloud& input, const Request& request,
+                                 const deform::HandleColumn& handle);
+
+/// Undoes everything since begin(): copies go, opacities and memberships are as they were.
+void rewind(WorkingScene& working, const scene::GaussianCloud& input, const deform::HandleColumn& handle);
+
+/// Rows that belong to P_h, ascending.
+[[nodiscard]] std::vector<std::uint32_t> dragged_rows(const WorkingScene& working);
+
+/// A camera of the world, for rendering `cloud`.
+[[nodiscard]] scene::Camera in_frame_of(const WorkingScene& working, scene::Camera camera);
+
+/// A working scene as its user gets it.
+struct Published {
+  scene::GaussianCloud cloud;         ///< Surviving input rows in input order, then copies.
+  std::vector<std::uint32_t> parent;  ///< [N_out] input row each row comes from.
+  std::size_t survivors = 0;          ///< Input rows.
+  std::size_t changeable = 0;         ///< Rows of M among the output's.
+};
+
+/// Ends an edit. Surviving input rows are the input's bytes; only the opacity of an original may differ.
+/// In a move, originals whose opacity has not risen above the one they were lowered to are left out, and so are copies
+/// that are too faint to be seen (opacity below 1/255). Rows the edit has not changed always stay, however faint.
+[[nodiscard]] Published publish(const WorkingScene& working, const scene::GaussianCloud& input, Mode mode);
+
+}  // namespace engine::edit

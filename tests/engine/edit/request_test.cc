@@ -1,0 +1,63 @@
+#include "engine/edit/request.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <limits>
+
+namespace engine::edit {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+Request good() {
+  Request request;
+  request.handles = {{DVec3(0), DVec3(1), 0.5, 0}, {DVec3(2), std::nullopt, 0.25, 1}};
+  request.region = Region{DVec3(0), DVec3(1)};
+  return request;
+}
+
+TEST(ValidateRequest, AcceptsTheDefaults) { EXPECT_TRUE(validate(good())); }
+
+TEST(ValidateRequest, NamesTheFieldThatIsWrong) {
+  const std::vector<std::pair<std::string, std::function<void(Request&)>>> cases{
+      {"handles", [](Request& r) { r.handles.clear(); }},
+      {"handles", [](Request& r) { r.handles.resize(257, r.handles[0]); }},
+      {"handles[1].source", [](Request& r) { r.handles[1].source.y = nan; }},
+      {"handles[1].source", [](Request& r) { r.handles[1].source.z = 2e12; }},
+      {"handles[0].target", [](Request& r) { r.handles[0].target->x = -infinity; }},
+      {"handles[0].radius", [](Request& r) { r.handles[0].radius = 0; }},
+      {"handles[1].radius", [](Request& r) { r.handles[1].radius = nan; }},
+      {"handles[1].radius", [](Request& r) { r.handles[1].radius = infinity; }},
+      {"handles[1].group", [](Request& r) { r.handles[1].group = -1; }},
+      {"region.center", [](Request& r) { r.region->center.x = nan; }},
+      {"region.size", [](Request& r) { r.region->size.y = 0; }},
+      {"region.size", [](Request& r) { r.region->size.z = infinity; }},
+      {"params.intervals", [](Request& r) { r.params.intervals = 21; }},
+      {"params.intervals", [](Request& r) { r.params.intervals = -1; }},
+      {"params.views", [](Request& r) { r.params.views = 0; }},
+      {"params.views", [](Request& r) { r.params.views = 1001; }},
+      {"params.max_image_side", [](Request& r) { r.params.max_image_side = 15; }},
+      {"params.max_image_side", [](Request& r) { r.params.max_image_side = 16385; }},
+  };
+  for (const auto& [where, spoil] : cases) {
+    Request request = good();
+    spoil(request);
+    const auto result = validate(request);
+    ASSERT_FALSE(result) << where;
+    EXPECT_EQ(result.error().code, ErrorCode::invalid_argument);
+    EXPECT_EQ(result.error().where, where);
+    EXPECT_FALSE(result.error().message.empty());
+  }
+}
+
+TEST(ValidateRequest, SaysWhatIsAllowed) {
+  Request request = good();
+  request.params.intervals = 40;
+  EXPECT_EQ(validate(request).error().message,
+            "the number of intervals is 1 to 20, or 0 to choose it from the drag, not 40");
+}
+
+}  // namespace
+}  // namespace engine::edit

@@ -1,0 +1,111 @@
+#include "engine/mask/mask.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "engine/core/parallel.h"
+#include "engine/core/rng.h"
+
+namespace engine::mask {
+namespace {
+
+using scene::Mask;
+using scene::Rect;
+
+Mask random_mask(int width, int height, float density, std::uint64_t seed) {
+  Mask mask(width, height);
+  Rng rng(seed);
+  for (auto& pixel : mask.data) pixel = rng.uniform() < density;
+  return mask;
+}
+
+Mask dilate_by_definition(const Mask& mask, int radius) {
+  Mask wide(mask.width, mask.height);
+  for (int y = 0; y < mask.height; ++y)
+    for (int x = 0; x < mask.width; ++x)
+      for (int v = 0; v < mask.height; ++v)
+        for (int u = 0; u < mask.width; ++u)
+          if (mask.at(u, v) && (u - x) * (u - x) + (v - y) * (v - y) <= radius * radius) wide.at(x, y) = 1;
+  return wide;
+}
+
+TEST(Mask2d, TakesPixelsAtOrAboveTheThresholdAndNoOthers) {
+  scene::Image weight(5, 1, 1);
+  weight.data = {0.0f, 0.4999f, 0.5f, 1.0f, std::numeric_limits<float>::quiet_NaN()};
+  const Mask mask = mask2d(weight);
+  EXPECT_EQ(mask.width, 5);
+  EXPECT_EQ(mask.data, (std::vector<std::uint8_t>{0, 0, 1, 1, 0}));
+  EXPECT_EQ(mask2d(weight, 0.25f).area(), 3u);
+}
+
+TEST(DilationRadius, IsTenPixelsAt512AndScalesWithThePicture) {
+  EXPECT_EQ(dilation_radius(512), 10);
+  EXPECT_EQ(dilation_radius(1024), 20);
+  EXPECT_EQ(dilation_radius(640), 13);
+  EXPECT_EQ(dilation_radius(20), 1);
+  EXPECT_EQ(dilation_radius(1), 1);
+}
+
+TEST(Dilate, IsTheDiscOfItsDefinition) {
+  for (std::uint64_t seed = 0; seed < 24; ++seed) {
+    SCOPED_TRACE(seed);
+    const float density = seed % 3 == 0 ? 0.003f : 0.05f;
+    const Mask mask = random_mask(23 + int(seed), 37 - int(seed), density, seed);
+    for (const int radius : {1, 2, 3, 5, 9}) {
+      SCOPED_TRACE(radius);
+      EXPECT_EQ(dilate(mask, radius), dilate_by_definition(mask, radius));
+    }
+  }
+}
+
+TEST(Dilate, LeavesAnEmptyMaskEmptyAndAFullOneFull) {
+  const Mask empty(9, 4);
+  EXPECT_EQ(dilate(empty, 3), empty);
+  Mask full(9, 4);
+  full.data.assign(full.data.size(), 1);
+  EXPECT_EQ(dilate(full, 3), full);
+  EXPECT_EQ(dilate(Mask(), 3), Mask());
+}
+
+TEST(Dilate, ByZeroOrLessChangesNothing) {
+  const Mask mask = random_mask(8, 8, 0.3f, 1);
+  EXPECT_EQ(dilate(mask, 0), mask);
+  EXPECT_EQ(dilate(mask, -4), mask);
+}
+
+TEST(Dilate, ByMoreThanThePictureFillsIt) {
+  Mask mask(6, 200);
+  mask.at(0, 0) = 1;
+  EXPECT_EQ(dilate(mask, std::numeric_limits<int>::max()).area(), mask.data.size());
+}
+
+TEST(Dilate, IsTheSameForAnyNumberOfThreads) {
+  const Mask mask = random_mask(300, 200, 0.001f, 7);
+  Mask one, four;
+  WorkArena(1).run([&] { one = dilate(mask, 11); });
+  WorkArena(4).run([&] { four = dilate(mask, 11); });
+  EXPECT_EQ(one, four);
+}
+
+TEST(Unite, KeepsWhatEitherHolds) {
+  Mask a(2, 2), b(2, 2);
+  a.at(0, 0) = b.at(0, 0) = b.at(1, 1) = 1;
+  unite(a, b);
+  EXPECT_EQ(a.data, (std::vector<std::uint8_t>{1, 0, 0, 1}));
+}
+
+TEST(BoundingBox, HoldsExactlyTheSetPixels) {
+  Mask mask(10, 8);
+  EXPECT_TRUE(bounding_box(mask).empty());
+  EXPECT_EQ(bounding_box(mask), Rect{});
+  mask.at(7, 3) = 1;
+  EXPECT_EQ(bounding_box(mask), (Rect{7, 3, 8, 4}));
+  mask.at(2, 6) = 1;
+  EXPECT_EQ(bounding_box(mask), (Rect{2, 3, 8, 7}));
+  mask.at(0, 0) = mask.at(9, 7) = 1;
+  EXPECT_EQ(bounding_box(mask), (Rect{0, 0, 10, 8}));
+}
+
+}  // namespace
+}  // namespace engine::mask
