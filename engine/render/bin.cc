@@ -122,16 +122,21 @@ void bin(const TileGrid& grid, ForwardBuffers& buffers) {
   parallel_for(buffers.count, bin_block, [&](std::size_t first, std::size_t last) {
     auto& block = buffers.bin_blocks[first / bin_block];
     block.position.assign(tiles, 0);
-    block.reached.clear();
-    block.tiles.clear();
+    std::size_t at_most = 0;
     for (std::size_t i = first; i < last; ++i) {
-      const std::size_t before = block.tiles.size();
+      const TileBox& box = buffers.boxes[i];
+      at_most += std::size_t(box.last_column - box.first_column + 1) * std::size_t(box.last_row - box.first_row + 1);
+    }
+    std::uint32_t* next = block.tiles.reserve(at_most);
+    std::uint32_t* reached = block.reached.reserve(last - first);
+    for (std::size_t i = first; i < last; ++i) {
+      const std::uint32_t* const before = next;
       visit_tiles(buffers.splats[i], buffers.boxes[i], grid.columns, [&](std::uint32_t tile) {
         if (!grid.wanted.empty() && grid.wanted[tile] == 0) return;
-        block.tiles.push_back(tile);
+        *next++ = tile;
         ++block.position[tile];
       });
-      block.reached.push_back(std::uint32_t(block.tiles.size() - before));
+      *reached++ = std::uint32_t(next - before);
     }
   });
 

@@ -34,6 +34,13 @@ HWY_INLINE V Exp2(D d, V x) {
   return hn::BitCast(d, hn::Add(hn::BitCast(di, p), hn::ShiftLeft<23>(hn::BitCast(di, shifted))));
 }
 
+/// Bit i of the result is lane i of the mask.
+HWY_INLINE std::uint64_t Bits(D d, hn::Mask<D> mask) {
+  std::uint8_t bytes[8] = {};
+  hn::StoreMaskBits(d, mask, bytes);
+  return bytes[0] | std::uint64_t{bytes[1]} << 8;
+}
+
 /// A tile is blended in blocks of one vector each, nearly square: a splat wastes fewer lanes at the rim of a square
 /// than at the ends of a row (4 x 2 against 8 x 1 saves a fifth of the vectors on a real capture). Pixels of a tile are
 /// stored block by block while it is blended.
@@ -44,163 +51,141 @@ struct Blocks {
   static constexpr std::size_t columns = tile_size / width, rows = tile_size / height, count = columns * rows;
 };
 
-/// Splats are taken in batches, in two phases: first which blocks each reaches, then the blending, one long loop over
-/// all (splat, block) pairs of the batch. Nested loops would end unpredictably after some ten blocks per splat, and
-/// each time lay bare the latency of finding the next splat's blocks: nearly half of the time.
+/// Splats are taken in batches, in two phases: first which blocks each reaches, then, block by block, the blending of
+/// all that reach it, with the block's pixels in registers. Splat by splat instead, each step would have to wait until
+/// the processor has seen that the last one's store to memory was not to the same block: half the speed.
 struct Batch {
-  static constexpr std::size_t size = 32;
-  // q = u^2 + v^2 with u = l1 dx + l2 dy, v = l3 dy: at a block's first pixel, plus what each lane adds.
-  alignas(64) float block_u[size * Blocks::count], block_v[size * Blocks::count];
-  alignas(64) float lane_u[size * Blocks::lanes], lane_v[size * Blocks::lanes];
-  const Splat* splat[size];
-  std::size_t pairs = 0;
-  std::uint16_t pair[size * Blocks::count + 8];  ///< slot * Blocks::count + block, in blending order.
+  static constexpr std::size_t size = 64;
+  // One value per splat. At pixel (px, py) of the tile: q = u^2 + v^2, u = l1 px + l2 py + u0, v = l3 py + v0.
+  alignas(64) float l1[size], l2[size], l3[size], u0[size], v0[size], log2_opacity[size];
+  alignas(64) float red[size], green[size], blue[size], depth[size], weight[size];
+  std::uint64_t reach[Blocks::count];  ///< Bit k: splat k can come to alpha 1/255 within the block.
 };
 
-/// The positions of the set bits of a byte, in order; what follows them is overwritten by the next byte's.
-struct BitPositions {
-  std::uint16_t of[256][8] = {};
-  constexpr BitPositions() {
-    for (unsigned byte = 0; byte < 256; ++byte)
-      for (unsigned bit = 0, n = 0; bit < 8; ++bit)
-        if ((byte >> bit & 1) != 0) of[byte][n++] = std::uint16_t(bit);
+/// Loads n splats, in the coordinates of the tile whose first pixel is (x0, y0).
+HWY_INLINE void Fill(const Splat* splats, const std::uint32_t* list, std::size_t n, int x0, int y0, Batch& batch) {
+  for (std::size_t k = 0; k < n; ++k) {
+    const Splat& splat = splats[list[k]];
+    const float x = splat.x - float(x0), y = splat.y - float(y0);
+    batch.l1[k] = splat.l1, batch.l2[k] = splat.l2, batch.l3[k] = splat.l3;
+    batch.u0[k] = -(splat.l1 * x + splat.l2 * y);
+    batch.v0[k] = -splat.l3 * y;
+    batch.log2_opacity[k] = splat.log2_opacity;
+    batch.red[k] = splat.red, batch.green[k] = splat.green, batch.blue[k] = splat.blue;
+    batch.depth[k] = splat.depth, batch.weight[k] = splat.weight;
   }
-};
-constexpr BitPositions bit_positions;
-
-/// Where the blocks of a tile are, and which of them still have a ray that has not ended.
-struct TileBlocks {
-  alignas(64) float x[Blocks::count], y[Blocks::count];            // first pixel, relative to the tile
-  alignas(64) float lane_x[Blocks::lanes], lane_y[Blocks::lanes];  // of a lane, relative to its block
-  std::uint8_t live[(Blocks::count + 7) / 8];                      // a bit per block
-
-  TileBlocks() {
-    for (std::size_t b = 0; b < Blocks::count; ++b) {
-      x[b] = float(b % Blocks::columns * Blocks::width);
-      y[b] = float(b / Blocks::columns * Blocks::height);
-    }
-    for (std::size_t i = 0; i < Blocks::lanes; ++i) {
-      lane_x[i] = float(i % Blocks::width);
-      lane_y[i] = float(i / Blocks::width);
-    }
-    std::fill(std::begin(live), std::end(live), std::uint8_t{0xff});
-  }
-};
-
-/// Puts a splat into a slot of the batch: its blocks that can reach alpha 1/255 join the pairs.
-/// u and v are linear, so over a block each stays within the interval that the block's corners span. A little more is
-/// let in, so that rounding here never drops a pixel that passes in the blending.
-HWY_INLINE void Reach(D d, const Splat& splat, std::size_t slot, int x0, int y0, const TileBlocks& tile, Batch& batch) {
-  constexpr std::size_t lanes = Blocks::lanes;
-  const V zero = hn::Zero(d);
-  const V l1 = hn::Set(d, splat.l1), l2 = hn::Set(d, splat.l2), l3 = hn::Set(d, splat.l3);
-  const V x = hn::Set(d, splat.x - float(x0)), y = hn::Set(d, splat.y - float(y0));
-  const V lane_x = hn::Load(d, tile.lane_x), lane_y = hn::Load(d, tile.lane_y);
-  hn::Store(hn::MulAdd(l1, lane_x, hn::Mul(l2, lane_y)), d, batch.lane_u + slot * lanes);
-  hn::Store(hn::Mul(l3, lane_y), d, batch.lane_v + slot * lanes);
-  batch.splat[slot] = &splat;
-
-  const V steps_x = hn::Set(d, float(Blocks::width - 1)), steps_y = hn::Set(d, float(Blocks::height - 1));
-  const V slant = hn::Mul(l2, steps_y);
-  const V low_u = hn::Min(zero, slant), high_u = hn::MulAdd(l1, steps_x, hn::Max(zero, slant));  // l1 > 0
-  const V high_v = hn::Mul(l3, steps_y);                                                         // l3 > 0
-  const V q_max = hn::Set(d, splat.log2_opacity + (log2_255 + 1e-3f));
-  std::uint8_t reached[sizeof tile.live + 8] = {};
-  for (std::size_t b = 0; b < Blocks::count; b += lanes) {
-    const V dx = hn::Sub(hn::Load(d, tile.x + b), x), dy = hn::Sub(hn::Load(d, tile.y + b), y);
-    const V u = hn::MulAdd(l1, dx, hn::Mul(l2, dy)), v = hn::Mul(l3, dy);
-    hn::Store(u, d, batch.block_u + slot * Blocks::count + b);
-    hn::Store(v, d, batch.block_v + slot * Blocks::count + b);
-    const V nearest_u = hn::Max(zero, hn::Max(hn::Add(u, low_u), hn::Neg(hn::Add(u, high_u))));
-    const V nearest_v = hn::Max(zero, hn::Max(v, hn::Neg(hn::Add(v, high_v))));
-    const auto inside = hn::Le(hn::MulAdd(nearest_u, nearest_u, hn::Mul(nearest_v, nearest_v)), q_max);
-    if constexpr (lanes >= 8) {
-      hn::StoreMaskBits(d, inside, reached + b / 8);
-    } else {
-      std::uint8_t bits[8] = {};
-      hn::StoreMaskBits(d, inside, bits);
-      reached[b / 8] = std::uint8_t(reached[b / 8] | bits[0] << (b % 8));
-    }
-  }
-  for (std::size_t byte = 0; byte < sizeof tile.live; ++byte) {
-    const std::uint8_t bits = reached[byte] & tile.live[byte];
-    const auto first = std::uint16_t(slot * Blocks::count + 8 * byte);
-    std::uint16_t* out = batch.pair + batch.pairs;
-    for (std::size_t i = 0; i < 8; ++i) out[i] = std::uint16_t(first + bit_positions.of[bits][i]);
-    batch.pairs += hwy::PopCount(std::uint64_t{bits});
+  for (std::size_t k = n; k % Blocks::lanes != 0; ++k) {  // what fills up the last vector reaches nothing
+    batch.l1[k] = batch.l2[k] = batch.l3[k] = batch.u0[k] = batch.v0[k] = 0;
+    batch.log2_opacity[k] = -1e30f;
   }
 }
 
+/// Which blocks the n splats of the batch reach. u and v are linear, so over a block each stays within the interval
+/// that the block's corners span. A little more is let in, so that rounding here never drops a pixel that passes in
+/// Blend().
+HWY_INLINE void FindReach(D d, std::size_t n, Batch& batch) {
+  std::fill(std::begin(batch.reach), std::end(batch.reach), std::uint64_t{0});
+  const V zero = hn::Zero(d), steps_x = hn::Set(d, float(Blocks::width - 1)),
+          steps_y = hn::Set(d, float(Blocks::height - 1));
+  for (std::size_t k = 0; k < n; k += Blocks::lanes) {
+    const V l1 = hn::Load(d, batch.l1 + k), l2 = hn::Load(d, batch.l2 + k), l3 = hn::Load(d, batch.l3 + k);
+    const V u0 = hn::Load(d, batch.u0 + k), v0 = hn::Load(d, batch.v0 + k);
+    const V q_max = hn::Add(hn::Load(d, batch.log2_opacity + k), hn::Set(d, log2_255 + 1e-3f));
+    const V slant = hn::Mul(l2, steps_y);
+    const V low_u = hn::Min(zero, slant), high_u = hn::MulAdd(l1, steps_x, hn::Max(zero, slant));  // l1 >= 0
+    const V high_v = hn::Mul(l3, steps_y);                                                         // l3 >= 0
+    for (std::size_t row = 0; row < Blocks::rows; ++row) {
+      const V y = hn::Set(d, float(row * Blocks::height));
+      const V v = hn::MulAdd(l3, y, v0), u_row = hn::MulAdd(l2, y, u0);
+      const V nearest_v = hn::Max(zero, hn::Max(v, hn::Neg(hn::Add(v, high_v))));
+      const V left = hn::NegMulAdd(nearest_v, nearest_v, q_max);
+      const V u_low = hn::Add(u_row, low_u), u_high = hn::Add(u_row, high_u);
+      for (std::size_t column = 0; column < Blocks::columns; ++column) {
+        const V x = hn::Mul(l1, hn::Set(d, float(column * Blocks::width)));
+        const V nearest_u = hn::Max(zero, hn::Max(hn::Add(u_low, x), hn::Neg(hn::Add(u_high, x))));
+        batch.reach[row * Blocks::columns + column] |= Bits(d, hn::Le(hn::Mul(nearest_u, nearest_u), left)) << k;
+      }
+    }
+  }
+}
+
+/// Blends the batch into one block. False if all of the block's rays have ended.
 template <bool kColor, bool kDepth, bool kWeight>
-HWY_INLINE void Blend(D d, const Batch& batch, TilePixels& tile) {
-  constexpr std::size_t lanes = Blocks::lanes;
-  const V threshold = hn::Set(d, -log2_255), ceiling = hn::Set(d, float(max_alpha)),
-          floor = hn::Set(d, float(min_transmittance)), sign = hn::Set(d, -0.0f);
-  const std::size_t pairs = batch.pairs;
-  for (std::size_t i = 0; i < pairs; ++i) {
-    const std::size_t pair = batch.pair[i], slot = pair / Blocks::count, at = pair % Blocks::count * lanes;
-    const Splat& splat = *batch.splat[slot];
-    const V u = hn::Add(hn::Set(d, batch.block_u[pair]), hn::Load(d, batch.lane_u + slot * lanes));
-    const V v = hn::Add(hn::Set(d, batch.block_v[pair]), hn::Load(d, batch.lane_v + slot * lanes));
-    const V power = hn::NegMulAdd(u, u, hn::NegMulAdd(v, v, hn::Set(d, splat.log2_opacity)));
+HWY_INLINE bool Blend(D d, const Batch& batch, std::size_t block, V lane_x, V lane_y, TilePixels& pixels) {
+  const V zero = hn::Zero(d), threshold = hn::Set(d, -log2_255), ceiling = hn::Set(d, float(max_alpha)),
+          floor = hn::Set(d, float(min_transmittance)), half = hn::Set(d, 0.5f), sign = hn::Set(d, -0.0f);
+  const std::size_t at = block * Blocks::lanes;
+  V transmittance = hn::Load(d, pixels.transmittance + at);
+  if (hn::AllTrue(d, hn::Lt(transmittance, zero))) return false;
+  const V px = hn::Add(lane_x, hn::Set(d, float(block % Blocks::columns * Blocks::width)));
+  const V py = hn::Add(lane_y, hn::Set(d, float(block / Blocks::columns * Blocks::height)));
+  V red = zero, green = zero, blue = zero, depth = zero, median_depth = zero, weight = zero;
+  if constexpr (kColor) {
+    red = hn::Load(d, pixels.red + at), green = hn::Load(d, pixels.green + at), blue = hn::Load(d, pixels.blue + at);
+  }
+  if constexpr (kDepth) {
+    depth = hn::Load(d, pixels.depth + at), median_depth = hn::Load(d, pixels.median_depth + at);
+  }
+  if constexpr (kWeight) weight = hn::Load(d, pixels.weight + at);
+
+  for (std::uint64_t rest = batch.reach[block]; rest != 0; rest &= rest - 1) {
+    const std::size_t k = hwy::Num0BitsBelowLS1Bit_Nonzero64(rest);
+    const V u =
+        hn::MulAdd(hn::Set(d, batch.l1[k]), px, hn::MulAdd(hn::Set(d, batch.l2[k]), py, hn::Set(d, batch.u0[k])));
+    const V v = hn::MulAdd(hn::Set(d, batch.l3[k]), py, hn::Set(d, batch.v0[k]));
+    const V power = hn::NegMulAdd(u, u, hn::NegMulAdd(v, v, hn::Set(d, batch.log2_opacity[k])));
     const V alpha = hn::IfThenElseZero(hn::Ge(power, threshold), hn::Min(Exp2(d, power), ceiling));  // from 1/255 on
-    const V before = hn::Load(d, tile.transmittance + at);
-    const V after = hn::NegMulAdd(before, alpha, before);
+    const V after = hn::NegMulAdd(transmittance, alpha, transmittance);
     const auto going_on = hn::Ge(after, floor);  // never true of a ray that has ended: its transmittance is negative
-    const V w = hn::IfThenElseZero(going_on, hn::Mul(before, alpha));
-    hn::Store(hn::IfThenElse(going_on, after, hn::Or(before, sign)), d, tile.transmittance + at);
+    const V w = hn::IfThenElseZero(going_on, hn::Mul(transmittance, alpha));
     if constexpr (kColor) {
-      hn::Store(hn::MulAdd(w, hn::Set(d, splat.red), hn::Load(d, tile.red + at)), d, tile.red + at);
-      hn::Store(hn::MulAdd(w, hn::Set(d, splat.green), hn::Load(d, tile.green + at)), d, tile.green + at);
-      hn::Store(hn::MulAdd(w, hn::Set(d, splat.blue), hn::Load(d, tile.blue + at)), d, tile.blue + at);
+      red = hn::MulAdd(w, hn::Set(d, batch.red[k]), red);
+      green = hn::MulAdd(w, hn::Set(d, batch.green[k]), green);
+      blue = hn::MulAdd(w, hn::Set(d, batch.blue[k]), blue);
     }
     if constexpr (kDepth) {
-      const V z = hn::Set(d, splat.depth), half = hn::Set(d, 0.5f);
-      hn::Store(hn::MulAdd(w, z, hn::Load(d, tile.depth + at)), d, tile.depth + at);
-      const auto crosses = hn::And(going_on, hn::And(hn::Ge(before, half), hn::Lt(after, half)));
-      hn::Store(hn::IfThenElse(crosses, z, hn::Load(d, tile.median_depth + at)), d, tile.median_depth + at);
+      const V z = hn::Set(d, batch.depth[k]);
+      depth = hn::MulAdd(w, z, depth);
+      const auto crosses = hn::And(going_on, hn::And(hn::Ge(transmittance, half), hn::Lt(after, half)));
+      median_depth = hn::IfThenElse(crosses, z, median_depth);
     }
-    if constexpr (kWeight)
-      hn::Store(hn::MulAdd(w, hn::Set(d, splat.weight), hn::Load(d, tile.weight + at)), d, tile.weight + at);
+    if constexpr (kWeight) weight = hn::MulAdd(w, hn::Set(d, batch.weight[k]), weight);
+    transmittance = hn::IfThenElse(going_on, after, hn::Or(transmittance, sign));
   }
-}
 
-/// Notes which blocks have a ray that has not ended; false if none has.
-bool UpdateLive(D d, const TilePixels& pixels, TileBlocks& tile) {
-  bool any = false;
-  std::fill(std::begin(tile.live), std::end(tile.live), std::uint8_t{0});
-  for (std::size_t b = 0; b < Blocks::count; ++b) {
-    const V transmittance = hn::Load(d, pixels.transmittance + b * Blocks::lanes);
-    const bool live = !hn::AllTrue(d, hn::Lt(transmittance, hn::Zero(d)));
-    tile.live[b / 8] = std::uint8_t(tile.live[b / 8] | unsigned{live} << (b % 8));
-    any |= live;
+  hn::Store(transmittance, d, pixels.transmittance + at);
+  if constexpr (kColor) {
+    hn::Store(red, d, pixels.red + at), hn::Store(green, d, pixels.green + at), hn::Store(blue, d, pixels.blue + at);
   }
-  return any;
+  if constexpr (kDepth) hn::Store(depth, d, pixels.depth + at), hn::Store(median_depth, d, pixels.median_depth + at);
+  if constexpr (kWeight) hn::Store(weight, d, pixels.weight + at);
+  return true;
 }
 
 template <bool kColor, bool kDepth, bool kWeight>
 void BlendTile(const Splat* splats, const std::uint32_t* list, std::size_t count, int x0, int y0, TilePixels& pixels) {
   const D d;
-  const V zero = hn::Zero(d);
-  for (std::size_t i = 0; i < TilePixels::count; i += Blocks::lanes) {
-    hn::Store(hn::Set(d, 1.0f), d, pixels.transmittance + i);
-    if constexpr (kColor) {
-      hn::Store(zero, d, pixels.red + i);
-      hn::Store(zero, d, pixels.green + i);
-      hn::Store(zero, d, pixels.blue + i);
-    }
-    if constexpr (kDepth) hn::Store(zero, d, pixels.depth + i), hn::Store(zero, d, pixels.median_depth + i);
-    if constexpr (kWeight) hn::Store(zero, d, pixels.weight + i);
+  auto fill = [](float* plane, float value) { std::fill_n(plane, TilePixels::count, value); };
+  fill(pixels.transmittance, 1);
+  if constexpr (kColor) fill(pixels.red, 0), fill(pixels.green, 0), fill(pixels.blue, 0);
+  if constexpr (kDepth) fill(pixels.depth, 0), fill(pixels.median_depth, 0);
+  if constexpr (kWeight) fill(pixels.weight, 0);
+  alignas(64) float lanes_x[Blocks::lanes], lanes_y[Blocks::lanes];
+  for (std::size_t i = 0; i < Blocks::lanes; ++i) {
+    lanes_x[i] = float(i % Blocks::width);
+    lanes_y[i] = float(i / Blocks::width);
   }
-  TileBlocks tile;
+  const V lane_x = hn::Load(d, lanes_x), lane_y = hn::Load(d, lanes_y);
   Batch batch;
   for (std::size_t first = 0; first < count; first += Batch::size) {
-    const std::size_t last = HWY_MIN(first + Batch::size, count);
-    batch.pairs = 0;
-    for (std::size_t k = first; k < last; ++k) Reach(d, splats[list[k]], k - first, x0, y0, tile, batch);
-    for (std::size_t k = last; k < HWY_MIN(last + Batch::size, count); ++k) hwy::Prefetch(&splats[list[k]]);
-    Blend<kColor, kDepth, kWeight>(d, batch, pixels);
-    if (!UpdateLive(d, pixels, tile)) return;
+    const std::size_t n = HWY_MIN(Batch::size, count - first);
+    Fill(splats, list + first, n, x0, y0, batch);
+    for (std::size_t k = first + n; k < HWY_MIN(first + n + Batch::size, count); ++k) hwy::Prefetch(&splats[list[k]]);
+    FindReach(d, n, batch);
+    bool live = false;
+    for (std::size_t block = 0; block < Blocks::count; ++block)
+      live |= Blend<kColor, kDepth, kWeight>(d, batch, block, lane_x, lane_y, pixels);
+    if (!live) return;
   }
 }
 
@@ -212,31 +197,48 @@ void ToRows(float* plane) {
     float* to = plane + b / Blocks::columns * Blocks::height * tile_size + b % Blocks::columns * Blocks::width;
     const float* from = blocks + b * Blocks::lanes;
     for (std::size_t y = 0; y < Blocks::height; ++y)
-      for (std::size_t x = 0; x < Blocks::width; ++x) to[y * tile_size + x] = from[y * Blocks::width + x];
+      std::copy_n(from + y * Blocks::width, Blocks::width, to + y * tile_size);
+  }
+}
+
+/// Turns the state of the rays into what a picture shows: alpha, and the background through what is left.
+template <bool kColor>
+void Finish(Vec3 background, TilePixels& pixels) {
+  const D d;
+  for (std::size_t i = 0; i < TilePixels::count; i += Blocks::lanes) {
+    const V left = hn::Abs(hn::Load(d, pixels.transmittance + i));
+    hn::Store(hn::Sub(hn::Set(d, 1.0f), left), d, pixels.alpha + i);
+    if constexpr (kColor) {
+      hn::Store(hn::MulAdd(left, hn::Set(d, background.x), hn::Load(d, pixels.red + i)), d, pixels.red + i);
+      hn::Store(hn::MulAdd(left, hn::Set(d, background.y), hn::Load(d, pixels.green + i)), d, pixels.green + i);
+      hn::Store(hn::MulAdd(left, hn::Set(d, background.z), hn::Load(d, pixels.blue + i)), d, pixels.blue + i);
+    }
   }
 }
 
 template <bool kColor, bool kDepth, bool kWeight>
-void Composite(const Splat* splats, const std::uint32_t* list, std::size_t count, int x0, int y0, TilePixels& tile) {
+void Composite(const Splat* splats, const std::uint32_t* list, std::size_t count, int x0, int y0, Vec3 background,
+               TilePixels& tile) {
   BlendTile<kColor, kDepth, kWeight>(splats, list, count, x0, y0, tile);
-  ToRows(tile.transmittance);
+  Finish<kColor>(background, tile);
+  ToRows(tile.alpha);
   if constexpr (kColor) ToRows(tile.red), ToRows(tile.green), ToRows(tile.blue);
   if constexpr (kDepth) ToRows(tile.depth), ToRows(tile.median_depth);
   if constexpr (kWeight) ToRows(tile.weight);
 }
 
 void CompositeTile(const Splat* splats, const std::uint32_t* list, std::size_t count, int x0, int y0, Channels channels,
-                   TilePixels& tile) {
+                   Vec3 background, TilePixels& tile) {
   if (channels.depth) {
-    if (channels.weight) return Composite<true, true, true>(splats, list, count, x0, y0, tile);
-    return Composite<true, true, false>(splats, list, count, x0, y0, tile);
+    if (channels.weight) return Composite<true, true, true>(splats, list, count, x0, y0, background, tile);
+    return Composite<true, true, false>(splats, list, count, x0, y0, background, tile);
   }
   if (channels.weight) {
-    if (channels.color) return Composite<true, false, true>(splats, list, count, x0, y0, tile);
-    return Composite<false, false, true>(splats, list, count, x0, y0, tile);
+    if (channels.color) return Composite<true, false, true>(splats, list, count, x0, y0, background, tile);
+    return Composite<false, false, true>(splats, list, count, x0, y0, background, tile);
   }
-  if (channels.color) return Composite<true, false, false>(splats, list, count, x0, y0, tile);
-  return Composite<false, false, false>(splats, list, count, x0, y0, tile);
+  if (channels.color) return Composite<true, false, false>(splats, list, count, x0, y0, background, tile);
+  return Composite<false, false, false>(splats, list, count, x0, y0, background, tile);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -249,8 +251,8 @@ namespace engine::render {
 HWY_EXPORT(CompositeTile);
 
 void composite_tile(const Splat* splats, std::span<const std::uint32_t> list, int x0, int y0, Channels channels,
-                    TilePixels& tile) {
-  HWY_DYNAMIC_DISPATCH(CompositeTile)(splats, list.data(), list.size(), x0, y0, channels, tile);
+                    Vec3 background, TilePixels& tile) {
+  HWY_DYNAMIC_DISPATCH(CompositeTile)(splats, list.data(), list.size(), x0, y0, channels, background, tile);
 }
 
 }  // namespace engine::render

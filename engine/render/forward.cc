@@ -38,28 +38,23 @@ scene::Rect rect_of(const ForwardOptions& options, const scene::Camera& camera) 
 }
 
 /// Copies the pixels of a finished tile that lie within `area` to the pictures, whose first pixel is area's.
-void store_tile(const TilePixels& tile, int x0, int y0, scene::Rect area, Vec3 background, Rendering& out) {
+void store_tile(const TilePixels& tile, int x0, int y0, scene::Rect area, Rendering& out) {
   const int first_x = std::max(x0, area.x0), last_x = std::min(x0 + tile_size, area.x1);
   const int first_y = std::max(y0, area.y0), last_y = std::min(y0 + tile_size, area.y1);
-  for (int y = first_y; y < last_y; ++y) {
-    const std::size_t from = std::size_t(y - y0) * tile_size + std::size_t(first_x - x0);
-    const std::size_t to = std::size_t(y - area.y0) * std::size_t(area.width()) + std::size_t(first_x - area.x0);
-    const auto n = std::size_t(last_x - first_x);
-    for (std::size_t i = 0; i < n; ++i) out.alpha.data[to + i] = 1 - std::abs(tile.transmittance[from + i]);
-    if (out.color.channels != 0) {
-      const float* sums[3] = {tile.red, tile.green, tile.blue};
-      for (int c = 0; c < 3; ++c) {
-        float* plane = out.color.plane(c).data() + to;
-        for (std::size_t i = 0; i < n; ++i)
-          plane[i] = sums[c][from + i] + std::abs(tile.transmittance[from + i]) * background[c];
-      }
-    }
-    if (out.depth.channels != 0) {
-      std::copy_n(tile.depth + from, n, out.depth.data.begin() + std::ptrdiff_t(to));
-      std::copy_n(tile.median_depth + from, n, out.median_depth.data.begin() + std::ptrdiff_t(to));
-    }
-    if (out.weight.channels != 0) std::copy_n(tile.weight + from, n, out.weight.data.begin() + std::ptrdiff_t(to));
-  }
+  auto store = [&](const float* from, scene::Image& image, int channel = 0) {
+    if (image.channels == 0) return;
+    float* plane = image.plane(channel).data();
+    for (int y = first_y; y < last_y; ++y)
+      std::copy_n(from + (y - y0) * tile_size + (first_x - x0), last_x - first_x,
+                  plane + std::ptrdiff_t(y - area.y0) * area.width() + (first_x - area.x0));
+  };
+  store(tile.alpha, out.alpha);
+  store(tile.red, out.color, 0);
+  store(tile.green, out.color, 1);
+  store(tile.blue, out.color, 2);
+  store(tile.depth, out.depth);
+  store(tile.median_depth, out.median_depth);
+  store(tile.weight, out.weight);
 }
 
 void forward_simd(const scene::GaussianCloud& cloud, const scene::Camera& camera, const ForwardOptions& options,
@@ -99,8 +94,9 @@ void forward_simd(const scene::GaussianCloud& cloud, const scene::Camera& camera
       const std::uint32_t tile = tiles[i];
       const int x0 = int(tile) % grid.columns * tile_size, y0 = int(tile) / grid.columns * tile_size;
       const std::uint32_t first = buffers.tile_begin[tile], last = buffers.tile_begin[tile + 1];
-      composite_tile(buffers.splats.data(), {buffers.entries.data() + first, last - first}, x0, y0, channels, pixels);
-      store_tile(pixels, x0, y0, grid.pixels, options.background, out);
+      composite_tile(buffers.splats.data(), {buffers.entries.data() + first, last - first}, x0, y0, channels,
+                     options.background, pixels);
+      store_tile(pixels, x0, y0, grid.pixels, out);
     }
   });
 }

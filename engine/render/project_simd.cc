@@ -19,7 +19,7 @@ using V = hn::Vec<D>;
 
 /// Survivors of a block, one array per field, before their colours are known.
 struct Survivors {
-  static constexpr std::size_t room = project_block + 64;  // a compressed store writes whole vectors
+  static constexpr std::size_t room = project_block + 64;  // whole vectors are stored
   alignas(64) float x[room], y[room], depth[room], l1[room], l2[room], l3[room], log2_opacity[room];
   alignas(64) float to_x[room], to_y[room], to_z[room];           // unit direction from the camera centre
   alignas(64) std::int32_t row[room], columns[room], rows[room];  // tiles: first | last << 16
@@ -143,20 +143,35 @@ void ProjectVector(D d, const scene::GaussianCloud& cloud, const ViewParams<floa
 
   const V inverse_length = hn::Div(set(1), hn::Sqrt(hn::MulAdd(dx, dx, hn::MulAdd(dy, dy, hn::Mul(dz, dz)))));
   const std::size_t at = out.count;
-  hn::CompressStore(x, alive, d, out.x + at);
-  hn::CompressStore(y, alive, d, out.y + at);
-  hn::CompressStore(pz, alive, d, out.depth + at);
-  hn::CompressStore(l1, alive, d, out.l1 + at);
-  hn::CompressStore(l2, alive, d, out.l2 + at);
-  hn::CompressStore(l3, alive, d, out.l3 + at);
-  hn::CompressStore(log2_opacity, alive, d, out.log2_opacity + at);
-  hn::CompressStore(hn::Mul(dx, inverse_length), alive, d, out.to_x + at);
-  hn::CompressStore(hn::Mul(dy, inverse_length), alive, d, out.to_y + at);
-  hn::CompressStore(hn::Mul(dz, inverse_length), alive, d, out.to_z + at);
-  const auto alive_i = hn::RebindMask(di, alive);
-  hn::CompressStore(tile_range(first_x, last_x), alive_i, di, out.columns + at);
-  hn::CompressStore(tile_range(first_y, last_y), alive_i, di, out.rows + at);
-  out.count += hn::CompressStore(hn::Iota(di, std::int32_t(i)), alive_i, di, out.row + at);
+  // Compacts by one permutation for all fields. (Highway's Compress() looks its permutation up in a table that GCC 12
+  // copies to the stack each time.) Whole vectors are stored; the next ones overwrite what is too much.
+  std::uint8_t bits[8] = {};
+  hn::StoreMaskBits(d, alive, bits);
+  alignas(64) std::int32_t lane[hn::MaxLanes(D())] = {};
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < hn::Lanes(d); ++k) {
+    lane[count] = std::int32_t(k);
+    count += bits[k / 8] >> (k % 8) & 1;
+  }
+  const auto order = hn::SetTableIndices(d, lane);
+  auto append = [&](V value, float* to) { hn::StoreU(hn::TableLookupLanes(value, order), d, to + at); };
+  append(x, out.x);
+  append(y, out.y);
+  append(pz, out.depth);
+  append(l1, out.l1);
+  append(l2, out.l2);
+  append(l3, out.l3);
+  append(log2_opacity, out.log2_opacity);
+  append(hn::Mul(dx, inverse_length), out.to_x);
+  append(hn::Mul(dy, inverse_length), out.to_y);
+  append(hn::Mul(dz, inverse_length), out.to_z);
+  auto append_i = [&](hn::Vec<hn::RebindToSigned<D>> value, std::int32_t* to) {
+    hn::StoreU(hn::BitCast(di, hn::TableLookupLanes(hn::BitCast(d, value), order)), di, to + at);
+  };
+  append_i(tile_range(first_x, last_x), out.columns);
+  append_i(tile_range(first_y, last_y), out.rows);
+  append_i(hn::Iota(di, std::int32_t(i)), out.row);
+  out.count += count;
 }
 
 /// Dot products of the three channels' coefficients with the basis, four coefficients at a time: every band's count but

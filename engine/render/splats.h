@@ -79,8 +79,8 @@ struct ForwardBuffers {
   std::size_t count = 0;  ///< Of splats.
   // bin: for each tile the splats that reach it, in their order
   struct BinBlock {
-    std::vector<std::uint32_t> tiles;     ///< Those reached, splat by splat.
-    std::vector<std::uint32_t> reached;   ///< How many tiles each splat reaches.
+    Buffer<std::uint32_t> tiles;          ///< Those reached, splat by splat.
+    Buffer<std::uint32_t> reached;        ///< How many tiles each splat reaches.
     std::vector<std::uint32_t> position;  ///< Per tile: count, then where the block's next entry goes.
   };
   std::vector<BinBlock> bin_blocks;
@@ -105,18 +105,20 @@ struct Channels {
   bool color = false, depth = false, weight = false;
 };
 
-/// The pixels of one tile while it is blended; row-major 16 x 16.
+/// The pixels of one tile, row-major 16 x 16 once composite_tile() is done.
 struct alignas(64) TilePixels {
   static constexpr std::size_t count = std::size_t(tile_size) * tile_size;
-  float transmittance[count];  ///< Its sign is the ray's state: negative once the ray has ended.
+  float transmittance[count];  ///< While blending; its sign is the ray's state: negative once the ray has ended.
+  float alpha[count];
   float red[count], green[count], blue[count];
   float depth[count], median_depth[count];
   float weight[count];
 };
 
-/// Blends the listed splats, nearest first, into the tile whose first pixel is (x0, y0). Starts from empty pixels.
+/// Blends the listed splats, nearest first, into the tile whose first pixel is (x0, y0), and the background behind
+/// them. Only the planes that `channels` names, and alpha, are written.
 void composite_tile(const Splat* splats, std::span<const std::uint32_t> list, int x0, int y0, Channels channels,
-                    TilePixels& tile);
+                    Vec3 background, TilePixels& tile);
 
 /// The stages between projection and blending.
 void sort_by_depth(ForwardBuffers& buffers);

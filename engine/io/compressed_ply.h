@@ -1,0 +1,23 @@
+// Compressed .ply files of PlayCanvas and SuperSplat: 16 bytes per Gaussian, in chunks of 256 with a range each.
+// Source: PlayCanvas, "Compressed PLY format", 2023-2024.
+#pragma once
+
+#include "engine/core/result.h"
+#include "engine/io/input_file.h"
+#include "engine/io/ply_header.h"
+#include "engine/io/read_options.h"
+#include "engine/scene/gaussian_cloud.h"
+
+namespace engine::io {
+
+/// Is this the header of a compressed file?
+[[nodiscard]] bool is_compressed_ply(const PlyHeader& header);
+
+/// Decodes the file; colour ranges per chunk and the `sh` element are optional. Opacity as logit_of_byte() says.
+///   errors  corrupt_data: a property missing or of another type, a number of chunks or SH rows that does not fit the
+///           vertices, a file shorter or longer than its header says, a range that is not finite
+///           unsupported: ASCII, big-endian; unprocessable; too_large
+[[nodiscard]] Result<scene::GaussianCloud> read_compressed_ply(const InputFile& file, const PlyHeader& header,
+                                                               const ReadOptions& options);
+
+}  // namespace engine::io

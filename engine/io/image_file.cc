@@ -1,0 +1,382 @@
+#include "engine/io/image_file.h"
+
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/imagebufalgo.h>
+#include <OpenImageIO/imageio.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <cstring>
+#include <exception>
+#include <initializer_list>
+#include <limits>
+#include <memory>
+#include <new>
+#include <optional>
+#include <string_view>
+
+#include "engine/core/finite.h"
+#include "engine/io/atomic_file.h"
+#include "engine/io/input_file.h"
+#include "engine/io/read_bytes.h"
+
+namespace engine::io {
+namespace {
+
+using scene::Image;
+namespace Filesystem = OIIO::Filesystem;
+
+/// OpenImageIO's name of the format that these first bytes announce. We ask for that one reader by name: left to
+/// itself, the library tries dozens of formats on what a stranger has sent.
+const char* sniff(std::span<const std::byte> bytes) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), std::min<std::size_t>(bytes.size(), 12));
+  using namespace std::string_view_literals;
+  if (text.starts_with("\x89PNG\r\n\x1a\n")) return "png";
+  if (text.starts_with("\xff\xd8\xff")) return "jpeg";
+  if (text.starts_with("\x76\x2f\x31\x01")) return "openexr";
+  if (text.starts_with("II*\0"sv) || text.starts_with("MM\0*"sv)) return "tiff";
+  if (text.starts_with("RIFF") && text.substr(std::min<std::size_t>(text.size(), 8)) == "WEBP") return "webp";
+  if (text.starts_with("BM")) return "bmp";
+  return nullptr;
+}
+
+std::size_t big_endian(std::span<const std::byte> bytes, std::size_t at, std::size_t size) {
+  std::size_t value = 0;
+  for (std::size_t i = 0; i < size; ++i) value = value << 8 | std::to_integer<std::size_t>(bytes[at + i]);
+  return value;
+}
+
+/// Does the stream run to its end-of-image marker? libjpeg fills what is missing with grey and only warns.
+bool jpeg_is_complete(std::span<const std::byte> bytes) {
+  std::size_t at = 2;  // behind the start-of-image marker
+  while (at + 2 <= bytes.size()) {
+    const std::size_t marker = big_endian(bytes, at, 2);
+    if (marker == 0xffd9) return true;
+    const bool in_scan = marker < 0xff01 || marker == 0xffff || (marker >= 0xffd0 && marker <= 0xffd7);
+    if (in_scan) {
+      ++at;  // entropy-coded data, a stuffed or fill byte, a restart marker: on to the next 0xff
+      const auto rest = bytes.subspan(at);
+      const auto* next = static_cast<const std::byte*>(std::memchr(rest.data(), 0xff, rest.size()));
+      at = next == nullptr ? bytes.size() : std::size_t(next - bytes.data());
+    } else {
+      if (at + 4 > bytes.size()) return false;
+      at += 2 + big_endian(bytes, at + 2, 2);
+    }
+  }
+  return false;
+}
+
+/// Do the chunks run to IEND? Without it the last rows may still decode.
+bool png_is_complete(std::span<const std::byte> bytes) {
+  std::size_t at = 8;  // behind the signature
+  while (bytes.size() >= 12 && at <= bytes.size() - 12) {
+    const bool is_last = std::memcmp(bytes.data() + at + 4, "IEND", 4) == 0;
+    at += 12 + big_endian(bytes, at, 4);
+    if (is_last) return at <= bytes.size();
+  }
+  return false;
+}
+
+bool is_complete(std::string_view format, std::span<const std::byte> bytes) {
+  return format == "png" ? png_is_complete(bytes) : format != "jpeg" || jpeg_is_complete(bytes);
+}
+
+/// The first line of what the library says.
+std::string one_line(std::string message) {
+  message.resize(std::min(message.find('\n'), message.size()));
+  return message.empty() ? "the picture cannot be decoded" : message;
+}
+
+/// A reader that is open on `source`; its size is within the limits.
+Result<std::unique_ptr<OIIO::ImageInput>> open_reader(std::span<const std::byte> first_bytes,
+                                                      Filesystem::IOProxy& source, const std::string& name,
+                                                      const ImageOptions& options) {
+  const char* format = sniff(first_bytes);
+  if (format == nullptr)
+    return fail(ErrorCode::unsupported, name + " is not a PNG, JPEG, EXR, TIFF, WebP or BMP picture", name);
+  auto reader = OIIO::ImageInput::create(format);
+  if (!reader) return fail(ErrorCode::unsupported, std::string("this build cannot read ") + format + " pictures", name);
+  reader->threads(1);
+  OIIO::ImageSpec spec, hints;
+  hints.attribute("oiio:UnassociatedAlpha", 1);  // or integer colours come multiplied by alpha, and rounded
+  if (!reader->set_ioproxy(&source) || !reader->open(name, spec, hints))
+    return fail(ErrorCode::corrupt_data, one_line(reader->geterror()), name);
+  if (spec.width < 1 || spec.height < 1 || spec.depth > 1 || spec.nchannels < 1 || spec.deep)
+    return fail(ErrorCode::corrupt_data, "the picture's header describes no flat picture", name);
+  const std::string found = "the picture has " + std::to_string(spec.width) + "x" + std::to_string(spec.height) +
+                            " pixels and " + std::to_string(spec.nchannels) + " channels; ";
+  if (spec.width > options.max_side || spec.height > options.max_side)
+    return fail(ErrorCode::too_large, found + "the limit is " + std::to_string(options.max_side) + " pixels a side",
+                name);
+  const std::uint64_t pixels = std::uint64_t(spec.width) * std::uint64_t(spec.height);
+  if (pixels > options.max_pixels || pixels * std::uint64_t(spec.nchannels) > 4 * options.max_pixels)
+    return fail(ErrorCode::too_large,
+                found + "the limit is " + std::to_string(options.max_pixels) + " pixels of 4 channels", name);
+  return reader;
+}
+
+/// Where a picture's colour is among its channels.
+struct ChannelLayout {
+  std::array<int, 3> color{};
+  int alpha = -1;  ///< -1: none
+};
+
+std::optional<ChannelLayout> find_channels(const OIIO::ImageSpec& spec) {
+  const int r = spec.channelindex("R"), g = spec.channelindex("G"), b = spec.channelindex("B");
+  if (r >= 0 && g >= 0 && b >= 0) return ChannelLayout{{r, g, b}, spec.alpha_channel};
+  const int y = std::max(spec.channelindex("Y"), spec.channelindex("I"));
+  if (y >= 0) return ChannelLayout{{y, y, y}, spec.alpha_channel};
+  if (spec.nchannels == 1 && spec.z_channel < 0) return ChannelLayout{{0, 0, 0}, -1};
+  return std::nullopt;
+}
+
+/// The stored picture turned as its EXIF orientation (2 to 8) asks.
+Image turned(const Image& stored, int orientation) {
+  const bool swaps = orientation >= 5;
+  const int right = stored.width - 1, bottom = stored.height - 1;
+  Image out(swaps ? stored.height : stored.width, swaps ? stored.width : stored.height, stored.channels);
+  const auto source = [&](int x, int y) -> std::array<int, 2> {
+    switch (orientation) {
+      case 2:
+        return {right - x, y};
+      case 3:
+        return {right - x, bottom - y};
+      case 4:
+        return {x, bottom - y};
+      case 5:
+        return {y, x};
+      case 6:
+        return {y, bottom - x};
+      case 7:
+        return {right - y, bottom - x};
+      default:
+        return {right - y, x};
+    }
+  };
+  for (int y = 0; y < out.height; ++y)
+    for (int x = 0; x < out.width; ++x) {
+      const auto [from_x, from_y] = source(x, y);
+      for (int c = 0; c < out.channels; ++c) out.at(x, y, c) = stored.at(from_x, from_y, c);
+    }
+  return out;
+}
+
+Result<Image> decode(std::span<const std::byte> bytes, const std::string& name, const ImageOptions& options) {
+  // Asked before the library sees a byte: at the end of a PNG it leaks memory, of a JPEG it sees nothing wrong.
+  if (const char* format = sniff(bytes); format != nullptr && !is_complete(format, bytes))
+    return fail(ErrorCode::corrupt_data, "the picture ends before its last row: copy or download it again", name);
+  Filesystem::IOMemReader source(const_cast<std::byte*>(bytes.data()), bytes.size());  // reads; takes a void*
+  auto opened = open_reader(bytes, source, name, options);
+  if (!opened) return propagate(opened);
+  OIIO::ImageInput& reader = **opened;
+  const OIIO::ImageSpec spec = reader.spec();
+  const auto layout = find_channels(spec);
+  if (!layout) return fail(ErrorCode::unsupported, "the picture has no channels R, G, B and none called Y", name);
+
+  const auto channels = std::size_t(spec.nchannels);
+  const std::size_t pixels = std::size_t(spec.width) * std::size_t(spec.height);
+  std::vector<float> interleaved(pixels * channels);
+  if (!reader.read_image(0, 0, 0, -1, OIIO::TypeDesc::FLOAT, interleaved.data()))
+    return fail(ErrorCode::corrupt_data, one_line(reader.geterror()), name);
+
+  const bool with_alpha = layout->alpha >= 0;
+  const bool multiply =
+      with_alpha && options.alpha == Alpha::on_black && spec.get_int_attribute("oiio:UnassociatedAlpha") != 0;
+  Image image(spec.width, spec.height, with_alpha && options.alpha == Alpha::keep ? 4 : 3);
+  for (int c = 0; c < image.channels; ++c) {
+    const auto from = std::size_t(c < 3 ? layout->color[std::size_t(c)] : layout->alpha);
+    const auto plane = image.plane(c);
+    for (std::size_t i = 0; i < pixels; ++i) {
+      plane[i] = interleaved[i * channels + from];
+      if (multiply) plane[i] *= interleaved[i * channels + std::size_t(layout->alpha)];
+    }
+  }
+  if (const auto bad = first_not_finite(image.data))
+    return fail(ErrorCode::corrupt_data, "a pixel is NaN or infinite",
+                name + ":pixel[" + std::to_string(*bad % pixels % std::size_t(image.width)) + "," +
+                    std::to_string(*bad % pixels / std::size_t(image.width)) + "]");
+  const int orientation = spec.get_int_attribute("Orientation", 1);
+  if (options.orientation == Orientation::upright && orientation >= 2 && orientation <= 8)
+    return turned(image, orientation);
+  return image;
+}
+
+tl::unexpected<Error> refused(std::string message) { return fail(ErrorCode::invalid_argument, std::move(message)); }
+
+/// Interleaved values of T's full range, as PNG and JPEG hold them.
+template <class T>
+std::vector<T> quantised(const Image& image) {
+  constexpr float top = std::numeric_limits<T>::max();
+  const auto channels = std::size_t(image.channels);
+  std::vector<T> out(image.data.size());
+  for (std::size_t c = 0; c < channels; ++c) {
+    const auto plane = image.plane(int(c));
+    // fmax returns the number of a number and a NaN: NaN becomes 0.
+    for (std::size_t i = 0; i < plane.size(); ++i)
+      out[i * channels + c] = T(std::lround(top * std::fmin(std::fmax(plane[i], 0.0f), 1.0f)));
+  }
+  return out;
+}
+
+/// `pixels` holds interleaved values of spec.format.
+Result<std::vector<std::byte>> encode(const char* format, OIIO::ImageSpec spec, const void* pixels) {
+  // Without a DateTime the EXR writer stamps the time of day.
+  if (std::string_view(format) == "openexr") spec.attribute("DateTime", "");
+  std::vector<unsigned char> bytes;
+  Filesystem::IOVecOutput target(bytes);
+  auto writer = OIIO::ImageOutput::create(format);
+  if (!writer) return fail(ErrorCode::unsupported, std::string("this build cannot write ") + format + " pictures");
+  writer->threads(1);
+  if (!writer->set_ioproxy(&target) || !writer->open(format, spec) || !writer->write_image(spec.format, pixels) ||
+      !writer->close())
+    return fail(ErrorCode::internal, one_line(writer->geterror()));
+  const auto* first = reinterpret_cast<const std::byte*>(bytes.data());
+  return std::vector<std::byte>(first, first + bytes.size());
+}
+
+struct NamedPlane {
+  const char* name;
+  std::span<const float> values;
+};
+
+Result<std::vector<std::byte>> encode_planes(int width, int height, std::span<const NamedPlane> planes) {
+  OIIO::ImageSpec spec(width, height, int(planes.size()), OIIO::TypeDesc::FLOAT);
+  std::vector<float> interleaved(std::size_t(width) * std::size_t(height) * planes.size());
+  for (std::size_t c = 0; c < planes.size(); ++c) {
+    spec.channelnames[c] = planes[c].name;
+    for (std::size_t i = 0; i < planes[c].values.size(); ++i) interleaved[i * planes.size() + c] = planes[c].values[i];
+  }
+  spec.alpha_channel = spec.channelindex("A");
+  spec.z_channel = spec.channelindex("Z");
+  spec.attribute("compression", "zip");
+  return encode("openexr", spec, interleaved.data());
+}
+
+bool is_consistent(const Image& image) {
+  return image.width > 0 && image.height > 0 && image.channels > 0 &&
+         image.data.size() == image.pixels() * std::size_t(image.channels);
+}
+
+}  // namespace
+
+Result<Image> decode_image(std::span<const std::byte> bytes, const std::string& name, const ImageOptions& options) {
+  try {
+    return decode(bytes, name, options);
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::too_large, name + " does not fit into the memory of this machine", name);
+  } catch (const std::exception& failure) {
+    return fail(ErrorCode::corrupt_data, one_line(failure.what()), name);
+  }
+}
+
+Result<Image> read_image(const std::filesystem::path& path, const ImageOptions& options) {
+  const auto bytes = read_bytes(path, options.max_file_bytes);
+  if (!bytes) return propagate(bytes);
+  return decode_image(*bytes, path.filename().string(), options);
+}
+
+Result<PictureSize> picture_size(const std::filesystem::path& path, const ImageOptions& options) {
+  const auto file = InputFile::open(path);
+  if (!file) return propagate(file);
+  const auto first_bytes = file->read_at(0, std::min<std::uint64_t>(file->size(), 12));
+  if (!first_bytes) return propagate(first_bytes);
+  try {
+    Filesystem::IOFile source(path.string(), Filesystem::IOProxy::Read);
+    const auto reader = open_reader(*first_bytes, source, file->name(), options);
+    if (!reader) return propagate(reader);
+    return PictureSize{(*reader)->spec().width, (*reader)->spec().height};
+  } catch (const std::exception& failure) {
+    return fail(ErrorCode::corrupt_data, one_line(failure.what()), file->name());
+  }
+}
+
+Result<ImageFormat> format_of(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension) c = char(std::tolower(static_cast<unsigned char>(c)));
+  if (extension == ".png") return ImageFormat::png;
+  if (extension == ".jpg" || extension == ".jpeg") return ImageFormat::jpeg;
+  if (extension == ".exr") return ImageFormat::exr;
+  return fail(ErrorCode::unsupported, "pictures are written as .png, .jpg or .exr; found " + path.filename().string(),
+              path.filename().string());
+}
+
+Result<std::vector<std::byte>> encode_image(const Image& image, ImageFormat format, const EncodeOptions& options) {
+  if (!is_consistent(image)) return refused("the picture is empty");
+  const bool jpeg = format == ImageFormat::jpeg;
+  if (image.channels != 1 && image.channels != 3 && (image.channels != 4 || jpeg))
+    return refused(std::string(jpeg ? "JPEG holds 1 or 3" : "PNG and EXR hold 1, 3 or 4") +
+                   " channels; the picture has " + std::to_string(image.channels));
+  if (options.jpeg_quality < 1 || options.jpeg_quality > 100) return refused("jpeg_quality: expected 1 to 100");
+  if (options.png_bits != 8 && options.png_bits != 16) return refused("png_bits: expected 8 or 16");
+
+  OIIO::ImageSpec spec(image.width, image.height, image.channels, OIIO::TypeDesc::UINT8);
+  spec.attribute("oiio:UnassociatedAlpha", 1);
+  spec.attribute("oiio:ColorSpace", "sRGB");
+  switch (format) {
+    case ImageFormat::png:
+      if (options.png_bits == 8) return encode("png", spec, quantised<std::uint8_t>(image).data());
+      spec.set_format(OIIO::TypeDesc::UINT16);
+      return encode("png", spec, quantised<std::uint16_t>(image).data());
+    case ImageFormat::jpeg:
+      spec.attribute("CompressionQuality", options.jpeg_quality);
+      return encode("jpeg", spec, quantised<std::uint8_t>(image).data());
+    case ImageFormat::exr:
+      break;
+  }
+  constexpr const char *grey[] = {"Y"}, *color[] = {"R", "G", "B", "A"};
+  std::vector<NamedPlane> planes;
+  for (int c = 0; c < image.channels; ++c) planes.push_back({image.channels == 1 ? grey[c] : color[c], image.plane(c)});
+  return encode_planes(image.width, image.height, planes);
+}
+
+Result<std::vector<std::byte>> encode_exr(const RenderLayers& layers) {
+  const Image* first = layers.color ? layers.color : layers.alpha ? layers.alpha : layers.depth;
+  if (first == nullptr) return refused("expected colour, alpha or depth; found none of them");
+  std::vector<NamedPlane> planes;
+  const auto add = [&](const Image* layer, std::initializer_list<const char*> names) {
+    if (layer == nullptr) return true;
+    if (!is_consistent(*layer) || layer->channels != int(names.size()) || layer->width != first->width ||
+        layer->height != first->height)
+      return false;
+    for (int c = 0; const char* name : names) planes.push_back({name, layer->plane(c++)});
+    return true;
+  };
+  if (!add(layers.color, {"R", "G", "B"}) || !add(layers.alpha, {"A"}) || !add(layers.depth, {"Z"}))
+    return refused("expected layers of one size: colour of 3 channels, alpha and depth of 1");
+  return encode_planes(first->width, first->height, planes);
+}
+
+Result<void> write_exr(const std::filesystem::path& path, const RenderLayers& layers) {
+  const auto bytes = encode_exr(layers);
+  if (!bytes) return propagate(bytes);
+  return write_file(path, *bytes);
+}
+
+Result<void> write_image(const std::filesystem::path& path, const Image& image, const EncodeOptions& options) {
+  const auto format = format_of(path);
+  if (!format) return propagate(format);
+  const auto bytes = encode_image(image, *format, options);
+  if (!bytes) return propagate(bytes);
+  return write_file(path, *bytes);
+}
+
+Result<Image> resized(const Image& image, int width, int height, ResizeFilter filter) {
+  if (!is_consistent(image)) return refused("the picture is empty");
+  if (width < 1 || height < 1) return refused("expected a size of at least 1x1 pixels");
+  if (width == image.width && height == image.height) return image;
+  Image out(width, height, image.channels);
+  for (int c = 0; c < image.channels; ++c) {
+    const OIIO::ImageSpec from_spec(image.width, image.height, 1, OIIO::TypeDesc::FLOAT);
+    const OIIO::ImageSpec to_spec(width, height, 1, OIIO::TypeDesc::FLOAT);
+    const OIIO::ImageBuf from(from_spec, const_cast<float*>(image.plane(c).data()));  // only read; takes a void*
+    OIIO::ImageBuf to(to_spec, out.plane(c).data());
+    const char* name = filter == ResizeFilter::box ? "box" : "lanczos3";
+    if (!OIIO::ImageBufAlgo::resize(to, from, name, 0.0f, {}, /*nthreads=*/1))
+      return fail(ErrorCode::internal, one_line(to.geterror()));
+  }
+  return out;
+}
+
+}  // namespace engine::io

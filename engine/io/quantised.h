@@ -1,0 +1,24 @@
+// Small conversions between stored values and the bytes of the compact formats.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+namespace engine::io {
+
+constexpr double sh_c0 = 0.28209479177387814;  ///< 1 / (2 sqrt(pi)): colour = 0.5 + sh_c0 * f_dc
+
+/// Nearest byte, saturating.
+inline std::uint8_t nearest_byte(double value) { return std::uint8_t(std::clamp(std::round(value), 0.0, 255.0)); }
+
+/// The logit of opacity u / 255. 0 and 255 would be infinite; they are taken as a quarter step inside, logit -6.93 and
+/// 6.93: an opacity of 0.001 is still below the 1/255 that is drawn, and both come back as the byte they were.
+inline float logit_of_byte(std::uint8_t u) {
+  const double opacity = std::clamp(double(u), 0.25, 254.75) / 255.0;
+  return float(std::log(opacity / (1.0 - opacity)));
+}
+
+inline std::uint8_t byte_of_logit(float logit) { return nearest_byte(255.0 / (1.0 + std::exp(-double(logit)))); }
+
+}  // namespace engine::io

@@ -1,0 +1,368 @@
+#include "engine/io/spz.h"
+
+#include <zstd.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <numbers>
+
+#include "engine/core/parallel.h"
+#include "engine/io/byte_reader.h"
+#include "engine/io/checks.h"
+#include "engine/io/gzip.h"
+#include "engine/io/quantised.h"
+
+namespace engine::io {
+namespace {
+
+using Bytes = std::vector<std::byte>;
+
+constexpr std::uint32_t magic = 0x5053474e;  // "NGSP"
+constexpr std::size_t grain = 4096;
+constexpr std::size_t header_bytes = 16;
+constexpr std::size_t max_deflate_ratio = 1032;  // of deflate: 258 bytes for every 2 bits
+constexpr double colour_scale = 0.15;            // of this format; wider than sh_c0 to keep colours beyond 0..1
+constexpr std::uint8_t flag_extensions = 2;
+
+/// SH coefficients that change sign when both y and z are negated: an odd power of exactly one of them.
+constexpr std::array<bool, 16> flips_sh = {false, true, true,  false, true, false, false, true,
+                                           false, true, false, true,  true, false, true,  false};
+
+struct Header {
+  std::uint32_t version = 0;
+  std::uint32_t count = 0;
+  int sh_degree = 0;
+  int fractional_bits = 0;
+  std::uint8_t flags = 0;
+  std::uint8_t streams = 0;  ///< Version 4 only.
+
+  [[nodiscard]] std::size_t position_bytes() const { return version == 1 ? 6 : 9; }
+  [[nodiscard]] std::size_t rotation_bytes() const { return version <= 2 ? 3 : 4; }
+  [[nodiscard]] std::size_t sh_bytes() const { return 3 * (scene::sh_coefficients(sh_degree) - 1); }
+};
+
+/// The attributes of all Gaussians, in the order of the file.
+struct Attributes {
+  Bytes positions, alphas, colors, scales, rotations, sh;
+};
+
+struct AttributeRow {
+  const char* name;
+  Bytes Attributes::*bytes;
+  std::size_t size;  ///< Bytes per Gaussian.
+};
+
+std::array<AttributeRow, 6> attribute_rows(const Header& header) {
+  return {{{"positions", &Attributes::positions, header.position_bytes()},
+           {"alphas", &Attributes::alphas, 1},
+           {"colors", &Attributes::colors, 3},
+           {"scales", &Attributes::scales, 3},
+           {"rotations", &Attributes::rotations, header.rotation_bytes()},
+           {"sh", &Attributes::sh, header.sh_bytes()}}};
+}
+
+std::uint64_t packed_row_bytes(const Header& header) {
+  std::uint64_t sum = 0;
+  for (const auto& row : attribute_rows(header)) sum += row.size;
+  return sum;
+}
+
+tl::unexpected<Error> damaged(const std::string& message, const std::string& where) {
+  return fail(ErrorCode::corrupt_data, message + ": the file is damaged or incomplete, copy or download it again",
+              where);
+}
+
+/// The 16 bytes all versions begin with.
+Result<Header> parse_header(std::span<const std::byte> bytes, std::uint32_t min_version, std::uint32_t max_version,
+                            const std::string& where) {
+  ByteReader in(bytes);
+  const auto found_magic = in.read<std::uint32_t>();
+  Header header;
+  header.version = in.read<std::uint32_t>();
+  header.count = in.read<std::uint32_t>();
+  header.sh_degree = in.read<std::uint8_t>();
+  header.fractional_bits = in.read<std::uint8_t>();
+  header.flags = in.read<std::uint8_t>();
+  header.streams = in.read<std::uint8_t>();
+  if (!in.ok()) return damaged("an .spz header has 16 bytes; fewer are there", where);
+  if (found_magic != magic)
+    return fail(ErrorCode::unsupported, "a gzip file, but there is no .spz scene in it; unpack it first", where);
+  if (header.version < min_version || header.version > max_version)
+    return fail(ErrorCode::unsupported,
+                ".spz version " + std::to_string(header.version) + " in this container is unknown; expected " +
+                    std::to_string(min_version) + " to " + std::to_string(max_version),
+                where);
+  if (header.sh_degree > scene::max_sh_degree)
+    return fail(ErrorCode::unsupported,
+                "SH degree " + std::to_string(header.sh_degree) + "; 0 to 3 is supported: export with degree 3", where);
+  if (header.fractional_bits > 24)
+    return damaged(std::to_string(header.fractional_bits) + " fractional bits in positions of 24 bits", where);
+  return header;
+}
+
+Result<void> check_limits(const Header& header, const ReadOptions& options, const std::string& file) {
+  return check_limits(header.count, cloud_row_bytes(header.sh_degree) + packed_row_bytes(header), options, file);
+}
+
+/// Versions 1 to 3: header and attributes in one gzip stream.
+Result<Header> unpack_gzip(std::span<const std::byte> bytes, const std::string& file, const ReadOptions& options,
+                           Attributes& attributes) {
+  GzipReader in(bytes);
+  std::array<std::byte, header_bytes> start;
+  if (!in.read(start)) return damaged("no .spz header could be unpacked", file + ":header");
+  const auto header = parse_header(start, 1, 3, file + ":header");
+  if (!header) return header;
+  if (header->flags & flag_extensions)
+    return fail(ErrorCode::unsupported,
+                "the file holds extensions, which have no fixed place before .spz version 4: export as version 4, or "
+                "without extensions",
+                file + ":header");
+  if (auto checked = check_limits(*header, options, file); !checked) return propagate(checked);
+  if (const auto needed = header->count * packed_row_bytes(*header); needed / max_deflate_ratio > bytes.size())
+    return damaged("the header announces " + std::to_string(header->count) + " Gaussians, more than " +
+                       std::to_string(bytes.size()) + " bytes can unpack to",
+                   file + ":header");
+  for (const auto& row : attribute_rows(*header)) {
+    Bytes& unpacked = attributes.*row.bytes;
+    unpacked.resize(header->count * row.size);
+    if (!in.read(unpacked))
+      return damaged(
+          std::string(row.name) + " of " + std::to_string(header->count) + " Gaussians could not be unpacked",
+          file + ":" + row.name);
+  }
+  if (!in.at_end()) return damaged("the file does not end after the last Gaussian", file);
+  return header;
+}
+
+/// Version 4: a plain header, a table of sizes, one zstd stream per attribute that is not empty.
+Result<Header> unpack_zstd(std::span<const std::byte> bytes, const std::string& file, const ReadOptions& options,
+                           Attributes& attributes) {
+  const std::string where = file + ":header";
+  ByteReader in(bytes);
+  const auto header = parse_header(in.take(std::min(header_bytes, bytes.size())), 4, 4, where);
+  if (!header) return header;
+  if (auto checked = check_limits(*header, options, file); !checked) return propagate(checked);
+  const auto toc_offset = in.read<std::uint32_t>();
+  constexpr std::uint32_t v4_header_bytes = 32;
+  if (!in.ok() || toc_offset < v4_header_bytes || toc_offset > bytes.size())
+    return damaged("the table of contents lies outside the file", where);
+  std::vector<AttributeRow> present;
+  for (const auto& row : attribute_rows(*header))
+    if (row.size > 0) present.push_back(row);
+  if (header->streams != present.size())
+    return damaged("expected " + std::to_string(present.size()) + " streams, found " + std::to_string(header->streams),
+                   where);
+
+  ByteReader table(bytes.subspan(toc_offset));  // extensions, if any, lie before it
+  constexpr std::uint64_t entry_bytes = 16;
+  ByteReader streams = table;
+  (void)streams.take(present.size(), entry_bytes);
+  for (const auto& row : present) {
+    const auto packed_size = table.read<std::uint64_t>(), size = table.read<std::uint64_t>();
+    const std::uint64_t expected = header->count * row.size;
+    const auto packed = streams.take(packed_size);
+    if (!table.ok() || !streams.ok()) return damaged("the file ends within the streams", file + ":" + row.name);
+    if (size != expected)
+      return damaged(std::to_string(header->count) + " Gaussians have " + std::to_string(expected) + " bytes of " +
+                         row.name + "; the table of contents says " + std::to_string(size),
+                     file + ":" + row.name);
+    // Some writers leave the size out of the frame; one that is there must agree before room is made for it.
+    const auto stated = ZSTD_getFrameContentSize(packed.data(), packed.size());
+    if (stated != ZSTD_CONTENTSIZE_UNKNOWN && stated != expected)
+      return damaged(std::string(row.name) + " could not be unpacked", file + ":" + row.name);
+    Bytes& unpacked = attributes.*row.bytes;
+    unpacked.resize(expected);
+    if (ZSTD_decompress(unpacked.data(), unpacked.size(), packed.data(), packed.size()) != expected)
+      return damaged(std::string(row.name) + " could not be unpacked", file + ":" + row.name);
+  }
+  if (streams.remaining() != 0)
+    return damaged(std::to_string(streams.remaining()) + " bytes follow the last stream", file);
+  return header;
+}
+
+std::uint32_t byte_at(const Bytes& bytes, std::size_t i) { return std::to_integer<std::uint32_t>(bytes[i]); }
+
+float half_to_float(std::uint32_t half) {
+  const int exponent = int(half >> 10 & 31u);
+  const auto fraction = float(half & 1023u);
+  const float sign = half & 0x8000u ? -1.0f : 1.0f;
+  if (exponent == 31)
+    return fraction == 0 ? sign * std::numeric_limits<float>::infinity() : std::numeric_limits<float>::quiet_NaN();
+  if (exponent == 0) return sign * std::ldexp(fraction, -24);
+  return sign * std::ldexp(1024.0f + fraction, exponent - 25);
+}
+
+Vec3 position_at(const Header& header, const Bytes& bytes, std::size_t i) {
+  Vec3 position;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (header.version == 1) {
+      const std::size_t at = 6 * i + 2 * axis;
+      position[int(axis)] = half_to_float(byte_at(bytes, at) | byte_at(bytes, at + 1) << 8);
+    } else {
+      const std::size_t at = 9 * i + 3 * axis;
+      const std::uint32_t raw = byte_at(bytes, at) | byte_at(bytes, at + 1) << 8 | byte_at(bytes, at + 2) << 16;
+      const int fixed = int(raw) - (raw & 0x800000u ? 0x1000000 : 0);
+      position[int(axis)] = std::ldexp(float(fixed), -header.fractional_bits);
+    }
+  }
+  return position;
+}
+
+/// Versions 1 and 2: x y z in a byte each, w from the unit length.
+Quat rotation_first_three(const Bytes& bytes, std::size_t i) {
+  std::array<double, 3> v;
+  double square = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    v[c] = byte_at(bytes, 3 * i + c) / 127.5 - 1.0;
+    square += v[c] * v[c];
+  }
+  return {float(std::sqrt(std::max(0.0, 1.0 - square))), float(v[0]), float(v[1]), float(v[2])};
+}
+
+/// Versions 3 and 4: the three smallest of (x, y, z, w) in 10 bits each, the largest from the unit length.
+Quat rotation_smallest_three(const Bytes& bytes, std::size_t i) {
+  std::uint32_t word;
+  std::memcpy(&word, bytes.data() + 4 * i, sizeof word);
+  const std::size_t largest = word >> 30;
+  std::array<double, 4> q{};
+  double square = 0;
+  for (std::size_t c = 4; c-- > 0;) {  // the highest index lies in the lowest bits
+    if (c == largest) continue;
+    q[c] = (word & 511u) / 511.0 / std::numbers::sqrt2 * (word & 512u ? -1.0 : 1.0);
+    square += q[c] * q[c];
+    word >>= 10;
+  }
+  q[largest] = std::sqrt(std::max(0.0, 1.0 - square));
+  return {float(q[3]), float(q[0]), float(q[1]), float(q[2])};
+}
+
+std::uint32_t packed_rotation(Quat rotation) {
+  std::array<double, 4> q = {rotation.x, rotation.y, rotation.z, rotation.w};
+  double square = 0;
+  for (const double c : q) square += c * c;
+  if (square == 0) q = {0, 0, 0, square = 1};  // no rotation to speak of: the identity
+  std::size_t largest = 0;
+  for (std::size_t c = 1; c < 4; ++c)
+    if (std::abs(q[c]) > std::abs(q[largest])) largest = c;
+  std::uint32_t word = std::uint32_t(largest);
+  for (std::size_t c = 0; c < 4; ++c) {
+    if (c == largest) continue;
+    const double unit = std::abs(q[c]) / std::sqrt(square) * std::numbers::sqrt2;  // at most 1
+    const auto magnitude = std::uint32_t(std::min(std::lround(unit * 511.0), 511L));
+    const bool negative = magnitude > 0 && (q[c] < 0) != (q[largest] < 0);  // q and -q are one rotation
+    word = word << 10 | std::uint32_t(negative) << 9 | magnitude;
+  }
+  return word;
+}
+
+/// RUB <-> RDF, one row; its own inverse.
+void flip_row(scene::GaussianCloud& cloud, std::size_t i) {
+  cloud.mean.y[i] = -cloud.mean.y[i], cloud.mean.z[i] = -cloud.mean.z[i];
+  cloud.rotation.y[i] = -cloud.rotation.y[i], cloud.rotation.z[i] = -cloud.rotation.z[i];
+  const std::size_t coefficients = scene::sh_coefficients(cloud.sh_degree);
+  for (std::size_t c = 0; c < 3; ++c)
+    for (std::size_t k = 1; k < coefficients; ++k)
+      if (flips_sh[k]) cloud.sh_row(i)[c * coefficients + k] = -cloud.sh_row(i)[c * coefficients + k];
+}
+
+/// Fractional bits with which every mean fits 24 bits: 12 as everybody writes, fewer for scenes beyond +-2048.
+Result<int> fractional_bits_for(const scene::GaussianCloud& cloud, const std::string& file) {
+  double farthest = 0;
+  for (const auto* axis : {&cloud.mean.x, &cloud.mean.y, &cloud.mean.z})
+    for (const float x : *axis) farthest = std::max(farthest, std::abs(double(x)));
+  for (int bits = 12; bits >= 0; --bits)
+    if (std::round(std::ldexp(farthest, bits)) <= 8388607.0) return bits;
+  return fail(ErrorCode::unprocessable,
+              "a Gaussian lies " + std::to_string(farthest) +
+                  " units from the origin; .spz reaches 8388607: write a .ply, or move the scene to the origin",
+              file);
+}
+
+}  // namespace
+
+bool looks_like_spz(std::span<const std::byte> bytes) {
+  const auto begins = [&](std::initializer_list<int> start) {
+    return bytes.size() >= start.size() &&
+           std::equal(start.begin(), start.end(), bytes.begin(), [](int a, std::byte b) { return std::byte(a) == b; });
+  };
+  return begins({0x1f, 0x8b}) || begins({'N', 'G', 'S', 'P'});
+}
+
+Result<scene::GaussianCloud> decode_spz(std::span<const std::byte> bytes, const std::string& file,
+                                        const ReadOptions& options) {
+  Attributes in;
+  const bool plain = !bytes.empty() && bytes[0] == std::byte{'N'};
+  const auto header = plain ? unpack_zstd(bytes, file, options, in) : unpack_gzip(bytes, file, options, in);
+  if (!header) return propagate(header);
+  scene::GaussianCloud cloud;
+  cloud.sh_degree = header->sh_degree;
+  cloud.resize(header->count);
+  const std::size_t coefficients = scene::sh_coefficients(cloud.sh_degree);
+  parallel_for(cloud.size(), grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      cloud.mean.set(i, position_at(*header, in.positions, i));
+      cloud.opacity_logit[i] = logit_of_byte(std::to_integer<std::uint8_t>(in.alphas[i]));
+      const auto log_scale = [&](std::size_t axis) { return float(byte_at(in.scales, 3 * i + axis)) / 16.0f - 10.0f; };
+      cloud.log_scale.set(i, {log_scale(0), log_scale(1), log_scale(2)});
+      cloud.rotation.set(
+          i, header->version <= 2 ? rotation_first_three(in.rotations, i) : rotation_smallest_three(in.rotations, i));
+      const auto sh = cloud.sh_row(i);
+      for (std::size_t c = 0; c < 3; ++c) {
+        sh[c * coefficients] = float((byte_at(in.colors, 3 * i + c) / 255.0 - 0.5) / colour_scale);
+        for (std::size_t k = 1; k < coefficients; ++k)
+          sh[c * coefficients + k] =
+              (float(byte_at(in.sh, (i * (coefficients - 1) + k - 1) * 3 + c)) - 128.0f) / 128.0f;
+      }
+      if (options.spz_frame == SpzFrame::rub) flip_row(cloud, i);
+    }
+  });
+  if (auto finite = check_finite(cloud, file); !finite) return propagate(finite);
+  return cloud;
+}
+
+Result<Bytes> encode_spz(const scene::GaussianCloud& cloud, const std::string& file) {
+  const auto bits = fractional_bits_for(cloud, file);
+  if (!bits) return propagate(bits);
+  Header header;
+  header.version = 3;
+  header.count = std::uint32_t(cloud.size());
+  header.sh_degree = cloud.sh_degree;
+  header.fractional_bits = *bits;
+  Bytes bytes;
+  bytes.reserve(header_bytes + cloud.size() * packed_row_bytes(header));
+  const auto put = [&](std::uint32_t value, std::size_t size) {
+    for (std::size_t b = 0; b < size; ++b) bytes.push_back(std::byte(value >> 8 * b & 255u));
+  };
+  put(magic, 4), put(header.version, 4), put(header.count, 4);
+  put(std::uint32_t(header.sh_degree), 1), put(std::uint32_t(header.fractional_bits), 1), put(0, 2);
+
+  const std::size_t n = cloud.size(), coefficients = scene::sh_coefficients(cloud.sh_degree);
+  for (std::size_t i = 0; i < n; ++i)
+    for (int axis = 0; axis < 3; ++axis) {
+      const double x = axis == 0 ? cloud.mean.get(i)[axis] : -cloud.mean.get(i)[axis];  // RDF -> RUB
+      put(std::uint32_t(std::int32_t(std::lround(std::ldexp(x, header.fractional_bits)))), 3);
+    }
+  for (const float logit : cloud.opacity_logit) put(byte_of_logit(logit), 1);
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t c = 0; c < 3; ++c)
+      put(nearest_byte((double(cloud.sh_row(i)[c * coefficients]) * colour_scale + 0.5) * 255.0), 1);
+  for (std::size_t i = 0; i < n; ++i)
+    for (int axis = 0; axis < 3; ++axis) put(nearest_byte((double(cloud.log_scale.get(i)[axis]) + 10.0) * 16.0), 1);
+  for (std::size_t i = 0; i < n; ++i) {
+    const Quat q = cloud.rotation.get(i);
+    put(packed_rotation({q.w, q.x, -q.y, -q.z}), 4);
+  }
+  // All 8 bits of each coefficient: Niantic's writer keeps 4 or 5 to pack better, which costs quality.
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t k = 1; k < coefficients; ++k)
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double value = cloud.sh_row(i)[c * coefficients + k];
+        put(nearest_byte((flips_sh[k] ? -value : value) * 128.0 + 128.0), 1);
+      }
+  return gzip(bytes);
+}
+
+}  // namespace engine::io

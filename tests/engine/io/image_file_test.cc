@@ -1,0 +1,339 @@
+#include "engine/io/image_file.h"
+
+#include <OpenImageIO/imageio.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <string_view>
+
+#include "engine/core/rng.h"
+#include "tests/support/data.h"
+
+namespace engine::io {
+namespace {
+
+using scene::Image;
+using support::TempDir;
+
+/// Seeded values that 8 bits hold exactly.
+Image noise(int width, int height, int channels, std::uint64_t seed = 3) {
+  Image image(width, height, channels);
+  Rng rng(seed);
+  for (float& value : image.data) value = float(rng.below(256)) / 255.0f;
+  return image;
+}
+
+/// Smooth enough for JPEG.
+Image ramp(int width, int height) {
+  Image image(width, height, 3);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      image.at(x, y, 0) = float(x) / float(width), image.at(x, y, 1) = float(y) / float(height),
+                     image.at(x, y, 2) = 0.5f;
+  return image;
+}
+
+float max_difference(const Image& a, const Image& b) {
+  float worst = a.width == b.width && a.height == b.height && a.channels == b.channels ? 0.0f : 1e9f;
+  for (std::size_t i = 0; worst < 1e9f && i < a.data.size(); ++i)
+    worst = std::max(worst, std::abs(a.data[i] - b.data[i]));
+  return worst;
+}
+
+Image decoded(const std::vector<std::byte>& bytes, const ImageOptions& options = {}) {
+  auto image = decode_image(bytes, "picture", options);
+  EXPECT_TRUE(image) << image.error().message;
+  return image.value_or(Image());
+}
+
+/// Written by the library itself, for forms that we read and do not write.
+void write_with_library(const std::filesystem::path& path, OIIO::ImageSpec spec,
+                        const std::vector<float>& interleaved) {
+  auto writer = OIIO::ImageOutput::create(path.string());
+  ASSERT_TRUE(writer && writer->open(path.string(), spec));
+  ASSERT_TRUE(writer->write_image(OIIO::TypeDesc::FLOAT, interleaved.data()));
+  ASSERT_TRUE(writer->close());
+}
+
+/// Something like 2024:05:17, as EXIF and EXR write dates.
+bool holds_a_date(std::string_view bytes) {
+  constexpr std::string_view form = "dddd:dd:dd";
+  for (std::size_t i = 0; i + form.size() <= bytes.size(); ++i)
+    if (std::ranges::equal(bytes.substr(i, form.size()), form, [](char found, char wanted) {
+          return wanted == 'd' ? std::isdigit(static_cast<unsigned char>(found)) != 0 : found == wanted;
+        }))
+      return true;
+  return false;
+}
+
+TEST(EncodeImage, PngComesBackAsItWas) {
+  for (const int channels : {1, 3, 4}) {
+    SCOPED_TRACE(channels);
+    const Image image = noise(37, 23, channels);
+    const auto bytes = encode_image(image, ImageFormat::png);
+    ASSERT_TRUE(bytes) << bytes.error().message;
+    const Image back = decoded(*bytes, {.alpha = Alpha::keep});
+    ASSERT_EQ(back.channels, channels == 4 ? 4 : 3);
+    for (int c = 0; c < back.channels; ++c)
+      for (int i = 0; i < 37 * 23; ++i)
+        ASSERT_NEAR(back.plane(c)[std::size_t(i)], image.plane(channels == 1 ? 0 : c)[std::size_t(i)], 1e-7f);
+  }
+  const Image fine(5, 4, 3, 12345.0f / 65535.0f);
+  EXPECT_LT(max_difference(decoded(*encode_image(fine, ImageFormat::png, {.png_bits = 16})), fine), 1e-7f);
+}
+
+TEST(EncodeImage, RoundsToTheNearestStepAndClamps) {
+  Image image(6, 1, 1);
+  image.data = {-3.0f,
+                0.5f / 255 - 1e-6f,
+                0.5f / 255 + 1e-6f,
+                1.7f,
+                std::numeric_limits<float>::quiet_NaN(),
+                std::numeric_limits<float>::infinity()};
+  const Image back = decoded(*encode_image(image, ImageFormat::png));
+  const float expected[] = {0, 0, 1, 255, 0, 255};
+  for (int x = 0; x < 6; ++x) EXPECT_EQ(std::lround(255 * back.at(x, 0)), std::lround(expected[x])) << x;
+}
+
+TEST(EncodeImage, JpegIsCloseAndQualityCosts) {
+  const Image image = ramp(64, 48);
+  const auto fine = encode_image(image, ImageFormat::jpeg, {.jpeg_quality = 97});
+  const auto coarse = encode_image(image, ImageFormat::jpeg, {.jpeg_quality = 30});
+  ASSERT_TRUE(fine);
+  ASSERT_TRUE(coarse);
+  EXPECT_LT(max_difference(decoded(*fine), image), 0.04f);
+  EXPECT_LT(coarse->size(), fine->size());
+}
+
+TEST(EncodeImage, ExrHoldsFloatsExactly) {
+  Image image(7, 5, 3);
+  Rng rng(5);
+  for (float& value : image.data) value = 100 * rng.normal();
+  EXPECT_EQ(decoded(*encode_image(image, ImageFormat::exr)), image);
+}
+
+TEST(EncodeImage, GivesTheSameBytesAgainAndNoDate) {
+  const Image image = ramp(33, 21);
+  for (const auto format : {ImageFormat::png, ImageFormat::jpeg, ImageFormat::exr}) {
+    const auto bytes = encode_image(image, format);
+    ASSERT_TRUE(bytes);
+    EXPECT_EQ(*bytes, *encode_image(image, format));
+    EXPECT_FALSE(holds_a_date({reinterpret_cast<const char*>(bytes->data()), bytes->size()}));
+  }
+}
+
+TEST(EncodeImage, RefusesWhatAFormatCannotHold) {
+  EXPECT_EQ(encode_image(noise(4, 4, 4), ImageFormat::jpeg).error().code, ErrorCode::invalid_argument);
+  EXPECT_EQ(encode_image(noise(4, 4, 2), ImageFormat::png).error().code, ErrorCode::invalid_argument);
+  EXPECT_EQ(encode_image(Image(), ImageFormat::png).error().code, ErrorCode::invalid_argument);
+  EXPECT_EQ(encode_image(noise(4, 4, 3), ImageFormat::jpeg, {.jpeg_quality = 0}).error().code,
+            ErrorCode::invalid_argument);
+  EXPECT_EQ(encode_image(noise(4, 4, 3), ImageFormat::png, {.png_bits = 12}).error().code, ErrorCode::invalid_argument);
+  EXPECT_EQ(encode_exr({}).error().code, ErrorCode::invalid_argument);
+  const Image color = noise(4, 4, 3), depth = noise(5, 4, 1);
+  EXPECT_EQ(encode_exr({.color = &color, .depth = &depth}).error().code, ErrorCode::invalid_argument);
+  EXPECT_EQ(encode_exr({.color = &depth}).error().code, ErrorCode::invalid_argument);
+}
+
+TEST(WriteExr, NamesItsChannelsAsTheFieldDoes) {
+  const TempDir dir;
+  const Image color = noise(6, 4, 3, 1), alpha = noise(6, 4, 1, 2), depth = noise(6, 4, 1, 3);
+  const auto path = dir.path() / "render.exr";
+  ASSERT_TRUE(write_exr(path, {.color = &color, .alpha = &alpha, .depth = &depth}));
+  auto reader = OIIO::ImageInput::open(path.string());
+  ASSERT_TRUE(reader);
+  EXPECT_EQ(reader->spec().channelnames, (std::vector<std::string>{"R", "G", "B", "A", "Z"}));
+  EXPECT_EQ(reader->spec().format, OIIO::TypeDesc::FLOAT);
+  std::vector<float> pixels(6 * 4 * 5);
+  ASSERT_TRUE(reader->read_image(0, 0, 0, -1, OIIO::TypeDesc::FLOAT, pixels.data()));
+  for (int i = 0; i < 24; ++i) {
+    EXPECT_EQ(pixels[std::size_t(i) * 5 + 1], color.plane(1)[std::size_t(i)]);
+    EXPECT_EQ(pixels[std::size_t(i) * 5 + 3], alpha.plane(0)[std::size_t(i)]);
+    EXPECT_EQ(pixels[std::size_t(i) * 5 + 4], depth.plane(0)[std::size_t(i)]);
+  }
+  ASSERT_TRUE(write_exr(dir.path() / "depth.exr", {.depth = &depth}));
+  EXPECT_EQ(read_image(dir.path() / "depth.exr").error().code, ErrorCode::unsupported);  // no colour in it
+}
+
+TEST(WriteImage, ChoosesTheFormatByExtension) {
+  const TempDir dir;
+  const Image image = noise(8, 8, 3);
+  for (const char* name : {"a.png", "b.JPG", "c.jpeg", "d.exr"}) {
+    ASSERT_TRUE(write_image(dir.path() / name, image)) << name;
+    EXPECT_TRUE(read_image(dir.path() / name)) << name;
+  }
+  EXPECT_EQ(write_image(dir.path() / "e.gif", image).error().code, ErrorCode::unsupported);
+  EXPECT_EQ(write_image(dir.path() / "none" / "f.png", image).error().code, ErrorCode::not_found);
+}
+
+TEST(ReadImage, ReadsByContentWhateverTheName) {
+  const TempDir dir;
+  const Image image = noise(9, 7, 3);
+  for (const auto format : {ImageFormat::png, ImageFormat::exr}) {
+    const auto bytes = encode_image(image, format);
+    ASSERT_TRUE(bytes);
+    support::write_file(dir.path() / "photo.jpg?x=1", {reinterpret_cast<const char*>(bytes->data()), bytes->size()});
+    const auto back = read_image(dir.path() / "photo.jpg?x=1");
+    ASSERT_TRUE(back) << back.error().message;
+    EXPECT_LT(max_difference(*back, image), 1e-6f);
+    EXPECT_EQ(picture_size(dir.path() / "photo.jpg?x=1").value(), (PictureSize{9, 7}));
+  }
+  support::write_file(dir.path() / "text.png", "this is not a picture");
+  EXPECT_EQ(read_image(dir.path() / "text.png").error().code, ErrorCode::unsupported);
+  EXPECT_EQ(picture_size(dir.path() / "text.png").error().code, ErrorCode::unsupported);
+  EXPECT_EQ(read_image(dir.path() / "absent.png").error().code, ErrorCode::not_found);
+  EXPECT_FALSE(read_image(dir.path()));
+}
+
+TEST(ReadImage, ReadsTiffWebpAndBmpToo) {
+  const TempDir dir;
+  const Image image = ramp(16, 11);
+  std::vector<float> interleaved;
+  for (std::size_t i = 0; i < image.pixels(); ++i)
+    for (int c = 0; c < 3; ++c) interleaved.push_back(image.plane(c)[i]);
+  for (const char* name : {"a.tif", "b.webp", "c.bmp"}) {
+    OIIO::ImageSpec spec(16, 11, 3, OIIO::TypeDesc::UINT8);
+    write_with_library(dir.path() / name, spec, interleaved);
+    const auto back = read_image(dir.path() / name);
+    ASSERT_TRUE(back) << name << back.error().message;
+    EXPECT_LT(max_difference(*back, image), std::string(name) == "b.webp" ? 0.06f : 0.5f / 255 + 1e-6f) << name;
+  }
+}
+
+TEST(ReadImage, PutsTransparentPicturesInFrontOfBlack) {
+  Image image(2, 1, 4);
+  for (int c = 0; c < 3; ++c) image.at(0, 0, c) = 0.8f, image.at(1, 0, c) = 1.0f;
+  image.at(0, 0, 3) = 1.0f, image.at(1, 0, 3) = 0.2f;
+  const auto bytes = encode_image(image, ImageFormat::png);
+  ASSERT_TRUE(bytes);
+  const Image flat = decoded(*bytes);
+  ASSERT_EQ(flat.channels, 3);
+  EXPECT_NEAR(flat.at(0, 0, 1), 0.8f, 1e-6f);
+  EXPECT_NEAR(flat.at(1, 0, 1), 0.2f, 1e-6f);
+  const Image kept = decoded(*bytes, {.alpha = Alpha::keep});
+  EXPECT_NEAR(kept.at(1, 0, 1), 1.0f, 1e-6f);
+  EXPECT_NEAR(kept.at(1, 0, 3), 0.2f, 1e-6f);
+}
+
+TEST(ReadImage, TurnsAPhotoUprightUnlessToldNotTo) {
+  const TempDir dir;
+  // What the eye should see: 3 x 2, one bright corner at the upper left, a half-bright one at the upper right.
+  const int w = 3, h = 2;
+  const auto upright = [&](int x, int y) { return y > 0 ? 0.0f : x == 0 ? 1.0f : x == w - 1 ? 0.5f : 0.0f; };
+  for (int orientation = 1; orientation <= 8; ++orientation) {
+    SCOPED_TRACE(orientation);
+    const bool swapped = orientation >= 5;
+    const int sw = swapped ? h : w, sh = swapped ? w : h;
+    // EXIF 2.3, 4.6.4: where row 0 and column 0 of the stored picture are in the upright one.
+    const bool row0_bottom = orientation == 3 || orientation == 4, column0_right = orientation == 2 || orientation == 3;
+    const bool row0_right = orientation == 6 || orientation == 7, column0_bottom = orientation == 7 || orientation == 8;
+    std::vector<float> stored;
+    for (int row = 0; row < sh; ++row)
+      for (int column = 0; column < sw; ++column) {
+        const int x = swapped ? (row0_right ? w - 1 - row : row) : (column0_right ? w - 1 - column : column);
+        const int y = swapped ? (column0_bottom ? h - 1 - column : column) : (row0_bottom ? h - 1 - row : row);
+        stored.push_back(upright(x, y));
+      }
+    OIIO::ImageSpec spec(sw, sh, 1, OIIO::TypeDesc::UINT8);
+    spec.attribute("Orientation", orientation);
+    write_with_library(dir.path() / "photo.tif", spec, stored);
+    const auto turned = read_image(dir.path() / "photo.tif");
+    ASSERT_TRUE(turned);
+    ASSERT_EQ(turned->width, w);
+    ASSERT_EQ(turned->height, h);
+    for (int y = 0; y < h; ++y)
+      for (int x = 0; x < w; ++x) EXPECT_NEAR(turned->at(x, y, 2), upright(x, y), 0.01f) << x << "," << y;
+    const auto as_stored = read_image(dir.path() / "photo.tif", {.orientation = Orientation::as_stored});
+    ASSERT_TRUE(as_stored);
+    EXPECT_EQ(as_stored->width, sw);
+    EXPECT_NEAR(as_stored->data[0], stored[0], 0.01f);
+  }
+}
+
+TEST(ReadImage, NamesTheLimitBeforeItAllocates) {
+  const auto bytes = encode_image(noise(40, 30, 3), ImageFormat::png);
+  ASSERT_TRUE(bytes);
+  EXPECT_EQ(decode_image(*bytes, "a.png", {.max_side = 39}).error().code, ErrorCode::too_large);
+  EXPECT_EQ(decode_image(*bytes, "a.png", {.max_pixels = 1199}).error().code, ErrorCode::too_large);
+  EXPECT_TRUE(decode_image(*bytes, "a.png", {.max_side = 40, .max_pixels = 1200}));
+  const TempDir dir;
+  ASSERT_TRUE(write_image(dir.path() / "a.png", noise(40, 30, 3)));
+  EXPECT_EQ(read_image(dir.path() / "a.png", {.max_file_bytes = 100}).error().code, ErrorCode::too_large);
+  // A header that claims 2^31 - 1 pixels a side (and whose checksum is thereby wrong) must not be believed either.
+  auto absurd = *bytes;
+  for (std::size_t i = 16; i < 24; ++i) absurd[i] = std::byte(i % 4 == 0 ? 0x7f : 0xff);
+  EXPECT_FALSE(decode_image(absurd, "absurd.png"));
+}
+
+TEST(ReadImage, NamesThePixelThatIsNotANumber) {
+  Image image = noise(5, 4, 3);
+  image.at(3, 2, 1) = std::numeric_limits<float>::quiet_NaN();
+  const auto read = decode_image(*encode_image(image, ImageFormat::exr), "a.exr");
+  EXPECT_EQ(read.error().code, ErrorCode::corrupt_data);
+  EXPECT_EQ(read.error().where, "a.exr:pixel[3,2]");
+}
+
+TEST(DecodeImage, CutAnywhereIsANamedError) {
+  for (const auto format : {ImageFormat::png, ImageFormat::jpeg, ImageFormat::exr}) {
+    const auto bytes = encode_image(noise(9, 8, 3), format);
+    ASSERT_TRUE(bytes && decode_image(*bytes, "whole"));
+    for (std::size_t size = 0; size < bytes->size(); ++size) {
+      const auto cut = decode_image(std::span(*bytes).first(size), "cut");
+      ASSERT_FALSE(cut) << "format " << int(format) << " cut at " << size << " of " << bytes->size();
+      EXPECT_EQ(cut.error().where.substr(0, 3), "cut");
+      EXPECT_FALSE(cut.error().message.empty());
+    }
+  }
+}
+
+TEST(DecodeImage, SurvivesCorruptedPictures) {
+  for (const auto format : {ImageFormat::png, ImageFormat::jpeg, ImageFormat::exr}) {
+    const auto whole = encode_image(noise(9, 8, 3), format);
+    ASSERT_TRUE(whole);
+    for (std::uint64_t seed = 0; seed < 400; ++seed) {
+      Rng rng(seed, std::uint64_t(format));
+      auto bytes = *whole;
+      for (auto changes = 1 + rng.below(3); changes > 0; --changes)
+        bytes[rng.below(std::uint32_t(bytes.size()))] = std::byte(rng.below(256));
+      const auto image = decode_image(bytes, "picture", {.max_side = 64});
+      SCOPED_TRACE(testing::Message() << "format " << int(format) << ", seed " << seed);
+      EXPECT_TRUE(image ? std::max(image->width, image->height) <= 64 : image.error().where.starts_with("picture"));
+    }
+  }
+}
+
+TEST(Resized, KeepsFlatColourAndSize) {
+  const Image flat(17, 13, 3, 0.3f);
+  for (const auto filter : {ResizeFilter::box, ResizeFilter::lanczos3}) {
+    for (const auto& [w, h] : {std::pair{8, 6}, std::pair{40, 31}, std::pair{1, 1}, std::pair{17, 13}}) {
+      const auto out = resized(flat, w, h, filter);
+      ASSERT_TRUE(out) << out.error().message;
+      ASSERT_EQ(out->width, w);
+      ASSERT_EQ(out->height, h);
+      for (const float value : out->data) EXPECT_NEAR(value, 0.3f, 1e-5f);
+    }
+  }
+  EXPECT_EQ(resized(flat, 0, 3).error().code, ErrorCode::invalid_argument);
+  EXPECT_EQ(resized(Image(), 3, 3).error().code, ErrorCode::invalid_argument);
+}
+
+TEST(Resized, HalvingAveragesFourPixels) {
+  const Image image = noise(12, 8, 3);
+  const auto half = resized(image, 6, 4);
+  ASSERT_TRUE(half);
+  for (int c = 0; c < 3; ++c)
+    for (int y = 0; y < 4; ++y)
+      for (int x = 0; x < 6; ++x) {
+        const float mean = (image.at(2 * x, 2 * y, c) + image.at(2 * x + 1, 2 * y, c) + image.at(2 * x, 2 * y + 1, c) +
+                            image.at(2 * x + 1, 2 * y + 1, c)) /
+                           4;
+        EXPECT_NEAR(half->at(x, y, c), mean, 1e-6f);
+      }
+}
+
+}  // namespace
+}  // namespace engine::io

@@ -1,0 +1,70 @@
+#include "engine/io/ply_header.h"
+
+#include <gtest/gtest.h>
+
+namespace engine::io {
+namespace {
+
+const std::string start = "ply\nformat binary_little_endian 1.0\n";
+
+TEST(PlyHeader, KeepsTheTextAndLaysOutTheRows) {
+  const std::string text =
+      "ply\r\nformat binary_little_endian 1.0\r\ncomment  made by  hand\r\nobj_info x\r\nelement  vertex\t0012\r\n"
+      "property float x\r\nproperty double w\r\nproperty uchar c\r\nelement face 3\r\n"
+      "property list uchar int vertex_indices\r\nend_header\r\n";
+  const auto header = parse_ply_header(text + "\x01\x02", "a.ply");
+  ASSERT_TRUE(header) << header.error().message;
+  EXPECT_EQ(header->text, text);
+  EXPECT_EQ(header->format, PlyFormat::binary_little_endian);
+  ASSERT_EQ(header->elements.size(), 2u);
+  const PlyElement& vertex = header->elements[0];
+  EXPECT_EQ(vertex.count, 12u);
+  EXPECT_EQ(text.substr(vertex.count_begin, vertex.count_size), "0012");
+  EXPECT_EQ(vertex.stride, 13u);
+  EXPECT_EQ(vertex.find("w")->offset, 4u);
+  EXPECT_EQ(vertex.find("w")->type, PlyType::float64);
+  EXPECT_EQ(vertex.find("v"), nullptr);
+  EXPECT_FALSE(vertex.has_list());
+  EXPECT_TRUE(header->elements[1].has_list());
+}
+
+TEST(PlyHeader, NamesTheLineThatIsWrong) {
+  const struct {
+    std::string text, message;
+  } cases[] = {
+      {start + "element vertex -5\n", "line 3 of the header: expected a whole number of 'vertex' rows"},
+      {start + "element vertex 1e9\n", "found '1e9'"},
+      {start + "element vertex 18446744073709551616\n", "found '18446744073709551616'"},
+      {start + "element vertex\n", "expected 'element NAME COUNT'"},
+      {start + "element vertex 1\nelement vertex 2\n", "line 4 of the header: a second element 'vertex'"},
+      {start + "property float x\n", "a property before the first element"},
+      {start + "element vertex 1\nproperty float x\nproperty int x\n", "line 5 of the header: a second property 'x'"},
+      {start + "element vertex 1\nproperty half x\n", "unknown type 'half'"},
+      {start + "element vertex 1\nproperty float\n", "expected 'property TYPE NAME'"},
+      {start + "element vertex 1\nproperty list uchar x\n", "expected 'property TYPE NAME'"},
+      {start + "vertices 1\n", "unknown keyword 'vertices'"},
+      {start + "format ascii 1.0\n", "expected one 'format KIND 1.0'"},
+      {"ply\nformat binary 1.0\n", "unknown format 'binary'"},
+      {"ply\nelement vertex 1\nend_header\n", "the header has no 'format' line"},
+      {start + "element vertex 1\n", "the file ends before 'end_header'"},
+      {start + std::string(100, '\x01') + "\n", "unknown keyword '" + std::string(40, '?') + "...'"},
+      {"plx\n", "a .ply file begins with a line 'ply'"},
+  };
+  for (const auto& [text, message] : cases) {
+    const auto header = parse_ply_header(text, "chair.ply");
+    ASSERT_FALSE(header) << text;
+    EXPECT_NE(header.error().message.find(message), std::string::npos) << header.error().message;
+    EXPECT_EQ(header.error().where, "chair.ply:header");
+  }
+}
+
+TEST(PlyHeader, GivesUpOnAHeaderOfMoreThanAMebibyte) {
+  std::string text = start;
+  while (text.size() <= max_ply_header_bytes) text += "comment and on it goes\n";
+  const auto header = parse_ply_header(text + "end_header\n", "chair.ply");
+  ASSERT_FALSE(header);
+  EXPECT_EQ(header.error().code, ErrorCode::too_large);
+}
+
+}  // namespace
+}  // namespace engine::io
