@@ -1,0 +1,31 @@
+// Surfaces covered with Gaussians: flat ones, that lie in the surface and carry its lit colour.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/procedural/light.h"
+#include "engine/procedural/surface.h"
+#include "engine/scene/camera.h"
+#include "engine/scene/gaussian_cloud.h"
+
+namespace engine::procedural {
+
+struct Surfels {
+  scene::GaussianCloud cloud;         ///< SH degree 1: glazed things look a little different from each side.
+  std::vector<std::uint16_t> object;  ///< [N] number of the object each Gaussian belongs to.
+};
+
+/// Covers what the cameras can see of the objects with about `count` Gaussians; what no camera can see stays empty.
+///
+/// Gaussians sit in rows along the patches, a little jittered, and overlap so that surfaces are closed. The short axis
+/// is the surface normal. A Gaussian is kept if from some camera a ray reaches it, or the surface right beside it, in
+/// front of which nothing stands.
+///   count    at least 1; the result is within 1 % of it unless the cameras see next to nothing
+///   returns  the same bytes for the same arguments, for any number of threads
+[[nodiscard]] Surfels make_surfels(std::span<const Object> objects, const Light& light,
+                                   std::span<const scene::Camera> cameras, std::size_t count, std::uint64_t seed);
+
+}  // namespace engine::procedural
