@@ -32,11 +32,12 @@ std::vector<scene::Camera> candidate_cameras(const scene::GaussianCloud& input, 
                                              const Request& request) {
   if (!dataset.empty()) return {dataset.begin(), dataset.end()};
   std::vector<DVec3> points;
+  views::VirtualCameraOptions options;
   for (const Handle& handle : request.handles) {
+    options.radius = std::max(options.radius, handle.radius);  // the dragged part itself is not in the way
     points.push_back(handle.source);
     if (handle.target) points.push_back(*handle.target);
   }
-  views::VirtualCameraOptions options;
   options.count = request.params.views;
   options.width = options.height = request.params.max_image_side;
   return views::virtual_cameras(input, points, options);

@@ -15,19 +15,28 @@ constexpr std::size_t bin_block = 2048;  // splats per unit of parallel work
 using Keyed = ForwardBuffers::Keyed;
 
 /// Stable radix sort by key, 11 bits at a time, least significant first. Returns whichever buffer holds the result.
+/// Each pass counts the digits of fixed blocks side by side, and then each block moves its elements to the places that
+/// the blocks before it leave.
 Keyed* radix_sort(Keyed* from, Keyed* to, std::size_t n) {
+  constexpr std::size_t block = 32768;
   constexpr int bits = 11;
   constexpr std::size_t buckets = std::size_t{1} << bits;
-  constexpr int passes = 3;  // the sign bit is never set: 31 bits in 33
-  std::vector<std::uint32_t> counts(passes * buckets, 0);
-  for (std::size_t i = 0; i < n; ++i)
-    for (int pass = 0; pass < passes; ++pass)
-      ++counts[std::size_t(pass) * buckets + ((from[i].key >> (pass * bits)) & (buckets - 1))];
-  for (int pass = 0; pass < passes; ++pass) {
-    std::uint32_t* next = counts.data() + std::size_t(pass) * buckets;
+  const std::size_t blocks = chunk_count(n, block);
+  std::vector<std::uint32_t> places(blocks * buckets);
+  for (int shift = 0; shift < 31; shift += bits) {  // the sign bit is never set
+    const auto digit = [shift](const Keyed& keyed) { return keyed.key >> shift & (buckets - 1); };
+    parallel_for(n, block, [&](std::size_t begin, std::size_t end) {
+      std::uint32_t* count = places.data() + begin / block * buckets;
+      std::fill_n(count, buckets, 0u);
+      for (std::size_t i = begin; i < end; ++i) ++count[digit(from[i])];
+    });
     std::uint32_t sum = 0;
-    for (std::size_t b = 0; b < buckets; ++b) sum += std::exchange(next[b], sum);
-    for (std::size_t i = 0; i < n; ++i) to[next[(from[i].key >> (pass * bits)) & (buckets - 1)]++] = from[i];
+    for (std::size_t bucket = 0; bucket < buckets; ++bucket)
+      for (std::size_t b = 0; b < blocks; ++b) sum += std::exchange(places[b * buckets + bucket], sum);
+    parallel_for(n, block, [&](std::size_t begin, std::size_t end) {
+      std::uint32_t* place = places.data() + begin / block * buckets;
+      for (std::size_t i = begin; i < end; ++i) to[place[digit(from[i])]++] = from[i];
+    });
     std::swap(from, to);
   }
   return from;

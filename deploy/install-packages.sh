@@ -1,0 +1,36 @@
+#!/usr/bin/env bash
+# Installs what splatdrag needs to build and test on Debian 12. Asks nothing, and does nothing where all is installed.
+set -euo pipefail
+
+packages=(
+  g++ cmake ninja-build ccache git ca-certificates
+  libopenimageio-dev openimageio-tools libopenexr-dev  # pictures
+  libglm-dev libexpected-dev libtbb-dev libhwy-dev     # mathematics, results, threads, SIMD
+  nlohmann-json3-dev libtomlplusplus-dev libcli11-dev libspdlog-dev
+  zlib1g-dev libzstd-dev                               # compressed scenes
+  libgtest-dev libbenchmark-dev                        # tests and benchmarks
+)
+
+installed() { [[ "$(dpkg-query --show --showformat='${db:Status-Status}' "$1" 2>/dev/null)" == installed ]]; }
+
+missing=()
+for package in "${packages[@]}"; do
+  installed "$package" || missing+=("$package")
+done
+if ((${#missing[@]} == 0)); then
+  exit 0
+fi
+
+as_root=()
+if ((EUID != 0)); then
+  if ! sudo -n true 2>/dev/null; then
+    echo "error: these packages are missing and only root can install them: ${missing[*]}" >&2
+    echo "run: sudo apt-get install --no-install-recommends ${missing[*]}" >&2
+    exit 1
+  fi
+  as_root=(sudo -n)
+fi
+echo "Installing ${missing[*]}"
+apt=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -q)
+"${apt[@]}" update
+"${apt[@]}" install -y --no-install-recommends "${missing[@]}"

@@ -1,0 +1,264 @@
+#include "proto/edit_request.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "proto/json_document.h"
+#include "proto/json_fields.h"
+#include "proto/json_text.h"
+
+namespace proto {
+namespace {
+
+using engine::Error;
+using engine::ErrorCode;
+using engine::fail;
+using engine::propagate;
+using nlohmann::json;
+using nlohmann::ordered_json;
+
+constexpr std::array mode_names{Name{Mode::move, "move"}, Name{Mode::extend, "extend"}};
+constexpr std::array preset_names{Name{Preset::preview, "preview"}, Name{Preset::draft, "draft"},
+                                  Name{Preset::standard, "standard"}, Name{Preset::paper, "paper"}};
+constexpr std::array annealing_names{Name{Annealing::linear, "linear"}, Name{Annealing::paper, "paper"}};
+constexpr std::array corrector_names{Name{Corrector::none, "none"}, Name{Corrector::scene, "scene"},
+                                     Name{Corrector::sd, "sd"}};
+constexpr std::array perceptual_names{Name{Perceptual::msssim, "msssim"}, Name{Perceptual::lpips, "lpips"}};
+constexpr std::array rotation_names{Name{Rotation::shortest_arc, "shortest_arc"}, Name{Rotation::paper, "paper"},
+                                    Name{Rotation::none, "none"}};
+constexpr std::array interpolation_names{Name{Interpolation::paper, "paper"}, Name{Interpolation::smooth, "smooth"},
+                                         Name{Interpolation::rigid, "rigid"}};
+constexpr std::array background_names{Name{Background::render, "render"}, Name{Background::photo, "photo"}};
+
+constexpr int no_limit = std::numeric_limits<int>::max();
+
+template <class E, std::size_t N>
+std::string_view name_in(const std::array<Name<E>, N>& names, E value) {
+  return std::find_if(names.begin(), names.end(), [&](const Name<E>& name) { return name.value == value; })->text;
+}
+
+Handle read_handle(const Field& field) {
+  const Members members(field, {"source", "target", "radius", "group"});
+  Handle handle;
+  if (const auto source = members.required("source")) handle.source = source->point();
+  if (const auto target = members.optional("target")) handle.target = target->point();
+  if (const auto radius = members.required("radius")) handle.radius = radius->length();
+  if (const auto group = members.optional("group")) handle.group = group->whole(0, no_limit);
+  return handle;
+}
+
+Region read_region(const Field& field, std::string_view size_name) {
+  const Members members(field, {"center", size_name});
+  Region region;
+  if (const auto center = members.required("center")) region.center = center->point();
+  if (const auto size = members.required(size_name)) region.size = size->edges();
+  return region;
+}
+
+std::vector<std::string> read_names(const Field& field) {
+  std::vector<std::string> names;
+  for (const Field& name : field.elements(0, max_excluded_views, "names of views")) names.push_back(name.text());
+  return names;
+}
+
+Params read_params(const Field& field) {
+  const Members members(field, {"intervals", "annealing_steps", "strength_initial", "strength_final", "annealing",
+                                "iterations", "views", "exclude_views", "max_image_side", "corrector", "perceptual",
+                                "rotation", "interpolation", "rotate_sh", "background", "seed"});
+  Params params;
+  if (const auto f = members.optional("intervals")) params.intervals = f->whole(1, 20);
+  if (const auto f = members.optional("annealing_steps")) params.annealing_steps = f->whole(1, 100);
+  if (const auto f = members.optional("strength_initial")) params.strength_initial = f->number(0, 1);
+  if (const auto f = members.optional("strength_final")) params.strength_final = f->number(0, 1);
+  if (const auto f = members.optional("annealing")) params.annealing = f->one_of(annealing_names);
+  if (const auto f = members.optional("iterations")) params.iterations = f->whole(0, 1'000'000);
+  if (const auto f = members.optional("views")) params.views = f->whole(1, 1000);
+  if (const auto f = members.optional("exclude_views")) params.exclude_views = read_names(*f);
+  if (const auto f = members.optional("max_image_side")) params.max_image_side = f->whole(16, 16384);
+  if (const auto f = members.optional("corrector")) params.corrector = f->one_of(corrector_names);
+  if (const auto f = members.optional("perceptual")) params.perceptual = f->one_of(perceptual_names);
+  if (const auto f = members.optional("rotation")) params.rotation = f->one_of(rotation_names);
+  if (const auto f = members.optional("interpolation")) params.interpolation = f->one_of(interpolation_names);
+  if (const auto f = members.optional("rotate_sh")) params.rotate_sh = f->boolean();
+  if (const auto f = members.optional("background")) params.background = f->one_of(background_names);
+  if (const auto f = members.optional("seed")) params.seed = f->unsigned_number();
+  return params;
+}
+
+EditRequest read_edit_request(const Field& field) {
+  const Members members(field, {"scene", "version", "mode", "preset", "prompt", "handles", "region", "params"});
+  EditRequest request;
+  if (const auto f = members.optional("scene")) request.scene = f->text();
+  if (const auto f = members.optional("version")) request.version = f->whole(0, no_limit);
+  if (const auto f = members.optional("mode")) request.mode = f->one_of(mode_names);
+  if (const auto f = members.optional("preset")) request.preset = f->one_of(preset_names);
+  if (const auto f = members.optional("prompt"); f && !f->is_null()) request.prompt = f->text();
+  if (const auto handles = members.required("handles"))
+    for (const Field& handle : handles->elements(1, max_handles, "handles"))
+      request.handles.push_back(read_handle(handle));
+  if (const auto f = members.optional("region")) request.region = read_region(*f, "size");
+  if (const auto f = members.optional("params")) request.params = read_params(*f);
+  return request;
+}
+
+/// One element per handle, or a refusal that says how many there are.
+std::vector<Field> per_handle(const Field& field, std::size_t handles, const std::string& things) {
+  return field.elements(handles, handles, things + ", as many as start has");
+}
+
+EditRequest read_released_config(const Field& field) {
+  const Members members(field, {"start", "direction", "voxel_size", "cluster", "local_mask", "mode"});
+  EditRequest request;
+  if (const auto start = members.required("start"))
+    for (const Field& source : start->elements(1, max_handles, "points"))
+      request.handles.push_back({.source = source.point(), .target = {}});
+  const std::size_t n = request.handles.size();
+  if (const auto f = members.required("direction")) {
+    const auto directions = per_handle(*f, n, "directions");
+    for (std::size_t i = 0; i < directions.size(); ++i) {
+      const Point motion = directions[i].point();
+      if (motion == Point{}) continue;
+      const Point& source = request.handles[i].source;
+      request.handles[i].target = Point{source[0] + motion[0], source[1] + motion[1], source[2] + motion[2]};
+    }
+  }
+  if (const auto f = members.required("voxel_size"))
+    for (Handle& handle : request.handles) handle.radius = f->length();
+  if (const auto f = members.optional("cluster")) {
+    const auto groups = per_handle(*f, n, "numbers");
+    for (std::size_t i = 0; i < groups.size(); ++i) request.handles[i].group = groups[i].whole(0, no_limit);
+  }
+  if (const auto f = members.optional("local_mask")) request.region = read_region(*f, "xyz");
+  if (const auto f = members.optional("mode")) request.mode = f->one_of(mode_names);
+  return request;
+}
+
+template <class Read>
+Result<EditRequest> decode(const json& document, const std::string& where, Read read) {
+  std::optional<Error> error;
+  EditRequest request = read(Field(document, where, error));
+  if (error) return tl::make_unexpected(std::move(*error));
+  return request;
+}
+
+bool is_released_config(const json& document) {
+  return document.contains("start") || document.contains("direction") || document.contains("voxel_size");
+}
+
+bool is_edit_request(const json& document) { return document.contains("handles"); }
+
+Result<EditRequest> decode_either(const json& document, const std::string& where) {
+  if (is_edit_request(document)) return decode(document, where, read_edit_request);
+  if (is_released_config(document)) return decode(document, where, read_released_config);
+  return fail(ErrorCode::invalid_argument,
+              "expected an edit request (with handles) or a 3DGS-Drag configuration (with start, direction and "
+              "voxel_size)",
+              where);
+}
+
+/// The requests of a file of several, by name; none if the document is something else.
+std::vector<std::string> request_names(const json& document) {
+  std::vector<std::string> names;
+  if (!document.is_object()) return names;
+  for (const auto& member : document.items()) {
+    if (member.value().is_object())
+      names.push_back(member.key());
+    else if (!member.value().is_string())
+      return {};
+  }
+  return names;
+}
+
+std::string listed(const std::vector<std::string>& names) {
+  constexpr std::size_t enough = 20;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(names.size(), enough); ++i) text += (i == 0 ? "" : ", ") + printable(names[i]);
+  return names.size() > enough ? text + ", ..." : text;
+}
+
+ordered_json encode(const Handle& handle) {
+  ordered_json out{{"source", handle.source}};
+  if (handle.target) out["target"] = *handle.target;
+  out["radius"] = handle.radius;
+  out["group"] = handle.group;
+  return out;
+}
+
+ordered_json encode(const Params& params) {
+  ordered_json out = ordered_json::object();
+  const auto put = [&](const char* name, const auto& value) {
+    if (value) out[name] = *value;
+  };
+  const auto put_name = [&](const char* name, const auto& value, const auto& names) {
+    if (value) out[name] = name_in(names, *value);
+  };
+  put("intervals", params.intervals);
+  put("annealing_steps", params.annealing_steps);
+  put("strength_initial", params.strength_initial);
+  put("strength_final", params.strength_final);
+  put_name("annealing", params.annealing, annealing_names);
+  put("iterations", params.iterations);
+  put("views", params.views);
+  put("exclude_views", params.exclude_views);
+  put("max_image_side", params.max_image_side);
+  put_name("corrector", params.corrector, corrector_names);
+  put_name("perceptual", params.perceptual, perceptual_names);
+  put_name("rotation", params.rotation, rotation_names);
+  put_name("interpolation", params.interpolation, interpolation_names);
+  put("rotate_sh", params.rotate_sh);
+  put_name("background", params.background, background_names);
+  put("seed", params.seed);
+  return out;
+}
+
+}  // namespace
+
+Result<EditRequest> parse_edit_request(std::string_view text, const JsonLimits& limits) {
+  const auto document = parse_document(text, limits);
+  if (!document) return propagate(document);
+  return decode(*document, "", read_edit_request);
+}
+
+Result<EditRequest> parse_released_config(std::string_view text, const JsonLimits& limits) {
+  const auto document = parse_document(text, limits);
+  if (!document) return propagate(document);
+  return decode(*document, "", read_released_config);
+}
+
+Result<EditRequest> parse_request_file(std::string_view text, std::string_view name, const JsonLimits& limits) {
+  const auto document = parse_document(text, limits);
+  if (!document) return propagate(document);
+  if (is_edit_request(*document) || is_released_config(*document)) {
+    if (name.empty()) return decode_either(*document, "");
+    return fail(ErrorCode::invalid_argument, "the file holds one request, which has no name: leave the name out");
+  }
+  const auto names = request_names(*document);
+  if (names.empty()) return decode_either(*document, "");
+  if (name.empty() && names.size() > 1)
+    return fail(ErrorCode::invalid_argument, "the file holds several requests; choose one by name: " + listed(names));
+  const std::string chosen(name.empty() ? names.front() : name);
+  if (std::find(names.begin(), names.end(), chosen) == names.end())
+    return fail(ErrorCode::not_found, "there is no request \"" + printable(chosen) + "\"; there are: " + listed(names));
+  return decode_either((*document)[chosen], printable(chosen));
+}
+
+std::string to_json(const EditRequest& request) {
+  ordered_json out = ordered_json::object();
+  if (request.scene) out["scene"] = *request.scene;
+  if (request.version) out["version"] = *request.version;
+  out["mode"] = name_of(request.mode);
+  if (request.preset) out["preset"] = name_of(*request.preset);
+  if (request.prompt) out["prompt"] = *request.prompt;
+  ordered_json& handles = out["handles"] = ordered_json::array();
+  for (const Handle& handle : request.handles) handles.push_back(encode(handle));
+  if (request.region) out["region"] = {{"center", request.region->center}, {"size", request.region->size}};
+  out["params"] = encode(request.params);
+  return pretty(out);
+}
+
+std::string_view name_of(Mode value) { return name_in(mode_names, value); }
+std::string_view name_of(Preset value) { return name_in(preset_names, value); }
+std::string_view name_of(Corrector value) { return name_in(corrector_names, value); }
+
+}  // namespace proto

@@ -1,0 +1,118 @@
+// The edit request as it travels: JSON in, a plain struct, JSON out. The names are the contract with clients.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "engine/core/result.h"
+
+namespace proto {
+
+using engine::Result;
+
+using Point = std::array<double, 3>;  ///< World units, the file's own frame.
+
+enum class Mode { move, extend };
+enum class Preset { preview, draft, standard, paper };
+enum class Annealing { linear, paper };
+enum class Corrector { none, scene, sd };
+enum class Perceptual { msssim, lpips };
+enum class Rotation { shortest_arc, paper, none };
+enum class Interpolation { paper, smooth, rigid };
+enum class Background { render, photo };
+
+constexpr std::size_t max_handles = 256;
+constexpr std::size_t max_excluded_views = 1000;
+constexpr std::size_t max_text_bytes = 4096;  ///< Of a prompt, a name.
+constexpr double max_coordinate = 1e12;       ///< World units.
+
+struct Handle {
+  Point source{};
+  std::optional<Point> target;  ///< Nothing: an anchor.
+  double radius = 0;            ///< World units, above 0.
+  int group = 0;                ///< From 0 up.
+  bool operator==(const Handle&) const = default;
+};
+
+struct Region {
+  Point center{}, size{};  ///< World units; full edge lengths, above 0.
+  bool operator==(const Region&) const = default;
+};
+
+/// What is not given is left to the preset and to the defaults of the engine.
+struct Params {
+  std::optional<int> intervals;            ///< T, 1 to 20
+  std::optional<int> annealing_steps;      ///< A, 1 to 100
+  std::optional<double> strength_initial;  ///< 0 to 1
+  std::optional<double> strength_final;    ///< 0 to 1
+  std::optional<Annealing> annealing;
+  std::optional<int> iterations;                          ///< Per correction, 0 to 1,000,000
+  std::optional<int> views;                               ///< 1 to 1000
+  std::optional<std::vector<std::string>> exclude_views;  ///< Names of views
+  std::optional<int> max_image_side;                      ///< Pixels, 16 to 16384
+  std::optional<Corrector> corrector;
+  std::optional<Perceptual> perceptual;
+  std::optional<Rotation> rotation;
+  std::optional<Interpolation> interpolation;
+  std::optional<bool> rotate_sh;
+  std::optional<Background> background;
+  std::optional<std::uint64_t> seed;
+  bool operator==(const Params&) const = default;
+};
+
+struct EditRequest {
+  std::optional<std::string> scene;  ///< Id of a scene that a service holds.
+  std::optional<int> version;        ///< Of that scene, from 0 up.
+  Mode mode = Mode::move;
+  std::optional<Preset> preset;
+  std::optional<std::string> prompt;
+  std::vector<Handle> handles;  ///< 1 to max_handles
+  std::optional<Region> region;
+  Params params;
+  bool operator==(const EditRequest&) const = default;
+};
+
+/// What a JSON document may be; checked while it is read, before memory grows with it.
+struct JsonLimits {
+  std::size_t max_bytes = std::size_t{1} << 20;
+  int max_depth = 16;  ///< Arrays and objects within one another.
+};
+
+/// Decodes a request. Strict: a field that is unknown, missing, given twice, of the wrong type, not finite or out of
+/// range is an error.
+///   errors  invalid_argument: `where` is the field's address, such as "handles[2].radius" or "params.views", or for
+///           text that is no JSON "line 3, column 7"; too_large: a limit, which the message names
+[[nodiscard]] Result<EditRequest> parse_edit_request(std::string_view text, const JsonLimits& limits = {});
+
+/// Decodes a configuration file as released with 3DGS-Drag:
+///   start       [n][3] source of each handle          direction  [n][3] its motion: target = start + direction
+///   voxel_size  radius of every handle                 cluster    [n] group of each handle; default: all 0
+///   local_mask  {"center": [3], "xyz": [3]}: the region, with full edge lengths; default: none
+///   mode        "move" or "extend"; default: "move"
+/// A direction of exactly zero makes an anchor: the released program moves such a handle by nothing.
+///   errors  as parse_edit_request()
+[[nodiscard]] Result<EditRequest> parse_released_config(std::string_view text, const JsonLimits& limits = {});
+
+/// Decodes a file of either form, or of several requests by name ({"ear_up": {...}, "comment": "..."}; members that are
+/// strings are comments).
+///   name    which of several; empty: the file holds one
+///   errors  as parse_edit_request(), with the name before the address ("ear_up.handles[2].radius");
+///           invalid_argument: several and no name, or a name and one; not_found: no request of that name. The message
+///           lists the names there are.
+[[nodiscard]] Result<EditRequest> parse_request_file(std::string_view text, std::string_view name,
+                                                     const JsonLimits& limits = {});
+
+/// The request as indented JSON that parse_edit_request() reads back; what is not given is left out.
+[[nodiscard]] std::string to_json(const EditRequest& request);
+
+/// The name that a value has on the wire, such as "shortest_arc".
+[[nodiscard]] std::string_view name_of(Mode value);
+[[nodiscard]] std::string_view name_of(Preset value);
+[[nodiscard]] std::string_view name_of(Corrector value);
+
+}  // namespace proto

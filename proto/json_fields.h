@@ -1,0 +1,90 @@
+// Reading a request out of a JSON document, strictly.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <initializer_list>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "proto/edit_request.h"
+
+namespace proto {
+
+/// The names of an enumeration's values on the wire.
+template <class E>
+struct Name {
+  E value;
+  std::string_view text;
+};
+
+/// A place in a document: a value and its address. The first failure below a document is noted in its error; after one,
+/// reading goes on with harmless values.
+class Field {
+ public:
+  Field(const nlohmann::json& value, std::string where, std::optional<engine::Error>& error)
+      : value_(&value), where_(std::move(where)), error_(&error) {}
+
+  /// A finite number, low <= x <= high.
+  [[nodiscard]] double number(double low, double high) const;
+  /// A number above 0, at most max_coordinate.
+  [[nodiscard]] double length() const;
+  [[nodiscard]] int whole(int low, int high) const;
+  [[nodiscard]] std::uint64_t unsigned_number() const;
+  [[nodiscard]] bool boolean() const;
+  [[nodiscard]] std::string text() const;  ///< Up to max_text_bytes.
+  [[nodiscard]] Point point() const;       ///< Coordinates within max_coordinate.
+  [[nodiscard]] Point edges() const;       ///< Three lengths.
+  template <class E, std::size_t N>
+  [[nodiscard]] E one_of(const std::array<Name<E>, N>& names) const;
+  /// The elements of an array of low to high of `things`.
+  [[nodiscard]] std::vector<Field> elements(std::size_t low, std::size_t high, const std::string& things) const;
+
+  [[nodiscard]] bool is_object() const { return value_->is_object(); }
+  [[nodiscard]] bool is_null() const { return value_->is_null(); }
+  [[nodiscard]] const std::string& where() const { return where_; }
+  /// Notes a failure here, unless one has been noted before.
+  void refuse(std::string message) const;
+
+ private:
+  friend class Members;
+
+  void expected(const std::string& what) const;
+
+  const nlohmann::json* value_;
+  std::string where_;
+  std::optional<engine::Error>* error_;
+};
+
+/// The members of an object; those not in `known` are refused at once.
+class Members {
+ public:
+  Members(const Field& object, std::initializer_list<std::string_view> known);
+
+  /// Refuses the object if the member is missing.
+  [[nodiscard]] std::optional<Field> required(std::string_view name) const;
+  [[nodiscard]] std::optional<Field> optional(std::string_view name) const;
+
+ private:
+  [[nodiscard]] std::string address(std::string_view name) const;
+
+  Field object_;
+};
+
+template <class E, std::size_t N>
+E Field::one_of(const std::array<Name<E>, N>& names) const {
+  if (value_->is_string())
+    for (const Name<E>& name : names)
+      if (value_->get_ref<const std::string&>() == name.text) return name.value;
+  std::string choices;
+  for (const Name<E>& name : names) choices += (choices.empty() ? "\"" : ", \"") + std::string(name.text) + '"';
+  expected("one of " + choices);
+  return names.front().value;
+}
+
+}  // namespace proto

@@ -1,0 +1,14 @@
+// The subcommands. Each function adds one to the program; when it is chosen on the command line, `action` is set.
+#pragma once
+
+#include "server/options.h"
+
+namespace server {
+
+void add_edit_command(CLI::App& program, Action& action);
+void add_render_command(CLI::App& program, Action& action);
+void add_info_command(CLI::App& program, Action& action);
+void add_convert_command(CLI::App& program, Action& action);
+void add_demo_scene_command(CLI::App& program, Action& action);
+
+}  // namespace server

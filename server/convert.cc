@@ -1,0 +1,152 @@
+#include "server/convert.h"
+
+#include <utility>
+
+namespace server {
+namespace {
+
+namespace edit = engine::edit;
+
+static_assert(proto::max_handles == edit::max_handles && proto::max_coordinate == edit::max_coordinate);
+
+// The numbers of `paper`; the other presets leave the deformation to the engine's defaults.
+constexpr int paper_intervals = 5, paper_views = 50;
+
+engine::DVec3 to_vec(const proto::Point& p) { return {p[0], p[1], p[2]}; }
+proto::Point to_point(engine::DVec3 v) { return {v.x, v.y, v.z}; }
+
+edit::Mode to_engine(proto::Mode mode) { return mode == proto::Mode::extend ? edit::Mode::extend : edit::Mode::move; }
+
+edit::Rotation to_engine(proto::Rotation rotation) {
+  switch (rotation) {
+    case proto::Rotation::paper:
+      return edit::Rotation::paper;
+    case proto::Rotation::none:
+      return edit::Rotation::none;
+    case proto::Rotation::shortest_arc:
+      break;
+  }
+  return edit::Rotation::shortest_arc;
+}
+
+proto::Rotation to_wire(edit::Rotation rotation) {
+  switch (rotation) {
+    case edit::Rotation::paper:
+      return proto::Rotation::paper;
+    case edit::Rotation::none:
+      return proto::Rotation::none;
+    case edit::Rotation::shortest_arc:
+      break;
+  }
+  return proto::Rotation::shortest_arc;
+}
+
+edit::Interpolation to_engine(proto::Interpolation interpolation) {
+  switch (interpolation) {
+    case proto::Interpolation::smooth:
+      return edit::Interpolation::smooth;
+    case proto::Interpolation::rigid:
+      return edit::Interpolation::rigid;
+    case proto::Interpolation::paper:
+      break;
+  }
+  return edit::Interpolation::paper;
+}
+
+proto::Interpolation to_wire(edit::Interpolation interpolation) {
+  switch (interpolation) {
+    case edit::Interpolation::smooth:
+      return proto::Interpolation::smooth;
+    case edit::Interpolation::rigid:
+      return proto::Interpolation::rigid;
+    case edit::Interpolation::paper:
+      break;
+  }
+  return proto::Interpolation::paper;
+}
+
+edit::Params to_engine(const proto::Params& given, std::optional<proto::Preset> preset) {
+  edit::Params params;
+  if (preset == proto::Preset::paper) {
+    params.intervals = paper_intervals;
+    params.views = paper_views;
+  }
+  if (given.intervals) params.intervals = *given.intervals;
+  if (given.views) params.views = *given.views;
+  if (given.exclude_views) params.exclude_views = *given.exclude_views;
+  if (given.max_image_side) params.max_image_side = *given.max_image_side;
+  if (given.rotation) params.rotation = to_engine(*given.rotation);
+  if (given.interpolation) params.interpolation = to_engine(*given.interpolation);
+  if (given.rotate_sh) params.rotate_sh = *given.rotate_sh;
+  if (given.seed) params.seed = *given.seed;
+  return params;
+}
+
+}  // namespace
+
+engine::Result<edit::Request> to_engine(const proto::EditRequest& request) {
+  const auto corrector = request.params.corrector.value_or(proto::Corrector::none);
+  if (corrector != proto::Corrector::none)
+    return engine::fail(engine::ErrorCode::unsupported,
+                        "this build has no corrector \"" + std::string(name_of(corrector)) +
+                            "\"; available: \"none\", which is the default",
+                        "params.corrector");
+  edit::Request out;
+  out.mode = to_engine(request.mode);
+  for (const proto::Handle& handle : request.handles) {
+    edit::Handle& made = out.handles.emplace_back();
+    made.source = to_vec(handle.source);
+    if (handle.target) made.target = to_vec(*handle.target);
+    made.radius = handle.radius;
+    made.group = handle.group;
+  }
+  if (request.region) out.region = {to_vec(request.region->center), to_vec(request.region->size)};
+  out.params = to_engine(request.params, request.preset);
+  return out;
+}
+
+proto::EditRequest resolved(const proto::EditRequest& asked, const edit::Params& used) {
+  proto::EditRequest out = asked;
+  out.params.intervals = used.intervals;
+  out.params.views = used.views;
+  out.params.exclude_views = used.exclude_views;
+  out.params.max_image_side = used.max_image_side;
+  out.params.corrector = proto::Corrector::none;
+  out.params.rotation = to_wire(used.rotation);
+  out.params.interpolation = to_wire(used.interpolation);
+  out.params.rotate_sh = used.rotate_sh;
+  out.params.seed = used.seed;
+  return out;
+}
+
+std::vector<std::string> fields_without_effect(const proto::EditRequest& request) {
+  std::vector<std::string> fields;
+  const auto note = [&](bool given, const char* field) {
+    if (given) fields.emplace_back(field);
+  };
+  const proto::Params& params = request.params;
+  note(request.preset == proto::Preset::draft || request.preset == proto::Preset::standard, "preset");
+  note(request.prompt.has_value(), "prompt");
+  note(params.annealing_steps.has_value(), "params.annealing_steps");
+  note(params.strength_initial.has_value(), "params.strength_initial");
+  note(params.strength_final.has_value(), "params.strength_final");
+  note(params.annealing.has_value(), "params.annealing");
+  note(params.iterations.has_value(), "params.iterations");
+  note(params.perceptual.has_value(), "params.perceptual");
+  note(params.background.has_value(), "params.background");
+  return fields;
+}
+
+proto::EditRequest to_request(const engine::procedural::SuggestedDrag& drag) {
+  proto::EditRequest request;
+  request.mode = drag.mode == "extend" ? proto::Mode::extend : proto::Mode::move;
+  for (const auto& handle : drag.handles) {
+    proto::Handle& made = request.handles.emplace_back();
+    made.source = to_point(handle.source);
+    if (handle.target) made.target = to_point(*handle.target);
+    made.radius = handle.radius;
+  }
+  return request;
+}
+
+}  // namespace server

@@ -1,0 +1,220 @@
+// splatdrag edit: a scene and a drag in, the edited scene and what there is to know about it out.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "engine/edit/edit.h"
+#include "engine/io/atomic_file.h"
+#include "engine/io/dataset.h"
+#include "engine/io/image_file.h"
+#include "engine/io/scene_file.h"
+#include "engine/render/forward.h"
+#include "server/commands.h"
+#include "server/compute.h"
+#include "server/convert.h"
+#include "server/edit_report.h"
+#include "server/folders.h"
+#include "server/picture_names.h"
+#include "server/pictures.h"
+#include "server/progress_display.h"
+#include "server/request_file.h"
+
+namespace server {
+namespace {
+
+namespace edit = engine::edit;
+namespace io = engine::io;
+namespace scene = engine::scene;
+using engine::ErrorCode;
+using engine::fail;
+using engine::propagate;
+using std::filesystem::path;
+
+struct EditOptions {
+  std::string scene, dataset, request, name, out;
+  int pictures = 3;
+  ComputeOptions compute;
+};
+
+/// Errors of the engine name a field of the request; the user knows the request by its file.
+void locate_in_file(engine::Error& error, const EditOptions& options) {
+  for (const char* field : {"handles", "region", "params"})
+    if (error.where.starts_with(field)) {
+      error.where = path(options.request).filename().string() + ":" + (options.name.empty() ? "" : options.name + ".") +
+                    error.where;
+      return;
+    }
+}
+
+/// The request in both forms: as asked, and for the engine.
+struct BothRequests {
+  proto::EditRequest asked;
+  edit::Request engine;
+};
+
+Result<BothRequests> load_request(const EditOptions& options) {
+  auto asked = read_request(options.request, options.name);
+  if (!asked) return propagate(asked);
+  auto request = to_engine(*asked);
+  if (request)
+    if (const auto valid = edit::validate(*request); !valid) request = propagate(valid);
+  if (!request) {
+    locate_in_file(request.error(), options);
+    return propagate(request);
+  }
+  return BothRequests{std::move(*asked), std::move(*request)};
+}
+
+Result<std::vector<scene::Camera>> load_cameras(const std::string& dataset) {
+  std::vector<scene::Camera> cameras;
+  if (dataset.empty()) return cameras;
+  const auto read = io::read_dataset(dataset, {.points = false});
+  if (!read) return propagate(read);
+  for (const io::View& view : read->views) cameras.push_back(view.camera);
+  return cameras;
+}
+
+Result<void> keep_input_safe(const path& input, const path& output) {
+  std::error_code absent;
+  if (!std::filesystem::equivalent(input, output, absent)) return {};
+  return fail(ErrorCode::conflict, "the edited scene would replace the scene it was made from; choose another --out",
+              output.string());
+}
+
+/// Before, after and mask of the best views.
+Result<std::vector<ViewPictures>> write_pictures(const path& folder, const scene::GaussianCloud& before,
+                                                 const scene::GaussianCloud& after, const edit::Outcome& outcome,
+                                                 std::size_t count) {
+  const auto names = picture_names(outcome.views);
+  std::vector<ViewPictures> written;
+  for (std::size_t v = 0; v < std::min(count, outcome.views.size()); ++v) {
+    const scene::Image was = engine::render::forward(before, outcome.views[v]).color;
+    const scene::Image is = engine::render::forward(after, outcome.views[v]).color;
+    ViewPictures pictures{outcome.views[v].name, "before_" + names[v] + ".png", "after_" + names[v] + ".png",
+                          "mask_" + names[v] + ".png", psnr_outside(was, is, outcome.masks[v])};
+    for (const auto& [name, picture] : {std::pair<std::string&, scene::Image>{pictures.before, was},
+                                        {pictures.after, is},
+                                        {pictures.mask, with_mask_shown(was, outcome.masks[v])}})
+      if (const auto saved = io::write_image(folder / name, picture); !saved) return propagate(saved);
+    written.push_back(std::move(pictures));
+  }
+  return written;
+}
+
+void summarise(std::ostream& out, const path& folder, const EditReport& report) {
+  const edit::Report& edit = report.edit;
+  out << (folder / "scene.ply").string() << ": " << edit.output_gaussians << " Gaussians, "
+      << edit.input_gaussians - edit.removed << " of the " << edit.input_gaussians << " before and " << edit.copies
+      << " deformed copies\n";
+  for (std::size_t i = 0; i < edit.handles.size(); ++i)
+    out << "handle " << i << ": " << edit.handles[i].gaussians << " Gaussians\n";
+  for (const ViewPictures& pictures : report.pictures) {
+    out << (folder / pictures.after).string() << ": outside the mask ";
+    if (std::isfinite(pictures.psnr_outside_db))
+      out << std::round(10 * pictures.psnr_outside_db) / 10 << " dB against " << pictures.before << '\n';
+    else
+      out << "the same as " << pictures.before << '\n';
+  }
+}
+
+/// The edit itself, shown to the user as it goes.
+Result<edit::Outcome> run_shown(const scene::GaussianCloud& input, const std::vector<scene::Camera>& cameras,
+                                const edit::Request& request, Terminal& terminal) {
+  ProgressDisplay display(terminal.err,
+                          terminal.err_is_terminal ? ProgressDisplay::Style::bar : ProgressDisplay::Style::lines);
+  edit::Observer observer;
+  observer.progress = [&](const edit::Progress& progress) { display.show(progress); };
+  return edit::run(input, cameras, request, observer);
+}
+
+std::vector<std::string> all_warnings(const edit::Report& report, const proto::EditRequest& asked) {
+  std::vector<std::string> warnings = report.warnings;
+  if (const auto unused = fields_without_effect(asked); !unused.empty()) {
+    std::string warning = "this build deforms, it does not correct or optimise; without effect:";
+    for (const std::string& field : unused) warning += " " + field;
+    warnings.push_back(std::move(warning));
+  }
+  return warnings;
+}
+
+/// Everything in the output folder; the scene first, because it is what nobody wants to lose.
+Result<void> write_results(const path& folder, std::size_t pictured_views, const io::SceneFile& input,
+                           edit::Outcome outcome, EditReport& report) {
+  const io::SceneFile edited{std::move(outcome.cloud), input.layout};
+  if (auto saved = io::write_scene(folder / "scene.ply", edited, io::SceneFormat::ply); !saved) return saved;
+  auto pictures = write_pictures(folder, input.cloud, edited.cloud, outcome, pictured_views);
+  if (!pictures) return propagate(pictures);
+  report.pictures = std::move(*pictures);
+  const std::string json = to_json(report);
+  return io::write_file(folder / "report.json", std::as_bytes(std::span(json)));
+}
+
+Result<void> run(const EditOptions& options, Terminal& terminal) {
+  const path folder = options.out;
+  const auto request = load_request(options);
+  if (!request) return propagate(request);
+  if (auto safe = keep_input_safe(options.scene, folder / "scene.ply"); !safe) return safe;
+  const auto input = io::read_scene(options.scene);
+  if (!input) return propagate(input);
+  const auto cameras = load_cameras(options.dataset);
+  if (!cameras) return propagate(cameras);
+  if (auto made = make_folder(folder); !made) return made;
+
+  return compute(options.compute, [&](const Machine& machine) -> Result<void> {
+    const auto start = std::chrono::steady_clock::now();
+    auto outcome = run_shown(input->cloud, *cameras, request->engine, terminal);
+    if (!outcome) {
+      locate_in_file(outcome.error(), options);
+      return propagate(outcome);
+    }
+    EditReport report;
+    report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    report.scene_file = path(options.scene).filename().string();
+    report.machine = machine;
+    report.request = resolved(request->asked, outcome->report.resolved);
+    report.edit = outcome->report;
+    report.edit.warnings = all_warnings(outcome->report, request->asked);
+    for (const std::string& warning : report.edit.warnings) terminal.err << "warning: " << warning << '\n';
+    auto written = write_results(folder, std::size_t(options.pictures), *input, std::move(*outcome), report);
+    if (written) summarise(terminal.out, folder, report);
+    return written;
+  });
+}
+
+}  // namespace
+
+void add_edit_command(CLI::App& program, Action& action) {
+  CLI::App* const command = program.add_subcommand("edit", "Drags parts of a scene and writes the edited scene");
+  const auto options = std::make_shared<EditOptions>();
+  command->add_option("--scene", options->scene, "Scene to edit: .ply, .splat or .spz")->required()->type_name("FILE");
+  command
+      ->add_option("--dataset", options->dataset,
+                   "Folder with the scene's cameras (COLMAP, transforms.json or an INRIA model); without it, cameras "
+                   "are placed around the handles")
+      ->type_name("DIR");
+  command
+      ->add_option("--request", options->request,
+                   "Edit request, a 3DGS-Drag configuration, or a file of several by name (JSON)")
+      ->required()
+      ->type_name("FILE");
+  command->add_option("--name", options->name, "Which request of a file of several")->type_name("NAME");
+  command
+      ->add_option("--out", options->out,
+                   "Folder for scene.ply, report.json and pictures of the best views; files of these names are "
+                   "replaced")
+      ->required()
+      ->type_name("DIR");
+  command->add_option("--pictures", options->pictures, "Views to show before, after and with the mask")
+      ->check(CLI::Range(0, 1000))
+      ->type_name("N");
+  add_compute_options(*command, options->compute);
+  command->callback([options, &action] { action = [options](Terminal& terminal) { return run(*options, terminal); }; });
+}
+
+}  // namespace server

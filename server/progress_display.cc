@@ -1,0 +1,57 @@
+#include "server/progress_display.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace server {
+namespace {
+
+using namespace std::chrono_literals;
+using Seconds = std::chrono::duration<double>;
+
+constexpr auto redraw_every = 100ms;  // faster than anyone reads, slow enough to cost nothing
+constexpr int line_every = 5;         // percent
+constexpr int bar_width = 28;         // characters
+
+}  // namespace
+
+ProgressDisplay::ProgressDisplay(std::ostream& out, Style style, Clock clock)
+    : out_(out), style_(style), clock_(std::move(clock)), start_(clock_()), drawn_(start_ - redraw_every) {}
+
+ProgressDisplay::~ProgressDisplay() {
+  if (style_ == Style::bar && percent_ >= 0) out_ << "\r\x1b[K" << std::flush;
+}
+
+void ProgressDisplay::show(const engine::edit::Progress& progress) {
+  const int percent = int(std::floor(100 * std::clamp(progress.fraction, 0.0, 1.0)));
+  if (style_ == Style::bar) {
+    if (clock_() - drawn_ < redraw_every && percent < 100) return;
+    drawn_ = clock_();
+    const int filled = bar_width * percent / 100;
+    out_ << "\r\x1b[K[" << std::string(std::size_t(filled), '#') << std::string(std::size_t(bar_width - filled), '.')
+         << "] " << description(progress) << std::flush;
+  } else {
+    if (percent_ >= 0 && percent < percent_ + line_every && (percent < 100 || percent_ == 100)) return;
+    out_ << description(progress) << '\n' << std::flush;
+  }
+  percent_ = percent;
+}
+
+std::string ProgressDisplay::description(const engine::edit::Progress& progress) const {
+  std::string text = std::to_string(int(std::floor(100 * progress.fraction))) + " %";
+  if (progress.interval > 0)
+    text += "  interval " + std::to_string(progress.interval) + " of " + std::to_string(progress.intervals);
+  return text + "  " + progress.stage + time_left(progress.fraction);
+}
+
+std::string ProgressDisplay::time_left(double fraction) const {
+  const double elapsed = Seconds(clock_() - start_).count();
+  // A guess from less than this would be noise.
+  if (fraction < 0.05 || fraction >= 1 || elapsed < 1) return {};
+  const auto seconds = std::int64_t(std::ceil(elapsed * (1 - fraction) / fraction));
+  if (seconds < 90) return "  about " + std::to_string(seconds) + " s left";
+  return "  about " + std::to_string((seconds + 59) / 60) + " min left";
+}
+
+}  // namespace server

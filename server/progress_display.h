@@ -1,0 +1,38 @@
+// Shows a running edit to the person who waits for it.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <ostream>
+#include <string>
+
+#include "engine/edit/edit.h"
+
+namespace server {
+
+/// On a terminal, one line that redraws itself; otherwise a line every few percent.
+class ProgressDisplay {
+ public:
+  enum class Style { bar, lines };
+  using Clock = std::function<std::chrono::steady_clock::time_point()>;
+
+  ProgressDisplay(std::ostream& out, Style style, Clock clock = std::chrono::steady_clock::now);
+  /// Removes the bar, so that what follows starts on a fresh line.
+  ~ProgressDisplay();
+  ProgressDisplay(const ProgressDisplay&) = delete;
+  ProgressDisplay& operator=(const ProgressDisplay&) = delete;
+
+  void show(const engine::edit::Progress& progress);
+
+ private:
+  [[nodiscard]] std::string description(const engine::edit::Progress& progress) const;
+  [[nodiscard]] std::string time_left(double fraction) const;
+
+  std::ostream& out_;
+  Style style_;
+  Clock clock_;
+  std::chrono::steady_clock::time_point start_, drawn_;
+  int percent_ = -1;  ///< As last shown.
+};
+
+}  // namespace server

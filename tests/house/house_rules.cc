@@ -1,0 +1,138 @@
+#include "tests/house/house_rules.h"
+
+#include <algorithm>
+#include <functional>
+#include <regex>
+#include <sstream>
+
+namespace house {
+namespace {
+
+/// Headers that only some rooms may include.
+struct Reserved {
+  std::string header;           ///< Begins with this.
+  std::set<std::string> rooms;  ///< Which may; nobody else.
+  bool in_headers = true;       ///< May their headers, too?
+};
+
+const std::vector<Reserved>& reserved() {
+  static const std::vector<Reserved> list = {{"flann/", {"engine/neighbours"}},
+                                             {"torch/", {"engine/diffusion"}, false},
+                                             {"ATen/", {"engine/diffusion"}, false},
+                                             {"OpenImageIO/", {"engine/io"}},
+                                             {"OpenEXR/", {"engine/io"}},
+                                             {"zlib.h", {"engine/io"}},
+                                             {"zstd.h", {"engine/io"}},
+                                             {"nlohmann/", {"engine/io", "proto", "server"}},
+                                             {"tbb/", {"engine/core"}},
+                                             {"oneapi/", {"engine/core"}},
+                                             {"sqlite3.h", {"engine/jobs"}},
+                                             {"httplib.h", {"server"}},
+                                             {"CLI/", {"server"}},
+                                             {"toml++/", {"server"}},
+                                             {"spdlog/", {"server"}},
+                                             {"prometheus/", {"server"}}};
+  return list;
+}
+
+/// Room that a path from the root lies in: "engine/render/forward.h" is in "engine/render"; "" if in none.
+std::string room_of(const std::string& path) {
+  const std::size_t first = path.find('/');
+  if (first == std::string::npos) return {};
+  const std::string top = path.substr(0, first);
+  if (top == "proto" || top == "server") return top;
+  if (top != "engine") return {};
+  const std::size_t second = path.find('/', first + 1);
+  return second == std::string::npos ? std::string() : path.substr(0, second);
+}
+
+/// "engine_render" is the library of "engine/render", "splatdrag_proto" that of "proto".
+std::string folder_of(const std::string& target) {
+  if (target.starts_with("engine_")) return "engine/" + target.substr(7);
+  if (target.starts_with("splatdrag_")) return target.substr(10);
+  return target;
+}
+
+std::string check_project_include(const Arrows& arrows, const std::string& room, const std::string& header) {
+  const std::string other = room_of(header);
+  if (other.empty()) return "\"" + header + "\" is no path from the root into a room";
+  if (other == room) return {};
+  const auto uses = arrows.find(room);
+  if (uses != arrows.end() && uses->second.contains(other)) return {};
+  return room + " includes " + other + ", which its USES does not declare";
+}
+
+std::string check_library_include(const std::string& room, bool in_header, const std::string& header) {
+  for (const Reserved& rule : reserved()) {
+    if (!header.starts_with(rule.header)) continue;
+    if (!rule.rooms.contains(room)) return "<" + header + "> does not belong into " + room;
+    if (in_header && !rule.in_headers) return "<" + header + "> belongs into .cc files only";
+  }
+  return {};
+}
+
+}  // namespace
+
+Arrows parse_arrows(const std::string& text) {
+  Arrows arrows;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t colon = line.find(':');
+    if (colon == std::string::npos) continue;
+    auto& uses = arrows[line.substr(0, colon)];
+    std::istringstream targets(line.substr(colon + 1));
+    for (std::string target; targets >> target;) uses.insert(folder_of(target));
+  }
+  return arrows;
+}
+
+std::vector<std::string> find_circle(const Arrows& arrows) {
+  std::vector<std::string> path, circle;
+  std::set<std::string> finished;
+  const std::function<void(const std::string&)> visit = [&](const std::string& room) {
+    if (!circle.empty() || finished.contains(room)) return;
+    const auto seen = std::find(path.begin(), path.end(), room);
+    if (seen != path.end()) {
+      circle.assign(seen, path.end());
+      circle.push_back(room);
+      return;
+    }
+    path.push_back(room);
+    if (const auto uses = arrows.find(room); uses != arrows.end())
+      for (const std::string& used : uses->second) visit(used);
+    path.pop_back();
+    finished.insert(room);
+  };
+  for (const auto& [room, uses] : arrows) visit(room);
+  return circle;
+}
+
+std::vector<std::string> violations(const Arrows& arrows, const std::string& file, const std::string& source) {
+  static const std::regex include_line(R"(^\s*#\s*include\s*([<"])([^>"]+)[>"])");
+  static const std::regex using_line(R"(^\s*using\s+namespace\b)");
+  std::vector<std::string> found;
+  const std::string room = room_of(file);
+  const bool is_header = file.ends_with(".h");
+  if (!arrows.contains(room)) found.push_back(file + ": lies in no room that CMake knows");
+  bool once = false;
+  int number = 0;
+  std::istringstream lines(source);
+  for (std::string line; std::getline(lines, line);) {
+    ++number;
+    const auto report = [&](const std::string& what) {
+      if (!what.empty()) found.push_back(file + ":" + std::to_string(number) + ": " + what);
+    };
+    std::smatch match;
+    if (std::regex_search(line, match, include_line)) {
+      const std::string header = match[2];
+      const bool of_project = match[1] == "\"" || !room_of(header).empty();
+      report(of_project ? check_project_include(arrows, room, header) : check_library_include(room, is_header, header));
+    }
+    if (is_header && std::regex_search(line, using_line)) report("a header says `using namespace`");
+    once = once || line.starts_with("#pragma once");
+  }
+  if (is_header && !once) found.push_back(file + ": a header without #pragma once");
+  return found;
+}
+
+}  // namespace house

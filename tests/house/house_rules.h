@@ -1,0 +1,25 @@
+// The rules of the house that a program can check: arrows between rooms, third-party libraries in their rooms, headers.
+#pragma once
+
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace house {
+
+/// Folder of a room ("engine/render", "proto") and the folders of those it may include.
+using Arrows = std::map<std::string, std::set<std::string>>;
+
+/// Reads what CMake wrote: "engine/scene: engine_core", one room a line.
+[[nodiscard]] Arrows parse_arrows(const std::string& text);
+
+/// Rooms that lie on a circle of arrows, in order, the first one repeated at the end; empty if there is no circle.
+[[nodiscard]] std::vector<std::string> find_circle(const Arrows& arrows);
+
+/// What is wrong with one source file, a sentence each: "engine/mask/mask.cc:3: ...".
+///   file  path from the project's root
+[[nodiscard]] std::vector<std::string> violations(const Arrows& arrows, const std::string& file,
+                                                  const std::string& source);
+
+}  // namespace house

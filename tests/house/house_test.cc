@@ -1,0 +1,112 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "tests/house/house_rules.h"
+
+namespace house {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string contents(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream bytes;
+  bytes << file.rdbuf();
+  return bytes.str();
+}
+
+const Arrows sample{
+    {"engine/core", {}}, {"engine/scene", {"engine/core"}}, {"engine/io", {"engine/scene"}}, {"proto", {}}};
+
+/// Number of complaints about a file of this content.
+std::size_t complaints(const std::string& file, const std::string& source) {
+  return violations(sample, file, source).size();
+}
+
+TEST(House, EverySourceKeepsTheRules) {
+  const fs::path root = SPLATDRAG_SOURCE_DIR;
+  const Arrows arrows = parse_arrows(contents(SPLATDRAG_ARROWS_FILE));
+  std::size_t files = 0;
+  for (const char* top : {"engine", "proto", "server"})
+    for (const auto& entry : fs::recursive_directory_iterator(root / top)) {
+      const std::string extension = entry.path().extension();
+      if (extension != ".h" && extension != ".cc") continue;
+      ++files;
+      for (const std::string& violation :
+           violations(arrows, fs::relative(entry.path(), root).generic_string(), contents(entry.path())))
+        ADD_FAILURE() << violation;
+    }
+  EXPECT_GT(files, 50u) << "the sources are not where this test looks for them";
+}
+
+TEST(House, ArrowsPointOneWay) {
+  const Arrows arrows = parse_arrows(contents(SPLATDRAG_ARROWS_FILE));
+  EXPECT_TRUE(arrows.contains("engine/core"));
+  std::string circle;
+  for (const std::string& room : find_circle(arrows)) circle += room + " ";
+  EXPECT_EQ(circle, "");
+}
+
+TEST(House, EngineKnowsNeitherWireNorProgram) {
+  for (const auto& [room, uses] : parse_arrows(contents(SPLATDRAG_ARROWS_FILE))) {
+    if (!room.starts_with("engine/")) continue;
+    for (const std::string& used : uses) EXPECT_TRUE(used.starts_with("engine/")) << room << " uses " << used;
+  }
+}
+
+TEST(HouseRules, ReadTheArrowsThatCMakeWrites) {
+  EXPECT_EQ(parse_arrows("engine/core: \nengine/scene: engine_core\nserver: splatdrag_proto engine_scene\n"),
+            (Arrows{{"engine/core", {}}, {"engine/scene", {"engine/core"}}, {"server", {"proto", "engine/scene"}}}));
+}
+
+TEST(HouseRules, ReportAnArrowNobodyDeclared) {
+  EXPECT_EQ(complaints("engine/io/ply.cc", "#include \"engine/scene/image.h\"\n#include \"engine/io/ply.h\"\n"), 0u);
+  EXPECT_EQ(complaints("engine/io/ply.cc", "#include \"engine/core/vec.h\"\n"), 1u) << "not through another room";
+  EXPECT_EQ(complaints("engine/scene/image.cc", "  #  include \"engine/io/ply.h\"\n"), 1u);
+  EXPECT_EQ(complaints("engine/scene/image.cc", "#include <engine/io/ply.h>\n"), 1u);
+  EXPECT_EQ(complaints("engine/scene/image.cc", "#include \"proto/edit_request.h\"\n"), 1u);
+  EXPECT_EQ(complaints("engine/scene/image.cc", "#include \"image.h\"\n"), 1u);
+  EXPECT_EQ(complaints("engine/scene/image.cc", "#include \"tests/support/data.h\"\n"), 1u);
+  EXPECT_EQ(complaints("engine/cellar/a.cc", ""), 1u) << "a folder that is no room";
+}
+
+TEST(HouseRules, ReportALibraryInTheWrongRoom) {
+  EXPECT_EQ(complaints("engine/io/image_file.cc", "#include <OpenImageIO/imageio.h>\n#include <nlohmann/json.hpp>\n"),
+            0u);
+  EXPECT_EQ(complaints("engine/scene/image.cc", "#include <OpenImageIO/imageio.h>\n"), 1u);
+  EXPECT_EQ(complaints("engine/scene/image.cc", "#include <nlohmann/json.hpp>\n"), 1u);
+  EXPECT_EQ(complaints("engine/io/ply.cc", "#include <flann/flann.hpp>\n#include <torch/torch.h>\n"), 2u);
+  EXPECT_EQ(complaints("engine/io/ply.cc", "#include <tbb/parallel_for.h>\n#include <httplib.h>\n"), 2u);
+  EXPECT_EQ(complaints("engine/io/ply.cc", "#include <vector>\n// #include <torch/torch.h>\n"), 0u);
+}
+
+TEST(HouseRules, KeepTorchOutOfHeadersEvenInItsRoom) {
+  const Arrows arrows{{"engine/diffusion", {}}};
+  EXPECT_EQ(violations(arrows, "engine/diffusion/unet.cc", "#include <torch/torch.h>\n").size(), 0u);
+  EXPECT_EQ(violations(arrows, "engine/diffusion/unet.h", "#pragma once\n#include <torch/torch.h>\n").size(), 1u);
+}
+
+TEST(HouseRules, ReportAHeaderThatIsNoGoodNeighbour) {
+  EXPECT_EQ(complaints("engine/core/vec.h", "#pragma once\nusing engine::Vec3;\n"), 0u);
+  EXPECT_EQ(complaints("engine/core/vec.h", "namespace engine {}\n"), 1u) << "no #pragma once";
+  EXPECT_EQ(complaints("engine/core/vec.h", "#pragma once\n  using namespace std;\n"), 1u);
+  EXPECT_EQ(complaints("engine/core/vec.cc", "using namespace std::chrono_literals;\n"), 0u);
+}
+
+TEST(HouseRules, SayWhere) {
+  const auto found = violations(sample, "engine/scene/image.cc", "\n\n#include \"engine/io/ply.h\"\n");
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_TRUE(found[0].starts_with("engine/scene/image.cc:3: engine/scene includes engine/io")) << found[0];
+}
+
+TEST(HouseRules, FindACircle) {
+  EXPECT_TRUE(find_circle(sample).empty());
+  EXPECT_EQ(find_circle({{"a", {"b"}}, {"b", {"c"}}, {"c", {"b"}}}), (std::vector<std::string>{"b", "c", "b"}));
+}
+
+}  // namespace
+}  // namespace house

@@ -1,0 +1,15 @@
+// The example payloads of proto/, which are also the tests' fixtures.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "tests/support/data.h"
+
+namespace proto {
+
+inline std::string example(const std::string& name) {
+  return support::read_file(std::filesystem::path(__FILE__).parent_path() / "../../proto/examples" / name);
+}
+
+}  // namespace proto

@@ -1,0 +1,75 @@
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "proto/edit_request.h"
+#include "tests/proto/examples.h"
+
+namespace proto {
+namespace {
+
+using engine::ErrorCode;
+
+TEST(RequestFile, TellsTheFormsApart) {
+  EXPECT_EQ(parse_request_file(example("move_ball.json"), "").value(),
+            parse_edit_request(example("move_ball.json")).value());
+  EXPECT_EQ(parse_request_file(example("released_config.json"), "").value(),
+            parse_released_config(example("released_config.json")).value());
+}
+
+TEST(RequestFile, PicksARequestByName) {
+  const auto ball = parse_request_file(example("named_requests.json"), "ball_right");
+  ASSERT_TRUE(ball) << ball.error().message;
+  EXPECT_EQ(ball->handles[0].radius, 0.22);
+  const auto apple = parse_request_file(example("named_requests.json"), "apple_up");
+  ASSERT_TRUE(apple) << apple.error().message;
+  EXPECT_EQ(apple->handles[0].radius, 0.2);
+}
+
+TEST(RequestFile, ListsTheNamesWhenNoneOrAWrongOneIsGiven) {
+  const auto none = parse_request_file(example("named_requests.json"), "");
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().code, ErrorCode::invalid_argument);
+  EXPECT_NE(none.error().message.find("apple_up, ball_right"), std::string::npos) << none.error().message;
+  const auto wrong = parse_request_file(example("named_requests.json"), "ball_left");
+  ASSERT_FALSE(wrong);
+  EXPECT_EQ(wrong.error().code, ErrorCode::not_found);
+  EXPECT_NE(wrong.error().message.find("apple_up, ball_right"), std::string::npos) << wrong.error().message;
+}
+
+TEST(RequestFile, TakesTheOnlyRequestWithoutAName) {
+  const std::string text = R"({"comment": "c", "up": {"handles": [{"source": [0, 0, 0], "radius": 1}]}})";
+  EXPECT_TRUE(parse_request_file(text, ""));
+  EXPECT_TRUE(parse_request_file(text, "up"));
+}
+
+TEST(RequestFile, PutsTheNameBeforeTheAddress) {
+  const auto request = parse_request_file(R"({"up": {"handles": [{"source": [0, 0, 0], "radius": -1}]}})", "up");
+  ASSERT_FALSE(request);
+  EXPECT_EQ(request.error().where, "up.handles[0].radius");
+}
+
+TEST(RequestFile, RefusesANameForASingleRequest) {
+  const auto request = parse_request_file(example("move_ball.json"), "ball");
+  ASSERT_FALSE(request);
+  EXPECT_EQ(request.error().code, ErrorCode::invalid_argument);
+}
+
+TEST(RequestFile, SaysWhatItExpectsOfAnythingElse) {
+  for (const char* text : {"{}", "[]", "7", R"({"frames": [], "camera": {}})", R"({"camera": {}})"}) {
+    const auto request = parse_request_file(text, "");
+    ASSERT_FALSE(request) << text;
+    EXPECT_EQ(request.error().code, ErrorCode::invalid_argument);
+    EXPECT_NE(request.error().message.find("voxel_size"), std::string::npos) << request.error().message;
+  }
+}
+
+TEST(RequestFile, RefusesAMixtureOfBothForms) {
+  const auto request =
+      parse_request_file(R"({"handles": [{"source": [0, 0, 0], "radius": 1}], "start": [[0, 0, 0]]})", "");
+  ASSERT_FALSE(request);
+  EXPECT_EQ(request.error().where, "start");
+}
+
+}  // namespace
+}  // namespace proto

@@ -1,0 +1,307 @@
+// The program as its users run it: end to end, on a small demo scene.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "engine/io/dataset.h"
+#include "engine/io/image_file.h"
+#include "engine/io/scene_file.h"
+#include "tests/support/data.h"
+
+namespace server {
+namespace {
+
+namespace fs = std::filesystem;
+namespace io = engine::io;
+using nlohmann::json;
+
+struct Finished {
+  int status = 0;
+  std::string out, err;
+};
+
+class Cli : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const Finished made =
+        splatdrag("demo-scene --out " + at("demo") + " --gaussians 5000 --views 6 --size 160x120 --render");
+    ASSERT_EQ(made.status, 0) << made.err;
+  }
+
+  /// Runs the program in a shell, with `environment` ("NAME=value") before it.
+  Finished splatdrag(const std::string& arguments, const std::string& environment = "") {
+    const std::string command =
+        environment + " " + SPLATDRAG_PROGRAM + " " + arguments + " >" + at("stdout") + " 2>" + at("stderr");
+    const int status = std::system(command.c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, support::read_file(at("stdout")),
+            support::read_file(at("stderr"))};
+  }
+
+  [[nodiscard]] std::string at(const std::string& name) const { return (folder_.path() / name).string(); }
+  [[nodiscard]] std::string demo(const std::string& name) const { return at("demo/" + name); }
+
+  std::string request(const json& document) {
+    support::write_file(at("request.json"), document.dump());
+    return at("request.json");
+  }
+
+  [[nodiscard]] json report(const std::string& out) const {
+    return json::parse(support::read_file(at(out + "/report.json")));
+  }
+
+  std::size_t files_in(const std::string& name) const {
+    return std::size_t(std::distance(fs::directory_iterator(at(name)), fs::directory_iterator()));
+  }
+
+ private:
+  support::TempDir folder_;
+};
+
+TEST_F(Cli, DemoSceneIsADatasetThatOurReadersRead) {
+  const auto scene = io::read_scene(demo("scene.ply"));
+  ASSERT_TRUE(scene) << scene.error().message;
+  EXPECT_NEAR(double(scene->cloud.size()), 5000, 100);
+  const auto dataset = io::read_dataset(at("demo"));
+  ASSERT_TRUE(dataset) << dataset.error().message;
+  ASSERT_EQ(dataset->views.size(), 6u);
+  EXPECT_EQ(dataset->kind, "colmap");
+  EXPECT_EQ(dataset->views[0].camera.name, "view_00.png");
+  EXPECT_EQ(dataset->views[0].camera.width, 160);
+  EXPECT_FALSE(dataset->views[0].photo.empty());
+  EXPECT_EQ(dataset->points.size(), scene->cloud.size());
+  EXPECT_TRUE(fs::exists(demo("drags/ball.json")));
+}
+
+TEST_F(Cli, DemoSceneIsTheSameEveryTime) {
+  ASSERT_EQ(
+      splatdrag("demo-scene --out " + at("again") + " --gaussians 5000 --views 6 --size 160x120 --threads 1").status,
+      0);
+  for (const char* name : {"scene.ply", "sparse/0/cameras.txt", "sparse/0/images.txt", "sparse/0/points3D.txt",
+                           "drags/ball.json", "drags/leaf.json"})
+    EXPECT_EQ(support::read_file(at("again/" + std::string(name))), support::read_file(demo(name))) << name;
+}
+
+TEST_F(Cli, EditWritesSceneReportAndPictures) {
+  const Finished run = splatdrag("edit --scene " + demo("scene.ply") + " --dataset " + at("demo") + " --request " +
+                                 demo("drags/ball.json") + " --out " + at("out/deep"));
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_NE(run.err.find("100 %"), std::string::npos) << run.err;
+  EXPECT_NE(run.err.find("interval 1 of "), std::string::npos) << run.err;
+  const json said = report("out/deep");
+  const auto before = io::read_scene(demo("scene.ply")), after = io::read_scene(at("out/deep/scene.ply"));
+  ASSERT_TRUE(after) << after.error().message;
+  EXPECT_EQ(said["gaussians"]["input"], before->cloud.size());
+  EXPECT_EQ(said["gaussians"]["output"], after->cloud.size());
+  EXPECT_GT(said["handles"][0]["gaussians"], 10);
+  EXPECT_EQ(said["gaussians"]["copies"], said["handles"][0]["gaussians"]);
+  EXPECT_EQ(said["request"]["handles"], json::parse(support::read_file(demo("drags/ball.json")))["handles"]);
+  EXPECT_GE(said["request"]["params"]["intervals"], 1);
+  EXPECT_EQ(said["request"]["params"]["corrector"], "none");
+  EXPECT_TRUE(said["simd"].is_string());
+  EXPECT_TRUE(said["warnings"].empty()) << said["warnings"];
+  ASSERT_EQ(said["pictures"].size(), 3u);
+  for (const json& pictures : said["pictures"])
+    for (const char* which : {"before", "after", "mask"}) {
+      const auto picture = io::read_image(at("out/deep/" + pictures[which].get<std::string>()));
+      ASSERT_TRUE(picture) << picture.error().message;
+      EXPECT_EQ(picture->width, 160);
+    }
+  EXPECT_EQ(files_in("out/deep"), 2u + 9u) << "and nothing else";
+}
+
+TEST_F(Cli, EditKeepsTheBytesOfRowsItDoesNotTouch) {
+  ASSERT_EQ(splatdrag("edit --scene " + demo("scene.ply") + " --dataset " + at("demo") + " --request " +
+                      demo("drags/ball.json") + " --out " + at("out") + " --pictures 0")
+                .status,
+            0);
+  const json said = report("out");
+  const std::size_t survivors =
+      said["gaussians"]["input"].get<std::size_t>() - said["gaussians"]["removed"].get<std::size_t>();
+  const auto rows = [](const std::string& file, std::size_t count) {
+    const std::string bytes = support::read_file(file);
+    const std::size_t begin = bytes.find("end_header\n") + 11, stride = (bytes.size() - begin) / count;
+    std::vector<std::string> list;
+    for (std::size_t i = 0; i < count; ++i) list.push_back(bytes.substr(begin + i * stride, stride));
+    return list;
+  };
+  const auto before = rows(demo("scene.ply"), said["gaussians"]["input"]),
+             after = rows(at("out/scene.ply"), said["gaussians"]["output"]);
+  std::size_t next = 0;  // survivors are a subsequence of the input
+  for (std::size_t i = 0; i < survivors; ++i) {
+    while (next < before.size() && before[next] != after[i]) ++next;
+    ASSERT_LT(next, before.size()) << "row " << i << " of the output is none of the input's";
+    ++next;
+  }
+}
+
+TEST_F(Cli, ADragOfNothingGivesTheSameBytes) {
+  const Finished run = splatdrag(
+      "edit --scene " + demo("scene.ply") + " --out " + at("out") + " --request " +
+      request(
+          {{"handles", {{{"source", {-0.28, -0.21, -0.62}}, {"target", {-0.28, -0.21, -0.62}}, {"radius", 0.25}}}}}));
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_TRUE(support::read_file(at("out/scene.ply")) == support::read_file(demo("scene.ply")));
+  EXPECT_NE(run.err.find("warning: nothing moves"), std::string::npos) << run.err;
+}
+
+TEST_F(Cli, EditGivesTheSameBytesForAnyNumberOfThreads) {
+  for (const char* threads : {"1", "3"})
+    ASSERT_EQ(splatdrag("edit --scene " + demo("scene.ply") + " --request " + demo("drags/leaf.json") + " --out " +
+                        at(std::string("out") + threads) + " --threads " + threads)
+                  .status,
+              0);
+  EXPECT_TRUE(support::read_file(at("out1/scene.ply")) == support::read_file(at("out3/scene.ply")));
+  EXPECT_EQ(report("out1")["threads"], 1);
+  EXPECT_EQ(report("out3")["threads"], 3);
+}
+
+TEST_F(Cli, EditTakesReleasedConfigurationsAndNamedRequests) {
+  const json released = {{"start", {{-0.28, -0.21, -0.62}}}, {"direction", {{0.3, 0.0, 0.0}}}, {"voxel_size", 0.22}};
+  ASSERT_EQ(splatdrag("edit --scene " + demo("scene.ply") + " --pictures 0 --out " + at("released") + " --request " +
+                      request(released))
+                .status,
+            0);
+  ASSERT_EQ(splatdrag("edit --scene " + demo("scene.ply") + " --pictures 0 --out " + at("named") +
+                      " --name b --request " + request({{"comment", "two"}, {"a", released}, {"b", released}}))
+                .status,
+            0);
+  EXPECT_TRUE(support::read_file(at("released/scene.ply")) == support::read_file(at("named/scene.ply")));
+}
+
+TEST_F(Cli, EditWarnsOfFieldsWithoutEffect) {
+  json document = json::parse(support::read_file(demo("drags/ball.json")));
+  document["params"]["iterations"] = 500;
+  const Finished run = splatdrag("edit --scene " + demo("scene.ply") + " --pictures 0 --out " + at("out") +
+                                 " --request " + request(document));
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_NE(run.err.find("warning: this build deforms"), std::string::npos) << run.err;
+  EXPECT_NE(report("out")["warnings"].dump().find("params.iterations"), std::string::npos);
+  EXPECT_EQ(report("out")["request"]["params"]["iterations"], 500);
+}
+
+TEST_F(Cli, EditNamesTheHandleThatHoldsNothing) {
+  const Finished run = splatdrag("edit --scene " + demo("scene.ply") + " --out " + at("out") + " --request " +
+                                 request({{"handles",
+                                           {{{"source", {-0.28, -0.21, -0.62}}, {"radius", 0.25}},
+                                            {{"source", {9, 9, 9}}, {"target", {9, 9, 8}}, {"radius", 0.25}}}}}));
+  EXPECT_EQ(run.status, 6);
+  EXPECT_NE(run.err.find("error: "), std::string::npos);
+  EXPECT_NE(run.err.find("(request.json:handles[1]"), std::string::npos) << run.err;
+  EXPECT_FALSE(fs::exists(at("out/scene.ply")));
+}
+
+TEST_F(Cli, EditNeverReplacesItsInput) {
+  const std::string before = support::read_file(demo("scene.ply"));
+  const Finished run =
+      splatdrag("edit --scene " + demo("scene.ply") + " --out " + at("demo") + " --request " + demo("drags/ball.json"));
+  EXPECT_EQ(run.status, 9) << run.err;
+  EXPECT_TRUE(support::read_file(demo("scene.ply")) == before);
+}
+
+TEST_F(Cli, RenderNamesPicturesAfterTheirViews) {
+  ASSERT_EQ(splatdrag("render --scene " + demo("scene.ply") + " --dataset " + at("demo") + " --all --out " + at("all"))
+                .status,
+            0);
+  EXPECT_EQ(files_in("all"), 6u);
+  EXPECT_TRUE(support::read_file(at("all/view_02.png")) == support::read_file(demo("images/view_02.png")));
+  ASSERT_EQ(splatdrag("render --scene " + demo("scene.ply") + " --dataset " + at("demo") +
+                      " --view view_02.png --view view_04.png --max-side 80 --format jpg --out " + at("two"))
+                .status,
+            0);
+  EXPECT_EQ(files_in("two"), 2u);
+  EXPECT_EQ(io::read_image(at("two/view_04.jpg"))->width, 80);
+}
+
+TEST_F(Cli, RenderComparesWithPhotos) {
+  const Finished run =
+      splatdrag("render --scene " + demo("scene.ply") + " --dataset " + at("demo") + " --all --compare");
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_EQ(std::count(run.out.begin(), run.out.end(), '\n'), 7) << run.out;
+  // The photos are these renderings, rounded to 8 bits: an error of at most half a step, about 59 dB if uniform.
+  const std::size_t mean = run.out.find("mean  ");
+  ASSERT_NE(mean, std::string::npos) << run.out;
+  EXPECT_GT(std::stod(run.out.substr(mean + 6)), 54.1) << run.out;
+}
+
+TEST_F(Cli, RenderWritesDepthAndAlpha) {
+  const std::string camera =
+      "render --scene " + demo("scene.ply") + " --eye 0,-1,-4.5 --target 0,-0.5,0 --size 96x64 --out ";
+  ASSERT_EQ(splatdrag(camera + at("c.exr")).status, 0);
+  ASSERT_EQ(splatdrag(camera + at("d.png") + " --what depth").status, 0);
+  ASSERT_EQ(splatdrag(camera + at("a.png") + " --what alpha --background 1,1,1").status, 0);
+  const auto exr = io::read_image(at("c.exr"), {.alpha = io::Alpha::keep}), shades = io::read_image(at("d.png")),
+             alpha = io::read_image(at("a.png"));
+  ASSERT_TRUE(exr) << exr.error().message;
+  EXPECT_EQ(exr->width, 96);
+  EXPECT_EQ(exr->channels, 4);
+  ASSERT_TRUE(shades);
+  ASSERT_TRUE(alpha);
+  EXPECT_NEAR(alpha->at(48, 32), exr->at(48, 32, 3), 1.0 / 255);
+  EXPECT_GT(alpha->at(48, 32), 0.9f);
+  EXPECT_GT(shades->at(48, 42), shades->at(48, 5)) << "the table is nearer than the wall";
+}
+
+TEST_F(Cli, InfoSaysWhatThereIs) {
+  const Finished run = splatdrag("info --json --scene " + demo("scene.ply") + " --dataset " + at("demo"));
+  ASSERT_EQ(run.status, 0) << run.err;
+  const json info = json::parse(run.out);
+  EXPECT_EQ(info["scene"]["format"], "ply");
+  EXPECT_EQ(info["scene"]["sh_degree"], 1);
+  EXPECT_EQ(info["scene"]["extra_properties"], (json{"nx", "ny", "nz"}));
+  EXPECT_EQ(info["scene"]["opacity"].size(), info["scene"]["quantiles"].size());
+  EXPECT_LE(info["scene"]["opacity"][0], info["scene"]["opacity"][6]);
+  EXPECT_EQ(info["dataset"]["views"].size(), 6u);
+  const Finished text = splatdrag("info --scene " + demo("scene.ply"));
+  EXPECT_NE(text.out.find("SH degree    1"), std::string::npos) << text.out;
+}
+
+TEST_F(Cli, ConvertSaysWhatIsLost) {
+  const Finished same = splatdrag("convert --in " + demo("scene.ply") + " --out " + at("same.ply"));
+  ASSERT_EQ(same.status, 0) << same.err;
+  EXPECT_EQ(same.err, "");
+  EXPECT_TRUE(support::read_file(at("same.ply")) == support::read_file(demo("scene.ply")));
+  const Finished splat = splatdrag("convert --in " + demo("scene.ply") + " --out " + at("a.splat"));
+  ASSERT_EQ(splat.status, 0) << splat.err;
+  EXPECT_NE(splat.err.find("warning: .splat holds no view-dependent colour"), std::string::npos) << splat.err;
+  ASSERT_EQ(splatdrag("convert --in " + at("a.splat") + " --out " + at("a.spz")).status, 0);
+  EXPECT_EQ(json::parse(splatdrag("info --json --scene " + at("a.splat")).out)["scene"]["format"], "splat");
+  EXPECT_EQ(json::parse(splatdrag("info --json --scene " + at("a.spz")).out)["scene"]["format"], "spz");
+}
+
+TEST_F(Cli, SettingsComeFromFlagThenEnvironmentThenFile) {
+  support::write_file(at("settings.toml"),
+                      "[render]\nview = ['view_01.png']\nmax-side = 40\ndataset = '" + at("demo") + "'\n");
+  const auto width = [&](const std::string& more, const std::string& environment) {
+    const Finished run = splatdrag("render --config " + at("settings.toml") + " --scene " + demo("scene.ply") +
+                                       " --out " + at("p.png") + " " + more,
+                                   environment);
+    EXPECT_EQ(run.status, 0) << run.err;
+    return io::read_image(at("p.png"))->width;
+  };
+  EXPECT_EQ(width("", ""), 40);
+  EXPECT_EQ(width("", "SPLATDRAG_MAX_SIDE=50"), 50);
+  EXPECT_EQ(width("--max-side 60", "SPLATDRAG_MAX_SIDE=50"), 60);
+  const Finished run = splatdrag("render --scene " + demo("scene.ply") + " --out " + at("q.png"),
+                                 "SPLATDRAG_CONFIG=" + at("settings.toml"));
+  EXPECT_EQ(run.status, 0) << run.err;
+  EXPECT_EQ(io::read_image(at("q.png"))->width, 40);
+  const Finished lost = splatdrag("info --scene " + demo("scene.ply"), "SPLATDRAG_CONFIG=" + at("none.toml"));
+  EXPECT_EQ(lost.status, 2) << "a settings file that was asked for and is not there";
+}
+
+TEST_F(Cli, AnOutputFolderThatCannotBeIsAnError) {
+  support::write_file(at("file"), "");
+  const Finished run = splatdrag("edit --scene " + demo("scene.ply") + " --request " + demo("drags/ball.json") +
+                                 " --out " + at("file/out"));
+  EXPECT_EQ(run.status, 2) << run.err;
+  EXPECT_NE(run.err.find("file"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace server
