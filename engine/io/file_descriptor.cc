@@ -19,6 +19,7 @@ ErrorCode code_for(int error_number) {
       return ErrorCode::not_found;
     case EISDIR:
     case ENAMETOOLONG:
+    case ELOOP:
       return ErrorCode::invalid_argument;
     case EACCES:
     case EPERM:
