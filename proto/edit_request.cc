@@ -148,13 +148,17 @@ bool is_released_config(const json& document) {
 
 bool is_edit_request(const json& document) { return document.contains("handles"); }
 
-Result<EditRequest> decode_either(const json& document, const std::string& where) {
-  if (is_edit_request(document)) return decode(document, where, read_edit_request);
-  if (is_released_config(document)) return decode(document, where, read_released_config);
+Result<RequestFile> decode_either(const json& document, const std::string& name) {
+  const auto in_file = [&](Result<EditRequest> request, bool released) -> Result<RequestFile> {
+    if (!request) return propagate(request);
+    return RequestFile{std::move(*request), name, released};
+  };
+  if (is_edit_request(document)) return in_file(decode(document, name, read_edit_request), false);
+  if (is_released_config(document)) return in_file(decode(document, name, read_released_config), true);
   return fail(ErrorCode::invalid_argument,
               "expected an edit request (with handles) or a 3DGS-Drag configuration (with start, direction and "
               "voxel_size)",
-              where);
+              name);
 }
 
 /// The requests of a file of several, by name; none if the document is something else.
@@ -226,7 +230,7 @@ Result<EditRequest> parse_released_config(std::string_view text, const JsonLimit
   return decode(*document, "", read_released_config);
 }
 
-Result<EditRequest> parse_request_file(std::string_view text, std::string_view name, const JsonLimits& limits) {
+Result<RequestFile> parse_request_file(std::string_view text, std::string_view name, const JsonLimits& limits) {
   const auto document = parse_document(text, limits);
   if (!document) return propagate(document);
   if (is_edit_request(*document) || is_released_config(*document)) {
@@ -241,6 +245,26 @@ Result<EditRequest> parse_request_file(std::string_view text, std::string_view n
   if (std::find(names.begin(), names.end(), chosen) == names.end())
     return fail(ErrorCode::not_found, "there is no request \"" + printable(chosen) + "\"; there are: " + listed(names));
   return decode_either((*document)[chosen], printable(chosen));
+}
+
+std::string RequestFile::address_of(std::string_view field) const {
+  std::string in_request(field);
+  if (released) {
+    const auto bracket = field.find(']');
+    if (field.ends_with(".radius")) {
+      in_request = "voxel_size";
+    } else if (field.starts_with("handles[") && bracket != std::string_view::npos) {
+      const std::string index(field.substr(7, bracket - 6));
+      in_request = field.ends_with(".group")    ? "cluster" + index
+                   : field.ends_with(".target") ? "direction" + index
+                                                : "start" + index;
+    } else if (field == "region.size") {
+      in_request = "local_mask.xyz";
+    } else if (field.starts_with("region")) {
+      in_request = "local_mask" + std::string(field.substr(6));
+    }
+  }
+  return name.empty() ? in_request : name + "." + in_request;
 }
 
 std::string to_json(const EditRequest& request) {

@@ -98,13 +98,24 @@ struct JsonLimits {
 ///   errors  as parse_edit_request()
 [[nodiscard]] Result<EditRequest> parse_released_config(std::string_view text, const JsonLimits& limits = {});
 
+/// A request and how its file says it, for the addresses of errors that come up later.
+struct RequestFile {
+  EditRequest request;
+  std::string name;       ///< Of the request among several; empty if the file holds one.
+  bool released = false;  ///< The file is a released 3DGS-Drag configuration.
+
+  /// What the file calls a field of the request: "ear_up.handles[2].radius", or "voxel_size" in a released
+  /// configuration.
+  [[nodiscard]] std::string address_of(std::string_view field) const;
+};
+
 /// Decodes a file of either form, or of several requests by name ({"ear_up": {...}, "comment": "..."}; members that are
 /// strings are comments).
 ///   name    which of several; empty: the file holds one
 ///   errors  as parse_edit_request(), with the name before the address ("ear_up.handles[2].radius");
 ///           invalid_argument: several and no name, or a name and one; not_found: no request of that name. The message
 ///           lists the names there are.
-[[nodiscard]] Result<EditRequest> parse_request_file(std::string_view text, std::string_view name,
+[[nodiscard]] Result<RequestFile> parse_request_file(std::string_view text, std::string_view name,
                                                      const JsonLimits& limits = {});
 
 /// The request as indented JSON that parse_edit_request() reads back; what is not given is left out.

@@ -134,7 +134,8 @@ constexpr std::size_t max_printable = 60;  // characters
 }  // namespace
 
 std::string printable(std::string_view text) {
-  const std::string quoted = json(text).dump(-1, ' ', /*ensure_ascii=*/true);
+  const std::string quoted =
+      json(text).dump(-1, ' ', /*ensure_ascii=*/true, json::error_handler_t::replace);  // text may not be UTF-8
   const std::string escaped = quoted.substr(1, quoted.size() - 2);
   return escaped.size() <= max_printable ? escaped : escaped.substr(0, max_printable) + "...";
 }

@@ -5,6 +5,7 @@
 
 #include "engine/io/scene_file.h"
 #include "server/commands.h"
+#include "server/folders.h"
 
 namespace server {
 namespace {
@@ -33,6 +34,7 @@ std::vector<std::string> losses(const io::SceneFile& scene, io::SceneFormat form
 Result<void> run(const ConvertOptions& options, Terminal& terminal) {
   const auto format = io::format_for(options.out);
   if (!format) return propagate(format);
+  if (auto safe = keep_input_safe(options.in, options.out); !safe) return safe;
   const auto scene = io::read_scene(options.in);
   if (!scene) return propagate(scene);
   for (const std::string& lost : losses(*scene, *format)) terminal.err << "warning: " << lost << '\n';

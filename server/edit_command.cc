@@ -42,30 +42,29 @@ struct EditOptions {
   ComputeOptions compute;
 };
 
-/// Errors of the engine name a field of the request; the user knows the request by its file.
-void locate_in_file(engine::Error& error, const EditOptions& options) {
+/// Errors of the engine name a field of the request; the user knows that field by its place in the file.
+void locate_in_file(engine::Error& error, const EditOptions& options, const proto::RequestFile& file) {
   for (const char* field : {"handles", "region", "params"})
     if (error.where.starts_with(field)) {
-      error.where = path(options.request).filename().string() + ":" + (options.name.empty() ? "" : options.name + ".") +
-                    error.where;
+      error.where = path(options.request).filename().string() + ":" + file.address_of(error.where);
       return;
     }
 }
 
 /// The request in both forms: as asked, and for the engine.
 struct BothRequests {
-  proto::EditRequest asked;
+  proto::RequestFile asked;
   edit::Request engine;
 };
 
 Result<BothRequests> load_request(const EditOptions& options) {
   auto asked = read_request(options.request, options.name);
   if (!asked) return propagate(asked);
-  auto request = to_engine(*asked);
+  auto request = to_engine(asked->request);
   if (request)
     if (const auto valid = edit::validate(*request); !valid) request = propagate(valid);
   if (!request) {
-    locate_in_file(request.error(), options);
+    locate_in_file(request.error(), options, *asked);
     return propagate(request);
   }
   return BothRequests{std::move(*asked), std::move(*request)};
@@ -78,13 +77,6 @@ Result<std::vector<scene::Camera>> load_cameras(const std::string& dataset) {
   if (!read) return propagate(read);
   for (const io::View& view : read->views) cameras.push_back(view.camera);
   return cameras;
-}
-
-Result<void> keep_input_safe(const path& input, const path& output) {
-  std::error_code absent;
-  if (!std::filesystem::equivalent(input, output, absent)) return {};
-  return fail(ErrorCode::conflict, "the edited scene would replace the scene it was made from; choose another --out",
-              output.string());
 }
 
 /// Before, after and mask of the best views.
@@ -160,26 +152,26 @@ Result<void> run(const EditOptions& options, Terminal& terminal) {
   const auto request = load_request(options);
   if (!request) return propagate(request);
   if (auto safe = keep_input_safe(options.scene, folder / "scene.ply"); !safe) return safe;
-  const auto input = io::read_scene(options.scene);
-  if (!input) return propagate(input);
-  const auto cameras = load_cameras(options.dataset);
-  if (!cameras) return propagate(cameras);
   if (auto made = make_folder(folder); !made) return made;
 
   return compute(options.compute, [&](const Machine& machine) -> Result<void> {
+    const auto input = io::read_scene(options.scene);
+    if (!input) return propagate(input);
+    const auto cameras = load_cameras(options.dataset);
+    if (!cameras) return propagate(cameras);
     const auto start = std::chrono::steady_clock::now();
     auto outcome = run_shown(input->cloud, *cameras, request->engine, terminal);
     if (!outcome) {
-      locate_in_file(outcome.error(), options);
+      locate_in_file(outcome.error(), options, request->asked);
       return propagate(outcome);
     }
     EditReport report;
     report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     report.scene_file = path(options.scene).filename().string();
     report.machine = machine;
-    report.request = resolved(request->asked, outcome->report.resolved);
+    report.request = resolved(request->asked.request, outcome->report.resolved);
     report.edit = outcome->report;
-    report.edit.warnings = all_warnings(outcome->report, request->asked);
+    report.edit.warnings = all_warnings(outcome->report, request->asked.request);
     for (const std::string& warning : report.edit.warnings) terminal.err << "warning: " << warning << '\n';
     auto written = write_results(folder, std::size_t(options.pictures), *input, std::move(*outcome), report);
     if (written) summarise(terminal.out, folder, report);

@@ -148,7 +148,8 @@ struct Destination {
 Result<Destination> destination(const RenderOptions& options, std::size_t pictures) {
   Destination to{options.out, std::nullopt, "." + options.format};
   const path out = options.out;
-  if (io::format_of(out) && !std::filesystem::is_directory(out)) {
+  std::error_code unreachable;  // then it is no folder
+  if (io::format_of(out) && !std::filesystem::is_directory(out, unreachable)) {
     if (pictures > 1)
       return fail(ErrorCode::invalid_argument, "several pictures need a folder, not a file name", "--out");
     to.file = out;
@@ -169,11 +170,14 @@ Result<void> run(const RenderOptions& options, Terminal& terminal) {
     auto found = destination(options, shots->size());
     if (!found) return propagate(found);
     to = std::move(*found);
+    for (const Shot& shot : *shots)
+      for (const path& input : {path(options.scene), shot.view.photo})
+        if (auto safe = keep_input_safe(input, to->of(shot)); !safe) return safe;
   }
-  const auto input = io::read_scene(options.scene);
-  if (!input) return propagate(input);
 
   return compute(options.compute, [&](const Machine&) -> Result<void> {
+    const auto input = io::read_scene(options.scene);
+    if (!input) return propagate(input);
     engine::render::ForwardOptions forward;
     forward.background = engine::Vec3(to_vec(options.background));
     const What what = options.what == "depth" ? What::depth : options.what == "alpha" ? What::alpha : What::color;

@@ -4,7 +4,7 @@
 
 namespace server {
 
-engine::Result<proto::EditRequest> read_request(const std::filesystem::path& path, const std::string& name) {
+engine::Result<proto::RequestFile> read_request(const std::filesystem::path& path, const std::string& name) {
   const proto::JsonLimits limits;
   const auto bytes = engine::io::read_bytes(path, limits.max_bytes);
   if (!bytes) return engine::propagate(bytes);

@@ -13,7 +13,7 @@ namespace server {
 ///   name    which of several; empty: the only one
 ///   errors  those of parse_request_file() and of reading; `where` begins with the file's name:
 ///           "drags.json:ear_up.handles[2].radius"
-[[nodiscard]] engine::Result<proto::EditRequest> read_request(const std::filesystem::path& path,
+[[nodiscard]] engine::Result<proto::RequestFile> read_request(const std::filesystem::path& path,
                                                               const std::string& name);
 
 }  // namespace server

@@ -144,6 +144,14 @@ Result<Outcome> run(const scene::GaussianCloud& scene, std::span<const scene::Ca
   if (const auto going = stages.enter("finish", intervals, finish_from); !going) return propagate(going);
   dilate_masks(outcome.masks);
   Published published = publish(working, scene, request.mode);
+  if (published.cloud.size() == 0)
+    return fail(ErrorCode::unprocessable,
+                "the edit would leave an empty scene: every Gaussian is dragged, and each has an opacity below 1/255, "
+                "which a move removes; choose smaller radii, or mode extend",
+                "handles");
+  if (published.faint > 0)
+    report.warnings.push_back(std::to_string(published.faint) +
+                              " dragged Gaussians have an opacity below 1/255 and are left out");
   outcome.cloud = std::move(published.cloud);
   outcome.parent = std::move(published.parent);
   outcome.survivors = published.survivors;

@@ -79,6 +79,7 @@ Published publish(const WorkingScene& working, const scene::GaussianCloud& input
     }
 
   Published out;
+  for (std::size_t i = 0; i < keep.size(); ++i) out.faint += working.role[i] == Role::copy && !keep[i];
   out.cloud = scene::select(input, std::span(keep).first(working.input_rows));
   out.survivors = out.cloud.size();
   std::vector<std::uint32_t> copies;

@@ -55,6 +55,7 @@ struct Published {
   std::vector<std::uint32_t> parent;  ///< [N_out] input row each row comes from.
   std::size_t survivors = 0;          ///< Input rows.
   std::size_t changeable = 0;         ///< Rows of M among the output's.
+  std::size_t faint = 0;              ///< Copies left out because they are too faint to be seen.
 };
 
 /// Ends an edit. Surviving input rows are the input's bytes; only the opacity of an original may differ.

@@ -210,6 +210,10 @@ Result<std::vector<std::uint64_t>> element_offsets(const PlyHeader& header, cons
 
   std::vector<std::uint64_t> offsets = {header.text.size()};
   for (const PlyElement& element : header.elements) {
+    if (element.count == 0) {  // no bytes, whatever its properties: some writers always announce faces
+      offsets.push_back(offsets.back());
+      continue;
+    }
     if (element.has_list())
       return fail(ErrorCode::unsupported,
                   "element '" + element.name +

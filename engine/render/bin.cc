@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
+#include <new>
 #include <utility>
 
 #include "engine/core/parallel.h"
@@ -150,6 +152,11 @@ void bin(const TileGrid& grid, ForwardBuffers& buffers) {
   });
 
   buffers.tile_begin.resize(tiles + 1);
+  // Entries are numbered in 32 bits. More would need 16 GiB for the list alone: out of memory, said before it happens.
+  std::uint64_t total = 0;
+  for (std::size_t b = 0; b < blocks; ++b)
+    for (const std::uint32_t count : buffers.bin_blocks[b].position) total += count;
+  if (total > std::numeric_limits<std::uint32_t>::max()) throw std::bad_alloc();
   std::uint32_t sum = 0;
   for (std::size_t tile = 0; tile < tiles; ++tile) {
     buffers.tile_begin[tile] = sum;

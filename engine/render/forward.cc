@@ -166,10 +166,13 @@ Rendering forward(const scene::GaussianCloud& cloud, const scene::Camera& camera
 
 namespace {
 
+/// Targets that are compiled in, supported and not excluded by a pin.
 std::vector<std::int64_t> supported_targets() {
+  // Asking Highway 1.0 resets its choice to everything the processor has, pinned or not: put ours back.
+  const std::int64_t supported = hwy::SupportedTargets();
+  hwy::GetChosenTarget().Update(supported);
   std::vector<std::int64_t> bits;  // Highway gives better instruction sets lower bits
-  for (std::int64_t rest = hwy::SupportedTargets() & HWY_TARGETS; rest != 0; rest &= rest - 1)
-    bits.push_back(rest & -rest);
+  for (std::int64_t rest = supported & HWY_TARGETS; rest != 0; rest &= rest - 1) bits.push_back(rest & -rest);
   return bits;
 }
 
@@ -189,7 +192,7 @@ Result<void> pin_simd_target(const std::string& name) {
   for (const std::int64_t target : supported_targets()) {
     if (hwy::TargetName(target) == name) {
       hwy::DisableTargets(~target);
-      hwy::GetChosenTarget().DeInit();  // the next pass chooses again
+      supported_targets();  // puts the choice into effect
       return {};
     }
     known += std::string(known.empty() ? "" : ", ") + hwy::TargetName(target);

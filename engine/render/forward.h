@@ -62,6 +62,7 @@ struct Rendering {
 ///   weight   [N] or empty: an arbitrary number per Gaussian, blended like a colour (1 for members of a mask)
 ///   returns  finite pictures for every finite cloud and valid camera
 ///   bytes    the same for any number of threads; they may differ between backends and instruction sets
+///   throws   std::bad_alloc, also where splats reach more than 2^32 tiles in all
 /// Precondition: validate(camera) holds; options.rect lies inside the picture; tiles and rect are not both given.
 [[nodiscard]] Rendering forward(const scene::GaussianCloud& cloud, const scene::Camera& camera,
                                 const ForwardOptions& options = {}, std::span<const float> weight = {});

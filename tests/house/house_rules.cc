@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <functional>
-#include <regex>
+#include <optional>
 #include <sstream>
+#include <string_view>
 
 namespace house {
 namespace {
@@ -51,6 +52,36 @@ std::string folder_of(const std::string& target) {
   if (target.starts_with("engine_")) return "engine/" + target.substr(7);
   if (target.starts_with("splatdrag_")) return target.substr(10);
   return target;
+}
+
+/// The line without `word` at its start; nothing if it starts with something else. Space before either is skipped.
+std::optional<std::string_view> after(std::string_view line, std::string_view word) {
+  line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size()));
+  if (!line.starts_with(word)) return std::nullopt;
+  line.remove_prefix(word.size());
+  line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size()));
+  return line;
+}
+
+struct Include {
+  std::string header;
+  bool quoted = false;
+};
+
+/// The header that a line includes, if it does.
+std::optional<Include> included(std::string_view line) {
+  const auto directive = after(line, "#");
+  const auto name = directive ? after(*directive, "include") : std::nullopt;
+  if (!name || name->empty() || (name->front() != '"' && name->front() != '<')) return std::nullopt;
+  const bool quoted = name->front() == '"';
+  const std::size_t end = name->find(quoted ? '"' : '>', 1);
+  if (end == std::string_view::npos) return std::nullopt;
+  return Include{std::string(name->substr(1, end - 1)), quoted};
+}
+
+bool is_using_namespace(std::string_view line) {
+  const auto rest = after(line, "using ");
+  return rest && rest->starts_with("namespace ");
 }
 
 std::string check_project_include(const Arrows& arrows, const std::string& room, const std::string& header) {
@@ -108,8 +139,6 @@ std::vector<std::string> find_circle(const Arrows& arrows) {
 }
 
 std::vector<std::string> violations(const Arrows& arrows, const std::string& file, const std::string& source) {
-  static const std::regex include_line(R"(^\s*#\s*include\s*([<"])([^>"]+)[>"])");
-  static const std::regex using_line(R"(^\s*using\s+namespace\b)");
   std::vector<std::string> found;
   const std::string room = room_of(file);
   const bool is_header = file.ends_with(".h");
@@ -122,13 +151,12 @@ std::vector<std::string> violations(const Arrows& arrows, const std::string& fil
     const auto report = [&](const std::string& what) {
       if (!what.empty()) found.push_back(file + ":" + std::to_string(number) + ": " + what);
     };
-    std::smatch match;
-    if (std::regex_search(line, match, include_line)) {
-      const std::string header = match[2];
-      const bool of_project = match[1] == "\"" || !room_of(header).empty();
-      report(of_project ? check_project_include(arrows, room, header) : check_library_include(room, is_header, header));
+    if (const auto include = included(line)) {
+      const bool of_project = include->quoted || !room_of(include->header).empty();
+      report(of_project ? check_project_include(arrows, room, include->header)
+                        : check_library_include(room, is_header, include->header));
     }
-    if (is_header && std::regex_search(line, using_line)) report("a header says `using namespace`");
+    if (is_header && is_using_namespace(line)) report("a header says `using namespace`");
     once = once || line.starts_with("#pragma once");
   }
   if (is_header && !once) found.push_back(file + ": a header without #pragma once");

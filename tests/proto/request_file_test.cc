@@ -11,19 +11,19 @@ namespace {
 using engine::ErrorCode;
 
 TEST(RequestFile, TellsTheFormsApart) {
-  EXPECT_EQ(parse_request_file(example("move_ball.json"), "").value(),
+  EXPECT_EQ(parse_request_file(example("move_ball.json"), "").value().request,
             parse_edit_request(example("move_ball.json")).value());
-  EXPECT_EQ(parse_request_file(example("released_config.json"), "").value(),
+  EXPECT_EQ(parse_request_file(example("released_config.json"), "").value().request,
             parse_released_config(example("released_config.json")).value());
 }
 
 TEST(RequestFile, PicksARequestByName) {
   const auto ball = parse_request_file(example("named_requests.json"), "ball_right");
   ASSERT_TRUE(ball) << ball.error().message;
-  EXPECT_EQ(ball->handles[0].radius, 0.22);
+  EXPECT_EQ(ball->request.handles[0].radius, 0.22);
   const auto apple = parse_request_file(example("named_requests.json"), "apple_up");
   ASSERT_TRUE(apple) << apple.error().message;
-  EXPECT_EQ(apple->handles[0].radius, 0.2);
+  EXPECT_EQ(apple->request.handles[0].radius, 0.2);
 }
 
 TEST(RequestFile, ListsTheNamesWhenNoneOrAWrongOneIsGiven) {
@@ -47,6 +47,27 @@ TEST(RequestFile, PutsTheNameBeforeTheAddress) {
   const auto request = parse_request_file(R"({"up": {"handles": [{"source": [0, 0, 0], "radius": -1}]}})", "up");
   ASSERT_FALSE(request);
   EXPECT_EQ(request.error().where, "up.handles[0].radius");
+}
+
+TEST(RequestFile, KnowsWhatTheFileCallsAField) {
+  const auto named = parse_request_file(R"({"up": {"handles": [{"source": [0, 0, 0], "radius": 1}]}})", "");
+  ASSERT_TRUE(named);
+  EXPECT_EQ(named->address_of("handles[0].radius"), "up.handles[0].radius");
+  const auto released = parse_request_file(example("released_config.json"), "");
+  ASSERT_TRUE(released);
+  EXPECT_EQ(released->address_of("handles[2].radius"), "voxel_size");
+  EXPECT_EQ(released->address_of("handles[12].target"), "direction[12]");
+  EXPECT_EQ(released->address_of("handles[1].source"), "start[1]");
+  EXPECT_EQ(released->address_of("handles[1].group"), "cluster[1]");
+  EXPECT_EQ(released->address_of("handles"), "handles");
+  EXPECT_EQ(released->address_of("region.size"), "local_mask.xyz");
+  EXPECT_EQ(released->address_of("region.center"), "local_mask.center");
+}
+
+TEST(RequestFile, ANameThatIsNoTextIsNotFound) {
+  const auto request = parse_request_file(example("named_requests.json"), "\xff");
+  ASSERT_FALSE(request);
+  EXPECT_EQ(request.error().code, ErrorCode::not_found);
 }
 
 TEST(RequestFile, RefusesANameForASingleRequest) {

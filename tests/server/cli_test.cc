@@ -204,6 +204,25 @@ TEST_F(Cli, EditNeverReplacesItsInput) {
   EXPECT_TRUE(support::read_file(demo("scene.ply")) == before);
 }
 
+TEST_F(Cli, RenderNeverReplacesAPhoto) {
+  const std::string before = support::read_file(demo("images/view_03.png"));
+  const Finished run = splatdrag("render --scene " + demo("scene.ply") + " --dataset " + at("demo") +
+                                 " --view view_03.png --background 1,0,0 --compare --out " + demo("images"));
+  EXPECT_EQ(run.status, 9) << run.err;
+  EXPECT_TRUE(support::read_file(demo("images/view_03.png")) == before);
+}
+
+TEST_F(Cli, ConvertNeverReplacesItsInput) {
+  ASSERT_EQ(splatdrag("convert --in " + demo("scene.ply") + " --out " + at("a.spz")).status, 0);
+  const std::string before = support::read_file(at("a.spz"));
+  fs::create_symlink(at("a.spz"), at("b.spz"));
+  for (const char* out : {"a.spz", "b.spz"}) {
+    const Finished run = splatdrag("convert --in " + at("a.spz") + " --out " + at(out));
+    EXPECT_EQ(run.status, 9) << run.err;
+  }
+  EXPECT_TRUE(support::read_file(at("a.spz")) == before);
+}
+
 TEST_F(Cli, RenderNamesPicturesAfterTheirViews) {
   ASSERT_EQ(splatdrag("render --scene " + demo("scene.ply") + " --dataset " + at("demo") + " --all --out " + at("all"))
                 .status,

@@ -14,7 +14,7 @@ TEST(RequestFile, IsReadFromDisk) {
   support::write_file(folder.path() / "drags.json", proto::example("named_requests.json"));
   const auto request = read_request(folder.path() / "drags.json", "ball_right");
   ASSERT_TRUE(request) << request.error().message;
-  EXPECT_EQ(request->handles[0].radius, 0.22);
+  EXPECT_EQ(request->request.handles[0].radius, 0.22);
 }
 
 TEST(RequestFile, PutsTheFileBeforeTheAddress) {

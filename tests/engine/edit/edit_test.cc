@@ -93,6 +93,29 @@ TEST(Edit, AZeroDragGivesBackTheInput) {
   }
 }
 
+TEST(Edit, CountsDraggedGaussiansThatAreTooFaintToKeep) {
+  scene::GaussianCloud scene = ball_before_wall(150);
+  std::size_t dimmed = 0;
+  for (std::size_t i = 0; i < scene.size() && dimmed < 7; ++i)
+    if (glm::length(DVec3(scene.mean.get(i))) < 0.3) scene.opacity_logit[i] = -9, ++dimmed;
+  const Outcome outcome = run_well(scene, arc_of_cameras(3, 64), drag_right());
+  EXPECT_EQ(outcome.report.copies, 150u - 7u);
+  ASSERT_EQ(outcome.report.warnings.size(), 1u);
+  EXPECT_NE(outcome.report.warnings[0].find("7 dragged Gaussians"), std::string::npos) << outcome.report.warnings[0];
+}
+
+TEST(Edit, RefusesToLeaveAnEmptyScene) {
+  const scene::GaussianCloud all = ball_before_wall(150);
+  std::vector<std::uint8_t> dragged(all.size());
+  for (std::size_t i = 0; i < all.size(); ++i) dragged[i] = glm::length(DVec3(all.mean.get(i))) < 0.3;
+  scene::GaussianCloud scene = scene::select(all, dragged);
+  std::fill(scene.opacity_logit.begin(), scene.opacity_logit.end(), -9.0f);
+  const auto outcome = run(scene, arc_of_cameras(3, 64), drag_right());
+  ASSERT_FALSE(outcome);
+  EXPECT_EQ(outcome.error().code, ErrorCode::unprocessable);
+  EXPECT_EQ(outcome.error().where, "handles");
+}
+
 TEST(Edit, WithoutADatasetItMakesItsOwnViews) {
   const scene::GaussianCloud scene = ball_before_wall(100);
   Request request = drag_right(1);

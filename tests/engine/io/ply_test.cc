@@ -275,11 +275,19 @@ TEST_F(Ply, SaysWhatIsWrongWithTheHeader) {
   expect_error(replaced("float f_rest_3\n", "float f_rest_11\n"), corrupt, "'f_rest_3' is missing", where);
   expect_error(replaced("float rot_3\n", "float rot_3\nproperty list uchar int l\n"), unsupported,
                "element 'vertex' has a list", where);
-  expect_error(replaced("end_header", "element face 0\nproperty list uchar int v\nend_header"), unsupported,
+  expect_error(replaced("end_header", "element face 1\nproperty list uchar int v\nend_header"), unsupported,
                "element 'face' has a list", where);
   expect_error(replaced("element vertex", "element vertices"), unsupported, "no 'vertex' element", where);
   expect_error(replaced("vertex 2", "vertex 0").substr(0, header_size(good)), ErrorCode::unprocessable,
                "holds no Gaussians", where);
+}
+
+TEST_F(Ply, KeepsAnEmptyElementOfAnyKind) {
+  std::string bytes = simple_ply(1, 2);
+  bytes.replace(bytes.find("end_header"), 10, "element face 0\nproperty list uchar int vertex_indices\nend_header");
+  const auto scene = read(bytes);
+  ASSERT_TRUE(scene) << scene.error().message;
+  EXPECT_EQ(written(scene->cloud, scene->layout), bytes);
 }
 
 TEST_F(Ply, BelievesNoCountThatTheFileDoesNotBear) {

@@ -314,6 +314,21 @@ TEST(Forward, IsTheSameToTheBitForAnyNumberOfThreads) {
   EXPECT_TRUE(same_pictures(seen[0], seen[2]));
 }
 
+TEST(Forward, APinnedInstructionSetStaysPinnedWhenItsNameIsAsked) {
+  const std::string best = simd_target();
+  const std::string plainest = simd_targets().back();
+  const auto cloud = random_cloud(500, 14);
+  const auto with_best = forward(cloud, test_camera(), everything());
+  ASSERT_TRUE(pin_simd_target(plainest));
+  const auto pinned = forward(cloud, test_camera(), everything());
+  EXPECT_EQ(simd_target(), plainest);
+  EXPECT_TRUE(same_pictures(forward(cloud, test_camera(), everything()), pinned));
+  // Instruction sets round differently: had the pin not held, these would be equal to the bit.
+  EXPECT_EQ(same_pictures(pinned, with_best), plainest == best);
+  ASSERT_TRUE(pin_simd_target(best));
+  EXPECT_TRUE(same_pictures(forward(cloud, test_camera(), everything()), with_best));
+}
+
 TEST(Forward, PinningAnUnknownInstructionSetNamesTheKnownOnes) {
   const auto pinned = pin_simd_target("AVX1024");
   ASSERT_FALSE(pinned);
