@@ -10,6 +10,7 @@ set_target_properties(OpenImageIO::OpenImageIO PROPERTIES INTERFACE_INCLUDE_DIRE
                       INTERFACE_SYSTEM_INCLUDE_DIRECTORIES "")
 find_package(ZLIB REQUIRED)                  # spz versions 1 to 3
 find_package(zstd REQUIRED)                  # spz version 4
+find_package(SQLite3 3.38 REQUIRED)          # job records
 find_package(nlohmann_json 3.11 REQUIRED)    # JSON
 find_package(tomlplusplus 3.3 REQUIRED)      # settings file
 find_package(CLI11 2.1 REQUIRED)             # command line

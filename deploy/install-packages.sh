@@ -8,6 +8,7 @@ packages=(
   libglm-dev libexpected-dev libtbb-dev libhwy-dev     # mathematics, results, threads, SIMD
   nlohmann-json3-dev libtomlplusplus-dev libcli11-dev libspdlog-dev
   zlib1g-dev libzstd-dev                               # compressed scenes
+  libsqlite3-dev                                       # job records
   libgtest-dev libbenchmark-dev                        # tests and benchmarks
 )
 

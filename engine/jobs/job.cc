@@ -1,0 +1,131 @@
+#include "engine/jobs/job.h"
+
+#include <algorithm>
+#include <array>
+#include <iterator>
+
+namespace engine::jobs {
+namespace {
+
+constexpr std::array<std::string_view, state_count> state_names = {
+    "queued", "running", "stop_requested", "cancel_requested", "succeeded", "failed", "cancelled"};
+
+using Row = std::array<std::optional<State>, event_count>;
+
+constexpr std::array<Row, state_count> make_transitions() {
+  constexpr std::optional<State> no;
+  constexpr std::optional run(State::running), stop(State::stop_requested), cancel(State::cancel_requested),
+      good(State::succeeded), bad(State::failed), gone(State::cancelled);
+  return {{
+      //  claim report finish_interval stop cancel succeed fail release
+      Row{run, no, no, no, gone, no, no, no},                 // queued
+      Row{run, run, run, stop, cancel, good, bad, run},       // running
+      Row{stop, stop, stop, stop, cancel, good, bad, stop},   // stop_requested
+      Row{no, cancel, cancel, no, cancel, gone, gone, gone},  // cancel_requested
+      Row{},                                                  // succeeded
+      Row{},                                                  // failed
+      Row{no, no, no, no, gone, no, no, no},                  // cancelled
+  }};
+}
+constexpr auto transitions = make_transitions();
+
+std::string refusal(const Job& job, Event event) {
+  const std::string is = job.id + " is " + std::string(to_string(job.state));
+  if (event == Event::stop && !is_final(job.state)) {
+    if (job.state == State::cancel_requested) return is + ": it will be discarded, there is nothing to keep";
+    return job.id + " has no finished interval to keep yet: wait for the first one, or cancel";
+  }
+  if (event == Event::stop || event == Event::cancel) return is + ": it has already ended and stays as it is";
+  return is + (job.claimed ? ", held by a worker" : ", held by no worker") + ": the change does not apply";
+}
+
+/// The state after the event; nothing where the event does not apply.
+std::optional<State> next_state(const Job& job, Event event) {
+  const auto next = transitions[std::size_t(job.state)][std::size_t(event)];
+  if (!next) return next;
+  switch (event) {
+    case Event::claim:
+      return job.claimed ? std::nullopt : next;
+    case Event::stop:
+      return job.finished_intervals > 0 ? next : std::nullopt;
+    case Event::cancel:
+      // With nobody at work on it there is nobody to wait for.
+      return job.claimed ? next : State::cancelled;
+    default:
+      return job.claimed ? next : std::nullopt;
+  }
+}
+
+}  // namespace
+
+std::string_view to_string(State state) { return state_names[std::size_t(state)]; }
+
+std::optional<State> parse_state(std::string_view name) {
+  const auto found = std::find(state_names.begin(), state_names.end(), name);
+  if (found == state_names.end()) return std::nullopt;
+  return State(std::distance(state_names.begin(), found));
+}
+
+bool is_final(State state) { return state == State::succeeded || state == State::failed || state == State::cancelled; }
+
+std::string id_of(std::int64_t number) {
+  const std::string digits = std::to_string(number);
+  return "e" + std::string(digits.size() < 6 ? 6 - digits.size() : 0, '0') + digits;
+}
+
+std::optional<std::int64_t> number_of(std::string_view id) {
+  // 15 digits fit the type; nobody ever counted so far.
+  if (id.size() < 7 || id.size() > 16 || id[0] != 'e') return std::nullopt;
+  std::int64_t number = 0;
+  for (const char c : id.substr(1)) {
+    if (c < '0' || c > '9') return std::nullopt;
+    number = 10 * number + (c - '0');
+  }
+  if (id_of(number) != id) return std::nullopt;  // zeros too many
+  return number;
+}
+
+Result<Job> after(Job job, const Change& change, Time now) {
+  const auto next = next_state(job, change.event);
+  if (!next) return fail(ErrorCode::conflict, refusal(job, change.event), job.id);
+  const bool was_final = is_final(job.state);
+  job.state = *next;
+  if (change.progress) job.progress = *change.progress;
+  switch (change.event) {
+    case Event::claim:
+      job.claimed = true;
+      if (!job.started) job.started = now;
+      break;
+    case Event::finish_interval:
+      if (change.interval <= job.finished_intervals)
+        return fail(ErrorCode::invalid_argument,
+                    "interval " + std::to_string(change.interval) + " follows interval " +
+                        std::to_string(job.finished_intervals) + ": intervals must count up",
+                    job.id);
+      job.finished_intervals = change.interval;
+      break;
+    case Event::succeed:
+      if (*next == State::succeeded) {
+        job.result = change.result;
+        job.stopped_early = change.stopped_early;
+      }
+      break;
+    case Event::fail:
+      if (*next == State::failed) job.error = change.error;
+      break;
+    case Event::release:
+      job.claimed = false;
+      break;
+    case Event::report:
+    case Event::stop:
+    case Event::cancel:
+      break;
+  }
+  if (is_final(job.state) && !was_final) {
+    job.claimed = false;
+    job.ended = now;
+  }
+  return job;
+}
+
+}  // namespace engine::jobs

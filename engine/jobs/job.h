@@ -1,0 +1,77 @@
+// A job's record, its states, and the one place that says how they change.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "engine/core/result.h"
+
+namespace engine::jobs {
+
+using Time = std::chrono::sys_time<std::chrono::milliseconds>;
+
+/// Where a job stands. `succeeded`, `failed` and `cancelled` are final.
+///
+///     queued ----------> running ------> succeeded | failed
+///       |                 |    \                ^
+///       | cancel   cancel |     \ stop          |
+///       v                 |      stop_requested-+
+///     cancelled <- cancel_requested <-/ cancel
+///
+/// - *stop* keeps the last finished interval: the job ends `succeeded`, with `stopped_early`. There has to be one.
+/// - *cancel* discards. It may be asked for again and again, and it wins: whatever the job still returns is dropped.
+/// - A job whose worker went away (shutdown, kill -9) keeps its state and is claimed again before younger ones; one that
+///   was to be cancelled is then `cancelled`.
+enum class State { queued, running, stop_requested, cancel_requested, succeeded, failed, cancelled };
+inline constexpr int state_count = 7;
+
+[[nodiscard]] std::string_view to_string(State state);  ///< "queued", "stop_requested", ...
+[[nodiscard]] std::optional<State> parse_state(std::string_view name);
+[[nodiscard]] bool is_final(State state);
+
+/// Texts are opaque here: any bytes.
+struct Job {
+  std::string id;               ///< "e000001": counts up, never used twice.
+  std::string lane;             ///< Jobs of one lane run one after the other, in the order of their ids.
+  std::string payload;          ///< What is asked for. Empty in a list.
+  std::string idempotency_key;  ///< "": none.
+  State state = State::queued;
+  bool claimed = false;        ///< A worker holds it.
+  bool stopped_early = false;  ///< Succeeded with fewer intervals than asked for.
+  int finished_intervals = 0;  ///< The last of them has its checkpoint on disk.
+  int queue_position = 0;      ///< 1: next of those that wait. 0: does not wait.
+  std::string progress;        ///< As last published.
+  std::string result;          ///< Of a job that succeeded. Empty in a list.
+  std::optional<Error> error;  ///< Of a job that failed.
+  Time created{};
+  std::optional<Time> started;  ///< First time.
+  std::optional<Time> ended;
+};
+
+/// "e000012" for 12, and back; nothing for a text that is no id.
+[[nodiscard]] std::string id_of(std::int64_t number);
+[[nodiscard]] std::optional<std::int64_t> number_of(std::string_view id);
+
+/// What can happen to a job. Its worker brings about all but `stop` and `cancel`.
+enum class Event { claim, report, finish_interval, stop, cancel, succeed, fail, release };
+inline constexpr int event_count = 8;
+
+/// An event with what it carries; the rest is ignored.
+struct Change {
+  Event event = Event::report;
+  std::optional<std::string> progress = {};  ///< Any event: replaces the record's.
+  int interval = 0;                          ///< finish_interval: its number, larger than any before; the first is 1.
+  std::string result = {};                   ///< succeed
+  bool stopped_early = false;                ///< succeed
+  Error error = {};                          ///< fail
+};
+
+/// The record after the change: every store asks here, so the rules are the same everywhere.
+///   errors  conflict: not in this state (`where` is the id; the message says what to do instead), invalid_argument:
+///           finish_interval with a number that does not count up
+[[nodiscard]] Result<Job> after(Job job, const Change& change, Time now);
+
+}  // namespace engine::jobs

@@ -1,0 +1,135 @@
+#include "engine/jobs/queue.h"
+
+#include <system_error>
+#include <utility>
+
+#include "engine/jobs/durable_file.h"
+#include "engine/jobs/live.h"
+
+namespace engine::jobs {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Files are removed after their record says that nobody needs them. What cannot be removed now is when the queue is
+/// opened next.
+void remove_files(const fs::path& folder) {
+  std::error_code ignored;
+  fs::remove_all(folder, ignored);
+}
+
+}  // namespace
+
+Queue::~Queue() = default;
+
+Result<std::unique_ptr<Queue>> Queue::open(Store& store, const QueueOptions& options) {
+  if (auto made = create_folder(options.folder); !made) return propagate(made);
+  std::error_code error;
+  std::vector<fs::path> orphans;
+  for (fs::directory_iterator entry(options.folder, error), end; !error && entry != end; entry.increment(error)) {
+    const std::string id = entry->path().filename();
+    if (!number_of(id)) continue;  // none of ours
+    const auto job = store.find(id);
+    if (!job && job.error().code != ErrorCode::not_found) return propagate(job);
+    if (!job || job->state == State::cancelled) orphans.push_back(entry->path());
+  }
+  if (error) return fail(ErrorCode::unavailable, "the folder cannot be read: " + error.message(), options.folder);
+  for (const fs::path& orphan : orphans) remove_files(orphan);
+  return std::unique_ptr<Queue>(new Queue(store, options));
+}
+
+Result<Submission> Queue::submit(const NewJob& job) {
+  auto submission = store_.submit(job, options_.max_queued);
+  if (!submission) return submission;
+  if (submission->created) touch();
+  submission->job = with_live_progress(std::move(submission->job));
+  return submission;
+}
+
+Result<Job> Queue::find(const std::string& id) {
+  auto job = store_.find(id);
+  if (job) *job = with_live_progress(std::move(*job));
+  return job;
+}
+
+Result<std::vector<Job>> Queue::list(const Filter& filter) {
+  auto jobs = store_.list(filter);
+  if (jobs)
+    for (Job& job : *jobs) job = with_live_progress(std::move(job));
+  return jobs;
+}
+
+Result<Job> Queue::stop(const std::string& id) {
+  auto job = store_.apply(id, {.event = Event::stop});
+  if (!job) return job;
+  if (const auto running = live(id)) running->stop = true;
+  touch();
+  return with_live_progress(std::move(*job));
+}
+
+Result<Job> Queue::cancel(const std::string& id) {
+  auto job = store_.apply(id, {.event = Event::cancel});
+  if (!job) return job;
+  if (const auto running = live(id)) running->interrupt.request_stop();
+  if (job->state == State::cancelled) remove_files(folder_of(id));
+  touch();
+  return with_live_progress(std::move(*job));
+}
+
+Result<void> Queue::remove(const std::string& id) {
+  if (auto removed = store_.remove(id); !removed) return removed;
+  remove_files(folder_of(id));
+  touch();
+  return {};
+}
+
+Result<void> Queue::expire() {
+  const auto expired = store_.expire(options_.retention);
+  if (!expired) return propagate(expired);
+  for (const std::string& id : *expired) remove_files(folder_of(id));
+  if (!expired->empty()) touch();
+  return {};
+}
+
+std::uint64_t Queue::version() const {
+  const std::lock_guard lock(mutex_);
+  return version_;
+}
+
+std::uint64_t Queue::wait_for_change(std::uint64_t seen, std::chrono::milliseconds timeout) const {
+  std::unique_lock lock(mutex_);
+  changed_.wait_for(lock, timeout, [&] { return version_ != seen; });
+  return version_;
+}
+
+void Queue::touch() {
+  {
+    const std::lock_guard lock(mutex_);
+    ++version_;
+  }
+  changed_.notify_all();
+}
+
+std::shared_ptr<Queue::Live> Queue::live(const std::string& id) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = live_.find(id);
+  return found == live_.end() ? nullptr : found->second;
+}
+
+void Queue::attach(const std::string& id, std::shared_ptr<Live> live) {
+  const std::lock_guard lock(mutex_);
+  live_[id] = std::move(live);
+}
+
+void Queue::detach(const std::string& id) {
+  const std::lock_guard lock(mutex_);
+  live_.erase(id);
+}
+
+Job Queue::with_live_progress(Job job) const {
+  if (const auto running = live(job.id))
+    if (auto progress = running->progress()) job.progress = std::move(*progress);
+  return job;
+}
+
+}  // namespace engine::jobs

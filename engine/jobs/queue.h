@@ -1,0 +1,80 @@
+// The queue as the rest of a program sees it: submit, look, stop, cancel, remove, wait for news.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "engine/jobs/store.h"
+
+namespace engine::jobs {
+
+struct QueueOptions {
+  std::filesystem::path folder;  ///< Holds one folder per job that needs one, named by its id. Nothing else uses it.
+  std::size_t max_queued = 32;   ///< Jobs that may wait.
+  Retention retention = {};
+};
+
+/// The jobs of a Store, together with what their workers know of them at this moment. Safe to call from any thread.
+/// Errors are those of Store, unless said otherwise.
+class Queue {
+ public:
+  /// Makes the folder, and removes in it what belongs to no job, or to a cancelled one.
+  ///   store   outlives the queue
+  ///   errors  no_space, unavailable; those of Store
+  [[nodiscard]] static Result<std::unique_ptr<Queue>> open(Store& store, const QueueOptions& options);
+  ~Queue();
+
+  /// Accepts a job: when this returns, it is on disk and will be done. With an idempotency key that is known already it
+  /// answers with the job that was accepted then.
+  ///   errors  busy: the queue is full; unprocessable: the key belongs to another payload or lane
+  [[nodiscard]] Result<Submission> submit(const NewJob& job);
+  /// The record, with the progress of this moment.
+  [[nodiscard]] Result<Job> find(const std::string& id);
+  [[nodiscard]] Result<std::vector<Job>> list(const Filter& filter = {});
+  /// Asks a job to end after its current interval and keep what it has.
+  ///   errors  conflict: no interval is finished yet, or the job has ended or is being cancelled
+  [[nodiscard]] Result<Job> stop(const std::string& id);
+  /// Asks a job to end at once and keep nothing; one that waits is cancelled when this returns. Idempotent.
+  ///   errors  conflict: the job has succeeded or failed
+  [[nodiscard]] Result<Job> cancel(const std::string& id);
+  /// Removes the record and the files of an ended job.
+  ///   errors  conflict: it has not ended
+  [[nodiscard]] Result<void> remove(const std::string& id);
+  /// Removes records and files that need not be kept. Workers do so between jobs.
+  [[nodiscard]] Result<void> expire();
+
+  /// Counts changes: of any record, of any progress.
+  [[nodiscard]] std::uint64_t version() const;
+  /// Waits until version() is not `seen`, but not longer than `timeout`.
+  ///   returns  version()
+  std::uint64_t wait_for_change(std::uint64_t seen, std::chrono::milliseconds timeout) const;
+
+ private:
+  friend class Worker;
+  friend class JobContext;
+  struct Live;  ///< A claimed job: how to reach whoever works on it.
+
+  Queue(Store& store, QueueOptions options) : store_(store), options_(std::move(options)) {}
+  [[nodiscard]] std::filesystem::path folder_of(const std::string& id) const { return options_.folder / id; }
+  void touch();
+  [[nodiscard]] std::shared_ptr<Live> live(const std::string& id) const;
+  void attach(const std::string& id, std::shared_ptr<Live> live);
+  void detach(const std::string& id);
+  [[nodiscard]] Job with_live_progress(Job job) const;
+
+  Store& store_;
+  const QueueOptions options_;
+  mutable std::mutex mutex_;  ///< Guards the two below.
+  std::map<std::string, std::shared_ptr<Live>> live_;
+  std::uint64_t version_ = 0;
+  mutable std::condition_variable changed_;
+};
+
+}  // namespace engine::jobs

@@ -1,0 +1,458 @@
+#include "engine/jobs/sqlite_store.h"
+
+#include <sqlite3.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <exception>
+#include <iterator>
+#include <mutex>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+
+#include "engine/jobs/durable_file.h"
+
+namespace engine::jobs {
+namespace {
+
+constexpr int schema_version = 1;
+constexpr const char* schema = R"(
+  CREATE TABLE jobs (
+    number INTEGER PRIMARY KEY AUTOINCREMENT,  -- AUTOINCREMENT: a removed job's number is never given away again
+    lane TEXT NOT NULL,
+    payload TEXT NOT NULL,
+    idempotency_key TEXT UNIQUE,
+    state TEXT NOT NULL,
+    claimed INTEGER NOT NULL,
+    stopped_early INTEGER NOT NULL,
+    finished_intervals INTEGER NOT NULL,
+    progress TEXT NOT NULL,
+    result TEXT NOT NULL,
+    error_code TEXT,
+    error_message TEXT,
+    error_where TEXT,
+    created INTEGER NOT NULL,  -- times: milliseconds since 1970
+    started INTEGER,
+    ended INTEGER
+  ) STRICT;
+  CREATE INDEX active ON jobs (lane, number) WHERE ended IS NULL;
+  CREATE INDEX finished ON jobs (ended, number) WHERE ended IS NOT NULL;
+  PRAGMA user_version = 1;
+)";
+
+/// SQLite's result codes become an Error here, travel as an exception to guarded() and leave this file as a Result.
+struct Failure : std::exception {
+  explicit Failure(Error e) : error(std::move(e)) {}
+  Error error;
+};
+
+/// In the order of ErrorCode. Names, because the numbers of an enum may change between versions and the file stays.
+constexpr std::array<std::string_view, 12> code_names = {
+    "invalid_argument", "unprocessable", "not_found", "conflict",  "corrupt_data", "unsupported",
+    "too_large",        "no_space",      "busy",      "cancelled", "unavailable",  "internal"};
+static_assert(std::size_t(ErrorCode::internal) + 1 == code_names.size());
+
+class Database {
+ public:
+  explicit Database(std::filesystem::path file) : file_(std::move(file)) {}
+  ~Database() { sqlite3_close(handle_); }
+  Database(const Database&) = delete;
+  Database& operator=(const Database&) = delete;
+
+  void open(std::chrono::milliseconds busy_timeout) {
+    // NOMUTEX: SqliteStore lets in one thread at a time, because a transaction is several calls.
+    const int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX;
+    check(sqlite3_open_v2(file_.c_str(), &handle_, flags, nullptr));
+    sqlite3_busy_timeout(handle_, int(busy_timeout.count()));
+  }
+  void execute(const char* sql) { check(sqlite3_exec(handle_, sql, nullptr, nullptr, nullptr)); }
+  void check(int code) const {
+    if (code != SQLITE_OK && code != SQLITE_ROW && code != SQLITE_DONE) throw Failure(error(code));
+  }
+  [[noreturn]] void corrupt(const std::string& what) const {
+    throw Failure({ErrorCode::corrupt_data,
+                   "the job store is damaged (" + what + "): put back a copy of it, or move it away to start afresh",
+                   file_});
+  }
+  [[nodiscard]] sqlite3* handle() const { return handle_; }
+  [[nodiscard]] const std::filesystem::path& file() const { return file_; }
+
+ private:
+  [[nodiscard]] Error error(int code) const {
+    const std::string reason = sqlite3_errstr(code);
+    // SQLite calls only ENOSPC a full disk; a quota or a limit on file size is one, too.
+    if ((code & 0xff) == SQLITE_FULL || ((code & 0xff) == SQLITE_IOERR && means_no_space(last_errno())))
+      return {ErrorCode::no_space, "the job store cannot grow, the disk is full: free some space and try again", file_};
+    switch (code & 0xff) {
+      case SQLITE_CORRUPT:
+        return {ErrorCode::corrupt_data,
+                "the job store is damaged: put back a copy of it, or move it away to start afresh", file_};
+      case SQLITE_NOTADB:
+        return {ErrorCode::corrupt_data, "the file is no job store: move it away, or choose another data folder",
+                file_};
+      case SQLITE_BUSY:
+      case SQLITE_LOCKED:
+        return {ErrorCode::unavailable, "another process uses this job store: end it, or choose another data folder",
+                file_};
+      case SQLITE_CANTOPEN:
+      case SQLITE_READONLY:
+      case SQLITE_PERM:
+      case SQLITE_IOERR:
+        return {ErrorCode::unavailable, "the job store cannot be read or written: " + reason, file_};
+      case SQLITE_TOOBIG:
+        return {ErrorCode::too_large, "the text is longer than the job store takes (1 GB)", {}};
+      default:
+        return {ErrorCode::internal, "job store: " + reason + ": " + sqlite3_errmsg(handle_), file_};
+    }
+  }
+
+  /// Of the write-ahead log: all that is written goes there first. (sqlite3_system_errno() is gone after a rollback.)
+  [[nodiscard]] int last_errno() const {
+    int number = 0;
+    sqlite3_file* log = nullptr;
+    sqlite3_file_control(handle_, "main", SQLITE_FCNTL_JOURNAL_POINTER, &log);
+    if (log && log->pMethods) log->pMethods->xFileControl(log, SQLITE_FCNTL_LAST_ERRNO, &number);
+    return number;
+  }
+
+  std::filesystem::path file_;
+  sqlite3* handle_ = nullptr;
+};
+
+/// One statement with its parameters, which bind to ?1, ?2, ... Texts must outlive it.
+class Statement {
+ public:
+  template <class... Values>
+  explicit Statement(Database& database, std::string_view sql, const Values&... values) : database_(database) {
+    sqlite3_stmt* prepared = nullptr;
+    const int code = sqlite3_prepare_v2(database_.handle(), sql.data(), int(sql.size()), &prepared, nullptr);
+    // Our statements are right for our tables: where they are not, the tables have become others.
+    if (code == SQLITE_ERROR) database_.corrupt(sqlite3_errmsg(database_.handle()));
+    database_.check(code);
+    handle_.reset(prepared);
+    (bind(values), ...);
+  }
+
+  /// Whether there is another row.
+  bool step() {
+    const int code = sqlite3_step(handle_.get());
+    database_.check(code);
+    return code == SQLITE_ROW;
+  }
+  void run() {
+    while (step()) {
+    }
+  }
+  [[nodiscard]] bool is_null(int column) const { return sqlite3_column_type(handle_.get(), column) == SQLITE_NULL; }
+  [[nodiscard]] std::int64_t integer(int column) const { return sqlite3_column_int64(handle_.get(), column); }
+  [[nodiscard]] std::string text(int column) const {
+    const auto* bytes = reinterpret_cast<const char*>(sqlite3_column_text(handle_.get(), column));
+    return bytes ? std::string(bytes, std::size_t(sqlite3_column_bytes(handle_.get(), column))) : std::string();
+  }
+
+ private:
+  struct Finalize {
+    void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+  };
+  void bind(std::int64_t value) { database_.check(sqlite3_bind_int64(handle_.get(), ++bound_, value)); }
+  void bind(std::string_view value) {
+    database_.check(sqlite3_bind_text64(handle_.get(), ++bound_, value.data() ? value.data() : "", value.size(),
+                                        SQLITE_STATIC, SQLITE_UTF8));
+  }
+  void bind(const std::string& value) { bind(std::string_view(value)); }
+  void bind(Time value) { bind(std::int64_t(value.time_since_epoch().count())); }
+  template <class T>
+  void bind(const std::optional<T>& value) {
+    if (value) {
+      bind(*value);
+    } else {
+      database_.check(sqlite3_bind_null(handle_.get(), ++bound_));
+    }
+  }
+
+  Database& database_;
+  std::unique_ptr<sqlite3_stmt, Finalize> handle_;
+  int bound_ = 0;
+};
+
+class Transaction {
+ public:
+  explicit Transaction(Database& database) : database_(database) { database_.execute("BEGIN IMMEDIATE"); }
+  ~Transaction() {
+    // A full disk may have rolled it back already.
+    if (!sqlite3_get_autocommit(database_.handle()))
+      sqlite3_exec(database_.handle(), "ROLLBACK", nullptr, nullptr, nullptr);
+  }
+  Transaction(const Transaction&) = delete;
+  Transaction& operator=(const Transaction&) = delete;
+  void commit() { database_.execute("COMMIT"); }
+
+ private:
+  Database& database_;
+};
+
+[[noreturn]] void no_such_job(const std::string& id) {
+  throw Failure({ErrorCode::not_found, "there is no job \"" + id + "\"; ended ones are removed after a while", id});
+}
+
+std::int64_t known_number(const std::string& id) {
+  const auto number = number_of(id);
+  if (!number) no_such_job(id);
+  return *number;
+}
+
+/// What read() reads; `payload` and `result` are columns, or '' where the texts are not wanted.
+std::string select(const std::string& payload, const std::string& result) {
+  return "SELECT number, lane, " + payload +
+         ", idempotency_key, state, claimed, stopped_early, finished_intervals, progress, " + result +
+         ", error_code, error_message, error_where, created, started, ended, "
+         "CASE state WHEN 'queued' THEN (SELECT count(*) FROM jobs AS other WHERE other.ended IS NULL AND "
+         "other.state = 'queued' AND other.number <= jobs.number) ELSE 0 END FROM jobs ";
+}
+
+std::optional<Time> time_at(const Statement& row, int column) {
+  if (row.is_null(column)) return std::nullopt;
+  return Time(std::chrono::milliseconds(row.integer(column)));
+}
+
+Job read(const Database& database, const Statement& row) {
+  Job job;
+  job.id = id_of(row.integer(0));
+  job.lane = row.text(1);
+  job.payload = row.text(2);
+  job.idempotency_key = row.text(3);
+  const auto state = parse_state(row.text(4));
+  if (!state) database.corrupt("job " + job.id + " is in state \"" + row.text(4) + "\"");
+  job.state = *state;
+  job.claimed = row.integer(5) != 0;
+  job.stopped_early = row.integer(6) != 0;
+  job.finished_intervals = int(row.integer(7));
+  job.progress = row.text(8);
+  job.result = row.text(9);
+  if (!row.is_null(10)) {
+    const auto code = std::find(code_names.begin(), code_names.end(), row.text(10));
+    if (code == code_names.end()) database.corrupt("job " + job.id + " has error code \"" + row.text(10) + "\"");
+    job.error = Error{ErrorCode(std::distance(code_names.begin(), code)), row.text(11), row.text(12)};
+  }
+  job.created = time_at(row, 13).value_or(Time{});
+  job.started = time_at(row, 14);
+  job.ended = time_at(row, 15);
+  job.queue_position = int(row.integer(16));
+  return job;
+}
+
+Job find_in(Database& database, const std::string& id) {
+  Statement row(database, select("payload", "result") + "WHERE number = ?1", known_number(id));
+  if (!row.step()) no_such_job(id);
+  return read(database, row);
+}
+
+Job apply_in(Database& database, const std::string& id, const Change& change, Time now) {
+  const auto changed = after(find_in(database, id), change, now);
+  if (!changed) throw Failure(changed.error());
+  const Job& job = *changed;
+  std::optional<std::string_view> code, message, where;
+  if (job.error) {
+    code = code_names[std::size_t(job.error->code)];
+    message = job.error->message;
+    where = job.error->where;
+  }
+  Statement(database,
+            "UPDATE jobs SET state = ?2, claimed = ?3, stopped_early = ?4, finished_intervals = ?5, progress = ?6, "
+            "result = ?7, error_code = ?8, error_message = ?9, error_where = ?10, started = ?11, ended = ?12 "
+            "WHERE number = ?1",
+            known_number(id), to_string(job.state), std::int64_t(job.claimed), std::int64_t(job.stopped_early),
+            std::int64_t(job.finished_intervals), job.progress, job.result, code, message, where, job.started,
+            job.ended)
+      .run();
+  return find_in(database, id);
+}
+
+/// First column of the first row.
+std::string text_of(Database& database, std::string_view sql) {
+  Statement row(database, sql);
+  return row.step() ? row.text(0) : std::string();
+}
+
+std::vector<std::string> ids(Statement&& rows) {
+  std::vector<std::string> found;
+  while (rows.step()) found.push_back(id_of(rows.integer(0)));
+  return found;
+}
+
+void prepare(Database& database, Time now) {
+  // EXCLUSIVE before the first access: the lock is then held until the process ends, and no shared memory is needed.
+  database.execute("PRAGMA locking_mode = EXCLUSIVE; PRAGMA synchronous = FULL;");
+  if (text_of(database, "PRAGMA journal_mode = WAL") != "wal")
+    throw Failure({ErrorCode::unavailable, "this file system cannot hold a job store: choose another data folder",
+                   database.file()});
+  if (const auto found = text_of(database, "PRAGMA quick_check(1)"); found != "ok") database.corrupt(found);
+
+  Transaction transaction(database);
+  const int version = std::stoi(text_of(database, "PRAGMA user_version"));
+  if (version > schema_version)
+    throw Failure({ErrorCode::unsupported,
+                   "the job store was written by a newer version (" + std::to_string(version) + ", known is " +
+                       std::to_string(schema_version) + "): use that one, or choose another data folder",
+                   database.file()});
+  if (version < schema_version) {
+    if (text_of(database, "SELECT count(*) FROM sqlite_schema") != "0")
+      throw Failure({ErrorCode::corrupt_data, "the file is no job store: move it away, or choose another data folder",
+                     database.file()});
+    database.execute(schema);
+  }
+  for (const std::string& id : ids(Statement(database, "SELECT number FROM jobs WHERE claimed ORDER BY number")))
+    apply_in(database, id, {.event = Event::release}, now);
+  transaction.commit();
+}
+
+/// Runs `body` and turns what SQLite and the library throw into an Error.
+template <class Body>
+auto guarded(Body body) -> Result<decltype(body())> {
+  try {
+    if constexpr (std::is_void_v<decltype(body())>) {
+      body();
+      return {};
+    } else {
+      return body();
+    }
+  } catch (const Failure& failure) {
+    return tl::make_unexpected(failure.error);
+  } catch (const std::exception& e) {
+    return fail(ErrorCode::internal, std::string("job store: ") + e.what());
+  }
+}
+
+}  // namespace
+
+struct SqliteStore::Impl {
+  Impl(std::filesystem::path file, std::function<Time()> clock) : database(std::move(file)), now(std::move(clock)) {}
+
+  /// One transaction, one thread at a time.
+  template <class Body>
+  auto transact(Body body) -> Result<decltype(body())> {
+    return guarded([&] {
+      const std::lock_guard lock(mutex);
+      Transaction transaction(database);
+      if constexpr (std::is_void_v<decltype(body())>) {
+        body();
+        transaction.commit();
+      } else {
+        auto result = body();
+        transaction.commit();
+        return result;
+      }
+    });
+  }
+
+  std::mutex mutex;  ///< Guards `database`: SQLite's connection is one thread's at a time.
+  Database database;
+  std::function<Time()> now;
+};
+
+SqliteStore::SqliteStore(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+SqliteStore::~SqliteStore() = default;
+
+Result<std::unique_ptr<SqliteStore>> SqliteStore::open(const SqliteOptions& options) {
+  if (auto made = create_folder(options.folder); !made) return propagate(made);
+  return guarded([&] {
+    auto impl = std::make_unique<Impl>(options.folder / "jobs.db", options.now);
+    impl->database.open(options.busy_timeout);
+    prepare(impl->database, impl->now());
+    return std::unique_ptr<SqliteStore>(new SqliteStore(std::move(impl)));
+  });
+}
+
+Result<Submission> SqliteStore::submit(const NewJob& job, std::size_t max_queued) {
+  return impl_->transact([&]() -> Submission {
+    Database& database = impl_->database;
+    std::optional<std::string_view> key;
+    if (!job.idempotency_key.empty()) {
+      key = job.idempotency_key;
+      Statement known(database, select("payload", "result") + "WHERE idempotency_key = ?1", key);
+      if (known.step()) {
+        Job earlier = read(database, known);
+        if (earlier.payload != job.payload || earlier.lane != job.lane)
+          throw Failure({ErrorCode::unprocessable,
+                         "this idempotency key came with another request before, job " + earlier.id +
+                             ": use a new key for a new request",
+                         "idempotency_key"});
+        return {.job = std::move(earlier), .created = false};
+      }
+    }
+    const std::string waiting = text_of(database, "SELECT count(*) FROM jobs WHERE ended IS NULL AND state = 'queued'");
+    if (std::stoull(waiting) >= max_queued)
+      throw Failure({ErrorCode::busy,
+                     "the queue is full: " + waiting + " jobs wait, its limit (max_queued) is " +
+                         std::to_string(max_queued) + "; try again later",
+                     "max_queued"});
+    Statement(database,
+              "INSERT INTO jobs (lane, payload, idempotency_key, state, claimed, stopped_early, finished_intervals, "
+              "progress, result, created) VALUES (?1, ?2, ?3, 'queued', 0, 0, 0, '', '', ?4)",
+              job.lane, job.payload, key, impl_->now())
+        .run();
+    return {.job = find_in(database, id_of(sqlite3_last_insert_rowid(database.handle()))), .created = true};
+  });
+}
+
+Result<Job> SqliteStore::find(const std::string& id) {
+  return guarded([&] {
+    const std::lock_guard lock(impl_->mutex);
+    return find_in(impl_->database, id);
+  });
+}
+
+Result<std::vector<Job>> SqliteStore::list(const Filter& filter) {
+  return guarded([&] {
+    const std::lock_guard lock(impl_->mutex);
+    std::optional<std::string_view> lane;
+    if (filter.lane) lane = *filter.lane;
+    Statement row(impl_->database,
+                  select("''", "''") +
+                      "WHERE (?1 IS NULL OR lane = ?1) AND (NOT ?2 OR ended IS NULL) ORDER BY number DESC LIMIT ?3",
+                  lane, std::int64_t(filter.active_only), std::int64_t(filter.limit));
+    std::vector<Job> jobs;
+    while (row.step()) jobs.push_back(read(impl_->database, row));
+    return jobs;
+  });
+}
+
+Result<std::optional<Job>> SqliteStore::claim() {
+  return impl_->transact([&]() -> std::optional<Job> {
+    const auto found = ids(Statement(impl_->database,
+                                     "SELECT number FROM jobs WHERE ended IS NULL AND NOT claimed AND NOT EXISTS "
+                                     "(SELECT 1 FROM jobs AS older WHERE older.ended IS NULL AND "
+                                     "older.lane = jobs.lane AND older.number < jobs.number) ORDER BY number LIMIT 1"));
+    if (found.empty()) return std::nullopt;
+    return apply_in(impl_->database, found.front(), {.event = Event::claim}, impl_->now());
+  });
+}
+
+Result<Job> SqliteStore::apply(const std::string& id, const Change& change) {
+  return impl_->transact([&] { return apply_in(impl_->database, id, change, impl_->now()); });
+}
+
+Result<void> SqliteStore::remove(const std::string& id) {
+  return impl_->transact([&] {
+    const Job job = find_in(impl_->database, id);
+    if (!is_final(job.state))
+      throw Failure({ErrorCode::conflict,
+                     id + " is " + std::string(to_string(job.state)) + ": cancel it and wait for its end first", id});
+    Statement(impl_->database, "DELETE FROM jobs WHERE number = ?1", known_number(id)).run();
+  });
+}
+
+Result<std::vector<std::string>> SqliteStore::expire(const Retention& retention) {
+  return impl_->transact([&] {
+    const Time oldest = impl_->now() - retention.max_age;
+    return ids(
+        Statement(impl_->database,
+                  "DELETE FROM jobs WHERE ended IS NOT NULL AND (ended < ?1 OR number NOT IN (SELECT number FROM "
+                  "jobs WHERE ended IS NOT NULL ORDER BY ended DESC, number DESC LIMIT ?2)) RETURNING number",
+                  oldest, std::int64_t(retention.max_count)));
+  });
+}
+
+}  // namespace engine::jobs

@@ -1,0 +1,44 @@
+// Job records in one SQLite file, for one process.
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <memory>
+
+#include "engine/jobs/store.h"
+
+namespace engine::jobs {
+
+struct SqliteOptions {
+  std::filesystem::path folder;                  ///< The file is "jobs.db" in it; made if absent.
+  std::chrono::milliseconds busy_timeout{2000};  ///< Wait so long for a process that is just ending.
+  std::function<Time()> now = [] {
+    return std::chrono::floor<std::chrono::milliseconds>(std::chrono::system_clock::now());
+  };
+};
+
+/// The embedded store: write-ahead log, synchronous=FULL. The process holds the file alone until it ends, however it
+/// ends; so whoever opens it knows that no worker is left, and open() releases every claim (Event::release).
+class SqliteStore final : public Store {
+ public:
+  ///   errors  unavailable: another process holds the file, or it cannot be opened; corrupt_data: it is damaged or no
+  ///           job store; unsupported: a newer version wrote it; no_space. `where` is the file.
+  [[nodiscard]] static Result<std::unique_ptr<SqliteStore>> open(const SqliteOptions& options);
+  ~SqliteStore() override;
+
+  [[nodiscard]] Result<Submission> submit(const NewJob& job, std::size_t max_queued) override;
+  [[nodiscard]] Result<Job> find(const std::string& id) override;
+  [[nodiscard]] Result<std::vector<Job>> list(const Filter& filter) override;
+  [[nodiscard]] Result<std::optional<Job>> claim() override;
+  [[nodiscard]] Result<Job> apply(const std::string& id, const Change& change) override;
+  [[nodiscard]] Result<void> remove(const std::string& id) override;
+  [[nodiscard]] Result<std::vector<std::string>> expire(const Retention& retention) override;
+
+ private:
+  struct Impl;
+  explicit SqliteStore(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace engine::jobs

@@ -1,0 +1,199 @@
+#include "engine/jobs/worker.h"
+
+#include <exception>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "engine/jobs/durable_file.h"
+#include "engine/jobs/live.h"
+
+namespace engine::jobs {
+namespace {
+
+namespace fs = std::filesystem;
+using std::chrono::steady_clock;
+
+constexpr std::string_view checkpoint_prefix = "checkpoint-";
+
+/// Errors that may be over in a moment.
+bool worth_retrying(const Error& error) {
+  return error.code == ErrorCode::no_space || error.code == ErrorCode::unavailable || error.code == ErrorCode::busy;
+}
+
+void remove_checkpoints(const fs::path& folder) {
+  std::error_code error;
+  std::vector<fs::path> found;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
+    if (entry->path().filename().string().starts_with(checkpoint_prefix)) found.push_back(entry->path());
+  for (const fs::path& file : found) fs::remove(file, error);
+}
+
+}  // namespace
+
+JobContext::JobContext(Queue& queue, Job job, Queue::Live& live, const std::atomic<bool>& draining,
+                       const WorkerOptions& options)
+    : queue_(queue),
+      job_(std::move(job)),
+      live_(live),
+      draining_(draining),
+      options_(options),
+      last_write_(steady_clock::now().time_since_epoch().count()) {}
+
+fs::path JobContext::folder() const { return queue_.folder_of(job_.id); }
+
+fs::path JobContext::checkpoint_file(int interval) const {
+  return folder() / (std::string(checkpoint_prefix) + std::to_string(interval));
+}
+
+Result<std::string> JobContext::load_checkpoint() const { return read_bytes(checkpoint_file(job_.finished_intervals)); }
+
+Result<void> JobContext::save_checkpoint(int interval, std::string_view bytes) {
+  const int previous = job_.finished_intervals;
+  const Change change{.event = Event::finish_interval, .progress = live_.progress(), .interval = interval};
+  // Asked before the file is written: a wrong number must not overwrite the checkpoint that the record speaks of.
+  if (auto allowed = after(job_, change, {}); !allowed) return propagate(allowed);
+  if (auto made = create_folder(folder()); !made) return made;
+  if (auto written = write_durably(checkpoint_file(interval), bytes); !written) return written;
+  if (auto recorded = queue_.store_.apply(job_.id, change); !recorded) return propagate(recorded);
+  job_.finished_intervals = interval;
+  std::error_code ignored;
+  fs::remove(checkpoint_file(previous), ignored);
+  queue_.touch();
+  if (live_.interrupt.stop_requested() || draining_)
+    return fail(ErrorCode::cancelled, job_.id + " was interrupted after interval " + std::to_string(interval), job_.id);
+  return {};
+}
+
+void JobContext::publish_progress(std::string progress) {
+  live_.set_progress(progress);
+  queue_.touch();
+  const auto now = steady_clock::now().time_since_epoch().count();
+  auto last = last_write_.load();
+  if (steady_clock::duration(now - last) < options_.progress_period) return;
+  if (!last_write_.compare_exchange_strong(last, now)) return;  // another thread is just writing
+  // Progress on disk is a comfort after a restart. A full disk shows where it matters, at the next checkpoint.
+  (void)queue_.store_.apply(job_.id, {.event = Event::report, .progress = std::move(progress)});
+}
+
+std::stop_token JobContext::cancel_token() const { return live_.interrupt.get_token(); }
+
+bool JobContext::stop_requested() const { return live_.stop; }
+
+Worker::Worker(Queue& queue, JobFunction function, const WorkerOptions& options)
+    : queue_(queue), function_(std::move(function)), options_(options), thread_([this] {
+        loop();
+        finished_.set_value();
+      }) {}
+
+Worker::~Worker() { drain(std::chrono::milliseconds(0)); }
+
+void Worker::drain(std::chrono::milliseconds grace) {
+  if (!thread_.joinable()) return;
+  draining_ = true;
+  queue_.touch();
+  if (finished_.get_future().wait_for(grace) != std::future_status::ready) {
+    const std::lock_guard lock(mutex_);
+    out_of_time_ = true;
+    if (current_) current_->interrupt.request_stop();
+  }
+  thread_.join();
+}
+
+std::optional<Error> Worker::trouble() const {
+  const std::lock_guard lock(mutex_);
+  return trouble_;
+}
+
+void Worker::set_trouble(std::optional<Error> error) {
+  const std::lock_guard lock(mutex_);
+  trouble_ = std::move(error);
+}
+
+void Worker::set_current(std::shared_ptr<Queue::Live> live) {
+  const std::lock_guard lock(mutex_);
+  if (live && out_of_time_) live->interrupt.request_stop();
+  current_ = std::move(live);
+}
+
+void Worker::loop() {
+  // The version is read before all that is looked at: what happens in between ends the wait at once.
+  for (auto seen = queue_.version(); !draining_; seen = queue_.version()) {
+    const auto expired = queue_.expire();
+    const auto job = queue_.store_.claim();
+    if (!expired || !job) {
+      set_trouble(expired ? job.error() : expired.error());
+    } else {
+      set_trouble(std::nullopt);
+    }
+    if (job && *job) {
+      run(**job);
+    } else {
+      queue_.wait_for_change(seen, job ? std::chrono::minutes(1) : options_.retry_period);
+    }
+  }
+}
+
+void Worker::run(const Job& job) {
+  const auto live = std::make_shared<Queue::Live>();
+  queue_.attach(job.id, live);
+  set_current(live);
+  // A stop or cancel between the claim and attach() has reached the record only.
+  const auto record = queue_.store_.find(job.id);
+  const State state = record ? record->state : job.state;
+  if (state == State::cancel_requested) live->interrupt.request_stop();
+  if (state == State::stop_requested) live->stop = true;
+  queue_.touch();
+
+  JobContext context(queue_, job, *live, draining_, options_);
+  const auto outcome = call(context);
+  Change change{.event = Event::succeed, .progress = live->progress()};
+  if (outcome) {
+    change.result = outcome->text;
+    change.stopped_early = outcome->stopped_early;
+  } else if (outcome.error().code == ErrorCode::cancelled && draining_) {
+    change.event = Event::release;
+  } else {
+    change.event = Event::fail;
+    change.error = outcome.error();
+  }
+  record_end(job.id, change);
+  set_current(nullptr);
+  queue_.detach(job.id);
+  queue_.touch();
+}
+
+Result<JobResult> Worker::call(JobContext& context) const {
+  if (context.cancel_token().stop_requested() || draining_)
+    return fail(ErrorCode::cancelled, context.id() + " was interrupted before it began", context.id());
+  try {
+    return function_(context);
+  } catch (const std::exception& e) {
+    return fail(ErrorCode::internal, std::string("the job met an unexpected error, please report it: ") + e.what(),
+                context.id());
+  } catch (...) {
+    return fail(ErrorCode::internal, "the job met an unexpected error, please report it", context.id());
+  }
+}
+
+void Worker::record_end(const std::string& id, const Change& change) {
+  for (;;) {
+    const auto seen = queue_.version();
+    const auto job = queue_.store_.apply(id, change);
+    if (job) {
+      if (job->state == State::cancelled) {
+        std::error_code ignored;
+        fs::remove_all(queue_.folder_of(id), ignored);
+      } else if (is_final(job->state)) {
+        remove_checkpoints(queue_.folder_of(id));
+      }
+      return;
+    }
+    set_trouble(job.error());
+    // Whoever opens the store next finds the job claimed by nobody and takes it up at its last checkpoint.
+    if (draining_ || !worth_retrying(job.error())) return;
+    queue_.wait_for_change(seen, options_.retry_period);
+  }
+}
+
+}  // namespace engine::jobs

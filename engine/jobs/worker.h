@@ -1,0 +1,118 @@
+// One thread that does the jobs of a queue, oldest first.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <string_view>
+#include <thread>
+
+#include "engine/jobs/queue.h"
+
+namespace engine::jobs {
+
+class JobContext;
+
+struct JobResult {
+  std::string text;            ///< Opaque; becomes Job::result.
+  bool stopped_early = false;  ///< Fewer intervals than asked for, because stop_requested().
+};
+
+/// The work. Called once per job, and again with the same payload after an interruption: it then starts from the last
+/// checkpoint, so that what it returns does not depend on where it was interrupted. What it does outside its own folder
+/// must bear being done twice. An error that the context gives it is to be returned.
+///   errors  any; the job ends as failed with it. After a cancel, whatever it returns is dropped.
+/// An exception that leaves it is a bug: the job ends as failed with ErrorCode::internal.
+using JobFunction = std::function<Result<JobResult>(JobContext&)>;
+
+struct WorkerOptions {
+  std::chrono::milliseconds progress_period{1000};  ///< Progress goes to disk at most so often.
+  std::chrono::milliseconds retry_period{1000};     ///< After an error of the store.
+};
+
+/// A running job as its function sees it. All of it may be called from any thread, except save_checkpoint(): by one
+/// thread at a time.
+class JobContext {
+ public:
+  [[nodiscard]] const std::string& id() const { return job_.id; }
+  [[nodiscard]] const std::string& payload() const { return job_.payload; }
+  /// For files of the job; they live as long as its record, or until it is cancelled. Absent before the first
+  /// checkpoint. Names that begin with "checkpoint-" are taken.
+  [[nodiscard]] std::filesystem::path folder() const;
+
+  /// Intervals that need not be done again; 0 at the first start.
+  [[nodiscard]] int finished_intervals() const { return job_.finished_intervals; }
+  /// Bytes of the checkpoint of interval finished_intervals().
+  ///   errors  not_found: there is none, or its file has been taken away; unavailable
+  [[nodiscard]] Result<std::string> load_checkpoint() const;
+  /// Puts the state after an interval on disk, then says so in the record: kill -9 at any moment leaves either this
+  /// checkpoint or the one before, whole.
+  ///   interval  larger than finished_intervals()
+  ///   errors    cancelled: it was saved, but the job is to end here (cancel or shutdown: return the error);
+  ///             invalid_argument: `interval` does not count up; no_space, unavailable: it was not saved
+  [[nodiscard]] Result<void> save_checkpoint(int interval, std::string_view bytes);
+  /// Tells readers how far the job is; they see it at once.
+  void publish_progress(std::string progress);
+
+  /// To be polled at every step. When it fires, return ErrorCode::cancelled; what was done since the last checkpoint is
+  /// lost.
+  [[nodiscard]] std::stop_token cancel_token() const;
+  /// To be asked at the start and after every interval: end now, and make the result of the last finished interval.
+  /// There is one; it may be that of load_checkpoint(), where the job was interrupted after the request.
+  [[nodiscard]] bool stop_requested() const;
+
+ private:
+  friend class Worker;
+  JobContext(Queue& queue, Job job, Queue::Live& live, const std::atomic<bool>& draining, const WorkerOptions& options);
+  [[nodiscard]] std::filesystem::path checkpoint_file(int interval) const;
+
+  Queue& queue_;
+  Job job_;
+  Queue::Live& live_;
+  const std::atomic<bool>& draining_;
+  const WorkerOptions options_;
+  std::atomic<std::chrono::steady_clock::rep> last_write_;  ///< Of progress to disk.
+};
+
+/// Runs until drained. Several workers may share a queue.
+class Worker {
+ public:
+  /// queue  outlives the worker
+  Worker(Queue& queue, JobFunction function, const WorkerOptions& options = {});
+  ~Worker();  ///< drain() without grace.
+
+  /// Ends the worker. It claims no more jobs; a running one ends at its next checkpoint, or when `grace` is over from
+  /// its cancel_token(). It keeps its state and its last checkpoint, and goes on when a worker claims it again.
+  /// Returns when the function has.
+  void drain(std::chrono::milliseconds grace);
+  /// What keeps it from working: the error of the store that it meets again and again. Nothing if all is well.
+  [[nodiscard]] std::optional<Error> trouble() const;
+
+ private:
+  void loop();
+  void run(const Job& job);
+  [[nodiscard]] Result<JobResult> call(JobContext& context) const;
+  void record_end(const std::string& id, const Change& change);
+  void set_trouble(std::optional<Error> error);
+  void set_current(std::shared_ptr<Queue::Live> live);
+
+  Queue& queue_;
+  const JobFunction function_;
+  const WorkerOptions options_;
+  std::atomic<bool> draining_ = false;
+  mutable std::mutex mutex_;  ///< Guards the three below.
+  std::optional<Error> trouble_;
+  std::shared_ptr<Queue::Live> current_;
+  bool out_of_time_ = false;
+  std::promise<void> finished_;
+  std::thread thread_;
+};
+
+}  // namespace engine::jobs

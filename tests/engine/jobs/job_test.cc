@@ -1,0 +1,142 @@
+#include "engine/jobs/job.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <map>
+#include <tuple>
+
+namespace engine::jobs {
+namespace {
+
+constexpr Time noon{std::chrono::hours(12)};
+
+Job job_in(State state, bool claimed, int finished_intervals) {
+  Job job;
+  job.id = "e000007";
+  job.state = state;
+  job.claimed = claimed;
+  job.finished_intervals = finished_intervals;
+  return job;
+}
+
+Result<Job> after_event(const Job& job, Event event) {
+  Change change{.event = event, .interval = job.finished_intervals + 1, .result = "text", .stopped_early = true};
+  change.error = {ErrorCode::unprocessable, "why", "where"};
+  return after(job, change, noon);
+}
+
+/// One line of the table that the states' documentation amounts to: "-" is a conflict.
+struct Line {
+  State state;
+  bool claimed;
+  int finished_intervals;
+  std::array<std::string, event_count> next;  // claim report finish_interval stop cancel succeed fail release
+};
+
+const std::string no = "-", run = "running", stopping = "stop_requested", leaving = "cancel_requested",
+                  good = "succeeded", bad = "failed", gone = "cancelled";
+
+const std::vector<Line>& table() {
+  using enum State;
+  static const std::vector<Line> lines = {
+      {queued, false, 0, {run, no, no, no, gone, no, no, no}},
+      {running, true, 0, {no, run, run, no, leaving, good, bad, run}},
+      {running, true, 2, {no, run, run, stopping, leaving, good, bad, run}},
+      {running, false, 0, {run, no, no, no, gone, no, no, no}},
+      {running, false, 2, {run, no, no, stopping, gone, no, no, no}},
+      {stop_requested, true, 2, {no, stopping, stopping, stopping, leaving, good, bad, stopping}},
+      {stop_requested, false, 2, {stopping, no, no, stopping, gone, no, no, no}},
+      {cancel_requested, true, 0, {no, leaving, leaving, no, leaving, gone, gone, gone}},
+      {cancel_requested, true, 2, {no, leaving, leaving, no, leaving, gone, gone, gone}},
+      {succeeded, false, 2, {no, no, no, no, no, no, no, no}},
+      {failed, false, 2, {no, no, no, no, no, no, no, no}},
+      {cancelled, false, 0, {no, no, no, no, gone, no, no, no}},
+  };
+  return lines;
+}
+
+TEST(JobStates, FollowTheTable) {
+  for (const Line& line : table())
+    for (int e = 0; e < event_count; ++e) {
+      const Job before = job_in(line.state, line.claimed, line.finished_intervals);
+      const auto result = after_event(before, Event(e));
+      EXPECT_EQ(result ? std::string(to_string(result->state)) : no, line.next[std::size_t(e)])
+          << to_string(line.state) << (line.claimed ? ", claimed" : "") << ", intervals " << line.finished_intervals
+          << ", event " << e;
+      if (result) continue;
+      EXPECT_EQ(result.error().code, ErrorCode::conflict);
+      EXPECT_EQ(result.error().where, "e000007");
+    }
+}
+
+TEST(JobStates, AreAllInTheTable) {
+  std::map<State, int> lines;
+  for (const Line& line : table()) ++lines[line.state];
+  EXPECT_EQ(lines.size(), std::size_t(state_count));
+}
+
+TEST(JobStates, EndWithATimeAndWithoutAWorker) {
+  for (const Line& line : table())
+    for (int e = 0; e < event_count; ++e) {
+      const Job before = job_in(line.state, line.claimed, line.finished_intervals);
+      const auto result = after_event(before, Event(e));
+      if (!result || is_final(before.state)) continue;
+      EXPECT_EQ(result->ended.has_value(), is_final(result->state));
+      if (is_final(result->state)) {
+        EXPECT_FALSE(result->claimed);
+      }
+      EXPECT_EQ(!result->result.empty() || result->stopped_early, result->state == State::succeeded);
+      EXPECT_EQ(result->error.has_value(), result->state == State::failed);
+    }
+}
+
+TEST(JobStates, CancellingAgainChangesNothing) {
+  Job job = job_in(State::cancelled, false, 1);
+  job.ended = Time(std::chrono::hours(3));
+  const auto again = after_event(job, Event::cancel);
+  ASSERT_TRUE(again);
+  EXPECT_EQ(again->ended, job.ended);
+}
+
+TEST(JobStates, KeepTheTimeOfTheFirstStart) {
+  Job job = job_in(State::running, false, 1);
+  job.started = Time(std::chrono::hours(3));
+  EXPECT_EQ(after_event(job, Event::claim)->started, job.started);
+  EXPECT_EQ(after_event(job_in(State::queued, false, 0), Event::claim)->started, noon);
+}
+
+TEST(JobStates, RefuseIntervalsThatDoNotCountUp) {
+  const Job job = job_in(State::running, true, 2);
+  for (const int interval : {-1, 0, 2}) {
+    const auto result = after(job, {.event = Event::finish_interval, .interval = interval}, noon);
+    ASSERT_FALSE(result);
+    EXPECT_EQ(result.error().code, ErrorCode::invalid_argument);
+  }
+  EXPECT_EQ(after(job, {.event = Event::finish_interval, .interval = 5}, noon)->finished_intervals, 5);
+}
+
+TEST(JobStates, SayWhatToDoInstead) {
+  EXPECT_EQ(after_event(job_in(State::running, true, 0), Event::stop).error().message,
+            "e000007 has no finished interval to keep yet: wait for the first one, or cancel");
+  EXPECT_EQ(after_event(job_in(State::failed, false, 0), Event::cancel).error().message,
+            "e000007 is failed: it has already ended and stays as it is");
+}
+
+TEST(JobStates, HaveNamesThatAreReadBack) {
+  for (int s = 0; s < state_count; ++s) EXPECT_EQ(parse_state(to_string(State(s))), State(s));
+  EXPECT_FALSE(parse_state("Queued"));
+  EXPECT_FALSE(parse_state(""));
+}
+
+TEST(JobIds, CountInSixDigitsOrMore) {
+  for (const auto& [number, id] : {std::pair{1L, "e000001"}, {999'999L, "e999999"}, {1'000'000L, "e1000000"}}) {
+    EXPECT_EQ(id_of(number), id);
+    EXPECT_EQ(number_of(id), number);
+  }
+  for (const char* text : {"", "e", "e1", "e0000001", "E000001", "e00001x", "e-00001", "e99999999999999999999", "../x"})
+    EXPECT_FALSE(number_of(text)) << text;
+}
+
+}  // namespace
+}  // namespace engine::jobs

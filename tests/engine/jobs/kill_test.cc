@@ -1,0 +1,133 @@
+// kill -9 at any moment: no accepted job is lost, and results are those of a run that nobody disturbed.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <set>
+#include <thread>
+
+#include "engine/core/rng.h"
+#include "engine/jobs/worker.h"
+#include "tests/engine/jobs/jobs_support.h"
+
+namespace engine::jobs {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kills = 20;
+constexpr int id_length = 7;
+
+/// One interval of the job: depends on all that came before it.
+std::uint64_t next_state(std::uint64_t state, int interval) {
+  Rng rng(state, std::uint64_t(interval));
+  return (std::uint64_t(rng.next()) << 32) | rng.next();
+}
+
+std::string undisturbed(int intervals) {
+  std::uint64_t state = 1;
+  for (int u = 1; u <= intervals; ++u) state = next_state(state, u);
+  return std::to_string(state);
+}
+
+/// The payload is the number of intervals.
+Result<JobResult> count_intervals(JobContext& context) {
+  const int intervals = std::stoi(context.payload());
+  std::uint64_t state = 1;
+  if (context.finished_intervals() > 0) {
+    const auto checkpoint = context.load_checkpoint();
+    if (!checkpoint) return propagate(checkpoint);
+    state = std::stoull(*checkpoint);
+  }
+  for (int u = context.finished_intervals() + 1; u <= intervals; ++u) {
+    state = next_state(state, u);
+    std::this_thread::sleep_for(std::chrono::milliseconds(4));
+    context.publish_progress(std::to_string(u));
+    if (auto saved = context.save_checkpoint(u, std::to_string(state)); !saved) return propagate(saved);
+  }
+  return JobResult{.text = std::to_string(state)};
+}
+
+/// The process that is killed: accepts one job more, tells its id, works until all is done.
+int serve(const fs::path& folder, int round, int accepted) {
+  try {
+    // The one before may still be dying; its lock goes with it.
+    const auto store = value(SqliteStore::open({.folder = folder}));
+    const auto queue = open_queue(*store, folder);
+    Worker worker(*queue, count_intervals, {.progress_period = std::chrono::milliseconds(5)});
+    const std::string id =
+        value(queue->submit({.lane = "b", .payload = "3", .idempotency_key = "round " + std::to_string(round)})).job.id;
+    if (::write(accepted, id.data(), id_length) != id_length) return 2;
+    for (const Job& job : value(queue->list()))
+      if (wait_for_end(*queue, job.id).state != State::succeeded) return 3;
+    return 0;
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "round %d: %s\n", round, e.what());
+    return 1;
+  }
+}
+
+TEST(Kill, LosesNoAcceptedJobAndChangesNoResult) {
+  const support::TempDir dir;
+  constexpr int intervals = 250;  // at 4 ms each: more than all rounds together give it
+  std::string long_job;
+  {
+    const auto store = open_store(dir.path());
+    long_job =
+        value(open_queue(*store, dir.path())->submit({.lane = "a", .payload = std::to_string(intervals)})).job.id;
+  }
+  int accepted[2];
+  ASSERT_EQ(::pipe2(accepted, O_CLOEXEC), 0);
+  Rng rng(20);
+  int killed = 0, finished_before = 0, resumed_rounds = 0;
+  std::set<std::string> promises;
+  for (int round = 0; round <= kills; ++round) {
+    SCOPED_TRACE(round);
+    const pid_t child = ::fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) ::_exit(serve(dir.path(), round, accepted[1]));
+    if (round < kills) {
+      std::this_thread::sleep_for(std::chrono::microseconds(rng.below(60'000)));
+      ::kill(child, SIGKILL);
+    }
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    if (round < kills && WIFSIGNALED(status)) {
+      ++killed;
+    } else {
+      ASSERT_TRUE(WIFEXITED(status));
+      ASSERT_EQ(WEXITSTATUS(status), 0);
+    }
+    // What the record calls finished is on disk, and it never goes back.
+    const auto store = open_store(dir.path());
+    const Job job = value(store->find(long_job));
+    EXPECT_GE(job.finished_intervals, finished_before);
+    if (job.finished_intervals > finished_before && finished_before > 0) ++resumed_rounds;
+    finished_before = job.finished_intervals;
+    if (job.finished_intervals > 0 && !is_final(job.state)) {
+      EXPECT_TRUE(
+          fs::exists(dir.path() / "jobs" / long_job / ("checkpoint-" + std::to_string(job.finished_intervals))));
+    }
+  }
+  ::close(accepted[1]);
+  for (char id[id_length]; ::read(accepted[0], id, id_length) == id_length;) promises.emplace(id, id_length);
+  ::close(accepted[0]);
+
+  const auto store = open_store(dir.path());
+  const Job job = value(store->find(long_job));
+  EXPECT_EQ(job.state, State::succeeded);
+  EXPECT_EQ(job.result, undisturbed(intervals));
+  for (const std::string& id : promises) {
+    const auto kept = store->find(id);
+    ASSERT_TRUE(kept) << "accepted, then lost";
+    EXPECT_EQ(kept->state, State::succeeded) << id;
+    EXPECT_EQ(kept->result, undisturbed(3)) << id;
+  }
+  EXPECT_FALSE(promises.empty());
+  EXPECT_GE(killed, kills - 2) << "the job was over before it could be disturbed";
+  EXPECT_GE(resumed_rounds, 3) << "hardly a round got far enough to matter";
+}
+
+}  // namespace
+}  // namespace engine::jobs

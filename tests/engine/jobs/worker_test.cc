@@ -1,0 +1,450 @@
+#include "engine/jobs/worker.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <semaphore>
+#include <set>
+#include <stdexcept>
+#include <thread>
+#include <vector>
+
+#include "engine/core/rng.h"
+#include "tests/engine/jobs/jobs_support.h"
+
+namespace engine::jobs {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+
+/// Passes when it is opened once for every passage; gives up after 20 s.
+class Gate {
+ public:
+  void open() { semaphore_.release(); }
+  void pass() {
+    if (!semaphore_.try_acquire_for(20s)) throw std::runtime_error("the gate stayed shut");
+  }
+
+ private:
+  std::counting_semaphore<> semaphore_{0};
+};
+
+tl::unexpected<Error> interrupted() { return fail(ErrorCode::cancelled, "interrupted"); }
+
+class WorkerTest : public testing::Test {
+ protected:
+  std::string submit(const std::string& payload = "", const std::string& lane = "a") {
+    return value(queue->submit({.lane = lane, .payload = payload})).job.id;
+  }
+  void start(JobFunction function) {
+    worker = std::make_unique<Worker>(*queue, std::move(function),
+                                      WorkerOptions{.progress_period = 0ms, .retry_period = 5ms});
+  }
+  /// As after the end of the process: the worker leaves, the store and the queue are opened anew.
+  void restart(JobFunction function) {
+    worker.reset();
+    queue.reset();
+    store.reset();
+    store = open_store(dir.path());
+    queue = open_queue(*store, dir.path());
+    start(std::move(function));
+  }
+  [[nodiscard]] fs::path folder(const std::string& id) const { return dir.path() / "jobs" / id; }
+
+  /// Three intervals; before each, it arrives at the gate, then passes or is cancelled.
+  JobFunction three_intervals() {
+    return [this](JobContext& context) -> Result<JobResult> {
+      std::string done = context.finished_intervals() > 0 ? value(context.load_checkpoint()) : "";
+      for (int u = context.finished_intervals() + 1; u <= 3; ++u) {
+        if (context.stop_requested()) return JobResult{.text = done, .stopped_early = true};
+        const std::stop_callback wake(context.cancel_token(), [this] { gate.open(); });
+        arrived.open();
+        gate.pass();
+        if (context.cancel_token().stop_requested()) return interrupted();
+        done += std::to_string(u);
+        if (auto saved = context.save_checkpoint(u, done); !saved) return propagate(saved);
+      }
+      return JobResult{.text = done};
+    };
+  }
+
+  support::TempDir dir;
+  std::unique_ptr<SqliteStore> store = open_store(dir.path());
+  std::unique_ptr<Queue> queue = open_queue(*store, dir.path());
+  Gate gate, arrived;
+  std::unique_ptr<Worker> worker;
+};
+
+TEST_F(WorkerTest, DoesJobsInTheirOrder) {
+  std::vector<std::string> order;
+  for (const char* payload : {"one", "two", "three"}) submit(payload);
+  start([&](JobContext& context) {
+    order.push_back(context.payload());
+    return JobResult{.text = context.payload() + " done"};
+  });
+  const Job last = wait_for_end(*queue, "e000003");
+  EXPECT_EQ(last.state, State::succeeded);
+  EXPECT_EQ(last.result, "three done");
+  EXPECT_FALSE(last.stopped_early);
+  EXPECT_EQ(order, (std::vector<std::string>{"one", "two", "three"}));
+  const std::string late = submit("four");
+  EXPECT_EQ(wait_for_end(*queue, late).result, "four done") << "a worker that waits must notice";
+}
+
+TEST_F(WorkerTest, RecordsTheErrorOfAJobAndGoesOn) {
+  submit("bad");
+  submit("good");
+  start([](JobContext& context) -> Result<JobResult> {
+    if (context.payload() == "bad") return fail(ErrorCode::unprocessable, "no Gaussians", "handles[0]");
+    return JobResult{};
+  });
+  const Job bad = wait_for_end(*queue, "e000001");
+  EXPECT_EQ(bad.state, State::failed);
+  EXPECT_EQ(bad.error->code, ErrorCode::unprocessable);
+  EXPECT_EQ(bad.error->where, "handles[0]");
+  EXPECT_EQ(wait_for_end(*queue, "e000002").state, State::succeeded);
+}
+
+TEST_F(WorkerTest, TurnsAnExceptionIntoAnInternalError) {
+  submit("known");
+  submit("unknown");
+  start([](JobContext& context) -> Result<JobResult> {
+    if (context.payload() == "known") throw std::out_of_range("vector::at");
+    throw 7;
+  });
+  const Job known = wait_for_end(*queue, "e000001");
+  EXPECT_EQ(known.state, State::failed);
+  EXPECT_EQ(known.error->code, ErrorCode::internal);
+  EXPECT_NE(known.error->message.find("vector::at"), std::string::npos);
+  EXPECT_EQ(wait_for_end(*queue, "e000002").error->code, ErrorCode::internal);
+}
+
+TEST_F(WorkerTest, CancelsAJobThatWaitsAtOnce) {
+  const std::string first = submit();
+  const std::string second = submit();
+  start(three_intervals());
+  EXPECT_EQ(value(queue->cancel(second)).state, State::cancelled);
+  EXPECT_EQ(value(queue->cancel(second)).state, State::cancelled);
+  for (int u = 0; u < 3; ++u) gate.open();
+  EXPECT_EQ(wait_for_end(*queue, first).state, State::succeeded);
+  EXPECT_FALSE(value(queue->find(second)).started);
+  EXPECT_EQ(code_of(queue->cancel(first)), ErrorCode::conflict) << "its result stands";
+}
+
+TEST_F(WorkerTest, CancelsAJobThatRunsAndRemovesItsFiles) {
+  const std::string id = submit();
+  start(three_intervals());
+  gate.open();
+  wait_for_interval(*queue, id, 1);
+  EXPECT_TRUE(fs::exists(folder(id)));
+  EXPECT_EQ(code_of(queue->remove(id)), ErrorCode::conflict);
+  const State state = value(queue->cancel(id)).state;
+  EXPECT_EQ(state, State::cancel_requested);
+  EXPECT_EQ(wait_for_end(*queue, id).state, State::cancelled);
+  worker.reset();
+  EXPECT_FALSE(fs::exists(folder(id)));
+}
+
+TEST_F(WorkerTest, DropsWhatAJobReturnsAfterACancel) {
+  const std::string id = submit();
+  Gate began;
+  start([&](JobContext&) {
+    began.open();
+    gate.pass();
+    return JobResult{.text = "too late"};
+  });
+  began.pass();
+  value(queue->cancel(id));
+  gate.open();
+  const Job job = wait_for_end(*queue, id);
+  EXPECT_EQ(job.state, State::cancelled);
+  EXPECT_EQ(job.result, "");
+}
+
+TEST_F(WorkerTest, StopsAfterAnIntervalAndKeepsIt) {
+  const std::string id = submit();
+  start(three_intervals());
+  wait_for(*queue, id, [](const Job& job) { return job.state == State::running; });
+  EXPECT_EQ(code_of(queue->stop(id)), ErrorCode::conflict) << "there is nothing to keep";
+  gate.open();
+  wait_for_interval(*queue, id, 1);
+  EXPECT_EQ(value(queue->stop(id)).state, State::stop_requested);
+  EXPECT_EQ(value(queue->stop(id)).state, State::stop_requested);
+  gate.open();
+  const Job job = wait_for_end(*queue, id);
+  EXPECT_EQ(job.state, State::succeeded);
+  EXPECT_TRUE(job.stopped_early);
+  EXPECT_TRUE(job.result == "1" || job.result == "12") << job.result;
+  EXPECT_EQ(job.result.size(), std::size_t(job.finished_intervals));
+  worker.reset();
+  EXPECT_TRUE(fs::is_empty(folder(id))) << "the checkpoint has served its purpose";
+}
+
+TEST_F(WorkerTest, ShowsProgressAtOnce) {
+  const std::string id = submit();
+  Gate published;
+  start([&](JobContext& context) {
+    context.publish_progress("half");
+    published.open();
+    gate.pass();
+    context.publish_progress("all");
+    return JobResult{};
+  });
+  published.pass();
+  EXPECT_EQ(value(queue->find(id)).progress, "half");
+  EXPECT_EQ(value(queue->list())[0].progress, "half");
+  const auto seen = queue->version();
+  gate.open();
+  EXPECT_NE(queue->wait_for_change(seen, 20s), seen);
+  wait_for_end(*queue, id);
+  EXPECT_EQ(value(store->find(id)).progress, "all") << "the last word is on disk";
+}
+
+TEST_F(WorkerTest, WritesProgressToDiskOnlySoOften) {
+  const std::string id = submit();
+  Gate published;
+  worker = std::make_unique<Worker>(
+      *queue,
+      [&](JobContext& context) {
+        for (int i = 0; i < 1000; ++i) context.publish_progress(std::to_string(i));
+        published.open();
+        gate.pass();
+        return JobResult{};
+      },
+      WorkerOptions{.progress_period = 1h});
+  published.pass();
+  EXPECT_EQ(value(queue->find(id)).progress, "999");
+  EXPECT_EQ(value(store->find(id)).progress, "");
+  gate.open();
+  wait_for_end(*queue, id);
+}
+
+TEST_F(WorkerTest, WaitsNoLongerThanAsked) {
+  const auto seen = queue->version();
+  EXPECT_EQ(queue->wait_for_change(seen, 1ms), seen);
+  submit();
+  EXPECT_NE(queue->wait_for_change(seen, 20s), seen);
+}
+
+TEST_F(WorkerTest, DrainsAtTheEndOfAnIntervalAndGoesOnAfterARestart) {
+  const std::string id = submit();
+  const std::string next = submit();
+  start(three_intervals());
+  gate.open();
+  for (int u = 1; u <= 2; ++u) arrived.pass();
+  const auto seen = queue->version();  // the worker changes nothing while it waits: the next change is the drain's
+  std::thread drain([&] { worker->drain(20s); });
+  EXPECT_NE(queue->wait_for_change(seen, 20s), seen);
+  gate.open();  // the running interval may end
+  drain.join();
+  const Job left = value(queue->find(id));
+  EXPECT_EQ(left.state, State::running);
+  EXPECT_FALSE(left.claimed);
+  EXPECT_EQ(left.finished_intervals, 2);
+  EXPECT_EQ(value(queue->find(next)).state, State::queued);
+
+  for (int u = 0; u < 4; ++u) gate.open();  // one for the third interval, three for the next job
+  restart(three_intervals());
+  EXPECT_EQ(wait_for_end(*queue, id).result, "123");
+  EXPECT_EQ(wait_for_end(*queue, next).result, "123");
+}
+
+TEST_F(WorkerTest, InterruptsAJobThatTakesLongerThanTheGrace) {
+  const std::string id = submit();
+  start(three_intervals());
+  gate.open();
+  wait_for_interval(*queue, id, 1);
+  worker->drain(1ms);
+  EXPECT_EQ(value(queue->find(id)).state, State::running);
+  EXPECT_EQ(value(queue->find(id)).finished_intervals, 1);
+  EXPECT_EQ(value(queue->cancel(id)).state, State::cancelled) << "nobody is at work on it";
+  EXPECT_FALSE(fs::exists(folder(id)));
+}
+
+TEST_F(WorkerTest, DrainsAnIdleWorkerWithoutDelay) {
+  start(three_intervals());
+  const auto begin = std::chrono::steady_clock::now();
+  worker->drain(20s);
+  worker->drain(20s);
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, 10s);
+  submit();
+  EXPECT_EQ(value(queue->find("e000001")).state, State::queued);
+}
+
+TEST_F(WorkerTest, EndsAStoppedJobAfterARestartFromItsCheckpoint) {
+  const std::string id = submit();
+  start(three_intervals());
+  gate.open();
+  wait_for_interval(*queue, id, 1);
+  // The request reaches the record, then the process dies before the job can react.
+  value(store->apply(id, {.event = Event::stop}));
+  restart(three_intervals());
+  const Job job = wait_for_end(*queue, id);
+  EXPECT_EQ(job.state, State::succeeded);
+  EXPECT_TRUE(job.stopped_early);
+  EXPECT_EQ(job.result, "1");
+}
+
+TEST_F(WorkerTest, RemovesFilesThatNoJobNeedsWhenItOpens) {
+  const std::string id = submit();
+  start(three_intervals());
+  gate.open();
+  wait_for_interval(*queue, id, 1);
+  for (const char* name : {"e000099", "notes"}) fs::create_directories(folder(name));
+  restart(three_intervals());
+  EXPECT_TRUE(fs::exists(folder(id)));
+  EXPECT_FALSE(fs::exists(folder("e000099")));
+  EXPECT_TRUE(fs::exists(folder("notes"))) << "no job's name: none of our business";
+}
+
+TEST_F(WorkerTest, RemovesARecordWithItsFiles) {
+  const std::string id = submit();
+  start(three_intervals());
+  for (int u = 0; u < 3; ++u) gate.open();
+  wait_for_end(*queue, id);
+  value(queue->remove(id));
+  EXPECT_FALSE(fs::exists(folder(id)));
+  EXPECT_EQ(code_of(queue->find(id)), ErrorCode::not_found);
+}
+
+TEST_F(WorkerTest, ExpiresEndedJobsAsItWorks) {
+  queue = value(Queue::open(*store, {.folder = dir.path() / "jobs", .retention = {.max_count = 1}}));
+  for (int i = 0; i < 3; ++i) submit();
+  start([](JobContext& context) -> Result<JobResult> {
+    if (auto saved = context.save_checkpoint(1, "x"); !saved) return propagate(saved);
+    return JobResult{};
+  });
+  const auto deadline = std::chrono::steady_clock::now() + 20s;
+  while (value(queue->list()).size() > 1 && std::chrono::steady_clock::now() < deadline)
+    queue->wait_for_change(queue->version(), 10ms);
+  EXPECT_EQ(value(queue->list())[0].id, "e000003");
+  worker.reset();
+  EXPECT_FALSE(fs::exists(folder("e000001")));
+}
+
+TEST_F(WorkerTest, NeverOverwritesACheckpointByAWrongNumber) {
+  const std::string id = submit();
+  start([](JobContext& context) -> Result<JobResult> {
+    if (auto saved = context.save_checkpoint(2, "right"); !saved) return propagate(saved);
+    EXPECT_EQ(code_of(context.save_checkpoint(2, "wrong")), ErrorCode::invalid_argument);
+    return JobResult{.text = value(context.load_checkpoint())};
+  });
+  EXPECT_EQ(wait_for_end(*queue, id).result, "right");
+}
+
+TEST_F(WorkerTest, FailsTheJobOnAFullDiskAndHarmsNothingElse) {
+  const std::string id = submit();
+  const std::string next = submit();
+  std::optional<FullDisk> full;
+  start([&](JobContext& context) -> Result<JobResult> {
+    if (context.id() == next) return JobResult{.text = "fine"};
+    if (auto saved = context.save_checkpoint(1, "small"); !saved) return propagate(saved);
+    full.emplace(fs::file_size(dir.path() / "jobs.db-wal"));
+    if (auto saved = context.save_checkpoint(2, std::string(1'000'000, 'x')); !saved) return propagate(saved);
+    return JobResult{};
+  });
+  // Not even the failure can be recorded now; the worker says so and tries again.
+  const auto deadline = std::chrono::steady_clock::now() + 20s;
+  while (!worker->trouble() && std::chrono::steady_clock::now() < deadline) std::this_thread::sleep_for(1ms);
+  ASSERT_TRUE(worker->trouble());
+  EXPECT_EQ(worker->trouble()->code, ErrorCode::no_space);
+  full.reset();
+  const Job job = wait_for_end(*queue, id);
+  EXPECT_EQ(job.state, State::failed);
+  EXPECT_EQ(job.error->code, ErrorCode::no_space);
+  EXPECT_EQ(job.finished_intervals, 1);
+  EXPECT_EQ(wait_for_end(*queue, next).result, "fine");
+  worker->drain(20s);
+  EXPECT_FALSE(worker->trouble());
+}
+
+TEST_F(WorkerTest, KeepsALaneInSequenceAmongSeveralWorkers) {
+  std::mutex mutex;
+  std::set<std::string> busy_lanes;
+  std::map<std::string, std::vector<std::string>> order;
+  std::size_t at_once = 0;
+  std::map<std::string, Gate> began;
+  for (const char* lane : {"a", "b"}) began[lane];
+  const JobFunction function = [&](JobContext& context) {
+    const std::string& lane = context.payload();
+    {
+      const std::lock_guard lock(mutex);
+      EXPECT_TRUE(busy_lanes.insert(lane).second) << "two jobs of lane " << lane << " run at once";
+      at_once = std::max(at_once, busy_lanes.size());
+      order[lane].push_back(context.id());
+    }
+    if (context.id() == "e000001" || context.id() == "e000002") {  // the first of each lane wait for each other
+      began.at(lane).open();
+      began.at(lane == "a" ? "b" : "a").pass();
+    }
+    std::this_thread::sleep_for(1ms);
+    const std::lock_guard lock(mutex);
+    busy_lanes.erase(lane);
+    return JobResult{};
+  };
+  for (int i = 0; i < 8; ++i) submit(i % 3 == 0 ? "a" : "b", i % 3 == 0 ? "a" : "b");
+  {
+    Worker first(*queue, function), second(*queue, function);
+    for (const Job& job : value(queue->list())) wait_for_end(*queue, job.id);
+  }
+  EXPECT_EQ(at_once, 2u);
+  for (const auto& [lane, ids] : order) EXPECT_TRUE(std::is_sorted(ids.begin(), ids.end())) << lane;
+}
+
+TEST_F(WorkerTest, BearsManyHandsAtOnce) {
+  constexpr int threads = 4, rounds = 12;
+  const JobFunction function = [](JobContext& context) -> Result<JobResult> {
+    for (int u = context.finished_intervals() + 1; u <= 2; ++u) {
+      if (context.cancel_token().stop_requested()) return interrupted();
+      if (context.stop_requested()) return JobResult{.text = "early", .stopped_early = true};
+      context.publish_progress(std::to_string(u));
+      if (auto saved = context.save_checkpoint(u, context.id()); !saved) return propagate(saved);
+    }
+    return JobResult{.text = "whole"};
+  };
+  start(function);
+  Worker second(*queue, function, {.progress_period = 0ms});
+  std::atomic<bool> watching = true;
+  std::thread watcher([&] {
+    for (auto seen = queue->version(); watching; seen = queue->wait_for_change(seen, 1s))
+      for (const Job& job : value(queue->list())) EXPECT_EQ(is_final(job.state), job.ended.has_value()) << job.id;
+  });
+  std::vector<std::thread> hands;
+  for (int t = 0; t < threads; ++t)
+    hands.emplace_back([&, t] {
+      Rng rng(1, std::uint64_t(t));
+      for (int i = 0; i < rounds; ++i) {
+        const std::string id = submit("", std::to_string(rng.below(3)));
+        if (rng.below(2) == 0) queue->wait_for_change(queue->version(), std::chrono::milliseconds(rng.below(4)));
+        switch (rng.below(4)) {
+          case 0:
+            (void)queue->cancel(id);
+            break;
+          case 1:
+            (void)queue->stop(id);
+            break;
+          case 2:
+            (void)queue->remove(id);
+            break;
+          default:
+            (void)queue->find(id);
+        }
+      }
+    });
+  for (std::thread& hand : hands) hand.join();
+  for (const Job& job : value(queue->list())) {
+    const Job end = wait_for_end(*queue, job.id);
+    EXPECT_NE(end.state, State::failed) << end.error->message;
+    EXPECT_EQ(end.result, end.state == State::cancelled ? "" : end.stopped_early ? "early" : "whole") << end.id;
+  }
+  watching = false;
+  watcher.join();
+}
+
+}  // namespace
+}  // namespace engine::jobs
