@@ -14,7 +14,6 @@ find_package(SQLite3 3.38 REQUIRED)          # job records
 find_package(nlohmann_json 3.11 REQUIRED)    # JSON
 find_package(tomlplusplus 3.3 REQUIRED)      # settings file
 find_package(CLI11 2.1 REQUIRED)             # command line
-find_package(spdlog 1.10 REQUIRED)           # logs
 find_package(tl-expected REQUIRED)           # Result
 if(SPLATDRAG_TESTS)
   find_package(GTest 1.12 REQUIRED)

@@ -6,7 +6,7 @@ packages=(
   g++ cmake ninja-build ccache git ca-certificates
   libopenimageio-dev openimageio-tools libopenexr-dev  # pictures
   libglm-dev libexpected-dev libtbb-dev libhwy-dev     # mathematics, results, threads, SIMD
-  nlohmann-json3-dev libtomlplusplus-dev libcli11-dev libspdlog-dev
+  nlohmann-json3-dev libtomlplusplus-dev libcli11-dev
   zlib1g-dev libzstd-dev                               # compressed scenes
   libsqlite3-dev                                       # job records
   libgtest-dev libbenchmark-dev                        # tests and benchmarks

@@ -29,7 +29,6 @@ const std::vector<Reserved>& reserved() {
                                              {"oneapi/", {"engine/core"}},
                                              {"sqlite3.h", {"engine/jobs"}},
                                              {"httplib.h", {"server"}},
-                                             {"sqlite3.h", {"engine/jobs"}},
                                              {"CLI/", {"server"}},
                                              {"toml++/", {"server"}},
                                              {"spdlog/", {"server"}},
