@@ -11,7 +11,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <numeric>
-#include <optional>
 
 #include "bench/calibrator.h"
 #include "engine/io/dataset.h"

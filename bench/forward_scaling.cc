@@ -3,7 +3,6 @@
 //   build/release/bench/forward_scaling docs
 //
 // writes docs/forward-scaling.md and docs/forward-scaling.svg.
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -12,7 +11,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <stdexcept>
 #include <thread>
 

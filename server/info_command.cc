@@ -8,13 +8,13 @@
 #include <string>
 #include <vector>
 
-#include "engine/edit/opacity.h"
 #include "engine/io/compressed_ply.h"
 #include "engine/io/dataset.h"
 #include "engine/io/input_file.h"
 #include "engine/io/ply_header.h"
 #include "engine/io/scene_file.h"
 #include "engine/io/spz.h"
+#include "engine/render/project.h"
 #include "proto/json_text.h"
 #include "server/commands.h"
 
@@ -70,7 +70,7 @@ ordered_json describe(const io::SceneFile& file, const std::string& format) {
   std::vector<double> opacity, sigma;
   opacity.reserve(cloud.size());
   sigma.reserve(3 * cloud.size());
-  for (const float logit : cloud.opacity_logit) opacity.push_back(engine::edit::opacity(logit));
+  for (const float logit : cloud.opacity_logit) opacity.push_back(engine::render::opacity<double>(logit));
   for (const auto* axis : {&cloud.log_scale.x, &cloud.log_scale.y, &cloud.log_scale.z})
     for (const float log_scale : *axis) sigma.push_back(std::exp(double(log_scale)));
   const scene::Bounds bounds = scene::bounds(cloud);

@@ -4,12 +4,10 @@
 #include <cmath>
 #include <vector>
 
-#include "engine/render/forward.h"
+#include "engine/render/project.h"
 
 namespace engine::edit {
 namespace {
-
-constexpr double near_plane = 0.2;  // the renderer's cull, in camera z
 
 // A splat ends where opacity * exp(-q / 2) < 1 / 255; for opacity 1 that is sqrt(2 ln 255) = 3.33 standard deviations.
 constexpr double extent = 3.34;
@@ -34,14 +32,15 @@ scene::Rect touched_rect(const scene::GaussianCloud& cloud, std::span<const std:
   for (const std::uint32_t row : rows) {
     const DVec3 p = camera.cam_from_world(DVec3(cloud.mean.get(row)));
     // Rounding in the renderer may put a mean on the other side of the plane.
-    if (p.z <= near_plane * (1 - 1e-4)) continue;
+    if (p.z <= render::near_plane * (1 - 1e-4)) continue;
     const DVec2 center = camera.pixel_from_cam(p);
     const Vec3 log_scale = cloud.log_scale.get(row);
-    const double log_sigma = std::clamp(double(std::max({log_scale.x, log_scale.y, log_scale.z})), -20.0, 20.0);
+    const double log_sigma = std::clamp(double(std::max({log_scale.x, log_scale.y, log_scale.z})),
+                                        -render::max_log_scale, render::max_log_scale);
     // |J sigma| for the perspective Jacobian J, plus the 0.3 square pixels of the screen filter.
     const double slant = 1 + (p.x * p.x + p.y * p.y) / (p.z * p.z);
     const double size = std::max(camera.fx, camera.fy) / p.z * std::exp(log_sigma);
-    const double radius = extent * std::sqrt(size * size * slant + 0.3) + 1;
+    const double radius = extent * std::sqrt(size * size * slant + render::low_pass_px2) + 1;
     box.add(center.x - radius, center.y - radius, center.x + radius, center.y + radius);
   }
   if (box.empty) return {};
@@ -51,7 +50,7 @@ scene::Rect touched_rect(const scene::GaussianCloud& cloud, std::span<const std:
 }
 
 scene::Image footprint(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
-                       const scene::Camera& camera) {
+                       const scene::Camera& camera, render::Workspace& workspace) {
   scene::Image picture(camera.width, camera.height, 1);
   const scene::Rect rect = touched_rect(cloud, rows, camera);
   if (rect.empty()) return picture;
@@ -60,7 +59,8 @@ scene::Image footprint(const scene::GaussianCloud& cloud, std::span<const std::u
   render::ForwardOptions options;
   options.color = false;
   options.rect = rect;
-  const render::Rendering rendering = render::forward(cloud, camera, options, member);
+  render::Rendering rendering;
+  render::forward(cloud, camera, options, member, workspace, rendering);
   for (int y = 0; y < rect.height(); ++y)
     std::copy_n(rendering.weight.data.begin() + std::ptrdiff_t(y) * rect.width(), rect.width(),
                 picture.data.begin() + std::ptrdiff_t(rect.y0 + y) * picture.width + rect.x0);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "engine/render/forward.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/gaussian_cloud.h"
 #include "engine/scene/image.h"
@@ -17,7 +18,8 @@ namespace engine::edit {
 /// The share that `rows` have in every pixel, 0 to 1, the rest of the scene in front of and behind them included: the
 /// mask rendering of the paper, with members as colour 1. One channel, in the camera's size. Only touched_rect() is
 /// rendered; the cost follows the part, not the picture.
+///   workspace  shared by the pictures of a loop, so that each does not allocate the scene's splats anew
 [[nodiscard]] scene::Image footprint(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
-                                     const scene::Camera& camera);
+                                     const scene::Camera& camera, render::Workspace& workspace);
 
 }  // namespace engine::edit

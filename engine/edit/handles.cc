@@ -1,7 +1,7 @@
 #include "engine/edit/handles.h"
 
 #include "engine/deform/intervals.h"
-#include "engine/edit/opacity.h"
+#include "engine/render/project.h"
 
 namespace engine::edit {
 
@@ -39,7 +39,7 @@ std::vector<std::size_t> relocate(const WorkingScene& working, const Request& re
   for (std::size_t row = 0; row < working.handle.size(); ++row) {
     if (working.handle[row] == 0) continue;
     const std::size_t i = working.handle[row] - 1u;
-    const double alpha = opacity(working.cloud.opacity_logit[row]);
+    const double alpha = render::opacity<double>(working.cloud.opacity_logit[row]);
     moved[i] += alpha * (DVec3(working.cloud.mean.get(row)) - DVec3(working.mean_at_deform.get(row)));
     weight[i] += alpha;
   }

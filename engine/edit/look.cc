@@ -47,9 +47,10 @@ Result<std::vector<double>> covered_areas(const WorkingScene& working, std::span
                                           std::span<const scene::Camera> cameras,
                                           const std::function<Result<void>(double)>& advance) {
   std::vector<double> areas;
+  render::Workspace workspace;
   for (const scene::Camera& camera : cameras) {
     const scene::Camera small = scene::fit_within(in_frame_of(working, camera), comparison_side);
-    const scene::Mask covered = mask::mask2d(footprint(working.cloud, rows, small));
+    const scene::Mask covered = mask::mask2d(footprint(working.cloud, rows, small, workspace));
     areas.push_back(double(covered.area()) / double(covered.data.size()));
     if (auto going = advance(double(areas.size()) / double(cameras.size())); !going) return propagate(going);
   }
@@ -73,9 +74,10 @@ Result<void> unite_masks(const WorkingScene& working, std::span<const std::uint3
                          std::span<const scene::Camera> views, std::vector<scene::Mask>& masks,
                          const std::function<Result<void>(double)>& advance) {
   masks.resize(views.size());
+  render::Workspace workspace;
   for (std::size_t v = 0; v < views.size(); ++v) {
     if (masks[v].data.empty()) masks[v] = scene::Mask(views[v].width, views[v].height);
-    mask::unite(masks[v], mask::mask2d(footprint(working.cloud, rows, in_frame_of(working, views[v]))));
+    mask::unite(masks[v], mask::mask2d(footprint(working.cloud, rows, in_frame_of(working, views[v]), workspace)));
     if (auto going = advance(double(v + 1) / double(views.size())); !going) return going;
   }
   return {};

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "engine/edit/opacity.h"
+#include "engine/render/project.h"
 
 namespace engine::edit {
 namespace {
@@ -75,7 +76,7 @@ Published publish(const WorkingScene& working, const scene::GaussianCloud& input
     for (std::size_t i = 0; i < keep.size(); ++i) {
       const float logit = working.cloud.opacity_logit[i];
       if (working.role[i] == Role::original) keep[i] = logit > keep_logit(mode);
-      if (working.role[i] == Role::copy) keep[i] = opacity(logit) >= faintest_visible;
+      if (working.role[i] == Role::copy) keep[i] = render::opacity<double>(logit) >= render::min_alpha;
     }
 
   Published out;

@@ -42,7 +42,7 @@ HWY_INLINE std::uint64_t Bits(D d, hn::Mask<D> mask) {
 }
 
 /// A tile is blended in blocks of one vector each, nearly square: a splat wastes fewer lanes at the rim of a square
-/// than at the ends of a row (4 x 2 against 8 x 1 saves a fifth of the vectors on a real capture). Pixels of a tile are
+/// than at the ends of a row (4 x 2 against 8 x 1 saves a sixth of the vectors on a real capture). Pixels of a tile are
 /// stored block by block while it is blended.
 struct Blocks {
   static constexpr std::size_t lanes = HWY_MIN(hn::MaxLanes(D()), std::size_t(tile_size));
@@ -52,8 +52,8 @@ struct Blocks {
 };
 
 /// Splats are taken in batches, in two phases: first which blocks each reaches, then, block by block, the blending of
-/// all that reach it, with the block's pixels in registers. Splat by splat instead, each step would have to wait until
-/// the processor has seen that the last one's store to memory was not to the same block: half the speed.
+/// all that reach it, with the block's pixels in registers, so that no step loads or stores one (docs/adr/0001 has what
+/// that and its alternatives cost).
 struct Batch {
   static constexpr std::size_t size = 64;
   // One value per splat. At pixel (px, py) of the tile: q = u^2 + v^2, u = l1 px + l2 py + u0, v = l3 py + v0.

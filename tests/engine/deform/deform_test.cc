@@ -8,24 +8,10 @@
 #include "engine/core/parallel.h"
 #include "engine/core/rng.h"
 #include "engine/scene/sh.h"
+#include "tests/engine/scene/random_cloud.h"
 
 namespace engine::deform {
 namespace {
-
-scene::GaussianCloud random_cloud(std::size_t n, int degree) {
-  scene::GaussianCloud cloud;
-  cloud.sh_degree = degree;
-  cloud.resize(n);
-  Rng rng(21);
-  for (std::size_t i = 0; i < n; ++i) {
-    cloud.mean.set(i, {rng.normal(), rng.normal(), rng.normal()});
-    cloud.log_scale.set(i, {rng.normal(), rng.normal(), rng.normal()});
-    cloud.rotation.set(i, {rng.normal(), rng.normal(), rng.normal(), rng.normal()});
-    cloud.opacity_logit[i] = rng.normal();
-  }
-  for (float& value : cloud.sh) value = rng.normal();
-  return cloud;
-}
 
 std::vector<std::uint32_t> all_rows(std::size_t n) {
   std::vector<std::uint32_t> rows(n);
@@ -37,7 +23,7 @@ const std::vector<Drag> turning{
     {DVec3(1, 0, 0), DVec3(0.2, 1, 0)}, {DVec3(-1, 0, 0), DVec3(-0.7, -1, 0.3)}, {DVec3(0, 0, 1), DVec3(0.5, 0, 1.5)}};
 
 TEST(Deformation, ColourTurnsWithTheGaussian) {
-  scene::GaussianCloud cloud = random_cloud(30, 3);
+  scene::GaussianCloud cloud = scene::random_cloud(30, 3, 21);
   const scene::GaussianCloud before = cloud;
   const auto motions = handle_motions(turning, Rotation::shortest_arc);
   const auto rows = all_rows(cloud.size());
@@ -69,7 +55,7 @@ TEST(Deformation, ColourTurnsWithTheGaussian) {
 }
 
 TEST(Deformation, WithoutRotationTheBytesOfQuaternionAndColourStay) {
-  scene::GaussianCloud cloud = random_cloud(4, 3);
+  scene::GaussianCloud cloud = scene::random_cloud(4, 3, 21);
   cloud.rotation.set(0, {1.0f, -0.0f, 0.0f, -0.0f});
   cloud.sh_row(0)[5] = -0.0f;
   const scene::GaussianCloud before = cloud;
@@ -84,7 +70,7 @@ TEST(Deformation, WithoutRotationTheBytesOfQuaternionAndColourStay) {
 }
 
 TEST(Deformation, SaysWhatDoesNotMove) {
-  scene::GaussianCloud cloud = random_cloud(2, 0);
+  scene::GaussianCloud cloud = scene::random_cloud(2, 0, 21);
   cloud.mean.set(0, {0, 0, 0});
   cloud.mean.set(1, {0.5f, 0, 0});
   const std::vector<Drag> drags{{DVec3(0), DVec3(0), 0, true}, {DVec3(1, 0, 0), DVec3(1, 1, 0)}};
@@ -94,7 +80,7 @@ TEST(Deformation, SaysWhatDoesNotMove) {
 }
 
 TEST(Deformation, AnUnnormalisedQuaternionKeepsItsLength) {
-  scene::GaussianCloud cloud = random_cloud(20, 0);
+  scene::GaussianCloud cloud = scene::random_cloud(20, 0, 21);
   for (std::size_t i = 0; i < 20; ++i) {
     const float length = std::pow(10.0f, float(i) - 10.0f);
     cloud.rotation.set(i, length * glm::normalize(cloud.rotation.get(i)));
@@ -106,7 +92,7 @@ TEST(Deformation, AnUnnormalisedQuaternionKeepsItsLength) {
 }
 
 TEST(Deformation, GivesTheSameBytesForAnyNumberOfThreads) {
-  const scene::GaussianCloud cloud = random_cloud(5000, 1);
+  const scene::GaussianCloud cloud = scene::random_cloud(5000, 1, 21);
   const auto motions = handle_motions(turning, Rotation::shortest_arc);
   const auto rows = all_rows(cloud.size());
   const std::vector<std::uint16_t> owner(rows.size(), 1);

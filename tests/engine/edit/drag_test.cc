@@ -10,6 +10,7 @@
 #include "engine/edit/handles.h"
 #include "engine/edit/opacity.h"
 #include "engine/edit/paste.h"
+#include "engine/render/project.h"
 #include "tests/engine/edit/samples.h"
 
 namespace engine::edit {
@@ -114,8 +115,8 @@ TEST(Extend, LeavesTheOriginalAndTheTrailAtHalfOpacity) {
 TEST(CopyAndPaste, AnOriginalFainterThanKeepKeepsItsBytes) {
   scene::GaussianCloud scene = ball_before_wall(2);
   const float keep = keep_logit(Mode::move);
-  EXPECT_NEAR(opacity(keep), 0.01, 3e-9);
-  EXPECT_EQ(opacity(keep_logit(Mode::extend)), 0.5);
+  EXPECT_NEAR(render::opacity<double>(keep), 0.01, 3e-9);
+  EXPECT_EQ(render::opacity<double>(keep_logit(Mode::extend)), 0.5);
   scene.opacity_logit[0] = -7.5f;
   scene.opacity_logit[2] = 2.0f;
   const Dragged result = carry_out(scene, drag(DVec3(1, 0, 0), 1));

@@ -22,6 +22,7 @@ scene::Image whole_footprint(const scene::GaussianCloud& cloud, std::span<const 
 
 TEST(Footprint, OfAPartOfThePictureIsThatOfTheWhole) {
   scene::GaussianCloud cloud = ball_before_wall(40);
+  render::Workspace workspace;
   Rng rng(4);
   for (int trial = 0; trial < 20; ++trial) {
     const std::vector<std::uint32_t> rows{rng.below(std::uint32_t(cloud.size())),
@@ -30,7 +31,7 @@ TEST(Footprint, OfAPartOfThePictureIsThatOfTheWhole) {
     cloud.log_scale.set(rows[0], {rng.uniform(-8, 1), rng.uniform(-8, 1), rng.uniform(-8, 1)});
     cloud.mean.set(rows[1], {rng.uniform(-4, 4), rng.uniform(-4, 4), rng.uniform(-4, 4)});
     for (const scene::Camera& camera : arc_of_cameras(3, 48)) {
-      const scene::Image part = footprint(cloud, rows, camera), whole = whole_footprint(cloud, rows, camera);
+      const scene::Image part = footprint(cloud, rows, camera, workspace), whole = whole_footprint(cloud, rows, camera);
       ASSERT_EQ(part.data.size(), whole.data.size());
       for (std::size_t i = 0; i < part.data.size(); ++i)
         ASSERT_NEAR(part.data[i], whole.data[i], 1e-5f) << trial << ": pixel " << i;
@@ -41,9 +42,10 @@ TEST(Footprint, OfAPartOfThePictureIsThatOfTheWhole) {
 TEST(Footprint, OfNothingOrOfWhatIsBehindTheCameraIsEmpty) {
   const scene::GaussianCloud cloud = ball_before_wall(5);
   scene::Camera camera = scene::look_at(DVec3(0, 0, -3), DVec3(0, 0, -6), DVec3(0, -1, 0), 0.9, 16, 16);
+  render::Workspace workspace;
   for (const std::vector<std::uint32_t>& rows : {std::vector<std::uint32_t>{}, std::vector<std::uint32_t>{0, 1, 2}}) {
     EXPECT_TRUE(touched_rect(cloud, rows, camera).empty());
-    EXPECT_EQ(footprint(cloud, rows, camera), scene::Image(16, 16, 1));
+    EXPECT_EQ(footprint(cloud, rows, camera, workspace), scene::Image(16, 16, 1));
   }
 }
 

@@ -5,30 +5,13 @@
 #include <cstring>
 #include <limits>
 
-#include "engine/core/rng.h"
+#include "tests/engine/scene/random_cloud.h"
 
 namespace engine::scene {
 namespace {
 
-GaussianCloud random_cloud(std::size_t n, int degree, std::size_t extra_stride) {
-  GaussianCloud cloud;
-  cloud.sh_degree = degree;
-  cloud.extra_stride = extra_stride;
-  cloud.resize(n);
-  Rng rng(1);
-  for (std::size_t i = 0; i < n; ++i) {
-    cloud.mean.set(i, {rng.normal(), rng.normal(), rng.normal()});
-    cloud.log_scale.set(i, {rng.normal(), rng.normal(), rng.normal()});
-    cloud.rotation.set(i, {rng.normal(), rng.normal(), rng.normal(), rng.normal()});
-    cloud.opacity_logit[i] = rng.normal();
-  }
-  for (float& value : cloud.sh) value = rng.normal();
-  for (std::byte& value : cloud.extra) value = std::byte(rng.next());
-  return cloud;
-}
-
 TEST(AppendRows, CopiesEverythingAlsoFromTheCloudItself) {
-  GaussianCloud cloud = random_cloud(5, 2, 3);
+  GaussianCloud cloud = random_cloud(5, 2, 1, 3);
   const GaussianCloud before = cloud;
   append_rows(cloud, cloud, std::vector<std::uint32_t>{4, 1});
   ASSERT_EQ(cloud.size(), 7u);
@@ -39,7 +22,7 @@ TEST(AppendRows, CopiesEverythingAlsoFromTheCloudItself) {
 }
 
 TEST(DropEmptyShBands, KeepsABandWithOneNegativeZero) {
-  GaussianCloud cloud = random_cloud(4, 3, 0);
+  GaussianCloud cloud = random_cloud(4, 3, 1);
   for (std::size_t i = 0; i < cloud.size(); ++i)
     for (std::size_t c = 0; c < 3; ++c)
       for (std::size_t k = 4; k < 16; ++k) cloud.sh_row(i)[c * 16 + k] = 0.0f;
@@ -56,7 +39,7 @@ TEST(DropEmptyShBands, KeepsABandWithOneNegativeZero) {
 }
 
 TEST(FirstNotFinite, NamesRowAndProperty) {
-  GaussianCloud cloud = random_cloud(9, 3, 0);
+  GaussianCloud cloud = random_cloud(9, 3, 1);
   EXPECT_FALSE(first_not_finite(cloud));
   cloud.sh_row(7)[2 * 16 + 5] = std::numeric_limits<float>::infinity();
   EXPECT_EQ(first_not_finite(cloud), "[7].f_rest_34");
