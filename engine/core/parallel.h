@@ -16,11 +16,20 @@ void parallel_for(std::size_t count, std::size_t grain, const std::function<void
 /// Number of chunks parallel_for() makes of `count` items.
 constexpr std::size_t chunk_count(std::size_t count, std::size_t grain) { return (count + grain - 1) / grain; }
 
+/// Whose work comes first when arenas compete for the threads of the machine.
+enum class Priority {
+  low,  ///< Jobs that take minutes.
+  normal,
+  high  ///< Work that somebody waits for at a screen.
+};
+
 /// A bounded set of worker threads. Whatever run() executes fans out to at most `threads` of them, the caller included.
 class WorkArena {
  public:
   /// threads: 0 means as many as the machine has cores.
-  explicit WorkArena(int threads = 0);
+  /// priority: threads that become free go to the arena of the highest priority first; a chunk of work that has begun
+  /// is finished where it is. While several arenas exist, the smallest `threads` among them limits the workers of all.
+  explicit WorkArena(int threads = 0, Priority priority = Priority::normal);
   ~WorkArena();
   WorkArena(WorkArena&&) noexcept;
   WorkArena& operator=(WorkArena&&) noexcept;

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <utility>
 
-#include "engine/io/byte_reader.h"
+#include "engine/core/byte_reader.h"
 
 namespace engine::io {
 namespace {

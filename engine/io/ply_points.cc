@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "engine/io/byte_reader.h"
+#include "engine/core/byte_reader.h"
 #include "engine/io/input_file.h"
 #include "engine/io/ply_header.h"
 

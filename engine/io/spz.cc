@@ -9,8 +9,8 @@
 #include <limits>
 #include <numbers>
 
+#include "engine/core/byte_reader.h"
 #include "engine/core/parallel.h"
-#include "engine/io/byte_reader.h"
 #include "engine/io/checks.h"
 #include "engine/io/gzip.h"
 #include "engine/io/quantised.h"

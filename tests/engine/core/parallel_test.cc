@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <chrono>
 #include <numeric>
 #include <stdexcept>
+#include <thread>
 #include <vector>
 
 namespace engine {
@@ -39,10 +42,40 @@ TEST(ParallelFor, DoesNothingForNoItems) {
   parallel_for(0, 16, [](std::size_t, std::size_t) { FAIL() << "called"; });
 }
 
+TEST(WorkArena, HasTheThreadsAskedForAtAnyPriority) {
+  for (const Priority priority : {Priority::low, Priority::normal, Priority::high}) {
+    WorkArena arena(3, priority);
+    EXPECT_EQ(arena.threads(), 3);
+    std::atomic<int> visits = 0;
+    arena.run([&] { parallel_for(100, 1, [&](std::size_t, std::size_t) { ++visits; }); });
+    EXPECT_EQ(visits, 100);
+  }
+}
+
+TEST(WorkArena, WorkOfHighPriorityIsDoneWhileALongJobOfLowPriorityGoesOn) {
+  WorkArena low(2, Priority::low), high(2, Priority::high);
+  std::atomic<bool> started = false, stop = false;
+  std::thread job([&] {
+    low.run([&] {
+      parallel_for(1'000'000'000, 1'000'000, [&](std::size_t, std::size_t) {
+        started = true;
+        if (!stop) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      });
+    });
+  });
+  while (!started) std::this_thread::yield();
+  std::atomic<int> visits = 0;
+  high.run([&] { parallel_for(64, 1, [&](std::size_t, std::size_t) { ++visits; }); });
+  EXPECT_EQ(visits, 64);
+  stop = true;
+  job.join();
+}
+
 TEST(ParallelFor, LetsAnExceptionOut) {
-  EXPECT_THROW(parallel_for(100, 1, [](std::size_t begin, std::size_t) {
-                 if (begin == 57) throw std::runtime_error("57");
-               }),
+  EXPECT_THROW(parallel_for(100, 1,
+                            [](std::size_t begin, std::size_t) {
+                              if (begin == 57) throw std::runtime_error("57");
+                            }),
                std::runtime_error);
 }
 

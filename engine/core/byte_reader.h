@@ -10,12 +10,12 @@
 #include <span>
 #include <string>
 
-namespace engine::io {
+namespace engine {
 
 static_assert(std::endian::native == std::endian::little, "the formats read here are little-endian, as is the host");
 
 template <class T>
-concept Scalar = std::integral<T> || std::floating_point<T>;
+concept Scalar = std::integral<T> || std::floating_point<T> || std::same_as<T, std::byte>;
 
 /// A position in a span of bytes that never moves past its end. A read that does not fit gives zero (or nothing) and
 /// leaves the reader failed for good, so a parser reads several fields and asks ok() once, before it believes them.
@@ -27,6 +27,9 @@ class ByteReader {
   [[nodiscard]] bool ok() const { return ok_; }
   [[nodiscard]] std::size_t offset() const { return offset_; }  ///< Bytes read so far.
   [[nodiscard]] std::size_t remaining() const { return bytes_.size() - offset_; }
+
+  /// What was read makes no sense: nothing after it does either.
+  void fail() { ok_ = false; }
 
   /// Are there `count` more items of `size` bytes each? Cannot overflow.
   [[nodiscard]] bool has(std::uint64_t count, std::uint64_t size = 1) const {
@@ -48,6 +51,19 @@ class ByteReader {
     return taken;
   }
 
+  /// As many values as `into` has room for; none of them if they do not all fit.
+  template <Scalar T>
+  void read_all(std::span<T> into) {
+    if (const auto bytes = take(into.size(), sizeof(T)); !bytes.empty())
+      std::memcpy(into.data(), bytes.data(), bytes.size());
+  }
+
+  /// A string of ByteWriter: its length in 32 bits, then its characters.
+  [[nodiscard]] std::string read_string() {
+    const auto bytes = take(read<std::uint32_t>());
+    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+  }
+
   /// The characters up to the next zero byte, which is read too. No zero byte: failed.
   [[nodiscard]] std::string read_c_string() {
     const auto rest = bytes_.subspan(offset_);
@@ -64,4 +80,4 @@ class ByteReader {
   bool ok_ = true;
 };
 
-}  // namespace engine::io
+}  // namespace engine

@@ -1,17 +1,17 @@
-#include "engine/io/byte_reader.h"
+#include "engine/core/byte_reader.h"
 
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <span>
+#include <string>
 
-#include "tests/engine/io/samples.h"
-
-namespace engine::io {
+namespace engine {
 namespace {
 
 TEST(ByteReader, ReadsLittleEndianValuesInOrder) {
   const std::string bytes("\x01\x02\x00\x00\x80\x3f", 6);
-  ByteReader in(as_span(bytes));
+  ByteReader in(std::as_bytes(std::span(bytes)));
   EXPECT_EQ(in.read<std::uint16_t>(), 0x0201);
   EXPECT_EQ(in.read<float>(), 1.0f);
   EXPECT_TRUE(in.ok());
@@ -21,7 +21,7 @@ TEST(ByteReader, ReadsLittleEndianValuesInOrder) {
 
 TEST(ByteReader, FailsForGoodAtTheFirstReadThatDoesNotFit) {
   const std::string bytes = "abc";
-  ByteReader in(as_span(bytes));
+  ByteReader in(std::as_bytes(std::span(bytes)));
   EXPECT_EQ(in.read<std::uint32_t>(), 0u);
   EXPECT_FALSE(in.ok());
   EXPECT_EQ(in.read<std::uint8_t>(), 0u);  // would fit, but what it means is unknown now
@@ -30,7 +30,7 @@ TEST(ByteReader, FailsForGoodAtTheFirstReadThatDoesNotFit) {
 
 TEST(ByteReader, CountsThatOverflowDoNotFit) {
   const std::string bytes(64, 'x');
-  ByteReader in(as_span(bytes));
+  ByteReader in(std::as_bytes(std::span(bytes)));
   constexpr auto most = std::numeric_limits<std::uint64_t>::max();
   EXPECT_TRUE(in.has(8, 8));
   EXPECT_FALSE(in.has(9, 8));
@@ -42,7 +42,7 @@ TEST(ByteReader, CountsThatOverflowDoNotFit) {
 
 TEST(ByteReader, ReadsAStringUpToItsZeroOrFails) {
   const std::string bytes("photo.jpg\0rest", 14);
-  ByteReader in(as_span(bytes));
+  ByteReader in(std::as_bytes(std::span(bytes)));
   EXPECT_EQ(in.read_c_string(), "photo.jpg");
   EXPECT_EQ(in.remaining(), 4u);
   EXPECT_EQ(in.read_c_string(), "");
@@ -50,4 +50,4 @@ TEST(ByteReader, ReadsAStringUpToItsZeroOrFails) {
 }
 
 }  // namespace
-}  // namespace engine::io
+}  // namespace engine
