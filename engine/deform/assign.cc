@@ -46,7 +46,7 @@ std::string text(double value) {
 std::string gaussians(std::size_t n) { return std::to_string(n) + (n == 1 ? " Gaussian" : " Gaussians"); }
 
 std::string why_empty(std::size_t handle, const Sphere& sphere, const Sighting& seen) {
-  const std::string within = " within " + text(sphere.radius) + " of handle " + std::to_string(handle);
+  const std::string within = " within " + text(sphere.radius) + " of handle " + std::to_string(handle + 1);
   if (seen.inside > 0)
     return gaussians(seen.inside) + within + ", but each is nearer to another handle: move this handle or leave it out";
   if (seen.excluded > 0)

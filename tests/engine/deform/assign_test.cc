@@ -53,7 +53,7 @@ TEST(Assign, SaysHowFarTheNearestGaussianIs) {
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().code, ErrorCode::unprocessable);
   EXPECT_EQ(result.error().where, "handles[1].radius");
-  EXPECT_EQ(result.error().message, "0 Gaussians within 0.02 of handle 1; the nearest is at 0.061: raise the radius");
+  EXPECT_EQ(result.error().message, "0 Gaussians within 0.02 of handle 2; the nearest is at 0.061: raise the radius");
 }
 
 TEST(Assign, SaysSoWhenTheRegionOrOtherHandlesTakeThemAll) {
@@ -61,16 +61,16 @@ TEST(Assign, SaysSoWhenTheRegionOrOtherHandlesTakeThemAll) {
   const auto by_region = assign(two, std::vector<Sphere>{{DVec3(0), 1.0}}, Box{DVec3(9, 0, 0), DVec3(1)});
   ASSERT_FALSE(by_region);
   EXPECT_EQ(by_region.error().message,
-            "2 Gaussians within 1 of handle 0, but all outside the region: enlarge the region or leave it out");
+            "2 Gaussians within 1 of handle 1, but all outside the region: enlarge the region or leave it out");
   const auto empty_region = assign(two, std::vector<Sphere>{{DVec3(5), 1.0}}, Box{DVec3(9, 0, 0), DVec3(1)});
   ASSERT_FALSE(empty_region);
   EXPECT_EQ(empty_region.error().message,
-            "0 Gaussians within 1 of handle 0: the region holds none; move or enlarge it");
+            "0 Gaussians within 1 of handle 1: the region holds none; move or enlarge it");
   const auto by_handle = assign(two, std::vector<Sphere>{{DVec3(0), 1.0}, {DVec3(0), 1.0}});
   ASSERT_FALSE(by_handle);
   EXPECT_EQ(by_handle.error().where, "handles[1].radius");
   EXPECT_EQ(by_handle.error().message,
-            "2 Gaussians within 1 of handle 1, but each is nearer to another handle: move this handle or leave it out");
+            "2 Gaussians within 1 of handle 2, but each is nearer to another handle: move this handle or leave it out");
   EXPECT_FALSE(assign(Array3{}, std::vector<Sphere>{{DVec3(0), 1.0}}));
 }
 
