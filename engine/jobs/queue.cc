@@ -46,6 +46,12 @@ Result<Submission> Queue::submit(const NewJob& job) {
   return submission;
 }
 
+Result<std::optional<Job>> Queue::find_key(const std::string& idempotency_key) {
+  auto job = store_.find_key(idempotency_key);
+  if (job && *job) *job = with_live_progress(std::move(**job));
+  return job;
+}
+
 Result<Job> Queue::find(const std::string& id) {
   auto job = store_.find(id);
   if (job) *job = with_live_progress(std::move(*job));

@@ -35,6 +35,8 @@ class Queue {
   /// answers with the job that was accepted then.
   ///   errors  busy: the queue is full; unprocessable: the key belongs to another payload or lane
   [[nodiscard]] Result<Submission> submit(const NewJob& job);
+  /// Whether submit() would answer with an earlier job: the one under this key, if there is one.
+  [[nodiscard]] Result<std::optional<Job>> find_key(const std::string& idempotency_key);
   /// The record, with the progress of this moment.
   [[nodiscard]] Result<Job> find(const std::string& id);
   [[nodiscard]] Result<std::vector<Job>> list(const Filter& filter = {});

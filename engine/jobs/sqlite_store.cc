@@ -249,6 +249,12 @@ Job find_in(Database& database, const std::string& id) {
   return read(database, row);
 }
 
+std::optional<Job> find_key_in(Database& database, const std::string& key) {
+  Statement row(database, select("payload", "result") + "WHERE idempotency_key = ?1", key);
+  if (!row.step()) return std::nullopt;
+  return read(database, row);
+}
+
 Job apply_in(Database& database, const std::string& id, const Change& change, Time now) {
   const auto changed = after(find_in(database, id), change, now);
   if (!changed) throw Failure(changed.error());
@@ -282,7 +288,14 @@ std::vector<std::string> ids(Statement&& rows) {
   return found;
 }
 
-void prepare(Database& database, Time now) {
+/// AUTOINCREMENT counts on from here.
+void skip_numbers(Database& database, std::int64_t used) {
+  if (text_of(database, "SELECT count(*) FROM sqlite_sequence WHERE name = 'jobs'") == "0")
+    database.execute("INSERT INTO sqlite_sequence (name, seq) VALUES ('jobs', 0)");
+  Statement(database, "UPDATE sqlite_sequence SET seq = max(seq, ?1) WHERE name = 'jobs'", used).run();
+}
+
+void prepare(Database& database, Time now, std::int64_t used_numbers) {
   // EXCLUSIVE before the first access: the lock is then held until the process ends, and no shared memory is needed.
   database.execute("PRAGMA locking_mode = EXCLUSIVE; PRAGMA synchronous = FULL;");
   if (text_of(database, "PRAGMA journal_mode = WAL") != "wal")
@@ -305,6 +318,7 @@ void prepare(Database& database, Time now) {
   }
   for (const std::string& id : ids(Statement(database, "SELECT number FROM jobs WHERE claimed ORDER BY number")))
     apply_in(database, id, {.event = Event::release}, now);
+  if (used_numbers > 0) skip_numbers(database, used_numbers);
   transaction.commit();
 }
 
@@ -360,7 +374,7 @@ Result<std::unique_ptr<SqliteStore>> SqliteStore::open(const SqliteOptions& opti
   return guarded([&] {
     auto impl = std::make_unique<Impl>(options.folder / "jobs.db", options.now);
     impl->database.open(options.busy_timeout);
-    prepare(impl->database, impl->now());
+    prepare(impl->database, impl->now(), options.used_numbers);
     return std::unique_ptr<SqliteStore>(new SqliteStore(std::move(impl)));
   });
 }
@@ -371,15 +385,13 @@ Result<Submission> SqliteStore::submit(const NewJob& job, std::size_t max_queued
     std::optional<std::string_view> key;
     if (!job.idempotency_key.empty()) {
       key = job.idempotency_key;
-      Statement known(database, select("payload", "result") + "WHERE idempotency_key = ?1", key);
-      if (known.step()) {
-        Job earlier = read(database, known);
-        if (earlier.payload != job.payload || earlier.lane != job.lane)
+      if (auto earlier = find_key_in(database, job.idempotency_key)) {
+        if (earlier->payload != job.payload || earlier->lane != job.lane)
           throw Failure({ErrorCode::unprocessable,
-                         "this idempotency key came with another request before, job " + earlier.id +
+                         "this idempotency key came with another request before, job " + earlier->id +
                              ": use a new key for a new request",
                          "idempotency_key"});
-        return {.job = std::move(earlier), .created = false};
+        return {.job = std::move(*earlier), .created = false};
       }
     }
     const std::string waiting = text_of(database, "SELECT count(*) FROM jobs WHERE ended IS NULL AND state = 'queued'");
@@ -401,6 +413,13 @@ Result<Job> SqliteStore::find(const std::string& id) {
   return guarded([&] {
     const std::lock_guard lock(impl_->mutex);
     return find_in(impl_->database, id);
+  });
+}
+
+Result<std::optional<Job>> SqliteStore::find_key(const std::string& idempotency_key) {
+  return guarded([&] {
+    const std::lock_guard lock(impl_->mutex);
+    return find_key_in(impl_->database, idempotency_key);
   });
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -13,6 +14,8 @@ namespace engine::jobs {
 struct SqliteOptions {
   std::filesystem::path folder;                  ///< The file is "jobs.db" in it; made if absent.
   std::chrono::milliseconds busy_timeout{2000};  ///< Wait so long for a process that is just ending.
+  std::int64_t used_numbers = 0;                 ///< Ids up to this one are known elsewhere and not given away, even if
+                                                 ///< the file is new because an old one was lost.
   std::function<Time()> now = [] {
     return std::chrono::floor<std::chrono::milliseconds>(std::chrono::system_clock::now());
   };
@@ -29,6 +32,7 @@ class SqliteStore final : public Store {
 
   [[nodiscard]] Result<Submission> submit(const NewJob& job, std::size_t max_queued) override;
   [[nodiscard]] Result<Job> find(const std::string& id) override;
+  [[nodiscard]] Result<std::optional<Job>> find_key(const std::string& idempotency_key) override;
   [[nodiscard]] Result<std::vector<Job>> list(const Filter& filter) override;
   [[nodiscard]] Result<std::optional<Job>> claim() override;
   [[nodiscard]] Result<Job> apply(const std::string& id, const Change& change) override;

@@ -50,6 +50,8 @@ class Store {
   ///   errors      busy: as many wait already; unprocessable: the idempotency key belongs to another payload or lane
   [[nodiscard]] virtual Result<Submission> submit(const NewJob& job, std::size_t max_queued) = 0;
   [[nodiscard]] virtual Result<Job> find(const std::string& id) = 0;
+  /// The job that was submitted under this idempotency key; nothing if none was.
+  [[nodiscard]] virtual Result<std::optional<Job>> find_key(const std::string& idempotency_key) = 0;
   /// Youngest first, payloads and results left out.
   [[nodiscard]] virtual Result<std::vector<Job>> list(const Filter& filter) = 0;
   /// Gives the oldest job that can run to the caller; nothing if none can. A job can run if nobody holds it and no

@@ -190,6 +190,10 @@ void Worker::record_end(const std::string& id, const Change& change) {
       return;
     }
     set_trouble(job.error());
+    // A failed job's own files may be what took the last bytes.
+    if (std::error_code ignored; change.event == Event::fail && job.error().code == ErrorCode::no_space &&
+                                 fs::remove_all(queue_.folder_of(id), ignored) > 0 && !ignored)
+      continue;
     // Whoever opens the store next finds the job claimed by nobody and takes it up at its last checkpoint.
     if (draining_ || !worth_retrying(job.error())) return;
     queue_.wait_for_change(seen, options_.retry_period);

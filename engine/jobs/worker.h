@@ -43,6 +43,8 @@ class JobContext {
  public:
   [[nodiscard]] const std::string& id() const { return job_.id; }
   [[nodiscard]] const std::string& payload() const { return job_.payload; }
+  /// As last published before this run; empty at the first start.
+  [[nodiscard]] const std::string& earlier_progress() const { return job_.progress; }
   /// For files of the job; they live as long as its record, or until it is cancelled. Absent before the first
   /// checkpoint. Names that begin with "checkpoint-" are taken.
   [[nodiscard]] std::filesystem::path folder() const;

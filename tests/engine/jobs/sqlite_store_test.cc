@@ -100,6 +100,31 @@ TEST_F(SqliteStoreTest, AnswersARepeatedSubmissionWithTheSameJob) {
   EXPECT_EQ(value(store->list({})).size(), 1u);
 }
 
+TEST_F(SqliteStoreTest, FindsAJobByItsKey) {
+  const std::string id = value(store->submit({.lane = "a", .payload = "x", .idempotency_key = "k"}, many)).job.id;
+  submit();  // one without a key
+  ASSERT_TRUE(value(store->find_key("k")));
+  EXPECT_EQ(value(store->find_key("k"))->id, id);
+  EXPECT_EQ(value(store->find_key("k"))->payload, "x");
+  EXPECT_EQ(value(store->find_key("K")), std::nullopt);
+  EXPECT_EQ(value(store->find_key("")), std::nullopt) << "no key is no key";
+  claim();
+  value(store->apply(id, {.event = Event::succeed}));
+  value(store->remove(id));
+  EXPECT_EQ(value(store->find_key("k")), std::nullopt) << "forgotten with its job";
+}
+
+TEST_F(SqliteStoreTest, LeavesOutNumbersThatAreKnownElsewhere) {
+  const auto reopen_after = [&](std::int64_t used) {
+    store.reset();
+    store = value(SqliteStore::open({.folder = dir.path(), .used_numbers = used}));
+  };
+  reopen_after(41);
+  EXPECT_EQ(submit(), "e000042");
+  reopen_after(7);
+  EXPECT_EQ(submit(), "e000043") << "never back";
+}
+
 TEST_F(SqliteStoreTest, RefusesMoreThanMayWaitAndNamesTheLimit) {
   for (int i = 0; i < 3; ++i) value(store->submit({.lane = "a", .payload = ""}, 3));
   const auto refused = store->submit({.lane = "a", .payload = ""}, 3);

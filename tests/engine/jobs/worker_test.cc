@@ -254,6 +254,27 @@ TEST_F(WorkerTest, DrainsAtTheEndOfAnIntervalAndGoesOnAfterARestart) {
   EXPECT_EQ(wait_for_end(*queue, next).result, "123");
 }
 
+TEST_F(WorkerTest, TellsAJobThatGoesOnWhatItHadPublished) {
+  submit();
+  std::vector<std::string> earlier;
+  const JobFunction publishing = [&](JobContext& context) -> Result<JobResult> {
+    earlier.push_back(context.earlier_progress());
+    context.publish_progress("half way");
+    if (auto saved = context.save_checkpoint(context.finished_intervals() + 1, ""); !saved) return propagate(saved);
+    if (context.finished_intervals() > 1) return JobResult{};
+    const std::stop_callback wake(context.cancel_token(), [this] { gate.open(); });
+    arrived.open();
+    gate.pass();
+    return interrupted();
+  };
+  start(publishing);
+  arrived.pass();
+  worker->drain(0s);
+  restart(publishing);
+  wait_for_end(*queue, "e000001");
+  EXPECT_EQ(earlier, (std::vector<std::string>{"", "half way"}));
+}
+
 TEST_F(WorkerTest, InterruptsAJobThatTakesLongerThanTheGrace) {
   const std::string id = submit();
   start(three_intervals());
@@ -358,6 +379,7 @@ TEST_F(WorkerTest, FailsTheJobOnAFullDiskAndHarmsNothingElse) {
   EXPECT_EQ(job.state, State::failed);
   EXPECT_EQ(job.error->code, ErrorCode::no_space);
   EXPECT_EQ(job.finished_intervals, 1);
+  EXPECT_FALSE(fs::exists(folder(id))) << "its files may be what took the last bytes";
   EXPECT_EQ(wait_for_end(*queue, next).result, "fine");
   worker->drain(20s);
   EXPECT_FALSE(worker->trouble());
