@@ -4,6 +4,8 @@
 #define HWY_TARGET_INCLUDE "engine/render/composite_simd.cc"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
+// After highway.h: compiled once per instruction set.
+#include "engine/render/tile_blocks.inc"
 
 #include <algorithm>
 
@@ -12,102 +14,6 @@
 HWY_BEFORE_NAMESPACE();
 namespace engine::render {
 namespace HWY_NAMESPACE {
-
-namespace hn = hwy::HWY_NAMESPACE;
-
-using D = hn::CappedTag<float, tile_size>;
-using V = hn::Vec<D>;
-
-/// 2^x for |x| < 2^21; anything, but no trap, beyond. Relative error below 2e-7.
-/// Minimax polynomial of degree 5 on [-1/2, 1/2] (Remez), scaled by 2^round(x) through the exponent bits.
-HWY_INLINE V Exp2(D d, V x) {
-  const hn::RebindToSigned<D> di;
-  const V shift = hn::Set(d, 12582912.0f);  // 1.5 * 2^23: adding it rounds to an integer, held in the low bits
-  const V shifted = hn::Add(x, shift);
-  const V f = hn::Sub(x, hn::Sub(shifted, shift));
-  // Estrin's order: half the latency of Horner's, for one multiplication more.
-  const V f2 = hn::Mul(f, f);
-  const V high = hn::MulAdd(hn::Set(d, 0.001327647198f), f, hn::Set(d, 0.009675541334f));
-  const V middle = hn::MulAdd(hn::Set(d, 0.05550713274f), f, hn::Set(d, 0.2402211972f));
-  const V low = hn::MulAdd(hn::Set(d, 0.6931469671f), f, hn::Set(d, 1.000000072f));
-  const V p = hn::MulAdd(hn::MulAdd(high, f2, middle), f2, low);
-  return hn::BitCast(d, hn::Add(hn::BitCast(di, p), hn::ShiftLeft<23>(hn::BitCast(di, shifted))));
-}
-
-/// Bit i of the result is lane i of the mask.
-HWY_INLINE std::uint64_t Bits(D d, hn::Mask<D> mask) {
-  std::uint8_t bytes[8] = {};
-  hn::StoreMaskBits(d, mask, bytes);
-  return bytes[0] | std::uint64_t{bytes[1]} << 8;
-}
-
-/// A tile is blended in blocks of one vector each, nearly square: a splat wastes fewer lanes at the rim of a square
-/// than at the ends of a row (4 x 2 against 8 x 1 saves a sixth of the vectors on a real capture). Pixels of a tile are
-/// stored block by block while it is blended.
-struct Blocks {
-  static constexpr std::size_t lanes = HWY_MIN(hn::MaxLanes(D()), std::size_t(tile_size));
-  static constexpr std::size_t width = lanes >= 4 ? 4 : lanes;
-  static constexpr std::size_t height = lanes / width;
-  static constexpr std::size_t columns = tile_size / width, rows = tile_size / height, count = columns * rows;
-};
-
-/// Splats are taken in batches, in two phases: first which blocks each reaches, then, block by block, the blending of
-/// all that reach it, with the block's pixels in registers, so that no step loads or stores one (docs/adr/0001 has what
-/// that and its alternatives cost).
-struct Batch {
-  static constexpr std::size_t size = 64;
-  // One value per splat. At pixel (px, py) of the tile: q = u^2 + v^2, u = l1 px + l2 py + u0, v = l3 py + v0.
-  alignas(64) float l1[size], l2[size], l3[size], u0[size], v0[size], log2_opacity[size];
-  alignas(64) float red[size], green[size], blue[size], depth[size], weight[size];
-  std::uint64_t reach[Blocks::count];  ///< Bit k: splat k can come to alpha 1/255 within the block.
-};
-
-/// Loads n splats, in the coordinates of the tile whose first pixel is (x0, y0).
-HWY_INLINE void Fill(const Splat* splats, const std::uint32_t* list, std::size_t n, int x0, int y0, Batch& batch) {
-  for (std::size_t k = 0; k < n; ++k) {
-    const Splat& splat = splats[list[k]];
-    const float x = splat.x - float(x0), y = splat.y - float(y0);
-    batch.l1[k] = splat.l1, batch.l2[k] = splat.l2, batch.l3[k] = splat.l3;
-    batch.u0[k] = -(splat.l1 * x + splat.l2 * y);
-    batch.v0[k] = -splat.l3 * y;
-    batch.log2_opacity[k] = splat.log2_opacity;
-    batch.red[k] = splat.red, batch.green[k] = splat.green, batch.blue[k] = splat.blue;
-    batch.depth[k] = splat.depth, batch.weight[k] = splat.weight;
-  }
-  for (std::size_t k = n; k % Blocks::lanes != 0; ++k) {  // what fills up the last vector reaches nothing
-    batch.l1[k] = batch.l2[k] = batch.l3[k] = batch.u0[k] = batch.v0[k] = 0;
-    batch.log2_opacity[k] = -1e30f;
-  }
-}
-
-/// Which blocks the n splats of the batch reach. u and v are linear, so over a block each stays within the interval
-/// that the block's corners span. A little more is let in, so that rounding here never drops a pixel that passes in
-/// Blend().
-HWY_INLINE void FindReach(D d, std::size_t n, Batch& batch) {
-  std::fill(std::begin(batch.reach), std::end(batch.reach), std::uint64_t{0});
-  const V zero = hn::Zero(d), steps_x = hn::Set(d, float(Blocks::width - 1)),
-          steps_y = hn::Set(d, float(Blocks::height - 1));
-  for (std::size_t k = 0; k < n; k += Blocks::lanes) {
-    const V l1 = hn::Load(d, batch.l1 + k), l2 = hn::Load(d, batch.l2 + k), l3 = hn::Load(d, batch.l3 + k);
-    const V u0 = hn::Load(d, batch.u0 + k), v0 = hn::Load(d, batch.v0 + k);
-    const V q_max = hn::Add(hn::Load(d, batch.log2_opacity + k), hn::Set(d, log2_255 + 1e-3f));
-    const V slant = hn::Mul(l2, steps_y);
-    const V low_u = hn::Min(zero, slant), high_u = hn::MulAdd(l1, steps_x, hn::Max(zero, slant));  // l1 >= 0
-    const V high_v = hn::Mul(l3, steps_y);                                                         // l3 >= 0
-    for (std::size_t row = 0; row < Blocks::rows; ++row) {
-      const V y = hn::Set(d, float(row * Blocks::height));
-      const V v = hn::MulAdd(l3, y, v0), u_row = hn::MulAdd(l2, y, u0);
-      const V nearest_v = hn::Max(zero, hn::Max(v, hn::Neg(hn::Add(v, high_v))));
-      const V left = hn::NegMulAdd(nearest_v, nearest_v, q_max);
-      const V u_low = hn::Add(u_row, low_u), u_high = hn::Add(u_row, high_u);
-      for (std::size_t column = 0; column < Blocks::columns; ++column) {
-        const V x = hn::Mul(l1, hn::Set(d, float(column * Blocks::width)));
-        const V nearest_u = hn::Max(zero, hn::Max(hn::Add(u_low, x), hn::Neg(hn::Add(u_high, x))));
-        batch.reach[row * Blocks::columns + column] |= Bits(d, hn::Le(hn::Mul(nearest_u, nearest_u), left)) << k;
-      }
-    }
-  }
-}
 
 /// Blends the batch into one block. False if all of the block's rays have ended.
 template <bool kColor, bool kDepth, bool kWeight>

@@ -57,7 +57,7 @@ void store_tile(const TilePixels& tile, int x0, int y0, scene::Rect area, Render
   store(tile.weight, out.weight);
 }
 
-void forward_simd(const scene::GaussianCloud& cloud, const scene::Camera& camera, const ForwardOptions& options,
+void forward_simd(const Layers& layers, const scene::Camera& camera, const ForwardOptions& options,
                   std::span<const float> weight, ForwardBuffers& buffers, Rendering& out) {
   TileGrid grid{.columns = tile_columns(camera.width),
                 .rows = tile_rows(camera.height),
@@ -74,15 +74,10 @@ void forward_simd(const scene::GaussianCloud& cloud, const scene::Camera& camera
   }
 
   const auto view = view_params<float>(camera);
-  const int sh_degree = options.color ? std::min(cloud.sh_degree, options.max_sh_degree) : -1;
-  Splat* projected = buffers.projected.reserve(cloud.size());
-  TileBox* boxes = buffers.projected_boxes.reserve(cloud.size());
-  buffers.block_sizes.resize(chunk_count(cloud.size(), project_block));
-  parallel_for(cloud.size(), project_block, [&](std::size_t begin, std::size_t end) {
-    buffers.block_sizes[begin / project_block] =
-        project_rows(cloud, view, sh_degree, weight.empty() ? nullptr : weight.data(), grid.pixels, begin, end,
-                     projected + begin, boxes + begin);
-  });
+  const int sh_degree = options.color ? std::min(layers.base->sh_degree, options.max_sh_degree) : -1;
+  // Where a tenth of the picture or less is wanted, most splats are elsewhere.
+  const double part = double(grid.pixels.width()) * grid.pixels.height() / (double(camera.width) * camera.height);
+  project(layers, view, sh_degree, weight, part < 0.1 ? Culling::by_bound : Culling::exact, grid.pixels, buffers);
   sort_by_depth(buffers);
   bin(grid, buffers);
 
@@ -117,9 +112,9 @@ void copy_wanted(const std::vector<float>& from, int width, const ForwardOptions
             from[std::size_t(y) * std::size_t(width) + std::size_t(x)];
 }
 
-void forward_scalar(const scene::GaussianCloud& cloud, const scene::Camera& camera, const ForwardOptions& options,
+void forward_scalar(const Layers& layers, const scene::Camera& camera, const ForwardOptions& options,
                     std::span<const float> weight, Rendering& out) {
-  const auto whole = forward_reference<float>(cloud, camera, options, weight);
+  const auto whole = forward_reference<float>(layers, camera, options, weight);
   const scene::Rect area = rect_of(options, camera);
   shape(options, !weight.empty(), area.width(), area.height(), out);
   auto copy = [&](const std::vector<float>& from, scene::Image& to, int plane = 0) {
@@ -134,33 +129,29 @@ void forward_scalar(const scene::GaussianCloud& cloud, const scene::Camera& came
 
 }  // namespace
 
-struct Workspace::Impl {
-  ForwardBuffers buffers;
-};
-
 Workspace::Workspace() : impl_(std::make_unique<Impl>()) {}
 Workspace::~Workspace() = default;
 Workspace::Workspace(Workspace&&) noexcept = default;
 Workspace& Workspace::operator=(Workspace&&) noexcept = default;
 
-void forward(const scene::GaussianCloud& cloud, const scene::Camera& camera, const ForwardOptions& options,
+void forward(const Layers& layers, const scene::Camera& camera, const ForwardOptions& options,
              std::span<const float> weight, Workspace& workspace, Rendering& out) {
   assert(scene::validate(camera));
-  assert(weight.empty() || weight.size() == cloud.size());
+  assert(weight.empty() || weight.size() == layers.size());
   assert(options.tiles.empty() || !options.rect);
   assert(options.semantics == Semantics::dense_stop || options.backend == Backend::reference);
   if (options.backend == Backend::reference) {
-    forward_scalar(cloud, camera, options, weight, out);
+    forward_scalar(layers, camera, options, weight, out);
   } else {
-    forward_simd(cloud, camera, options, weight, workspace.impl_->buffers, out);
+    forward_simd(layers, camera, options, weight, workspace.impl_->buffers, out);
   }
 }
 
-Rendering forward(const scene::GaussianCloud& cloud, const scene::Camera& camera, const ForwardOptions& options,
+Rendering forward(const Layers& layers, const scene::Camera& camera, const ForwardOptions& options,
                   std::span<const float> weight) {
   Workspace workspace;
   Rendering out;
-  forward(cloud, camera, options, weight, workspace, out);
+  forward(layers, camera, options, weight, workspace, out);
   return out;
 }
 

@@ -12,6 +12,7 @@
 
 #include "engine/core/result.h"
 #include "engine/core/vec.h"
+#include "engine/render/layers.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/gaussian_cloud.h"
 #include "engine/scene/image.h"
@@ -58,14 +59,18 @@ struct Rendering {
   scene::Image weight;        ///< [1] sum w_i weight_i, where weights were given
 };
 
-/// Renders `cloud` through `camera`.
-///   weight   [N] or empty: an arbitrary number per Gaussian, blended like a colour (1 for members of a mask)
+/// Renders a cloud, or layers of two, through `camera`. Layers give the bytes of the merged cloud, unless a changed
+/// row and another one have the very same depth: ties are drawn in the order of the layers' rows.
+///   weight   [layers.size()] or empty: an arbitrary number per Gaussian, blended like a colour (1 for members of a
+///            mask)
 ///   returns  finite pictures for every finite cloud and valid camera
 ///   bytes    the same for any number of threads; they may differ between backends and instruction sets
 ///   throws   std::bad_alloc, also where splats reach more than 2^32 tiles in all
 /// Precondition: validate(camera) holds; options.rect lies inside the picture; tiles and rect are not both given.
-[[nodiscard]] Rendering forward(const scene::GaussianCloud& cloud, const scene::Camera& camera,
-                                const ForwardOptions& options = {}, std::span<const float> weight = {});
+[[nodiscard]] Rendering forward(const Layers& layers, const scene::Camera& camera, const ForwardOptions& options = {},
+                                std::span<const float> weight = {});
+
+struct PixelHit;
 
 /// Memory that a sequence of renderings shares. Not for two threads at once.
 class Workspace {
@@ -76,15 +81,16 @@ class Workspace {
   Workspace& operator=(Workspace&&) noexcept;
 
  private:
-  friend void forward(const scene::GaussianCloud&, const scene::Camera&, const ForwardOptions&, std::span<const float>,
-                      Workspace&, Rendering&);
+  friend void forward(const Layers&, const scene::Camera&, const ForwardOptions&, std::span<const float>, Workspace&,
+                      Rendering&);
+  friend std::optional<PixelHit> pick(const Layers&, const scene::Camera&, DVec2, Workspace&);
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
 
 /// The same, into pictures and memory of an earlier call, which a frame of the same size then does not allocate again:
 /// a fifth of the time of a small scene.
-void forward(const scene::GaussianCloud& cloud, const scene::Camera& camera, const ForwardOptions& options,
+void forward(const Layers& layers, const scene::Camera& camera, const ForwardOptions& options,
              std::span<const float> weight, Workspace& workspace, Rendering& out);
 
 /// Instruction sets compiled in and supported by this processor, best first ("AVX2", "SSE4", ...).

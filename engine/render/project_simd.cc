@@ -6,6 +6,8 @@
 // After highway.h: the math functions are compiled once per instruction set.
 #include <hwy/contrib/math/math-inl.h>
 
+#include <algorithm>
+
 #include "engine/render/splats.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -59,8 +61,8 @@ HWY_INLINE Axes RotationMatrix(D d, V w, V x, V y, V z) {
 }
 
 /// Projects lanes [i, i + n) of the cloud and appends those that reach `pixels`.
-void ProjectVector(D d, const scene::GaussianCloud& cloud, const ViewParams<float>& view, scene::Rect pixels,
-                   std::size_t i, std::size_t n, Survivors& out) {
+void ProjectVector(D d, const scene::GaussianCloud& cloud, const ViewParams<float>& view, Culling culling,
+                   scene::Rect pixels, std::size_t i, std::size_t n, Survivors& out) {
   auto set = [&](double value) { return hn::Set(d, float(value)); };
   const auto& r = view.rotation;
   const V dx = hn::Sub(hn::Sub(Load(d, cloud.mean.x.data() + i, n), set(view.centre_high[0])), set(view.centre_low[0]));
@@ -80,6 +82,25 @@ void ProjectVector(D d, const scene::GaussianCloud& cloud, const ViewParams<floa
   const V y = hn::MulAdd(set(view.fy), y_over_z, set(view.cy));
   alive = hn::And(alive, hn::And(hn::Lt(hn::Abs(x), far_away), hn::Lt(hn::Abs(y), far_away)));
 
+  const V jx = hn::Mul(set(view.fx), inverse_z), jy = hn::Mul(set(view.fy), inverse_z);
+  const V tx = hn::Clamp(x_over_z, set(view.min_x_over_z), set(view.max_x_over_z));
+  const V ty = hn::Clamp(y_over_z, set(view.min_y_over_z), set(view.max_y_over_z));
+  if (culling == Culling::by_bound) {
+    // A splat ends at most sqrt(2 ln 255) = 3.33 standard deviations from its mean, and those are at most
+    // j sigma sqrt(1 + t^2) and the low pass, added as squares: less than the sum of all.
+    const V largest =
+        hn::Max(Load(d, cloud.log_scale.x.data() + i, n),
+                hn::Max(Load(d, cloud.log_scale.y.data() + i, n), Load(d, cloud.log_scale.z.data() + i, n)));
+    const V reach = hn::Mul(hn::Exp(d, hn::Clamp(largest, set(-max_log_scale), set(max_log_scale))), set(3.35));
+    const V bound_x = hn::MulAdd(hn::Mul(jx, reach), hn::Add(hn::Abs(tx), set(1)), set(3));
+    const V bound_y = hn::MulAdd(hn::Mul(jy, reach), hn::Add(hn::Abs(ty), set(1)), set(3));
+    const auto meets = [&](V middle, V bound, int first, int end) {
+      return hn::And(hn::Ge(hn::Add(middle, bound), set(first)), hn::Le(hn::Sub(middle, bound), set(end)));
+    };
+    alive = hn::And(alive, hn::And(meets(x, bound_x, pixels.x0, pixels.x1), meets(y, bound_y, pixels.y0, pixels.y1)));
+    if (hn::AllFalse(d, alive)) return;
+  }
+
   // log2 of the sigmoid, by log1p so that nearly opaque Gaussians keep their digits.
   const V logit =
       hn::Clamp(Load(d, cloud.opacity_logit.data() + i, n), set(-max_opacity_logit), set(max_opacity_logit));
@@ -88,9 +109,6 @@ void ProjectVector(D d, const scene::GaussianCloud& cloud, const ViewParams<floa
   alive = hn::And(alive, hn::Ge(q_max, hn::Zero(d)));
   if (hn::AllFalse(d, alive)) return;
 
-  const V jx = hn::Mul(set(view.fx), inverse_z), jy = hn::Mul(set(view.fy), inverse_z);
-  const V tx = hn::Clamp(x_over_z, set(view.min_x_over_z), set(view.max_x_over_z));
-  const V ty = hn::Clamp(y_over_z, set(view.min_y_over_z), set(view.max_y_over_z));
   const Axes q = RotationMatrix(d, Load(d, cloud.rotation.w.data() + i, n), Load(d, cloud.rotation.x.data() + i, n),
                                 Load(d, cloud.rotation.y.data() + i, n), Load(d, cloud.rotation.z.data() + i, n));
   auto sigma = [&](const std::vector<float>& log_scale) {
@@ -194,17 +212,22 @@ HWY_INLINE void ShadeRow(const float* sh, std::size_t stored, std::size_t used, 
   splat.red = rgb[0], splat.green = rgb[1], splat.blue = rgb[2];
 }
 
-std::size_t ProjectRows(const scene::GaussianCloud& cloud, const ViewParams<float>& view, int sh_degree,
-                        const float* weight, scene::Rect pixels, std::size_t begin, std::size_t end, Splat* out,
-                        TileBox* boxes) {
+std::size_t ProjectRows(const ProjectedLayer& layer, const ViewParams<float>& view, int sh_degree, Culling culling,
+                        scene::Rect pixels, std::size_t begin, std::size_t end, Splat* out, TileBox* boxes) {
   const D d;
+  const scene::GaussianCloud& cloud = layer.cloud;
   Survivors found;
   for (std::size_t i = begin; i < end; i += hn::Lanes(d))
-    ProjectVector(d, cloud, view, pixels, i, HWY_MIN(hn::Lanes(d), end - i), found);
+    ProjectVector(d, cloud, view, culling, pixels, i, HWY_MIN(hn::Lanes(d), end - i), found);
   const std::size_t stored = scene::sh_coefficients(cloud.sh_degree), used = scene::sh_coefficients(sh_degree);
+  const std::uint32_t* hidden = std::lower_bound(layer.hidden.data(), layer.hidden.data() + layer.hidden.size(), begin);
+  const std::uint32_t* const last_hidden = layer.hidden.data() + layer.hidden.size();
+  std::size_t written = 0;
   for (std::size_t k = 0; k < found.count; ++k) {
     const auto row = std::size_t(found.row[k]);
-    Splat& splat = out[k];
+    while (hidden != last_hidden && *hidden < row) ++hidden;
+    if (hidden != last_hidden && *hidden == row) continue;
+    Splat& splat = out[written];
     splat = {.x = found.x[k],
              .y = found.y[k],
              .l1 = found.l1[k],
@@ -215,16 +238,16 @@ std::size_t ProjectRows(const scene::GaussianCloud& cloud, const ViewParams<floa
              .green = 0,
              .blue = 0,
              .depth = found.depth[k],
-             .weight = weight != nullptr ? weight[row] : 0.0f,
-             .row = std::uint32_t(row)};
-    boxes[k] = {std::uint16_t(found.columns[k] & 0xffff), std::uint16_t(found.columns[k] >> 16),
-                std::uint16_t(found.rows[k] & 0xffff), std::uint16_t(found.rows[k] >> 16)};
+             .weight = layer.weight != nullptr ? layer.weight[row] : 0.0f,
+             .row = std::uint32_t(layer.first_row + row)};
+    boxes[written++] = {std::uint16_t(found.columns[k] & 0xffff), std::uint16_t(found.columns[k] >> 16),
+                        std::uint16_t(found.rows[k] & 0xffff), std::uint16_t(found.rows[k] >> 16)};
     if (sh_degree < 0) continue;
     alignas(16) float basis[16];
     scene::sh_basis(sh_degree, found.to_x[k], found.to_y[k], found.to_z[k], basis);
     ShadeRow(cloud.sh.data() + row * cloud.sh_stride(), stored, used, basis, splat);
   }
-  return found.count;
+  return written;
 }
 
 }  // namespace HWY_NAMESPACE
@@ -236,10 +259,9 @@ namespace engine::render {
 
 HWY_EXPORT(ProjectRows);
 
-std::size_t project_rows(const scene::GaussianCloud& cloud, const ViewParams<float>& view, int sh_degree,
-                         const float* weight, scene::Rect pixels, std::size_t begin, std::size_t end, Splat* out,
-                         TileBox* boxes) {
-  return HWY_DYNAMIC_DISPATCH(ProjectRows)(cloud, view, sh_degree, weight, pixels, begin, end, out, boxes);
+std::size_t project_rows(const ProjectedLayer& layer, const ViewParams<float>& view, int sh_degree, Culling culling,
+                         scene::Rect pixels, std::size_t begin, std::size_t end, Splat* out, TileBox* boxes) {
+  return HWY_DYNAMIC_DISPATCH(ProjectRows)(layer, view, sh_degree, culling, pixels, begin, end, out, boxes);
 }
 
 }  // namespace engine::render

@@ -19,14 +19,14 @@ struct ReferencePictures {
 };
 
 /// Renders the whole picture on one thread. Every option of ForwardOptions but rect, tiles and backend is honoured.
-///   weight  [N] or empty
+///   weight  [layers.size()] or empty
 template <std::floating_point Real>
-[[nodiscard]] ReferencePictures<Real> forward_reference(const scene::GaussianCloud& cloud, const scene::Camera& camera,
+[[nodiscard]] ReferencePictures<Real> forward_reference(const Layers& layers, const scene::Camera& camera,
                                                         const ForwardOptions& options, std::span<const Real> weight);
 
-extern template ReferencePictures<float> forward_reference(const scene::GaussianCloud&, const scene::Camera&,
-                                                           const ForwardOptions&, std::span<const float>);
-extern template ReferencePictures<double> forward_reference(const scene::GaussianCloud&, const scene::Camera&,
-                                                            const ForwardOptions&, std::span<const double>);
+extern template ReferencePictures<float> forward_reference(const Layers&, const scene::Camera&, const ForwardOptions&,
+                                                           std::span<const float>);
+extern template ReferencePictures<double> forward_reference(const Layers&, const scene::Camera&, const ForwardOptions&,
+                                                            std::span<const double>);
 
 }  // namespace engine::render

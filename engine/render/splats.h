@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/render/forward.h"
+#include "engine/render/layers.h"
 #include "engine/render/project.h"
 
 namespace engine::render {
@@ -22,7 +23,7 @@ struct Splat {
   float red, green, blue;
   float depth;  ///< World units along the optical axis.
   float weight;
-  std::uint32_t row;  ///< Of the Gaussian in its cloud.
+  std::uint32_t row;  ///< Of the Gaussian in its layers.
 };
 static_assert(sizeof(Splat) == 48);
 
@@ -64,7 +65,7 @@ struct TileGrid {
 
 /// What a forward pass works in. The stages fill it from top to bottom.
 struct ForwardBuffers {
-  // project: block b of the cloud's rows writes its survivors from b * project_block on
+  // project: block b of the rows, the base's blocks before those on top, writes its survivors from b * project_block on
   Buffer<Splat> projected;
   Buffer<TileBox> projected_boxes;
   std::vector<std::size_t> block_sizes;
@@ -88,14 +89,30 @@ struct ForwardBuffers {
   std::vector<std::uint32_t> tile_begin;  ///< [tiles + 1] into entries.
 };
 
+struct Workspace::Impl {
+  ForwardBuffers buffers;
+};
+
+/// One cloud on its way through projection.
+struct ProjectedLayer {
+  const scene::GaussianCloud& cloud;
+  std::span<const std::uint32_t> hidden;  ///< Rows left out, ascending.
+  std::size_t first_row;                  ///< What Splat::row is of its row 0.
+  const float* weight;                    ///< [N] or null
+};
+
+/// How to find out that a Gaussian reaches no wanted pixel. The survivors are the same.
+enum class Culling {
+  exact,    ///< Once it is projected.
+  by_bound  ///< From a bound on its extent first: pays where most of what is in front of the camera is elsewhere.
+};
+
 /// Projects the rows [begin, end) and writes those that can be seen within `pixels` to `out`, in row order.
-///   weight  [N] or null
 ///   sh_degree  bands used; -1: colours are not needed
 ///   out, boxes room for end - begin
 ///   returns    how many were written
-std::size_t project_rows(const scene::GaussianCloud& cloud, const ViewParams<float>& view, int sh_degree,
-                         const float* weight, scene::Rect pixels, std::size_t begin, std::size_t end, Splat* out,
-                         TileBox* boxes);
+std::size_t project_rows(const ProjectedLayer& layer, const ViewParams<float>& view, int sh_degree, Culling culling,
+                         scene::Rect pixels, std::size_t begin, std::size_t end, Splat* out, TileBox* boxes);
 
 /// Most rows project_rows() takes at once.
 constexpr std::size_t project_block = 1024;
@@ -119,6 +136,11 @@ struct alignas(64) TilePixels {
 /// them. Only the planes that `channels` names, and alpha, are written.
 void composite_tile(const Splat* splats, std::span<const std::uint32_t> list, int x0, int y0, Channels channels,
                     Vec3 background, TilePixels& tile);
+
+/// Projects all layers into the buffers.
+///   weight  [layers.size()] or empty
+void project(const Layers& layers, const ViewParams<float>& view, int sh_degree, std::span<const float> weight,
+             Culling culling, scene::Rect pixels, ForwardBuffers& buffers);
 
 /// The stages between projection and blending.
 void sort_by_depth(ForwardBuffers& buffers);

@@ -73,7 +73,7 @@ INSTANTIATE_TEST_SUITE_P(Backends, BackendTest, testing::Values(Backend::referen
                          [](const auto& backend) { return backend.param == Backend::simd ? "simd" : "reference"; });
 
 TEST_P(BackendTest, AnEmptySceneShowsTheBackground) {
-  const Rendering seen = forward({}, test_camera(), everything(GetParam()));
+  const Rendering seen = forward(scene::GaussianCloud{}, test_camera(), everything(GetParam()));
   for (int c = 0; c < 3; ++c)
     for (const float value : seen.color.plane(c)) EXPECT_EQ(value, everything().background[c]);
   for (const float alpha : seen.alpha.data) EXPECT_EQ(alpha, 0.0f);
@@ -287,6 +287,39 @@ TEST_P(ExtremeTest, GivesFinitePicturesThatBothBackendsAgreeOn) {
   for (std::size_t i = 0; i < seen.alpha.data.size(); ++i)
     flips += std::abs(seen.alpha.data[i] - expected.alpha.data[i]) > 1e-3f;
   EXPECT_LE(flips, seen.alpha.data.size() / 200) << "of " << seen.alpha.data.size();
+}
+
+TEST_P(ExtremeTest, ASmallRectangleIsACutOutOfTheWholePicture) {
+  // What a small rectangle does not need is left out by a bound on its extent, which must never leave out too much.
+  auto cloud = random_cloud(197, 17);
+  GetParam().spoil(cloud);
+  const std::vector<float> weight(cloud.size(), 0.7f);
+  const auto whole = forward(cloud, test_camera(), everything(), weight);
+  for (int y0 = 0; y0 + 9 <= 50; y0 += 8)
+    for (int x0 = 0; x0 + 11 <= 70; x0 += 10) {
+      ForwardOptions options = everything();
+      options.rect = scene::Rect{x0, y0, x0 + 11, y0 + 9};
+      const auto part = forward(cloud, test_camera(), options, weight);
+      for (int y = 0; y < 9; ++y)
+        for (int x = 0; x < 11; ++x) {
+          ASSERT_EQ(part.color.at(x, y, 1), whole.color.at(x0 + x, y0 + y, 1)) << x0 + x << ", " << y0 + y;
+          ASSERT_EQ(part.alpha.at(x, y), whole.alpha.at(x0 + x, y0 + y)) << x0 + x << ", " << y0 + y;
+          ASSERT_EQ(part.median_depth.at(x, y), whole.median_depth.at(x0 + x, y0 + y)) << x0 + x << ", " << y0 + y;
+        }
+    }
+}
+
+TEST(Forward, ASmallRectangleOfACrowdedSceneIsACutOutOfTheWholePicture) {
+  const auto cloud = random_cloud(4000, 18);
+  const auto whole = forward(cloud, test_camera(), everything());
+  for (int y = 0; y < 50; y += 7)
+    for (int x = 0; x < 70; x += 3) {
+      ForwardOptions options = everything();
+      options.rect = scene::Rect{x, y, x + 1, y + 1};
+      const auto part = forward(cloud, test_camera(), options);
+      ASSERT_EQ(part.alpha.at(0, 0), whole.alpha.at(x, y)) << x << ", " << y;
+      ASSERT_EQ(part.color.at(0, 0, 2), whole.color.at(x, y, 2)) << x << ", " << y;
+    }
 }
 
 TEST(Forward, BackendsAgreeOnACrowdedScene) {

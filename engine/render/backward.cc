@@ -1,0 +1,248 @@
+#include "engine/render/backward.h"
+
+#include <algorithm>
+#include <cassert>
+
+#include "engine/core/parallel.h"
+#include "engine/render/backward_stages.h"
+#include "engine/render/reference_backward.h"
+
+namespace engine::render {
+namespace {
+
+/// Is the pixel one that the options ask for?
+class Wanted {
+ public:
+  Wanted(const ForwardOptions& options, const scene::Camera& camera)
+      : area_(options.rect.value_or(scene::Rect{0, 0, camera.width, camera.height})),
+        columns_(tile_columns(camera.width)) {
+    if (options.tiles.empty()) return;
+    tiles_.assign(std::size_t(columns_) * std::size_t(tile_rows(camera.height)), 0);
+    for (const std::uint32_t tile : options.tiles) tiles_[tile] = 1;
+  }
+  [[nodiscard]] scene::Rect area() const { return area_; }
+  [[nodiscard]] const std::vector<std::uint8_t>& tiles() const { return tiles_; }  ///< As TileGrid::wanted.
+  [[nodiscard]] bool operator()(int x, int y) const {
+    return tiles_.empty() || tiles_[std::size_t(y / tile_size * columns_ + x / tile_size)] != 0;
+  }
+
+ private:
+  scene::Rect area_;
+  int columns_;
+  std::vector<std::uint8_t> tiles_;
+};
+
+/// A plane of the whole picture that is zero where nothing is wanted. Empty for an empty image.
+std::vector<float> whole_plane(const scene::Image& image, int channel, const Wanted& wanted, int width, int height) {
+  if (image.channels == 0) return {};
+  std::vector<float> plane(std::size_t(width) * std::size_t(height), 0.0f);
+  const scene::Rect area = wanted.area();
+  for (int y = area.y0; y < area.y1; ++y)
+    for (int x = area.x0; x < area.x1; ++x)
+      if (wanted(x, y))
+        plane[std::size_t(y) * std::size_t(width) + std::size_t(x)] = image.at(x - area.x0, y - area.y0, channel);
+  return plane;
+}
+
+Vec3 vector_of(const std::array<float, 3>& v) { return {v[0], v[1], v[2]}; }
+
+void backward_scalar(const Layers& layers, const scene::Camera& camera, const BackwardOptions& options,
+                     const Upstream& upstream, std::span<const std::uint32_t> rows, Gradients& out) {
+  const Wanted wanted(options.forward, camera);
+  const auto plane = [&](const scene::Image& image, int channel) {
+    return whole_plane(image, channel, wanted, camera.width, camera.height);
+  };
+  const ReferenceUpstream<float> whole{
+      .color = {plane(upstream.color, 0), plane(upstream.color, 1), plane(upstream.color, 2)},
+      .depth = plane(upstream.depth, 0),
+      .alpha = plane(upstream.alpha, 0)};
+  const auto v = backward_reference<float>(layers, camera, options, whole, rows);
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    out.mean.set(r, out.mean.get(r) + vector_of(v.mean[r]));
+    out.log_scale.set(r, out.log_scale.get(r) + vector_of(v.log_scale[r]));
+    out.rotation.w[r] += v.rotation[r][0], out.rotation.x[r] += v.rotation[r][1];
+    out.rotation.y[r] += v.rotation[r][2], out.rotation.z[r] += v.rotation[r][3];
+    out.opacity_logit[r] += v.opacity_logit[r];
+    out.mean2d_x_px[r] = v.mean2d_px[r][0], out.mean2d_y_px[r] = v.mean2d_px[r][1];
+  }
+  for (std::size_t i = 0; i < out.sh.size(); ++i) out.sh[i] += v.sh[i];
+}
+
+}  // namespace
+
+void Gradients::reset(std::size_t rows, int degree) {
+  sh_degree = degree;
+  for (Array3* array : {&mean, &log_scale})
+    for (std::vector<float>* component : {&array->x, &array->y, &array->z}) component->assign(rows, 0.0f);
+  for (std::vector<float>* component :
+       {&rotation.w, &rotation.x, &rotation.y, &rotation.z, &opacity_logit, &mean2d_x_px, &mean2d_y_px})
+    component->assign(rows, 0.0f);
+  sh.assign(rows * 3 * scene::sh_coefficients(degree), 0.0f);
+}
+
+namespace {
+
+constexpr std::size_t sum_block = 2048;  // splats per unit of parallel work
+
+/// Reads dL/d(pictures) of the tile whose first pixel is (x0, y0), and what they make of the ray's end. False if all is
+/// zero.
+bool load_tile(const UpstreamPlanes& upstream, scene::Rect area, Vec3 background, int x0, int y0, TileUpstream& tile) {
+  tile = {};
+  bool any = false;
+  for (int y = std::max(y0, area.y0); y < std::min(y0 + tile_size, area.y1); ++y)
+    for (int x = std::max(x0, area.x0); x < std::min(x0 + tile_size, area.x1); ++x) {
+      const auto at = std::size_t((y - y0) * tile_size + x - x0);
+      const int from_x = x - area.x0, from_y = y - area.y0;
+      if (upstream.color != nullptr) {
+        tile.red[at] = upstream.color->at(from_x, from_y, 0);
+        tile.green[at] = upstream.color->at(from_x, from_y, 1);
+        tile.blue[at] = upstream.color->at(from_x, from_y, 2);
+      }
+      if (upstream.depth != nullptr) tile.depth[at] = upstream.depth->at(from_x, from_y);
+      const float v_alpha = upstream.alpha != nullptr ? upstream.alpha->at(from_x, from_y) : 0.0f;
+      tile.transmittance[at] =
+          background.x * tile.red[at] + background.y * tile.green[at] + background.z * tile.blue[at] - v_alpha;
+      any |= tile.red[at] != 0 || tile.green[at] != 0 || tile.blue[at] != 0 || tile.depth[at] != 0 || v_alpha != 0;
+    }
+  return any;
+}
+
+/// Sums the tiles' gradients of each splat, in the order of tiles, into those of its row. A block of splats has a part
+/// of each tile's list to itself, since lists are in the order of splats: no two threads add to the same sum.
+void sum_over_tiles(const ForwardBuffers& forward, std::size_t rows, WalkBuffers& work) {
+  work.rows.seen.assign(rows, 0);
+  std::array<float*, TileGradient::sums> sums;
+  for (std::size_t k = 0; k < sums.size(); ++k) sums[k] = work.rows.sums[k].reserve(rows);
+  parallel_for(forward.count, sum_block, [&](std::size_t begin, std::size_t end) {
+    const std::int32_t* const slots = work.slot_of_splat.data();
+    if (std::all_of(slots + begin, slots + end, [](std::int32_t slot) { return slot < 0; })) return;
+    std::vector<std::array<double, TileGradient::sums>> totals(end - begin);
+    std::vector<std::uint8_t> seen(end - begin, 0);
+    const std::uint32_t* const list = forward.entries.data();
+    for (std::size_t tile = 0; tile < work.walked.size(); ++tile) {
+      if (work.walked[tile] == 0) continue;
+      const std::uint32_t* const last = list + forward.tile_begin[tile + 1];
+      for (const std::uint32_t* entry = std::lower_bound(list + forward.tile_begin[tile], last, begin);
+           entry != last && *entry < end; ++entry) {
+        if (slots[*entry] < 0) continue;
+        const TileGradient& v = work.entries[std::size_t(entry - list)];
+        const std::array<float, TileGradient::sums> values{
+            v.g, v.along, v.across, v.along_along, v.along_across, v.across_across, v.red, v.green, v.blue, v.depth};
+        auto& total = totals[*entry - begin];
+        for (std::size_t k = 0; k < values.size(); ++k) total[k] += double(values[k]);
+        seen[*entry - begin] = 1;
+      }
+    }
+    for (std::size_t i = begin; i < end; ++i) {
+      if (seen[i - begin] == 0) continue;
+      const auto slot = std::size_t(slots[i]);
+      for (std::size_t k = 0; k < sums.size(); ++k) sums[k][slot] = float(totals[i - begin][k]);
+      work.rows.seen[slot] = 1;
+    }
+  });
+}
+
+}  // namespace
+
+void clear_mean2d(Gradients& out) {
+  std::fill(out.mean2d_x_px.begin(), out.mean2d_x_px.end(), 0.0f);
+  std::fill(out.mean2d_y_px.begin(), out.mean2d_y_px.end(), 0.0f);
+}
+
+void walk_tiles(const ForwardBuffers& forward, const TileGrid& grid, const UpstreamPlanes& upstream, Vec3 background,
+                std::size_t rows, WalkBuffers& work) {
+  const std::int32_t* const slot_of_splat = work.slot_of_splat.data();
+  const std::size_t tiles = std::size_t(grid.columns) * std::size_t(grid.rows);
+  work.walked.assign(tiles, 0);
+  TileGradient* const entries = work.entries.reserve(forward.tile_begin[tiles]);
+  parallel_for(tiles, 1, [&](std::size_t tile, std::size_t) {
+    const std::uint32_t first = forward.tile_begin[tile], last = forward.tile_begin[tile + 1];
+    const std::span list(forward.entries.data() + first, last - first);
+    if (std::none_of(list.begin(), list.end(), [&](std::uint32_t splat) { return slot_of_splat[splat] >= 0; })) return;
+    const int x0 = int(tile) % grid.columns * tile_size, y0 = int(tile) / grid.columns * tile_size;
+    TileUpstream tile_upstream;
+    if (!load_tile(upstream, grid.pixels, background, x0, y0, tile_upstream)) return;
+    auto trace = work.traces.take();
+    composite_tile_vjp(forward.splats.data(), list, slot_of_splat, x0, y0, tile_upstream, upstream.depth != nullptr,
+                       *trace, entries + first);
+    work.traces.give_back(std::move(trace));
+    work.walked[tile] = 1;
+  });
+  sum_over_tiles(forward, rows, work);
+}
+
+namespace {
+
+const scene::Image* plane_or_none(const scene::Image& image) { return image.channels != 0 ? &image : nullptr; }
+
+/// What a backward pass works in. The stages fill it from top to bottom.
+struct BackwardBuffers {
+  ForwardBuffers forward;
+  Buffer<std::int32_t> slot_of_row;  ///< [layers.size()] Where a row is in the list of those that may change, or -1.
+  WalkBuffers walk;
+};
+
+void backward_simd(const Layers& layers, const scene::Camera& camera, const BackwardOptions& options,
+                   const Upstream& upstream, std::span<const std::uint32_t> rows, BackwardBuffers& work,
+                   Gradients& out) {
+  clear_mean2d(out);
+  if (rows.empty()) return;
+  const Wanted wanted(options.forward, camera);
+  const auto view = view_params<float>(camera);
+  const int sh_degree = std::min(layers.base->sh_degree, options.forward.max_sh_degree);
+  const TileGrid grid{.columns = tile_columns(camera.width),
+                      .rows = tile_rows(camera.height),
+                      .pixels = wanted.area(),
+                      .wanted = wanted.tiles()};
+  ForwardBuffers& forward = work.forward;
+  project(layers, view, sh_degree, {}, Culling::exact, grid.pixels, forward);
+  sort_by_depth(forward);
+  bin(grid, forward);
+
+  std::int32_t* const slot_of_row = work.slot_of_row.reserve(layers.size());
+  std::fill_n(slot_of_row, layers.size(), -1);
+  for (std::size_t r = 0; r < rows.size(); ++r) slot_of_row[rows[r]] = std::int32_t(r);
+  std::int32_t* const slot_of_splat = work.walk.slot_of_splat.reserve(forward.count);
+  for (std::size_t i = 0; i < forward.count; ++i) slot_of_splat[i] = slot_of_row[forward.splats[i].row];
+
+  const UpstreamPlanes planes{.color = plane_or_none(upstream.color),
+                              .depth = plane_or_none(upstream.depth),
+                              .alpha = plane_or_none(upstream.alpha)};
+  walk_tiles(forward, grid, planes, options.forward.background, rows.size(), work.walk);
+  const std::size_t base_rows = layers.base->size();
+  const auto of_base = std::size_t(std::lower_bound(rows.begin(), rows.end(), base_rows) - rows.begin());
+  parallel_for(rows.size(), project_vjp_block, [&](std::size_t begin, std::size_t end) {
+    const std::size_t split = std::clamp(of_base, begin, end);
+    if (begin < split) project_rows_vjp(*layers.base, 0, view, sh_degree, rows, work.walk.rows, begin, split, out);
+    if (split < end) project_rows_vjp(*layers.top, base_rows, view, sh_degree, rows, work.walk.rows, split, end, out);
+  });
+}
+
+}  // namespace
+
+struct BackwardWorkspace::Impl {
+  BackwardBuffers buffers;
+};
+
+BackwardWorkspace::BackwardWorkspace() : impl_(std::make_unique<Impl>()) {}
+BackwardWorkspace::~BackwardWorkspace() = default;
+BackwardWorkspace::BackwardWorkspace(BackwardWorkspace&&) noexcept = default;
+BackwardWorkspace& BackwardWorkspace::operator=(BackwardWorkspace&&) noexcept = default;
+
+void backward(const Layers& layers, const scene::Camera& camera, const BackwardOptions& options,
+              const Upstream& upstream, std::span<const std::uint32_t> rows, BackwardWorkspace& workspace,
+              Gradients& out) {
+  assert(scene::validate(camera));
+  assert(options.forward.tiles.empty() || !options.forward.rect);
+  assert(std::is_sorted(rows.begin(), rows.end()) && (rows.empty() || rows.back() < layers.size()));
+  assert(out.size() == rows.size() && out.sh_degree == layers.base->sh_degree);
+  assert(options.forward.backend == Backend::reference ||
+         (options.forward.semantics == Semantics::dense_stop && options.alpha_clamp == AlphaClamp::exact));
+  if (options.forward.backend == Backend::reference) {
+    backward_scalar(layers, camera, options, upstream, rows, out);
+  } else {
+    backward_simd(layers, camera, options, upstream, rows, workspace.impl_->buffers, out);
+  }
+}
+
+}  // namespace engine::render

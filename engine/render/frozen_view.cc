@@ -1,0 +1,266 @@
+#include "engine/render/frozen_view.h"
+
+#include <algorithm>
+#include <cassert>
+#include <limits>
+#include <new>
+#include <numeric>
+#include <vector>
+
+#include "engine/core/parallel.h"
+#include "engine/render/backward_stages.h"
+#include "engine/render/splats.h"
+
+namespace engine::render {
+namespace {
+
+TileGrid grid_of(const scene::Camera& camera) {
+  return {.columns = tile_columns(camera.width),
+          .rows = tile_rows(camera.height),
+          .pixels = {0, 0, camera.width, camera.height},
+          .wanted = {}};
+}
+
+/// Copies the pixels of a tile to a picture of `region`.
+void store_tile(const TilePixels& tile, int x0, int y0, scene::Rect region, scene::Image& color) {
+  const int width = std::min(x0 + tile_size, region.x1) - x0, height = std::min(y0 + tile_size, region.y1) - y0;
+  int channel = 0;
+  for (const float* from : {tile.red, tile.green, tile.blue}) {
+    float* const plane = color.plane(channel++).data();
+    for (int y = 0; y < height; ++y)
+      std::copy_n(from + y * tile_size, width,
+                  plane + std::ptrdiff_t(y0 - region.y0 + y) * color.width + (x0 - region.x0));
+  }
+}
+
+/// Blends one tile of the listed splats and stores it.
+void render_tile(const Splat* splats, std::span<const std::uint32_t> list, std::uint32_t tile, int columns,
+                 Vec3 background, scene::Rect region, scene::Image& color) {
+  TilePixels pixels;
+  const int x0 = int(tile) % columns * tile_size, y0 = int(tile) / columns * tile_size;
+  composite_tile(splats, list, x0, y0, {.color = true}, background, pixels);
+  store_tile(pixels, x0, y0, region, color);
+}
+
+[[maybe_unused]] bool contains(scene::Rect outer, scene::Rect inner) {
+  return inner.empty() ||
+         (inner.x0 >= outer.x0 && inner.y0 >= outer.y0 && inner.x1 <= outer.x1 && inner.y1 <= outer.y1);
+}
+
+}  // namespace
+
+scene::Rect whole_tiles(scene::Rect rect, const scene::Camera& camera) {
+  if (rect.empty()) return {};
+  const auto down = [](int pixel) { return std::max(pixel, 0) / tile_size * tile_size; };
+  const auto up = [](int pixel, int limit) { return std::min((pixel + tile_size - 1) / tile_size * tile_size, limit); };
+  return {down(rect.x0), down(rect.y0), up(rect.x1, camera.width), up(rect.y1, camera.height)};
+}
+
+struct FrozenView::Impl {
+  scene::Camera camera;
+  scene::Rect region;
+  Vec3 background;
+  int columns = 0;                        ///< Tiles across the whole picture.
+  std::vector<Splat> splats;              ///< Those that reach the region, by depth.
+  std::vector<std::uint32_t> tile_begin;  ///< [tiles of the picture + 1] into entries
+  std::vector<std::uint32_t> entries;     ///< Indices into splats.
+  scene::Image color;
+
+  [[nodiscard]] std::span<const std::uint32_t> list(std::size_t tile) const {
+    return std::span(entries).subspan(tile_begin[tile], tile_begin[tile + 1] - tile_begin[tile]);
+  }
+};
+
+FrozenView::FrozenView(const Layers& frozen, const scene::Camera& camera, scene::Rect region, Vec3 background)
+    : impl_(std::make_unique<Impl>()) {
+  assert(scene::validate(camera) && !region.empty() && whole_tiles(region, camera) == region);
+  TileGrid grid = grid_of(camera);
+  grid.wanted.assign(std::size_t(grid.columns) * std::size_t(grid.rows), 0);
+  std::vector<std::uint32_t> tiles;
+  for (int y = region.y0; y < region.y1; y += tile_size)
+    for (int x = region.x0; x < region.x1; x += tile_size)
+      tiles.push_back(std::uint32_t(y / tile_size * grid.columns + x / tile_size));
+  for (const std::uint32_t tile : tiles) grid.wanted[tile] = 1;
+  ForwardBuffers buffers;
+  // Within all of the picture: what a splat's box is cut to decides which tiles it is listed in, and the lists are to
+  // be those of a picture that was not cut.
+  project(frozen, view_params<float>(camera), frozen.base->sh_degree, {}, Culling::exact, grid.pixels, buffers);
+  sort_by_depth(buffers);
+  bin(grid, buffers);
+
+  Impl& view = *impl_;
+  view.camera = camera, view.region = region, view.background = background, view.columns = grid.columns;
+  const std::span<const std::uint32_t> entries(buffers.entries.data(), buffers.tile_begin.back());
+  std::vector<std::uint32_t> number(buffers.count, 0);  // of a splat among those kept, plus one
+  for (const std::uint32_t splat : entries) number[splat] = 1;
+  std::uint32_t kept = 0;
+  for (std::uint32_t& n : number)
+    if (n != 0) n = ++kept;
+  view.splats.reserve(kept);
+  for (std::size_t i = 0; i < number.size(); ++i)
+    if (number[i] != 0) view.splats.push_back(buffers.splats[i]);
+  view.entries.reserve(entries.size());
+  for (const std::uint32_t splat : entries) view.entries.push_back(number[splat] - 1);
+  view.tile_begin = buffers.tile_begin;
+
+  view.color = scene::Image(region.width(), region.height(), 3);
+  parallel_for(tiles.size(), 1, [&](std::size_t i, std::size_t) {
+    render_tile(view.splats.data(), view.list(tiles[i]), tiles[i], view.columns, background, region, view.color);
+  });
+}
+
+FrozenView::~FrozenView() = default;
+FrozenView::FrozenView(FrozenView&&) noexcept = default;
+FrozenView& FrozenView::operator=(FrozenView&&) noexcept = default;
+
+const scene::Camera& FrozenView::camera() const { return impl_->camera; }
+scene::Rect FrozenView::region() const { return impl_->region; }
+const scene::Image& FrozenView::color() const { return impl_->color; }
+std::size_t FrozenView::splats() const { return impl_->splats.size(); }
+std::size_t FrozenView::memory_bytes() const {
+  return sizeof(Impl) + impl_->splats.capacity() * sizeof(Splat) +
+         (impl_->entries.capacity() + impl_->tile_begin.capacity()) * sizeof(std::uint32_t) +
+         impl_->color.data.capacity() * sizeof(float);
+}
+
+struct LocalFrame::Impl {
+  ForwardBuffers changeable;        ///< Of the changeable Gaussians alone.
+  ForwardBuffers merged;            ///< splats, count, entries and tile_begin: of both.
+  Buffer<std::uint32_t> of_frozen;  ///< [frozen splats] Number among the merged.
+  Buffer<std::uint32_t> of_change;  ///< [changeable splats]
+  scene::Rect reach;
+  std::vector<std::uint32_t> tiles;  ///< Reached.
+  std::vector<std::uint32_t> rows;   ///< 0, 1, 2, ...
+  WalkBuffers walk;
+};
+
+LocalFrame::LocalFrame() : impl_(std::make_unique<Impl>()) {}
+LocalFrame::~LocalFrame() = default;
+LocalFrame::LocalFrame(LocalFrame&&) noexcept = default;
+LocalFrame& LocalFrame::operator=(LocalFrame&&) noexcept = default;
+
+scene::Rect LocalFrame::project(const scene::GaussianCloud& changeable, const scene::Camera& camera) {
+  assert(scene::validate(camera));
+  const TileGrid grid = grid_of(camera);
+  ForwardBuffers& buffers = impl_->changeable;
+  render::project(changeable, view_params<float>(camera), changeable.sh_degree, {}, Culling::exact, grid.pixels,
+                  buffers);
+  sort_by_depth(buffers);
+  bin(grid, buffers);
+
+  impl_->tiles.clear();
+  scene::Rect reach;
+  for (std::size_t tile = 0; tile + 1 < buffers.tile_begin.size(); ++tile) {
+    if (buffers.tile_begin[tile] == buffers.tile_begin[tile + 1]) continue;
+    const int x = int(tile) % grid.columns * tile_size, y = int(tile) / grid.columns * tile_size;
+    if (impl_->tiles.empty()) reach = {x, y, x, y};
+    reach = {std::min(reach.x0, x), reach.y0, std::max(reach.x1, x + tile_size), y + tile_size};
+    impl_->tiles.push_back(std::uint32_t(tile));
+  }
+  return impl_->reach = whole_tiles(reach, camera);
+}
+
+void LocalFrame::merge(const FrozenView& frozen) {
+  Impl& frame = *impl_;
+  const FrozenView::Impl& view = *frozen.impl_;
+  const ForwardBuffers& top = frame.changeable;
+  ForwardBuffers& merged = frame.merged;
+  assert(top.tile_begin.size() == view.tile_begin.size() && contains(view.region, frame.reach));
+
+  // By depth; a frozen splat comes before a changeable one of the same depth, as rows of a base do.
+  merged.count = view.splats.size() + top.count;
+  // Entries are numbered in 32 bits, and so are splats.
+  if (merged.count > std::numeric_limits<std::int32_t>::max()) throw std::bad_alloc();
+  Splat* const splats = merged.splats.reserve(merged.count);
+  std::int32_t* const slots = frame.walk.slot_of_splat.reserve(merged.count);
+  std::uint32_t* const of_frozen = frame.of_frozen.reserve(view.splats.size());
+  std::uint32_t* const of_change = frame.of_change.reserve(top.count);
+  std::size_t at = 0, f = 0;
+  for (std::size_t t = 0; t <= top.count; ++t) {
+    const std::size_t first = f;
+    if (t == top.count)
+      f = view.splats.size();
+    else
+      while (f < view.splats.size() && view.splats[f].depth <= top.splats[t].depth) ++f;
+    std::copy_n(view.splats.data() + first, f - first, splats + at);
+    std::fill_n(slots + at, f - first, -1);
+    std::iota(of_frozen + first, of_frozen + f, std::uint32_t(at));
+    at += f - first;
+    if (t == top.count) break;
+    splats[at] = top.splats[t];
+    slots[at] = std::int32_t(top.splats[t].row);
+    of_change[t] = std::uint32_t(at++);
+  }
+
+  const std::size_t all_tiles = view.tile_begin.size() - 1;
+  const auto list_of_change = [&](std::size_t tile) {
+    return std::span(top.entries.data() + top.tile_begin[tile], top.tile_begin[tile + 1] - top.tile_begin[tile]);
+  };
+  merged.tile_begin.assign(all_tiles + 1, 0);
+  std::uint64_t total = 0;
+  std::size_t next = 0;
+  for (std::size_t tile = 0; tile < all_tiles; ++tile) {
+    merged.tile_begin[tile] = std::uint32_t(total);
+    if (next == frame.tiles.size() || frame.tiles[next] != tile) continue;
+    ++next;
+    total += view.list(tile).size() + list_of_change(tile).size();
+    if (total > std::numeric_limits<std::uint32_t>::max()) throw std::bad_alloc();
+  }
+  merged.tile_begin[all_tiles] = std::uint32_t(total);
+  std::uint32_t* const entries = merged.entries.reserve(std::size_t(total));
+  parallel_for(frame.tiles.size(), 4, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::uint32_t tile = frame.tiles[i];
+      const std::span<const std::uint32_t> below = view.list(tile), above = list_of_change(tile);
+      std::uint32_t* to = entries + merged.tile_begin[tile];
+      std::size_t a = 0;
+      for (const std::uint32_t change : above) {
+        const std::uint32_t number = of_change[change];
+        for (; a < below.size() && of_frozen[below[a]] < number; ++a) *to++ = of_frozen[below[a]];
+        *to++ = number;
+      }
+      for (; a < below.size(); ++a) *to++ = of_frozen[below[a]];
+    }
+  });
+}
+
+std::span<const std::uint32_t> LocalFrame::tiles() const { return impl_->tiles; }
+float LocalFrame::nearest_depth(std::size_t i) const {
+  const ForwardBuffers& top = impl_->changeable;  // whose lists are by depth
+  return top.splats[top.entries[top.tile_begin[impl_->tiles[i]]]].depth;
+}
+std::size_t LocalFrame::entries() const {
+  return impl_->merged.tile_begin.empty() ? 0 : impl_->merged.tile_begin.back();
+}
+
+void LocalFrame::forward(const FrozenView& frozen, scene::Image& color) {
+  const FrozenView::Impl& view = *frozen.impl_;
+  assert(color.width == view.region.width() && color.height == view.region.height() && color.channels == 3);
+  const ForwardBuffers& merged = impl_->merged;
+  parallel_for(impl_->tiles.size(), 1, [&](std::size_t i, std::size_t) {
+    const std::uint32_t tile = impl_->tiles[i], first = merged.tile_begin[tile], last = merged.tile_begin[tile + 1];
+    render_tile(merged.splats.data(), {merged.entries.data() + first, last - first}, tile, view.columns,
+                view.background, view.region, color);
+  });
+}
+
+void LocalFrame::backward(const FrozenView& frozen, const scene::GaussianCloud& changeable, const scene::Image& v_color,
+                          Gradients& out) {
+  const FrozenView::Impl& view = *frozen.impl_;
+  assert(v_color.width == view.region.width() && v_color.height == view.region.height() && v_color.channels == 3);
+  assert(out.size() == changeable.size() && out.sh_degree == changeable.sh_degree);
+  std::vector<std::uint32_t>& rows = impl_->rows;
+  rows.resize(changeable.size());
+  std::iota(rows.begin(), rows.end(), 0u);
+  TileGrid grid = grid_of(view.camera);
+  grid.pixels = view.region;
+  const UpstreamPlanes upstream{.color = &v_color};
+  clear_mean2d(out);
+  walk_tiles(impl_->merged, grid, upstream, view.background, rows.size(), impl_->walk);
+  const auto params = view_params<float>(view.camera);
+  parallel_for(rows.size(), project_vjp_block, [&](std::size_t begin, std::size_t end) {
+    project_rows_vjp(changeable, 0, params, changeable.sh_degree, rows, impl_->walk.rows, begin, end, out);
+  });
+}
+
+}  // namespace engine::render
