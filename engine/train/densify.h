@@ -1,0 +1,37 @@
+// More Gaussians where the picture asks for them.
+// Source: Kerbl et al. 2023, section 5.2; Rota Bulo et al. 2024, "Revising densification in Gaussian splatting",
+// section 3.3, for the opacity of clones.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/core/rng.h"
+#include "engine/render/backward.h"
+#include "engine/scene/camera.h"
+#include "engine/scene/gaussian_cloud.h"
+
+namespace engine::train {
+
+/// How strongly pictures pull at the positions of splats.
+struct PullStatistic {
+  std::vector<double> sum;           ///< [R] of lengths, in half pictures.
+  std::vector<std::uint32_t> views;  ///< [R] that showed the row.
+
+  void reset(std::size_t rows);
+  /// Takes in one view.
+  void add(const render::Gradients& gradients, const scene::Camera& camera);
+};
+
+/// Rows whose mean pull exceeds the threshold, ascending: at most `most`, the strongest (the lower row if two tie).
+[[nodiscard]] std::vector<std::uint32_t> rows_to_densify(const PullStatistic& pull, double threshold, std::size_t most);
+
+/// Appends a child for each of `rows` (ascending), in their order, with the parent's extra bytes.
+///   larger_than  world units: a Gaussian whose largest sigma exceeds this is split: it and its child take places drawn
+///                from it, at 1 / 1.6 of its size. Others are cloned: both at the same place, with the opacity
+///                1 - sqrt(1 - alpha), two of which blend like alpha
+void add_children(scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows, double larger_than, Rng& rng);
+
+}  // namespace engine::train

@@ -1,0 +1,294 @@
+#include "engine/train/trainer.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <numeric>
+#include <string>
+#include <utility>
+
+#include "engine/optim/picture_view.h"
+
+namespace engine::train {
+namespace {
+
+const Vec3 black(0.0f);
+
+/// The groups of parameters, in the order of adam_groups(). Named as in a .ply file where that has one name for them.
+std::vector<optim::AdamLayout> adam_layout(const scene::GaussianCloud& cloud) {
+  std::vector<optim::AdamLayout> layout;
+  for (const char* name :
+       {"x", "y", "z", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3", "opacity"})
+    layout.push_back({name, 1});
+  layout.push_back({"sh", cloud.sh_stride()});
+  return layout;
+}
+
+/// Largest distance of a mean from their centre.
+double radius_of(const scene::GaussianCloud& cloud) {
+  DVec3 centre(0.0);
+  for (std::size_t i = 0; i < cloud.size(); ++i) centre += DVec3(cloud.mean.get(i));
+  centre /= std::max<double>(double(cloud.size()), 1);
+  double radius = 0;
+  for (std::size_t i = 0; i < cloud.size(); ++i)
+    radius = std::max(radius, glm::distance(centre, DVec3(cloud.mean.get(i))));
+  return radius;
+}
+
+scene::Rect bounding_box(const scene::Mask& mask) {
+  scene::Rect box;
+  for (int y = 0; y < mask.height; ++y)
+    for (int x = 0; x < mask.width; ++x)
+      if (mask.at(x, y) != 0) box = united(box, {x, y, x + 1, y + 1});
+  return box;
+}
+
+void shape_like(const scene::Image& image, scene::Image& out) {
+  out.width = image.width, out.height = image.height, out.channels = image.channels;
+  out.data.assign(image.data.size(), 0.0f);
+}
+
+}  // namespace
+
+Result<void> validate(const DensifyOptions& options) {
+  if (options.every < 0)
+    return fail(ErrorCode::invalid_argument, "Densification happens every 0 or more iterations.", "every");
+  for (const auto& [value, name] : {std::pair{options.until, "until"},
+                                    {options.gradient, "gradient"},
+                                    {options.dense, "dense"},
+                                    {options.most_growth, "most_growth"}})
+    if (!(value >= 0 && std::isfinite(value)))
+      return fail(ErrorCode::invalid_argument, "An option of densification must be 0 or more.", name);
+  return {};
+}
+
+Result<void> validate(const TrainOptions& options) {
+  if (auto valid = optim::validate(options.rates); !valid) return valid;
+  if (auto valid = optim::validate(options.adam); !valid) return valid;
+  if (auto valid = optim::validate(options.background); !valid) return valid;
+  for (const auto& [value, name] : {std::pair{options.perceptual_weight, "perceptual_weight"},
+                                    {options.dead_zone, "dead_zone"},
+                                    {options.floater_distance, "floater_distance"}})
+    if (!(value >= 0 && std::isfinite(value)))
+      return fail(ErrorCode::invalid_argument, "An option of training must be 0 or more.", name);
+  return validate(options.densify);
+}
+
+Trainer::Trainer(Frozen frozen, Changeable changeable, double scene_extent, const TrainOptions& options,
+                 optim::PerceptualLoss& loss)
+    : frozen_(frozen),
+      cloud_(std::move(changeable.cloud)),
+      name_(std::move(changeable.name)),
+      options_(options),
+      loss_(loss),
+      initial_rows_(cloud_.size()),
+      radius_(radius_of(cloud_)),
+      position_scale_(optim::position_scale(options.rates, scene_extent, radius_)),
+      ancestor_(cloud_.size()),
+      adam_(adam_layout(cloud_), cloud_.size(), options.adam) {
+  assert(validate(options) && cloud_.sh_degree == frozen.base->sh_degree);
+  assert(name_.empty() || name_.size() == cloud_.size());
+  std::iota(ancestor_.begin(), ancestor_.end(), 0u);
+}
+
+bool Trainer::add_view(const scene::Camera& camera, const scene::Mask& mask, const scene::GaussianCloud& original) {
+  assert(mask.width == camera.width && mask.height == camera.height);
+  const scene::Rect box = bounding_box(mask);
+  if (box.empty()) return false;
+  scene::Rect reach = united(box, frame_.project(cloud_, camera));
+  reach = united(reach, frame_.project(original, camera));
+  views_.push_back({.frozen = render::FrozenView(frozen_.layers(), camera, region_around(reach, camera), black),
+                    .mask = mask,
+                    .box = box,
+                    .background = {},
+                    .edited = {},
+                    .near_by_tile = {},
+                    .nearest = 0});
+  View& view = views_.back();
+  frame_.merge(view.frozen);  // of `original`, as projected last
+  view.background = view.frozen.color();
+  frame_.forward(view.frozen, view.background);
+  set_edited(views_.size() - 1, render(views_.size() - 1));
+  return true;
+}
+
+void Trainer::lay_over(View& view) {
+  const scene::Rect reach = frame_.project(cloud_, view.frozen.camera());
+  if (!has_room(view.frozen.region(), reach, view.frozen.camera())) widen(view, reach, frozen_, black);
+  frame_.merge(view.frozen);
+}
+
+scene::Image Trainer::render(std::size_t v) {
+  View& view = views_[v];
+  lay_over(view);
+  scene::Image picture = view.frozen.color();
+  frame_.forward(view.frozen, picture);
+  return picture;
+}
+
+void Trainer::set_edited(std::size_t v, scene::Image picture) {
+  const scene::Rect region = views_[v].frozen.region();
+  assert(picture.width == region.width() && picture.height == region.height() && picture.channels == 3);
+  (void)region;
+  quantise(picture);
+  views_[v].edited = std::move(picture);
+}
+
+void Trainer::note_depths(View& view) {
+  const scene::Camera& camera = view.frozen.camera();
+  frame_.project(cloud_, camera);
+  view.near_by_tile.assign(
+      std::size_t(render::tile_columns(camera.width)) * std::size_t(render::tile_rows(camera.height)), 0.0f);
+  view.nearest = 0;
+  for (std::size_t i = 0; i < frame_.tiles().size(); ++i) {
+    const float depth = frame_.nearest_depth(i);
+    view.near_by_tile[frame_.tiles()[i]] = depth;
+    view.nearest = view.nearest == 0 ? depth : std::min(view.nearest, depth);
+  }
+}
+
+void Trainer::begin_correction(const Key& key, int iterations) {
+  assert(!views_.empty() && iterations >= 1);
+  key_ = key;
+  iteration_ = 0, iterations_ = iterations;
+  pull_.reset(cloud_.size());
+  for (View& view : views_) note_depths(view);
+}
+
+Result<double> Trainer::differentiate(View& view) {
+  lay_over(view);
+  const scene::Camera& camera = view.frozen.camera();
+  rendered_ = view.frozen.color();
+  frame_.forward(view.frozen, rendered_);
+  cost_ = {frame_.tiles().size(), frame_.entries(), view.frozen.splats()};
+
+  const scene::Rect region = view.frozen.region(), box = within(view.box, region);
+  const std::size_t view_pixels = std::size_t(camera.width) * std::size_t(camera.height);
+  shape_like(rendered_, v_rendered_);
+  const auto background =
+      optim::background_loss(optim::view(rendered_), optim::view(view.background), optim::crop(view.mask, region),
+                             view_pixels, options_.background, loss_workspace_, optim::view(v_rendered_));
+  const auto edit =
+      optim::edit_loss(loss_, optim::crop(std::as_const(rendered_), box), optim::crop(std::as_const(view.edited), box),
+                       optim::crop(view.mask, view.box), view_pixels, options_.perceptual_weight, edit_workspace_,
+                       optim::crop(v_rendered_, box), float(options_.dead_zone));
+  if (!edit) return propagate(edit);
+  gradients_.reset(cloud_.size(), cloud_.sh_degree);
+  frame_.backward(view.frozen, cloud_, v_rendered_, gradients_);
+  return background.total + options_.perceptual_weight * *edit;
+}
+
+Result<void> Trainer::adam_step(double decay) {
+  const optim::LearningRates& rates = options_.rates;
+  const std::array<double, 1> position{rates.position * position_scale_ * decay}, scale{rates.log_scale * decay},
+      rotation{rates.rotation * decay}, opacity{rates.opacity_logit * decay};
+  std::vector<double> sh(cloud_.sh_stride(), rates.sh_rest * decay);
+  for (std::size_t c = 0; c < 3; ++c) sh[c * scene::sh_coefficients(cloud_.sh_degree)] = rates.sh_dc * decay;
+  render::Gradients& g = gradients_;
+  const std::array<optim::AdamGroup, 12> groups{{{cloud_.mean.x, g.mean.x, position},
+                                                 {cloud_.mean.y, g.mean.y, position},
+                                                 {cloud_.mean.z, g.mean.z, position},
+                                                 {cloud_.log_scale.x, g.log_scale.x, scale},
+                                                 {cloud_.log_scale.y, g.log_scale.y, scale},
+                                                 {cloud_.log_scale.z, g.log_scale.z, scale},
+                                                 {cloud_.rotation.w, g.rotation.w, rotation},
+                                                 {cloud_.rotation.x, g.rotation.x, rotation},
+                                                 {cloud_.rotation.y, g.rotation.y, rotation},
+                                                 {cloud_.rotation.z, g.rotation.z, rotation},
+                                                 {cloud_.opacity_logit, g.opacity_logit, opacity},
+                                                 {cloud_.sh, g.sh, sh}}};
+  auto stepped = adam_.step(groups);
+  if (stepped) return {};
+  // "[12].opacity" -> "gaussian[12].opacity", with the name of the row.
+  Error error = std::move(stepped.error());
+  const std::size_t end = error.where.find(']');
+  const std::size_t row = std::stoull(error.where.substr(1, end - 1));
+  const std::uint32_t ancestor = ancestor_[row];
+  error.where = "gaussian[" + std::to_string(name_.empty() ? ancestor : name_[ancestor]) + error.where.substr(end);
+  return tl::make_unexpected(std::move(error));
+}
+
+Result<Iteration> Trainer::step() {
+  assert(iteration_ < iterations_);
+  const std::size_t in_epoch = std::size_t(iteration_) % views_.size();
+  if (in_epoch == 0) order_ = shuffled(views_.size(), key_, std::size_t(iteration_));
+  Iteration done{iteration_, order_[in_epoch], 0};
+  View& view = views_[done.view];
+  const auto loss = differentiate(view);
+  if (!loss) return propagate(loss);
+  done.loss = *loss;
+  if (auto stepped = adam_step(optim::decay_within_correction(iteration_, iterations_, options_.rates.last)); !stepped)
+    return propagate(stepped);
+  if (!std::isfinite(done.loss))
+    return fail(ErrorCode::internal, "The loss is not a finite number at iteration " + std::to_string(iteration_) + ".",
+                "view[" + view.frozen.camera().name + "].loss");
+  ++iteration_;
+
+  const DensifyOptions& densify_options = options_.densify;
+  if (densify_options.every > 0) {
+    pull_.add(gradients_, view.frozen.camera());
+    if (iteration_ % densify_options.every == 0 && iteration_ <= densify_options.until * iterations_) {
+      remove_floaters();
+      densify();
+    }
+  }
+  if (iteration_ == iterations_) remove_floaters();
+  return done;
+}
+
+void Trainer::densify() {
+  const DensifyOptions& options = options_.densify;
+  const std::size_t most = std::size_t(options.most_growth * double(initial_rows_)),
+                    there = cloud_.size() - initial_rows_;
+  const double loss_weight =
+      options_.background.l1_weight + options_.background.ssim_weight + options_.perceptual_weight;
+  const auto rows = rows_to_densify(pull_, options.gradient * loss_weight, most - std::min(most, there));
+  Rng rng = stream(key_, Purpose::split, std::size_t(iteration_));
+  add_children(cloud_, rows, options.dense * position_scale_, rng);
+  for (const std::uint32_t row : rows) ancestor_.push_back(ancestor_[row]);
+  adam_.append_rows(rows.size());
+  pull_.reset(cloud_.size());
+}
+
+void Trainer::remove_floaters() {
+  std::vector<std::uint8_t> keep(cloud_.size(), 1);
+  std::size_t removed = 0;
+  const double margin = options_.floater_distance * radius_;
+  for (std::size_t row = initial_rows_; row < cloud_.size(); ++row) {
+    const bool floats = std::any_of(views_.begin(), views_.end(), [&](const View& view) {
+      const scene::Camera& camera = view.frozen.camera();
+      const DVec3 p = camera.cam_from_world(DVec3(cloud_.mean.get(row)));
+      if (!(p.z > 0) || view.nearest == 0) return false;
+      const DVec2 pixel = camera.pixel_from_cam(p);
+      if (!(pixel.x >= 0 && pixel.x < camera.width && pixel.y >= 0 && pixel.y < camera.height)) return false;
+      const auto tile = std::size_t(int(pixel.y) / render::tile_size * render::tile_columns(camera.width) +
+                                    int(pixel.x) / render::tile_size);
+      const float near = view.near_by_tile[tile] != 0 ? view.near_by_tile[tile] : view.nearest;
+      return p.z < double(near) - margin;
+    });
+    if (floats) keep[row] = 0, ++removed;
+  }
+  if (removed == 0) return;
+  cloud_ = scene::select(cloud_, keep);
+  adam_.keep_rows(keep);
+  std::size_t kept = 0;
+  for (std::size_t row = 0; row < keep.size(); ++row) {
+    if (keep[row] == 0) continue;
+    ancestor_[kept] = ancestor_[row];
+    pull_.sum[kept] = pull_.sum[row], pull_.views[kept] = pull_.views[row];
+    ++kept;
+  }
+  ancestor_.resize(kept), pull_.sum.resize(kept), pull_.views.resize(kept);
+  floaters_ += removed;
+}
+
+std::size_t Trainer::memory_bytes() const {
+  std::size_t bytes = 0;
+  for (const View& view : views_)
+    bytes += view.frozen.memory_bytes() + view.mask.data.size() + view.near_by_tile.size() * sizeof(float) +
+             (view.background.data.size() + view.edited.data.size()) * sizeof(float);
+  return bytes;
+}
+
+}  // namespace engine::train

@@ -1,0 +1,131 @@
+// Training of changeable Gaussians amid frozen ones, towards pictures.
+// Source: 3DGS-Drag (ICLR 2025), section 3.4, for the loss; Kerbl et al. 2023 for the rest.
+//
+// Per iteration one view:
+//   L = background_loss(I_r, I_o) outside the mask + perceptual_weight * edit_loss(I_r, I_e) inside it,
+// means over all pixels of the full view. Rendered and differentiated are the tiles that changeable Gaussians reach;
+// all else of a view is kept (render::FrozenView). An iteration costs what they reach and how many they are, never the
+// size of the scene. Same bytes for any number of threads.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/optim/adam.h"
+#include "engine/optim/losses.h"
+#include "engine/optim/perceptual.h"
+#include "engine/render/backward.h"
+#include "engine/render/frozen_view.h"
+#include "engine/scene/camera.h"
+#include "engine/scene/gaussian_cloud.h"
+#include "engine/scene/image.h"
+#include "engine/train/chance.h"
+#include "engine/train/densify.h"
+#include "engine/train/options.h"
+#include "engine/train/view.h"
+
+namespace engine::train {
+
+/// The Gaussians that are trained.
+struct Changeable {
+  scene::GaussianCloud cloud;
+  std::vector<std::uint32_t> name;  ///< [rows] What messages call each; empty: by its row.
+};
+
+/// One iteration.
+struct Iteration {
+  int number = 0;        ///< From 0, within the correction.
+  std::size_t view = 0;  ///< As numbered by add_view().
+  double loss = 0;       ///< Of that view, before the step.
+};
+
+/// What an iteration has cost, in things that do not depend on the machine.
+struct IterationCost {
+  std::size_t tiles = 0;          ///< Rendered and differentiated.
+  std::size_t entries = 0;        ///< Splats in their lists.
+  std::size_t frozen_splats = 0;  ///< Of the view's region.
+};
+
+class Trainer {
+ public:
+  /// Adam starts with moments 0.
+  ///   frozen        kept by reference: its cloud and list outlive the trainer and stay as they are
+  ///   changeable    of the degree of frozen.base
+  ///   scene_extent  world units, see optim::position_scale()
+  ///   loss          outlives the trainer
+  /// Precondition: validate(options).
+  Trainer(Frozen frozen, Changeable changeable, double scene_extent, const TrainOptions& options,
+          optim::PerceptualLoss& loss);
+
+  /// A view to train on. I_o is the picture in which `original` stands among the frozen Gaussians, at the place of the
+  /// changeable ones; I_e is what the view shows now, rounded to 8 bits. Projects the scene once.
+  ///   mask     in the camera's size; one without a set pixel: there is nothing to train, and the view is left out
+  ///   returns  whether it was added. Views are numbered as they are added.
+  bool add_view(const scene::Camera& camera, const scene::Mask& mask, const scene::GaussianCloud& original);
+  [[nodiscard]] std::size_t views() const { return views_.size(); }
+  [[nodiscard]] const View& view(std::size_t v) const { return views_[v]; }
+
+  /// What view v shows now: a picture of its region.
+  [[nodiscard]] scene::Image render(std::size_t v);
+  /// Sets I_e of view v, rounded to 8 bits. A picture of its region.
+  void set_edited(std::size_t v, scene::Image picture);
+
+  /// Starts over with iteration 0 of a correction: learning rates are full again, Adam goes on.
+  /// Precondition: views() > 0, iterations >= 1.
+  void begin_correction(const Key& key, int iterations);
+  /// The next iteration of those that begin_correction() announced: view by view, in shuffled epochs.
+  /// Every so often (DensifyOptions) rows that pictures pull at get children, which are appended. After that, and
+  /// after the last iteration, children that came to stand nearer to a camera than the changeable part did when the
+  /// correction began, by more than floater_distance, are removed: floaters.
+  ///   errors  internal: a parameter, a gradient or the loss is not finite. `where` names the first
+  ///           ("gaussian[12].opacity"; by Changeable::name; a child goes by its ancestor). The trainer is of no use
+  ///           any more. Those of the loss.
+  [[nodiscard]] Result<Iteration> step();
+
+  [[nodiscard]] const scene::GaussianCloud& cloud() const { return cloud_; }
+  /// [rows] The row of the initial cloud that each comes from. Rows from initial_rows() on are children.
+  [[nodiscard]] std::span<const std::uint32_t> ancestors() const { return ancestor_; }
+  [[nodiscard]] std::size_t initial_rows() const { return initial_rows_; }
+  [[nodiscard]] std::size_t floaters_removed() const { return floaters_; }
+  [[nodiscard]] const IterationCost& last_cost() const { return cost_; }
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+ private:
+  /// Puts the changeable Gaussians as they are now into the view; widens it if they have left it.
+  void lay_over(View& view);
+  Result<double> differentiate(View& view);
+  Result<void> adam_step(double decay);
+  void densify();
+  void remove_floaters();
+  void note_depths(View& view);
+
+  Frozen frozen_;
+  scene::GaussianCloud cloud_;
+  std::vector<std::uint32_t> name_;
+  TrainOptions options_;
+  optim::PerceptualLoss& loss_;
+  std::size_t initial_rows_;
+  double radius_, position_scale_;
+  std::vector<std::uint32_t> ancestor_;
+  std::vector<View> views_;
+
+  Key key_;
+  int iteration_ = 0, iterations_ = 0;
+  std::vector<std::uint32_t> order_;
+  std::size_t floaters_ = 0;
+  IterationCost cost_;
+
+  optim::Adam adam_;
+  PullStatistic pull_;
+  render::LocalFrame frame_;
+  render::Gradients gradients_;
+  scene::Image rendered_, v_rendered_;
+  optim::LossWorkspace loss_workspace_;
+  optim::EditWorkspace edit_workspace_;
+};
+
+}  // namespace engine::train
