@@ -3,16 +3,17 @@
 #include <optional>
 
 #include "engine/edit/handles.h"
+#include "engine/edit/messages.h"
 #include "engine/edit/paste.h"
 
 namespace engine::edit {
 
-Result<deform::Assignment> assign(const scene::GaussianCloud& scene, const Request& request) {
+Result<deform::Assignment> assign(const Array3& mean, const Request& request) {
   std::vector<deform::Sphere> spheres;
   for (const Handle& handle : request.handles) spheres.push_back({handle.source, handle.radius});
   std::optional<deform::Box> region;
   if (request.region) region = deform::Box{request.region->center, request.region->size};
-  return deform::assign(scene.mean, spheres, region);
+  return deform::assign(mean, spheres, region);
 }
 
 Step plan_step(const WorkingScene& working, const Request& request, std::span<const DVec3> positions, int u,
@@ -28,17 +29,18 @@ Step plan_step(const WorkingScene& working, const Request& request, std::span<co
   return step;
 }
 
-std::vector<std::uint32_t> drag_through(WorkingScene& working, const Request& request, int intervals, bool rotate_sh) {
-  std::vector<DVec3> positions = handle_sources(working, request);
+DragResult drag_through(WorkingScene& working, const Request& request, int intervals, bool rotate_sh) {
+  DragResult result;
+  result.positions = handle_sources(working, request);
   for (int u = 1; u <= intervals; ++u) {
-    const Step step = plan_step(working, request, positions, u, intervals);
+    const Step step = plan_step(working, request, result.positions, u, intervals);
     paste(working, step.deformation, step.rows, request.mode, rotate_sh);
-    relocate(working, request, positions);
+    for (const std::size_t lost : relocate(working, request, result.positions))
+      result.warnings.push_back(handle_lost(lost, u));
   }
-  std::vector<std::uint32_t> copies;
   for (std::size_t i = 0; i < working.role.size(); ++i)
-    if (working.role[i] == Role::copy) copies.push_back(std::uint32_t(i));
-  return copies;
+    if (working.role[i] == Role::copy) result.copies.push_back(std::uint32_t(i));
+  return result;
 }
 
 }  // namespace engine::edit

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "engine/deform/assign.h"
@@ -14,7 +15,7 @@ namespace engine::edit {
 
 /// P_h^i of every handle of the request.
 ///   errors  unprocessable: a handle without Gaussians; `where` names it
-[[nodiscard]] Result<deform::Assignment> assign(const scene::GaussianCloud& scene, const Request& request);
+[[nodiscard]] Result<deform::Assignment> assign(const Array3& mean, const Request& request);
 
 /// What an interval will do to P_h, before it is done.
 struct Step {
@@ -27,9 +28,15 @@ struct Step {
 [[nodiscard]] Step plan_step(const WorkingScene& working, const Request& request, std::span<const DVec3> positions,
                              int u, int intervals);
 
+/// Where a whole drag has led.
+struct DragResult {
+  std::vector<std::uint32_t> copies;  ///< Rows of the copies at their final place, ascending.
+  std::vector<DVec3> positions;       ///< Of the handles, in the frame of the working scene.
+  std::vector<std::string> warnings;
+};
+
 /// All intervals one after the other: deform, copy and paste, relocate.
 ///   rotate_sh  false where only shapes matter
-///   returns    the rows of the copies at their final place, ascending
-std::vector<std::uint32_t> drag_through(WorkingScene& working, const Request& request, int intervals, bool rotate_sh);
+DragResult drag_through(WorkingScene& working, const Request& request, int intervals, bool rotate_sh);
 
 }  // namespace engine::edit

@@ -1,10 +1,15 @@
 #include "engine/edit/edit.h"
 
 #include <algorithm>
+#include <chrono>
+#include <optional>
+#include <utility>
 
 #include "engine/edit/drag.h"
 #include "engine/edit/handles.h"
 #include "engine/edit/look.h"
+#include "engine/edit/messages.h"
+#include "engine/edit/optimise.h"
 #include "engine/edit/paste.h"
 #include "engine/edit/stages.h"
 #include "engine/edit/working_scene.h"
@@ -52,7 +57,9 @@ Result<std::vector<scene::Camera>> choose_views(const scene::GaussianCloud& scen
       return stages.advance(views_from + (intervals_from - views_from) * (part + done / 2));
     };
   };
-  const auto copies = drag_through(working, request, report.resolved.intervals, /*rotate_sh=*/false);
+  auto copies = drag_through(working, request, report.resolved.intervals, /*rotate_sh=*/false).copies;
+  const bool moves = !copies.empty();
+  if (!moves && request.params.optimise_unmoved) copies = dragged_rows(working);
   const auto target_areas = covered_areas(working, copies, candidates, advance_from(0));
   if (!target_areas) return propagate(target_areas);
   const auto sources = parents_of(working, copies);
@@ -60,111 +67,213 @@ Result<std::vector<scene::Camera>> choose_views(const scene::GaussianCloud& scen
   const auto source_areas = covered_areas(working, sources, candidates, advance_from(0.5));
   if (!source_areas) return propagate(source_areas);
   auto chosen = choose_views(candidates, *source_areas, *target_areas, request);
-  if (copies.empty())
-    report.warnings.push_back("nothing moves: every target is where its handle is");
+  if (!moves)
+    report.warnings.push_back(nothing_moves());
   else if (chosen.empty())
     report.warnings.push_back("no view sees the edited part");
   return chosen;
 }
 
+/// Does the state belong to this request? What it says of the scene, restore() checks.
+Result<void> check_resume(const Checkpoint& from, const Request& request) {
+  const std::size_t handles = request.handles.size();
+  bool fits = from.interval >= 1 && from.interval <= resolved_intervals(request) &&
+              from.report.resolved.intervals == resolved_intervals(request) && from.positions.size() == handles &&
+              from.report.handles.size() == handles && from.masks.size() == from.views.size() &&
+              validate_cameras(from.views).has_value();
+  for (std::size_t v = 0; fits && v < from.views.size(); ++v)
+    fits = from.masks[v].width == from.views[v].width && from.masks[v].height == from.views[v].height;
+  for (const std::uint16_t handle : from.members.handle) fits = fits && handle <= handles;
+  if (!fits) return fail(ErrorCode::invalid_argument, "the checkpoint is of another edit", "checkpoint");
+  return {};
+}
+
+/// One edit while it runs.
+class Run {
+ public:
+  Run(const scene::GaussianCloud& scene, const Request& request, const Observer& observer,
+      optim::PerceptualLoss& perceptual)
+      : scene_(scene), request_(request), observer_(observer), perceptual_(perceptual) {}
+
+  Result<void> start(std::span<const scene::Camera> cameras);
+  Result<void> go_on(const Checkpoint& from);
+  [[nodiscard]] int finished() const { return finished_; }
+  [[nodiscard]] int intervals() const { return report_.resolved.intervals; }
+  Result<void> next_interval();
+  Result<Outcome> finish();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  [[nodiscard]] double fraction(int u, double part) const {
+    return intervals_from + (finish_from - intervals_from) * (u - 1 + part) / intervals();
+  }
+  /// Of an interval: what comes before the optimisation, which takes most of the time of an edit that has one.
+  [[nodiscard]] double early(double part) const { return request_.params.iterations > 0 ? 0.1 * part : part; }
+  Result<void> mask(int u, std::span<const std::uint32_t> rows, double from, double to);
+  Result<void> optimise(int u);
+  Result<void> show(const char* stage, int u, double part);
+  Result<void> hand_out_checkpoint(int u, Clock::time_point start);
+
+  const scene::GaussianCloud& scene_;
+  const Request& request_;
+  const Observer& observer_;
+  optim::PerceptualLoss& perceptual_;
+  Report report_;
+  Stages stages_{observer_, report_.times};
+  WorkingScene working_;
+  std::vector<scene::Camera> views_;
+  std::vector<scene::Mask> masks_;  ///< Undilated.
+  std::vector<DVec3> positions_;
+  std::vector<std::uint32_t> shown_;  ///< The rows of the last mask rendering, as long as they are as they were then.
+  int finished_ = 0;
+};
+
+Result<void> Run::start(std::span<const scene::Camera> cameras) {
+  // 1. Assign: P_h^i, and the start of the 3D mask M.
+  if (auto going = stages_.enter("assign", 0, 0); !going) return going;
+  const auto assignment = assign(scene_.mean, request_);
+  if (!assignment) return propagate(assignment);
+  working_ = begin(scene_, request_, assignment->handle);
+
+  // 2. Intervals.
+  report_.resolved = request_.params;
+  report_.resolved.intervals = resolved_intervals(request_);
+  report_.input_gaussians = scene_.size();
+  for (const std::size_t count : assignment->count) report_.handles.push_back({count, {}});
+  stages_.set_intervals(intervals());
+
+  if (auto going = stages_.enter("views", 0, views_from); !going) return going;
+  auto views = choose_views(scene_, cameras, request_, assignment->handle, working_, stages_, report_);
+  if (!views) return propagate(views);
+  views_ = std::move(*views);
+  for (const scene::Camera& view : views_) masks_.emplace_back(view.width, view.height);
+  positions_ = handle_sources(working_, request_);
+  return {};
+}
+
+Result<void> Run::go_on(const Checkpoint& from) {
+  if (auto fits = check_resume(from, request_); !fits) return fits;
+  report_ = from.report;
+  stages_.set_intervals(intervals());
+  if (auto going = stages_.enter("assign", from.interval, fraction(from.interval, 1)); !going) return going;
+  working_ = begin(scene_, request_, deform::HandleColumn(scene_.size(), 0));
+  if (auto restored = restore(from.members, working_); !restored) return restored;
+  views_ = from.views;
+  masks_ = from.masks;
+  positions_ = from.positions;
+  finished_ = from.interval;
+  return {};
+}
+
+Result<void> Run::mask(int u, std::span<const std::uint32_t> rows, double from, double to) {
+  if (auto going = stages_.enter("mask", u, fraction(u, from)); !going) return going;
+  return unite_masks(working_, rows, views_, masks_,
+                     [&](double done) { return stages_.advance(fraction(u, from + (to - from) * done)); });
+}
+
+Result<void> Run::optimise(int u) {
+  if (auto going = stages_.enter("optimise", u, fraction(u, early(0.95))); !going) return going;
+  std::vector<scene::Mask> dilated = masks_;
+  dilate_masks(dilated);
+  const auto advance = [&](double done, double loss) {
+    return stages_.advance(fraction(u, early(0.95) + (0.95 - early(0.95)) * done), loss);
+  };
+  const auto outcome = edit::optimise(working_, scene_, views_, dilated, request_.params, u, perceptual_, advance);
+  if (!outcome) return propagate(outcome);
+  report_.losses.push_back(outcome->loss);
+  shown_.clear();
+  return show("optimised", u, 0.95);
+}
+
+Result<void> Run::show(const char* stage, int u, double part) {
+  if (!observer_.moment) return {};
+  if (auto going = stages_.enter("renders", u, fraction(u, part)); !going) return going;
+  const Published published = publish(working_, scene_, request_.mode);
+  return observer_.moment({u, intervals(), stage, published.overlay, views_});
+}
+
+Result<void> Run::hand_out_checkpoint(int u, Clock::time_point start) {
+  if (!observer_.interval_done) return {};
+  if (auto going = stages_.enter("checkpoint", u, fraction(u, 0.97)); !going) return going;
+  const Checkpoint checkpoint{u, members_of(working_), positions_, views_, masks_, report_};
+  std::vector<DVec3> in_world;
+  for (const DVec3& position : positions_) in_world.push_back(position + working_.origin);
+  const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  std::optional<double> loss;
+  if (!report_.losses.empty()) loss = report_.losses.back();
+  return observer_.interval_done({u, intervals(), seconds, loss, std::move(in_world), checkpoint});
+}
+
+Result<void> Run::next_interval() {
+  const int u = finished_ + 1;
+  const auto start = Clock::now();
+  if (auto shown = show("before", u, 0); !shown) return shown;
+
+  // 3. Deform from the relocated handles to p_t'(u).
+  if (auto going = stages_.enter("deform", u, fraction(u, 0)); !going) return going;
+  const Step step = plan_step(working_, request_, positions_, u, intervals());
+
+  // 6. 2D masks: the moving Gaussians before the deformation ... (unless the last picture showed exactly that)
+  const bool forced = request_.params.optimise_unmoved;
+  if (const auto& rows = forced ? step.rows : step.moving; rows != shown_)
+    if (auto masked = mask(u, rows, 0, early(0.45)); !masked) return masked;
+
+  // 4. Copy and paste.
+  if (auto going = stages_.enter("deform", u, fraction(u, early(0.45))); !going) return going;
+  shown_ = paste(working_, step.deformation, step.rows, request_.mode, request_.params.rotate_sh);
+  std::sort(shown_.begin(), shown_.end());
+  if (forced) shown_ = dragged_rows(working_);
+  if (auto shown = show("deformed", u, early(0.48)); !shown) return shown;
+
+  // 6. ... and after it.
+  if (auto masked = mask(u, shown_, early(0.5), early(0.95)); !masked) return masked;
+
+  // 7. and 8. Correct (nothing does yet) and optimise.
+  if (request_.params.iterations > 0 && !shown_.empty())
+    if (auto optimised = optimise(u); !optimised) return optimised;
+
+  // 9. Relocate.
+  if (auto going = stages_.enter("relocate", u, fraction(u, 0.95)); !going) return going;
+  for (const std::size_t lost : relocate(working_, request_, positions_))
+    report_.warnings.push_back(handle_lost(lost, u));
+  for (std::size_t i = 0; i < positions_.size(); ++i)
+    report_.handles[i].relocated.push_back(positions_[i] + working_.origin);
+  finished_ = u;
+  return hand_out_checkpoint(u, start);
+}
+
+Result<Outcome> Run::finish() {
+  if (auto going = stages_.enter("finish", finished_, finish_from); !going) return propagate(going);
+  dilate_masks(masks_);
+  Published published = publish(working_, scene_, request_.mode);
+  const scene::Overlay& overlay = published.overlay;
+  report_.output_gaussians = scene_.size() - overlay.removed.size() + overlay.added();
+  if (report_.output_gaussians == 0) return tl::make_unexpected(leaves_nothing());
+  if (published.faint > 0) report_.warnings.push_back(faint_left_out(published.faint));
+  for (std::size_t v = 0; v < views_.size(); ++v)
+    report_.views.push_back({views_[v].name, double(masks_[v].area()) / double(masks_[v].data.size())});
+  report_.changeable = published.changeable;
+  report_.copies = overlay.added();
+  report_.removed = overlay.removed.size();
+  stages_.finish();
+  return Outcome{std::move(published.overlay), finished_ < intervals(), std::move(views_), std::move(masks_),
+                 std::move(report_)};
+}
+
 }  // namespace
 
 Result<Outcome> run(const scene::GaussianCloud& scene, std::span<const scene::Camera> cameras, const Request& request,
-                    const Observer& observer) {
+                    const Observer& observer, const Checkpoint* resume, optim::PerceptualLoss* perceptual) {
   if (const auto valid = validate(request); !valid) return propagate(valid);
   if (const auto valid = validate_cameras(cameras); !valid) return propagate(valid);
-  Outcome outcome;
-  Report& report = outcome.report;
-  Stages stages(observer, report.times);
-
-  // 1. Assign: P_h^i, and the start of the 3D mask M.
-  if (const auto going = stages.enter("assign", 0, 0); !going) return propagate(going);
-  const auto assignment = assign(scene, request);
-  if (!assignment) return propagate(assignment);
-  WorkingScene working = begin(scene, request, assignment->handle);
-
-  // 2. Intervals.
-  const int intervals = resolved_intervals(request);
-  stages.set_intervals(intervals);
-  report.resolved = request.params;
-  report.resolved.intervals = intervals;
-  report.input_gaussians = scene.size();
-  for (const std::size_t count : assignment->count) report.handles.push_back({count, {}});
-
-  if (const auto going = stages.enter("views", 0, views_from); !going) return propagate(going);
-  auto views = choose_views(scene, cameras, request, assignment->handle, working, stages, report);
-  if (!views) return propagate(views);
-  outcome.views = std::move(*views);
-  for (const scene::Camera& view : outcome.views) outcome.masks.emplace_back(view.width, view.height);
-
-  std::vector<DVec3> positions = handle_sources(working, request);
-  std::vector<std::uint32_t> shown;  // the rows of the last mask rendering
-  for (int u = 1; u <= intervals; ++u) {
-    // Within an interval: 0 to 0.45 what it looked like, 0.5 to 0.95 what it looks like.
-    const auto fraction = [&](double part) {
-      return intervals_from + (finish_from - intervals_from) * (u - 1 + part) / intervals;
-    };
-    const auto advance_between = [&](double from, double to) {
-      return
-          [&stages, &fraction, from, to](double done) { return stages.advance(fraction(from + (to - from) * done)); };
-    };
-
-    // 3. Deform from the relocated handles to p_t'(u).
-    if (const auto going = stages.enter("deform", u, fraction(0)); !going) return propagate(going);
-    const Step step = plan_step(working, request, positions, u, intervals);
-
-    // 6. 2D masks: the moving Gaussians before the deformation ... (unless the last picture showed exactly that)
-    if (step.moving != shown) {
-      if (const auto going = stages.enter("mask", u, fraction(0)); !going) return propagate(going);
-      const auto united = unite_masks(working, step.moving, outcome.views, outcome.masks, advance_between(0, 0.45));
-      if (!united) return propagate(united);
-    }
-
-    // 4. Copy and paste.
-    if (const auto going = stages.enter("deform", u, fraction(0.45)); !going) return propagate(going);
-    shown = paste(working, step.deformation, step.rows, request.mode, request.params.rotate_sh);
-    std::sort(shown.begin(), shown.end());
-
-    // 6. ... and after it.
-    if (const auto going = stages.enter("mask", u, fraction(0.5)); !going) return propagate(going);
-    const auto united = unite_masks(working, shown, outcome.views, outcome.masks, advance_between(0.5, 0.95));
-    if (!united) return propagate(united);
-
-    // 9. Relocate.
-    if (const auto going = stages.enter("relocate", u, fraction(0.95)); !going) return propagate(going);
-    for (const std::size_t lost : relocate(working, request, positions))
-      report.warnings.push_back("handle " + std::to_string(lost) + " has lost all its Gaussians in interval " +
-                                std::to_string(u) + " and stays where it is");
-    for (std::size_t i = 0; i < positions.size(); ++i)
-      report.handles[i].relocated.push_back(positions[i] + working.origin);
-    if (observer.interval_done && u < intervals)
-      observer.interval_done({u, intervals, publish(working, scene, request.mode).cloud});
-  }
-
-  if (const auto going = stages.enter("finish", intervals, finish_from); !going) return propagate(going);
-  dilate_masks(outcome.masks);
-  Published published = publish(working, scene, request.mode);
-  if (published.cloud.size() == 0)
-    return fail(ErrorCode::unprocessable,
-                "the edit would leave an empty scene: every Gaussian is dragged, and each has an opacity below 1/255, "
-                "which a move removes; choose smaller radii, or mode extend",
-                "handles");
-  if (published.faint > 0)
-    report.warnings.push_back(std::to_string(published.faint) +
-                              " dragged Gaussians have an opacity below 1/255 and are left out");
-  outcome.cloud = std::move(published.cloud);
-  outcome.parent = std::move(published.parent);
-  outcome.survivors = published.survivors;
-  if (observer.interval_done) observer.interval_done({intervals, intervals, outcome.cloud});
-  for (std::size_t v = 0; v < outcome.views.size(); ++v)
-    report.views.push_back(
-        {outcome.views[v].name, double(outcome.masks[v].area()) / double(outcome.masks[v].data.size())});
-  report.output_gaussians = outcome.cloud.size();
-  report.changeable = published.changeable;
-  report.copies = outcome.cloud.size() - outcome.survivors;
-  report.removed = scene.size() - outcome.survivors;
-  stages.finish();
-  return outcome;
+  optim::MsSsimLoss ms_ssim;
+  Run run(scene, request, observer, perceptual != nullptr ? *perceptual : ms_ssim);
+  if (const auto ready = resume ? run.go_on(*resume) : run.start(cameras); !ready) return propagate(ready);
+  const auto is_enough = [&] { return run.finished() > 0 && observer.keep && observer.keep(); };
+  while (run.finished() < run.intervals() && !is_enough())
+    if (const auto done = run.next_interval(); !done) return propagate(done);
+  return run.finish();
 }
 
 }  // namespace engine::edit

@@ -3,79 +3,68 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <stop_token>
 #include <string>
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/edit/checkpoint.h"
+#include "engine/edit/report.h"
 #include "engine/edit/request.h"
+#include "engine/optim/perceptual.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/gaussian_cloud.h"
 #include "engine/scene/image.h"
+#include "engine/scene/overlay.h"
 
 namespace engine::edit {
-
-/// What is known about one handle once the edit has looked at the scene.
-struct HandleReport {
-  std::size_t gaussians = 0;     ///< |P_h^i| at the start.
-  std::vector<DVec3> relocated;  ///< Position after each interval, world units. An anchor stays where it is.
-};
-
-/// One view the edit looks through.
-struct ViewReport {
-  std::string name;
-  double mask_area = 0;  ///< Union of its 2D masks over all intervals, fraction of the picture, 0..1.
-};
-
-/// Wall time of one stage, seconds.
-struct StageTime {
-  std::string stage;
-  double seconds = 0;
-};
-
-/// Everything a user may want to know afterwards.
-struct Report {
-  Params resolved;  ///< With every default filled in (intervals is never 0 here).
-  std::vector<HandleReport> handles;
-  std::vector<ViewReport> views;
-  std::size_t input_gaussians = 0;
-  std::size_t output_gaussians = 0;
-  std::size_t changeable = 0;  ///< Size of the 3D mask M at the end.
-  std::size_t copies = 0;      ///< Deformed copies in the output.
-  std::size_t removed = 0;     ///< Input rows that are not in the output.
-  std::vector<std::string> warnings;
-  std::vector<StageTime> times;
-};
 
 /// Where a running edit is.
 struct Progress {
   int interval = 0;  ///< 1..intervals; 0 before the first.
   int intervals = 0;
-  std::string stage;    ///< "assign", "views", "deform", "mask", "relocate", "finish"
+  std::string stage;    ///< "assign", "views", "deform", "mask", "optimise", "relocate", "finish"; for an Observer that
+                        ///< wants them, "renders" (Observer::moment) and "checkpoint" (Observer::interval_done)
   double fraction = 0;  ///< Of the whole edit, 0..1, never falls.
+  std::optional<double> loss = {};  ///< Of the last iteration, while it optimises.
+};
+
+/// The scene at one moment of an interval, for those who want to see it.
+struct Moment {
+  int interval = 0;
+  int intervals = 0;
+  std::string
+      stage;  ///< "before": as the interval found it; "deformed"; "corrected" and "optimised" where they happen.
+  const scene::Overlay& overlay;         ///< Over the input: the scene as it would be published.
+  std::span<const scene::Camera> views;  ///< Of the edit, best first.
 };
 
 /// One interval is finished.
 struct IntervalDone {
   int interval = 0;
   int intervals = 0;
-  const scene::GaussianCloud& cloud;  ///< The scene as it would be published if the user stopped here.
+  double seconds = 0;            ///< It took.
+  std::optional<double> loss;    ///< Mean over the views of the last epoch of the optimisation, if there was one.
+  std::vector<DVec3> positions;  ///< Of the handles, world units.
+  const Checkpoint& checkpoint;  ///< From which run() goes on to the same bytes.
 };
 
-/// How an edit talks to whoever runs it. All are optional.
+/// How an edit talks to whoever runs it. All are optional. An error that one returns ends the edit with it.
 struct Observer {
   std::function<void(const Progress&)> progress;
-  std::function<void(const IntervalDone&)> interval_done;
-  std::stop_token stop;  ///< Asked between stages: the edit then ends with ErrorCode::cancelled.
+  std::function<Result<void>(const Moment&)> moment;
+  std::function<Result<void>(const IntervalDone&)> interval_done;
+  std::function<bool()> keep;  ///< Asked after every interval but the last: end here, with what there is?
+  std::stop_token stop;        ///< Asked between stages and iterations: the edit then ends with ErrorCode::cancelled.
 };
 
 struct Outcome {
-  scene::GaussianCloud cloud;         ///< Surviving input rows in input order, then new rows.
-  std::vector<std::uint32_t> parent;  ///< [N_out] row of the input each row comes from (itself, if it survived).
-  std::size_t survivors = 0;          ///< The first so many rows are input rows, in input order.
-  std::vector<scene::Camera> views;   ///< Those chosen, best first, scaled to params.max_image_side.
-  std::vector<scene::Mask> masks;     ///< Per chosen view, in its size: union over intervals.
+  scene::Overlay overlay;            ///< Over the input. An empty one: nothing moved.
+  bool stopped_early = false;        ///< By Observer::keep, before the last interval.
+  std::vector<scene::Camera> views;  ///< Those chosen, best first, scaled to params.max_image_side.
+  std::vector<scene::Mask> masks;    ///< Per chosen view, in its size: union over intervals.
   Report report;
 };
 
@@ -83,10 +72,15 @@ struct Outcome {
 ///   scene    not changed
 ///   cameras  the dataset's; empty: virtual ones are made
 ///   errors   invalid_argument (validate; a camera: `where` is "cameras[3].fx"), unprocessable (a handle without
-///   Gaussians: `where` names it), cancelled
+///   Gaussians: `where` names it), cancelled, internal (a value that is not finite came up while optimising: `where` is
+///   "gaussian[12].opacity", by the input's row); those of `perceptual`
 /// A drag that moves nothing gives the scene back, byte for byte.
 /// Deterministic: same inputs, same bytes, for any number of threads.
+///   resume   state after an interval of the same edit: it goes on with the next one; null: from the start. With
+///            Observer::keep answering yes at once, it ends with that interval as its result.
+///   perceptual  the loss inside masks; null: optim::MsSsimLoss
 [[nodiscard]] Result<Outcome> run(const scene::GaussianCloud& scene, std::span<const scene::Camera> cameras,
-                                  const Request& request, const Observer& observer = {});
+                                  const Request& request, const Observer& observer = {},
+                                  const Checkpoint* resume = nullptr, optim::PerceptualLoss* perceptual = nullptr);
 
 }  // namespace engine::edit

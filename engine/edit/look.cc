@@ -39,6 +39,7 @@ std::vector<scene::Camera> candidate_cameras(const scene::GaussianCloud& input, 
     if (handle.target) points.push_back(*handle.target);
   }
   options.count = request.params.views;
+  options.up = request.up;
   options.width = options.height = request.params.max_image_side;
   return views::virtual_cameras(input, points, options);
 }

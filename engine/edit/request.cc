@@ -48,12 +48,20 @@ Result<void> validate(const Params& params) {
   if (outside(params.max_image_side, 16, 16384))
     return invalid(range(params.max_image_side, "the longer side of a working picture", "16 to 16384 pixels"),
                    "params.max_image_side");
+  if (outside(params.iterations, 0, 1'000'000))
+    return invalid(range(params.iterations, "the number of iterations per correction", "0 to 1,000,000"),
+                   "params.iterations");
+  if (outside(params.annealing_steps, 1, 100))
+    return invalid(range(params.annealing_steps, "the number of corrections per interval", "1 to 100"),
+                   "params.annealing_steps");
   return {};
 }
 
 }  // namespace
 
 Result<void> validate(const Request& request) {
+  if (const double length = glm::length(request.up); !(length > 0 && std::isfinite(length)))
+    return invalid("a direction has three finite numbers that are not all 0", "up");
   if (request.handles.empty()) return invalid("an edit needs at least one handle", "handles");
   if (request.handles.size() > max_handles)
     return invalid("an edit has at most " + std::to_string(max_handles) + " handles, not " +

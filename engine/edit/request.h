@@ -45,8 +45,11 @@ struct Params {
   bool rotate_sh = true;                   ///< Turn SH bands 1 to 3 with their Gaussian.
   int views = 50;                          ///< Most views an edit looks through, 1 to max_views.
   std::vector<std::string> exclude_views;  ///< Names held back from the choice.
+  int iterations = 0;                      ///< Of the optimisation per correction, 0 to 1,000,000; 0: none.
+  int annealing_steps = 1;                 ///< A: corrections per interval, 1 to 100.
   int max_image_side = 512;                ///< Pixels, of the pictures an edit works on, 16 to 16384.
   std::uint64_t seed = 0;
+  bool optimise_unmoved = false;  ///< For tests: masks and optimises also what no handle moves. Not on the wire.
 };
 
 struct Request {
@@ -54,6 +57,8 @@ struct Request {
   std::vector<Handle> handles;
   std::optional<Region> region;
   Params params;
+  DVec3 up{0.0, -1.0, 0.0};  ///< World direction that virtual cameras take for up, any length but 0. Default: COLMAP's
+                             ///< habit, y down.
 };
 
 /// Ranges and finiteness of every field.

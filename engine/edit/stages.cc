@@ -8,15 +8,20 @@ Result<void> Stages::enter(const std::string& stage, int interval, double fracti
   end_stage();
   progress_.stage = stage;
   progress_.interval = interval;
+  progress_.loss.reset();
   since_ = std::chrono::steady_clock::now();
   return report(fraction);
 }
 
-Result<void> Stages::advance(double fraction) { return report(fraction); }
+Result<void> Stages::advance(double fraction, std::optional<double> loss) {
+  progress_.loss = loss;
+  return report(fraction);
+}
 
 void Stages::finish() {
   end_stage();
   progress_.fraction = 1;
+  progress_.loss.reset();
   if (observer_.progress) observer_.progress(progress_);
 }
 

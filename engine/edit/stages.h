@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <optional>
 #include <string>
 
 #include "engine/core/result.h"
@@ -21,7 +22,7 @@ class Stages {
   ///   errors    cancelled: a stop was requested
   [[nodiscard]] Result<void> enter(const std::string& stage, int interval, double fraction);
   /// Still in the same stage.
-  [[nodiscard]] Result<void> advance(double fraction);
+  [[nodiscard]] Result<void> advance(double fraction, std::optional<double> loss = std::nullopt);
   /// The last stage ends; all is done.
   void finish();
 

@@ -11,6 +11,7 @@
 #include "engine/edit/request.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/gaussian_cloud.h"
+#include "engine/scene/overlay.h"
 
 namespace engine::edit {
 
@@ -20,7 +21,8 @@ enum class Role : std::uint8_t {
   held,      ///< An input row of P_h that has not moved yet.
   original,  ///< An input row whose copy has left; its opacity was lowered.
   copy,      ///< A deformed copy at its latest place, in P_h.
-  trail,     ///< A copy that was copied in turn, in an extend; its opacity was lowered.
+  trail,     ///< Not the input's and not in P_h: a copy that was copied in turn, in an extend, its opacity lowered; or
+             ///< a child that the optimisation gave an original.
 };
 
 /// Rows [0, input_rows) are the input's, in its order; the rest are copies in the order they were made.
@@ -46,21 +48,30 @@ void rewind(WorkingScene& working, const scene::GaussianCloud& input, const defo
 /// Rows that belong to P_h, ascending.
 [[nodiscard]] std::vector<std::uint32_t> dragged_rows(const WorkingScene& working);
 
+/// Rows of M, ascending.
+[[nodiscard]] std::vector<std::uint32_t> member_rows(const WorkingScene& working);
+
+/// Those of `rows` that are the input's, as begin() took them over.
+[[nodiscard]] scene::GaussianCloud as_begun(const WorkingScene& working, const scene::GaussianCloud& input,
+                                            std::span<const std::uint32_t> rows);
+
+/// Row `a` of `from`, everything included, in place of row `b` of `to`. Same degree and extra bytes.
+void copy_row(const scene::GaussianCloud& from, std::size_t a, scene::GaussianCloud& to, std::size_t b);
+
 /// A camera of the world, for rendering `cloud`.
 [[nodiscard]] scene::Camera in_frame_of(const WorkingScene& working, scene::Camera camera);
 
 /// A working scene as its user gets it.
 struct Published {
-  scene::GaussianCloud cloud;         ///< Surviving input rows in input order, then copies.
-  std::vector<std::uint32_t> parent;  ///< [N_out] input row each row comes from.
-  std::size_t survivors = 0;          ///< Input rows.
-  std::size_t changeable = 0;         ///< Rows of M among the output's.
-  std::size_t faint = 0;              ///< Copies left out because they are too faint to be seen.
+  scene::Overlay overlay;      ///< Over the input: rows that changed and stay; then new ones, as they were made.
+  std::size_t changeable = 0;  ///< Rows of M among the output's.
+  std::size_t faint = 0;       ///< Copies left out because they are too faint to be seen.
 };
 
-/// Ends an edit. Surviving input rows are the input's bytes; only the opacity of an original may differ.
-/// In a move, originals whose opacity has not risen above the one they were lowered to are left out, and so are copies
-/// that are too faint to be seen (opacity below 1/255). Rows the edit has not changed always stay, however faint.
+/// What an edit has come to. Surviving input rows are the input's bytes, but for those of M that the edit changed.
+/// In a move, originals whose opacity has not risen above the one they were lowered to are left out, and so is what
+/// else of M the edit has made or changed and is too faint to be seen (opacity below 1/255). Rows the edit has not
+/// changed always stay, however faint.
 [[nodiscard]] Published publish(const WorkingScene& working, const scene::GaussianCloud& input, Mode mode);
 
 }  // namespace engine::edit

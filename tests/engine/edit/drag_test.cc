@@ -24,28 +24,48 @@ Request drag(DVec3 by, int intervals, Mode mode = Mode::move, DVec3 center = DVe
   return request;
 }
 
+/// What was published, merged into one cloud.
+struct Merged {
+  scene::GaussianCloud cloud;
+  std::vector<std::uint32_t> parent;  ///< Input row of each row.
+  std::size_t survivors = 0, changeable = 0;
+};
+
+Merged merged(const WorkingScene& working, const scene::GaussianCloud& scene, Mode mode) {
+  const Published published = publish(working, scene, mode);
+  EXPECT_TRUE(scene::validate(published.overlay, scene));
+  Merged out{scene::flatten(scene, published.overlay), survivors_of(scene.size(), published.overlay), 0,
+             published.changeable};
+  out.survivors = out.parent.size();
+  for (std::size_t i = scene.size(); i < working.role.size(); ++i)
+    if (mode == Mode::extend || render::opacity<double>(working.cloud.opacity_logit[i]) >= render::min_alpha)
+      out.parent.push_back(working.parent[i]);
+  EXPECT_EQ(out.parent.size(), out.cloud.size());
+  return out;
+}
+
 struct Dragged {
   WorkingScene working;
-  Published published;
+  Merged published;
   std::size_t assigned = 0;
   std::vector<std::uint32_t> copies;
 };
 
 Dragged carry_out(const scene::GaussianCloud& scene, const Request& request) {
-  const auto assignment = assign(scene, request);
+  const auto assignment = assign(scene.mean, request);
   EXPECT_TRUE(assignment) << assignment.error().message;
   Dragged out;
   for (const std::size_t n : assignment->count) out.assigned += n;
   out.working = begin(scene, request, assignment->handle);
-  out.copies = drag_through(out.working, request, resolved_intervals(request), request.params.rotate_sh);
-  out.published = publish(out.working, scene, request.mode);
+  out.copies = drag_through(out.working, request, resolved_intervals(request), request.params.rotate_sh).copies;
+  out.published = merged(out.working, scene, request.mode);
   return out;
 }
 
 TEST(Move, OneHandleTranslatesItsGaussiansAndLeavesTheRestToTheByte) {
   const scene::GaussianCloud scene = ball_before_wall(60);
   const Dragged result = carry_out(scene, drag(DVec3(0.5, -0.25, 0.125), 1));
-  const Published& out = result.published;
+  const Merged& out = result.published;
   EXPECT_EQ(result.assigned, 60u);
   ASSERT_EQ(out.cloud.size(), scene.size());
   ASSERT_EQ(out.survivors, scene.size() - 60);
@@ -70,7 +90,7 @@ TEST(Move, SeveralIntervalsLeaveExactlyOneCopyOfEveryDraggedGaussian) {
   const scene::GaussianCloud scene = ball_before_wall(40);
   for (const int intervals : {1, 2, 5, 20}) {
     const Dragged result = carry_out(scene, drag(DVec3(1, 0.5, 0), intervals));
-    const Published& out = result.published;
+    const Merged& out = result.published;
     ASSERT_EQ(out.cloud.size() - out.survivors, 40u) << intervals;
     std::vector<std::uint32_t> parents(out.parent.begin() + std::ptrdiff_t(out.survivors), out.parent.end());
     std::sort(parents.begin(), parents.end());
@@ -85,7 +105,7 @@ TEST(Move, SeveralIntervalsLeaveExactlyOneCopyOfEveryDraggedGaussian) {
 TEST(Extend, LeavesTheOriginalAndTheTrailAtHalfOpacity) {
   const scene::GaussianCloud scene = ball_before_wall(30);
   const Dragged result = carry_out(scene, drag(DVec3(0.9, 0, 0), 3, Mode::extend));
-  const Published& out = result.published;
+  const Merged& out = result.published;
   ASSERT_EQ(out.survivors, scene.size());
   ASSERT_EQ(out.cloud.size(), scene.size() + 3 * 30);
   std::size_t lowered = 0;
@@ -139,7 +159,7 @@ TEST(Publish, AnOriginalWhoseOpacityHasRisenStays) {
   const scene::GaussianCloud scene = ball_before_wall(3);
   Dragged result = carry_out(scene, drag(DVec3(1, 0, 0), 1));
   result.working.cloud.opacity_logit[2] = 0.25f;  // as an optimisation might
-  const Published out = publish(result.working, scene, Mode::move);
+  const Merged out = merged(result.working, scene, Mode::move);
   ASSERT_EQ(out.cloud.size(), scene.size() + 1);
   const auto row = std::size_t(std::find(out.parent.begin(), out.parent.end(), 2u) - out.parent.begin());
   EXPECT_LT(row, out.survivors);
@@ -155,7 +175,7 @@ TEST(CopyAndPaste, WhatDoesNotMoveIsNotCopiedAndMayMoveLater) {
   scene.mean.set(pulled, {1, 0, 0});
   Request request;
   request.handles = {{DVec3(0), std::nullopt, 0.2, 0}, {DVec3(1, 0, 0), DVec3(1, 1, 0), 0.2, 0}};
-  const auto assignment = assign(scene, request);
+  const auto assignment = assign(scene.mean, request);
   ASSERT_TRUE(assignment);
   WorkingScene working = begin(scene, request, assignment->handle);
   std::vector<DVec3> positions = handle_sources(working, request);
@@ -168,7 +188,7 @@ TEST(CopyAndPaste, WhatDoesNotMoveIsNotCopiedAndMayMoveLater) {
   EXPECT_EQ(working.handle[still], 1);
   EXPECT_EQ(working.handle[pulled], 0);
   EXPECT_EQ(working.handle.back(), 2);
-  const Published out = publish(working, scene, request.mode);
+  const Merged out = merged(working, scene, request.mode);
   EXPECT_EQ(out.survivors, scene.size() - 1);
   EXPECT_EQ(out.changeable, 2u);
 }
@@ -177,7 +197,7 @@ TEST(Rewind, BringsBackTheStart) {
   const scene::GaussianCloud scene = ball_before_wall(20);
   for (const Mode mode : {Mode::move, Mode::extend}) {
     const Request request = drag(DVec3(1, 0, 0), 3, mode);
-    const auto assignment = assign(scene, request);
+    const auto assignment = assign(scene.mean, request);
     ASSERT_TRUE(assignment);
     const WorkingScene fresh = begin(scene, request, assignment->handle);
     WorkingScene working = fresh;
@@ -195,7 +215,7 @@ TEST(Rewind, BringsBackTheStart) {
 TEST(Relocate, FollowsTheOpacityWeightedMotionOfItsGaussians) {
   scene::GaussianCloud scene = ball_before_wall(2);
   const Request request = drag(DVec3(1, 0, 0), 1);
-  const auto assignment = assign(scene, request);
+  const auto assignment = assign(scene.mean, request);
   ASSERT_TRUE(assignment);
   WorkingScene working = begin(scene, request, assignment->handle);
   working.cloud.opacity_logit[0] = 0.0f;                            // 1/2
@@ -210,7 +230,7 @@ TEST(Relocate, FollowsTheOpacityWeightedMotionOfItsGaussians) {
 TEST(Relocate, WithoutSurvivorsTheHandleStaysAndIsReported) {
   const scene::GaussianCloud scene = ball_before_wall(2);
   const Request request = drag(DVec3(1, 0, 0), 1);
-  const auto assignment = assign(scene, request);
+  const auto assignment = assign(scene.mean, request);
   ASSERT_TRUE(assignment);
   WorkingScene working = begin(scene, request, assignment->handle);
   std::fill(working.handle.begin(), working.handle.end(), std::uint16_t{0});
@@ -222,7 +242,7 @@ TEST(Relocate, WithoutSurvivorsTheHandleStaysAndIsReported) {
 TEST(Relocate, WithOneHandleItIsWhereItsTargetWas) {
   const scene::GaussianCloud scene = ball_before_wall(25);
   const Request request = drag(DVec3(0.7, -0.4, 0.2), 2);
-  const auto assignment = assign(scene, request);
+  const auto assignment = assign(scene.mean, request);
   ASSERT_TRUE(assignment);
   WorkingScene working = begin(scene, request, assignment->handle);
   std::vector<DVec3> positions = handle_sources(working, request);

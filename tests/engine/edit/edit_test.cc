@@ -54,7 +54,9 @@ TEST(Edit, MovesTheBallAndMasksWhereItWasAndWhereItIs) {
   EXPECT_EQ(outcome.report.removed, 150u);
   EXPECT_EQ(outcome.report.changeable, 150u);
   EXPECT_EQ(outcome.report.input_gaussians, scene.size());
-  EXPECT_EQ(outcome.report.output_gaussians, outcome.cloud.size());
+  EXPECT_EQ(outcome.report.output_gaussians, scene::flatten(scene, outcome.overlay).size());
+  EXPECT_TRUE(scene::validate(outcome.overlay, scene));
+  EXPECT_FALSE(outcome.stopped_early);
   EXPECT_TRUE(outcome.report.warnings.empty());
 }
 
@@ -67,7 +69,7 @@ TEST(Edit, PixelsOfHeldGaussiansStayOutsideTheMask) {
   const Outcome with_anchor = run_well(scene, arc_of_cameras(1, 64), request);
   EXPECT_EQ(with_anchor.masks, alone.masks);
   EXPECT_GT(with_anchor.report.changeable, alone.report.changeable);
-  EXPECT_EQ(with_anchor.cloud, alone.cloud);
+  EXPECT_EQ(with_anchor.overlay, alone.overlay);
 }
 
 TEST(Edit, AZeroDragGivesBackTheInput) {
@@ -81,12 +83,7 @@ TEST(Edit, AZeroDragGivesBackTheInput) {
     request.handles.push_back({DVec3(0.1, 0.1, 0), std::nullopt, 0.2, 0});
     request.handles.push_back({DVec3(-0.1, 0.1, 0.05), DVec3(-0.1, 0.1, 0.05), 0.2, 0});
     const Outcome outcome = run_well(scene, arc_of_cameras(2, 32), request);
-    ASSERT_EQ(outcome.cloud.size(), scene.size());
-    for (std::size_t i = 0; i < scene.size(); ++i) {
-      EXPECT_TRUE(same_row(outcome.cloud, i, scene, i)) << i;
-      EXPECT_EQ(outcome.parent[i], i);
-    }
-    EXPECT_EQ(outcome.survivors, scene.size());
+    EXPECT_EQ(outcome.overlay, scene::no_change(scene));
     EXPECT_EQ(outcome.report.resolved.intervals, 1);
     EXPECT_EQ(outcome.report.warnings,
               (std::vector<std::string>{"nothing moves: every target is where its handle is"}));
@@ -161,14 +158,18 @@ TEST(Edit, ReportsProgressThatNeverFallsAndEveryInterval) {
   observer.interval_done = [&](const IntervalDone& done) {
     EXPECT_EQ(done.interval, int(sizes.size()) + 1);
     EXPECT_EQ(done.intervals, 3);
-    sizes.push_back(done.cloud.size());
+    sizes.push_back(done.checkpoint.members.cloud.size());
+    EXPECT_EQ(done.positions.size(), 1u);
+    EXPECT_LT(glm::distance(done.positions[0], DVec3(0.7 * done.interval / 3, 0, 0)), 1e-6);
+    EXPECT_GT(done.seconds, 0);
+    return Result<void>{};
   };
   Request request = drag_right(3);
   request.mode = Mode::extend;
   const Outcome outcome = run_well(scene, arc_of_cameras(2, 32), request, observer);
-  const std::size_t n = scene.size();
-  EXPECT_EQ(sizes, (std::vector<std::size_t>{n + 30, n + 60, n + 90}));
-  EXPECT_EQ(outcome.cloud.size(), n + 90);
+  EXPECT_EQ(sizes, (std::vector<std::size_t>{60, 90, 120})) << "the originals, and a copy of each per interval";
+  EXPECT_EQ(outcome.overlay.added(), 90u);
+  EXPECT_TRUE(outcome.overlay.removed.empty());
   ASSERT_FALSE(seen.empty());
   for (std::size_t i = 1; i < seen.size(); ++i) {
     EXPECT_GE(seen[i].fraction, seen[i - 1].fraction);
@@ -176,7 +177,7 @@ TEST(Edit, ReportsProgressThatNeverFallsAndEveryInterval) {
   }
   EXPECT_EQ(seen.front().stage, "assign");
   EXPECT_EQ(seen.back().fraction, 1.0);
-  for (const char* stage : {"assign", "views", "deform", "mask", "relocate", "finish"})
+  for (const char* stage : {"assign", "views", "deform", "mask", "relocate", "checkpoint", "finish"})
     EXPECT_EQ(std::count_if(outcome.report.times.begin(), outcome.report.times.end(),
                             [&](const StageTime& time) { return time.stage == stage && time.seconds >= 0; }),
               1)
@@ -227,8 +228,7 @@ TEST(Edit, GivesTheSameBytesForAnyNumberOfThreads) {
     WorkArena arena(threads);
     arena.run([&] {
       const Outcome outcome = run_well(scene, cameras, drag_right());
-      EXPECT_EQ(outcome.cloud, alone.cloud) << threads;
-      EXPECT_EQ(outcome.parent, alone.parent) << threads;
+      EXPECT_EQ(outcome.overlay, alone.overlay) << threads;
       EXPECT_EQ(outcome.masks, alone.masks) << threads;
     });
   }

@@ -40,6 +40,8 @@ TEST(ValidateRequest, NamesTheFieldThatIsWrong) {
       {"params.views", [](Request& r) { r.params.views = 1001; }},
       {"params.max_image_side", [](Request& r) { r.params.max_image_side = 15; }},
       {"params.max_image_side", [](Request& r) { r.params.max_image_side = 16385; }},
+      {"up", [](Request& r) { r.up = DVec3(0.0); }},
+      {"up", [](Request& r) { r.up.x = nan; }},
   };
   for (const auto& [where, spoil] : cases) {
     Request request = good();

@@ -1,8 +1,10 @@
 // Small scenes for the tests of this room.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <numbers>
 #include <string>
@@ -11,6 +13,7 @@
 #include "engine/core/rng.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/gaussian_cloud.h"
+#include "engine/scene/overlay.h"
 
 namespace engine::edit {
 
@@ -58,6 +61,14 @@ inline std::vector<scene::Camera> arc_of_cameras(int count, int side, DVec3 cent
     cameras.back().name = "view_" + std::to_string(i);
   }
   return cameras;
+}
+
+/// The input rows that an overlay leaves, ascending: row i of flatten() is survivors[i] of the input.
+inline std::vector<std::uint32_t> survivors_of(std::size_t input_rows, const scene::Overlay& overlay) {
+  std::vector<std::uint32_t> survivors;
+  for (std::uint32_t row = 0; row < input_rows; ++row)
+    if (!std::binary_search(overlay.removed.begin(), overlay.removed.end(), row)) survivors.push_back(row);
+  return survivors;
 }
 
 /// Row a of `left` and row b of `right` hold the same bytes.

@@ -1,0 +1,316 @@
+#include "engine/edit/checkpoint.h"
+
+#include <algorithm>
+#include <span>
+#include <utility>
+
+#include "engine/core/byte_reader.h"
+#include "engine/core/byte_writer.h"
+#include "engine/core/checksum.h"
+#include "engine/scene/cloud_arrays.h"
+#include "engine/scene/cloud_bytes.h"
+
+namespace engine::edit {
+namespace {
+
+constexpr std::string_view magic = "SDCHKPNT";
+constexpr std::uint32_t version = 2;
+
+// Each part is written and read by a pair of functions that name the same fields in the same order.
+
+void write(ByteWriter& out, DVec3 v) { out.write(v.x), out.write(v.y), out.write(v.z); }
+
+void read(ByteReader& in, DVec3& v) {
+  for (int i = 0; i < 3; ++i) v[i] = in.read<double>();
+}
+
+void write(ByteWriter& out, const std::string& text) { out.write_string(text); }
+void read(ByteReader& in, std::string& text) { text = in.read_string(); }
+
+template <Scalar T>
+void write(ByteWriter& out, const std::vector<T>& values) {
+  out.write(std::uint64_t(values.size()));
+  out.write_all(std::span(values));
+}
+
+template <Scalar T>
+void read(ByteReader& in, std::vector<T>& values) {
+  const auto count = in.read<std::uint64_t>();
+  if (!in.has(count, sizeof(T))) return in.fail();
+  values.resize(std::size_t(count));
+  in.read_all(std::span(values));
+}
+
+// Declared before the lists that hold them.
+void write(ByteWriter& out, const HandleReport& handle);
+void read(ByteReader& in, HandleReport& handle);
+void write(ByteWriter& out, const ViewReport& view);
+void read(ByteReader& in, ViewReport& view);
+void write(ByteWriter& out, const StageTime& time);
+void read(ByteReader& in, StageTime& time);
+void write(ByteWriter& out, const scene::Camera& camera);
+void read(ByteReader& in, scene::Camera& camera);
+void write(ByteWriter& out, const scene::Mask& mask);
+void read(ByteReader& in, scene::Mask& mask);
+
+/// A list of anything that takes at least four bytes.
+template <class T>
+void write_list(ByteWriter& out, const std::vector<T>& items) {
+  out.write(std::uint64_t(items.size()));
+  for (const T& item : items) write(out, item);
+}
+
+template <class T>
+void read_list(ByteReader& in, std::vector<T>& items) {
+  const auto count = in.read<std::uint64_t>();
+  if (!in.has(count, 4)) return in.fail();
+  for (std::uint64_t i = 0; i < count && in.ok(); ++i) read(in, items.emplace_back());
+}
+
+/// An enumerator, of which `last` is the last.
+template <class Enum>
+void read(ByteReader& in, Enum& value, Enum last) {
+  const auto number = in.read<std::uint8_t>();
+  if (number > std::uint8_t(last)) in.fail();
+  value = Enum(number);
+}
+
+void write(ByteWriter& out, const Array3& array) { write(out, array.x), write(out, array.y), write(out, array.z); }
+void read(ByteReader& in, Array3& array) { read(in, array.x), read(in, array.y), read(in, array.z); }
+
+void write(ByteWriter& out, const MemberRows& members) {
+  write(out, members.inputs);
+  scene::write_cloud(out, members.cloud);
+  for (const Role role : members.role) out.write(std::uint8_t(role));
+  write(out, members.handle);
+  write(out, members.parent);
+  write(out, members.mean_at_deform);
+}
+
+void read(ByteReader& in, MemberRows& members) {
+  read(in, members.inputs);
+  members.cloud = scene::read_cloud(in);
+  if (!in.has(members.cloud.size())) return in.fail();
+  members.role.resize(members.cloud.size());
+  for (Role& role : members.role) read(in, role, Role::trail);
+  read(in, members.handle);
+  read(in, members.parent);
+  read(in, members.mean_at_deform);
+}
+
+void write(ByteWriter& out, const scene::Camera& camera) {
+  write(out, camera.name);
+  for (int column = 0; column < 3; ++column) write(out, camera.rotation[column]);
+  write(out, camera.translation);
+  for (const double value : {camera.fx, camera.fy, camera.cx, camera.cy}) out.write(value);
+  out.write(std::int32_t(camera.width)), out.write(std::int32_t(camera.height));
+}
+
+void read(ByteReader& in, scene::Camera& camera) {
+  read(in, camera.name);
+  for (int column = 0; column < 3; ++column) read(in, camera.rotation[column]);
+  read(in, camera.translation);
+  for (double* value : {&camera.fx, &camera.fy, &camera.cx, &camera.cy}) *value = in.read<double>();
+  camera.width = in.read<std::int32_t>(), camera.height = in.read<std::int32_t>();
+}
+
+void write(ByteWriter& out, const scene::Mask& mask) {
+  out.write(std::int32_t(mask.width)), out.write(std::int32_t(mask.height));
+  std::vector<std::uint8_t> packed((mask.data.size() + 7) / 8, 0);
+  for (std::size_t i = 0; i < mask.data.size(); ++i)
+    packed[i / 8] = std::uint8_t(packed[i / 8] | mask.data[i] << i % 8);
+  out.write_all(std::span(packed));
+}
+
+void read(ByteReader& in, scene::Mask& mask) {
+  const auto width = in.read<std::int32_t>(), height = in.read<std::int32_t>();
+  if (width < 0 || height < 0) return in.fail();
+  const auto pixels = std::uint64_t(width) * std::uint64_t(height);
+  const auto packed = in.take((pixels + 7) / 8);
+  if (!in.ok()) return;
+  mask = scene::Mask(width, height);
+  for (std::size_t i = 0; i < mask.data.size(); ++i)
+    mask.data[i] = std::uint8_t(std::to_integer<unsigned>(packed[i / 8]) >> i % 8 & 1u);
+}
+
+void write(ByteWriter& out, const Params& params) {
+  out.write(std::int32_t(params.intervals));
+  out.write(std::uint8_t(params.rotation)), out.write(std::uint8_t(params.interpolation));
+  out.write(std::uint8_t(params.rotate_sh));
+  out.write(std::int32_t(params.views));
+  write_list(out, params.exclude_views);
+  out.write(std::int32_t(params.iterations)), out.write(std::int32_t(params.annealing_steps));
+  out.write(std::int32_t(params.max_image_side));
+  out.write(params.seed);
+  out.write(std::uint8_t(params.optimise_unmoved));
+}
+
+void read(ByteReader& in, Params& params) {
+  params.intervals = in.read<std::int32_t>();
+  read(in, params.rotation, Rotation::none), read(in, params.interpolation, Interpolation::rigid);
+  params.rotate_sh = in.read<std::uint8_t>() != 0;
+  params.views = in.read<std::int32_t>();
+  read_list(in, params.exclude_views);
+  params.iterations = in.read<std::int32_t>(), params.annealing_steps = in.read<std::int32_t>();
+  params.max_image_side = in.read<std::int32_t>();
+  params.seed = in.read<std::uint64_t>();
+  params.optimise_unmoved = in.read<std::uint8_t>() != 0;
+}
+
+void write(ByteWriter& out, const HandleReport& handle) {
+  out.write(std::uint64_t(handle.gaussians));
+  write_list(out, handle.relocated);
+}
+
+void read(ByteReader& in, HandleReport& handle) {
+  handle.gaussians = std::size_t(in.read<std::uint64_t>());
+  read_list(in, handle.relocated);
+}
+
+void write(ByteWriter& out, const ViewReport& view) { write(out, view.name), out.write(view.mask_area); }
+void read(ByteReader& in, ViewReport& view) { read(in, view.name), view.mask_area = in.read<double>(); }
+
+void write(ByteWriter& out, const StageTime& time) { write(out, time.stage), out.write(time.seconds); }
+void read(ByteReader& in, StageTime& time) { read(in, time.stage), time.seconds = in.read<double>(); }
+
+void write(ByteWriter& out, const Report& report) {
+  write(out, report.resolved);
+  write_list(out, report.handles);
+  write_list(out, report.views);
+  for (const std::size_t count :
+       {report.input_gaussians, report.output_gaussians, report.changeable, report.copies, report.removed})
+    out.write(std::uint64_t(count));
+  write(out, report.losses);
+  write_list(out, report.warnings);
+  write_list(out, report.times);
+}
+
+void read(ByteReader& in, Report& report) {
+  read(in, report.resolved);
+  read_list(in, report.handles);
+  read_list(in, report.views);
+  for (std::size_t* count :
+       {&report.input_gaussians, &report.output_gaussians, &report.changeable, &report.copies, &report.removed})
+    *count = std::size_t(in.read<std::uint64_t>());
+  read(in, report.losses);
+  read_list(in, report.warnings);
+  read_list(in, report.times);
+}
+
+tl::unexpected<Error> damaged(const std::string& what) {
+  return fail(ErrorCode::corrupt_data, "the checkpoint is damaged: " + what, "checkpoint");
+}
+
+}  // namespace
+
+std::string encode(const Checkpoint& checkpoint) {
+  ByteWriter out;
+  out.write_all(std::span(magic));
+  out.write(version);
+  out.write(std::int32_t(checkpoint.interval));
+  write(out, checkpoint.members);
+  write_list(out, checkpoint.positions);
+  write_list(out, checkpoint.views);
+  write_list(out, checkpoint.masks);
+  write(out, checkpoint.report);
+  out.write(fnv1a(out.bytes()));
+  return std::move(out).take();
+}
+
+Result<Checkpoint> decode(std::string_view text) {
+  const auto bytes = std::as_bytes(std::span(text));
+  ByteReader in(bytes);
+  const auto found_magic = in.take(magic.size());
+  if (!in.ok() || !std::ranges::equal(found_magic, std::as_bytes(std::span(magic))))
+    return damaged("it does not begin as one");
+  const auto found_version = in.read<std::uint32_t>();
+  if (!in.ok()) return damaged("it ends too early");
+  if (found_version != version)
+    return fail(ErrorCode::unsupported,
+                "the checkpoint is of version " + std::to_string(found_version) + "; this program reads version " +
+                    std::to_string(version),
+                "checkpoint");
+  if (in.remaining() < sizeof(std::uint64_t)) return damaged("it ends too early");
+  const auto contents = bytes.first(bytes.size() - sizeof(std::uint64_t));
+  if (ByteReader(bytes.subspan(contents.size())).read<std::uint64_t>() != fnv1a(contents))
+    return damaged("its checksum does not match");
+
+  in = ByteReader(contents.subspan(in.offset()));
+  Checkpoint checkpoint;
+  checkpoint.interval = in.read<std::int32_t>();
+  read(in, checkpoint.members);
+  read_list(in, checkpoint.positions);
+  read_list(in, checkpoint.views);
+  read_list(in, checkpoint.masks);
+  read(in, checkpoint.report);
+  if (!in.ok() || in.remaining() != 0) return damaged("its parts do not fit together");
+  return checkpoint;
+}
+
+MemberRows members_of(const WorkingScene& working) {
+  MemberRows members;
+  members.cloud.sh_degree = working.cloud.sh_degree;
+  members.cloud.extra_stride = working.cloud.extra_stride;
+  std::vector<std::uint32_t> rows;
+  for (std::size_t i = 0; i < working.role.size(); ++i) {
+    if (working.role[i] == Role::frozen) continue;
+    rows.push_back(std::uint32_t(i));
+    if (i < working.input_rows) members.inputs.push_back(std::uint32_t(i));
+    members.role.push_back(working.role[i]);
+    members.handle.push_back(working.handle[i]);
+    members.parent.push_back(working.parent[i]);
+    members.mean_at_deform.push_back(working.mean_at_deform.get(i));
+  }
+  scene::append_rows(members.cloud, working.cloud, rows);
+  return members;
+}
+
+namespace {
+
+/// Could this be the state of an edit of a scene with so many rows?
+bool makes_sense(const MemberRows& members, const WorkingScene& working) {
+  const std::size_t count = members.cloud.size(), inputs = members.inputs.size();
+  if (inputs > count || members.role.size() != count || members.handle.size() != count ||
+      members.parent.size() != count || members.mean_at_deform.x.size() != count ||
+      members.mean_at_deform.y.size() != count || members.mean_at_deform.z.size() != count)
+    return false;
+  if (members.cloud.sh_degree != working.cloud.sh_degree || members.cloud.extra_stride != working.cloud.extra_stride)
+    return false;
+  for (std::size_t k = 0; k < count; ++k) {
+    const Role role = members.role[k];
+    const bool is_input = k < inputs;
+    if (is_input != (role == Role::held || role == Role::original) || role == Role::frozen) return false;
+    if ((role == Role::held || role == Role::copy) != (members.handle[k] != 0)) return false;
+    if (members.parent[k] >= working.input_rows) return false;
+    if (is_input && (members.parent[k] != members.inputs[k] || (k > 0 && members.inputs[k] <= members.inputs[k - 1])))
+      return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+Result<void> restore(const MemberRows& members, WorkingScene& working) {
+  if (!makes_sense(members, working))
+    return fail(ErrorCode::invalid_argument, "the checkpoint is of an edit of another scene", "checkpoint");
+  const std::size_t inputs = members.inputs.size();
+  std::vector<std::uint32_t> copies;
+  for (std::size_t k = inputs; k < members.role.size(); ++k) copies.push_back(std::uint32_t(k));
+  for (std::size_t k = 0; k < inputs; ++k) {
+    const std::size_t row = members.inputs[k];
+    copy_row(members.cloud, k, working.cloud, row);
+    working.role[row] = members.role[k];
+    working.handle[row] = members.handle[k];
+    working.mean_at_deform.set(row, members.mean_at_deform.get(k));
+  }
+  scene::append_rows(working.cloud, members.cloud, copies);
+  for (const std::uint32_t k : copies) {
+    working.role.push_back(members.role[k]);
+    working.handle.push_back(members.handle[k]);
+    working.parent.push_back(members.parent[k]);
+    working.mean_at_deform.push_back(members.mean_at_deform.get(k));
+  }
+  return {};
+}
+
+}  // namespace engine::edit

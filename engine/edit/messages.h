@@ -1,0 +1,18 @@
+// What an edit says to its user, wherever it is said. In sentences handles count from 1, as on the page; in addresses
+// (`where`) from 0, as in the request.
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+#include "engine/core/result.h"
+
+namespace engine::edit {
+
+[[nodiscard]] std::string nothing_moves();
+[[nodiscard]] std::string handle_lost(std::size_t handle, int interval);  ///< handle: from 0
+[[nodiscard]] std::string faint_left_out(std::size_t copies);
+/// unprocessable, `where` is "handles".
+[[nodiscard]] Error leaves_nothing();
+
+}  // namespace engine::edit

@@ -1,0 +1,78 @@
+#include "engine/edit/optimise.h"
+
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+#include "engine/train/trainer.h"
+
+namespace engine::edit {
+namespace {
+
+/// INRIA's extent of a capture: 1.1 times the largest distance of a camera from their centre.
+double scene_extent(std::span<const scene::Camera> cameras) {
+  DVec3 middle(0.0);
+  for (const scene::Camera& camera : cameras) middle += camera.centre() / double(cameras.size());
+  double reach = 0;
+  for (const scene::Camera& camera : cameras) reach = std::max(reach, glm::distance(camera.centre(), middle));
+  return 1.1 * reach;
+}
+
+/// Writes what the trainer has made of the members back, and appends their children.
+void take_over(const train::Trainer& trainer, std::span<const std::uint32_t> members, WorkingScene& working) {
+  for (std::size_t k = 0; k < members.size(); ++k) copy_row(trainer.cloud(), k, working.cloud, members[k]);
+  std::vector<std::uint32_t> children(trainer.cloud().size() - members.size());
+  std::iota(children.begin(), children.end(), std::uint32_t(members.size()));
+  scene::append_rows(working.cloud, trainer.cloud(), children);
+  for (const std::uint32_t child : children) {
+    const std::uint32_t ancestor = members[trainer.ancestors()[child]];
+    working.handle.push_back(working.handle[ancestor]);
+    working.role.push_back(working.handle[ancestor] != 0 ? Role::copy : Role::trail);
+    working.parent.push_back(working.parent[ancestor]);
+    working.mean_at_deform.push_back(working.mean_at_deform.get(ancestor));
+  }
+}
+
+}  // namespace
+
+Result<OptimiseOutcome> optimise(WorkingScene& working, const scene::GaussianCloud& input,
+                                 std::span<const scene::Camera> views, std::span<const scene::Mask> masks,
+                                 const Params& params, int u, optim::PerceptualLoss& perceptual,
+                                 const std::function<Result<void>(double, double)>& advance) {
+  const std::vector<std::uint32_t> members = member_rows(working);
+  train::Changeable changeable;
+  changeable.cloud.sh_degree = working.cloud.sh_degree;
+  changeable.cloud.extra_stride = working.cloud.extra_stride;
+  scene::append_rows(changeable.cloud, working.cloud, members);
+  for (const std::uint32_t row : members) changeable.name.push_back(working.parent[row]);
+  const scene::GaussianCloud originals = as_begun(working, input, members);
+  train::Trainer trainer({&working.cloud, members}, std::move(changeable), scene_extent(views), {}, perceptual);
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    trainer.add_view(in_frame_of(working, views[v]), masks[v], originals);
+    if (auto going = advance(0, 0); !going) return propagate(going);
+  }
+  OptimiseOutcome outcome;
+  if (trainer.views() == 0) return outcome;
+
+  std::vector<double> losses(trainer.views(), 0.0);
+  const double all = double(params.annealing_steps) * params.iterations;
+  for (int a = 1; a <= params.annealing_steps; ++a) {
+    if (a > 1)
+      for (std::size_t v = 0; v < trainer.views(); ++v) trainer.set_edited(v, trainer.render(v));
+    trainer.begin_correction({params.seed, u, a}, params.iterations);
+    for (int i = 0; i < params.iterations; ++i) {
+      const auto done = trainer.step();
+      if (!done) return propagate(done);
+      losses[done->view] = done->loss;
+      const double part = (double(a - 1) * params.iterations + i + 1) / all;
+      if (auto going = advance(part, done->loss); !going) return propagate(going);
+    }
+  }
+  const auto seen = std::min(trainer.views(), std::size_t(all));
+  outcome.loss = std::accumulate(losses.begin(), losses.end(), 0.0) / double(seen);
+  outcome.children = trainer.cloud().size() - members.size();
+  take_over(trainer, members, working);
+  return outcome;
+}
+
+}  // namespace engine::edit

@@ -1,0 +1,38 @@
+// Step 8, optimise: the Gaussians of M are trained towards what each view should show.
+// Source: 3DGS-Drag (ICLR 2025), section 3.4.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/edit/request.h"
+#include "engine/edit/working_scene.h"
+#include "engine/optim/perceptual.h"
+#include "engine/scene/camera.h"
+#include "engine/scene/gaussian_cloud.h"
+#include "engine/scene/image.h"
+
+namespace engine::edit {
+
+struct OptimiseOutcome {
+  double loss = 0;           ///< Mean over the views of the last epoch of the last correction.
+  std::size_t children = 0;  ///< Rows that densification added and the guard against floaters left.
+};
+
+/// The optimisation of interval u: params.annealing_steps corrections of params.iterations iterations each.
+/// Nothing corrects pictures yet (`corrector: "none"`): I_e is what a view shows when a correction begins, rounded to 8
+/// bits; I_o is the render of the input. Only rows of M change. Children are appended: they inherit handle, parent and
+/// mean_at_deform; those of members of P_h are copies, others a trail.
+///   masks    per view, dilated; views without a set pixel are left out. If none is left, nothing happens.
+///   advance  called as the work goes on, with the part of it that is done and the loss of the last iteration; its
+///            error ends the optimisation
+///   errors   internal: a value is not finite; `where` names it by the input's row ("gaussian[12].opacity")
+/// On an error the working scene is as it was.
+[[nodiscard]] Result<OptimiseOutcome> optimise(WorkingScene& working, const scene::GaussianCloud& input,
+                                               std::span<const scene::Camera> views, std::span<const scene::Mask> masks,
+                                               const Params& params, int u, optim::PerceptualLoss& perceptual,
+                                               const std::function<Result<void>(double, double)>& advance);
+
+}  // namespace engine::edit

@@ -1,0 +1,27 @@
+// The deformation of an edit alone, at once: what the user sees while placing points.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/edit/request.h"
+#include "engine/scene/overlay.h"
+
+namespace engine::edit {
+
+struct PreviewOutcome {
+  scene::Overlay overlay;           ///< Over the previewed version, as an edit without correction would publish it.
+  std::vector<std::size_t> counts;  ///< |P_h^i| per handle.
+  std::vector<DVec3> positions;     ///< Of the handles after the whole drag, world units.
+  int intervals = 0;                ///< T
+  std::size_t changeable = 0;       ///< Size of M at the end.
+  std::vector<std::string> warnings;
+};
+
+/// Carries out steps 1 to 4 and 9 of an edit on the dragged Gaussians only: its cost follows P_h, but for one pass over
+/// the means. The result equals that of run() with the same request.
+///   errors  those of run()
+[[nodiscard]] Result<PreviewOutcome> preview(const scene::LayeredCloud& scene, const Request& request);
+
+}  // namespace engine::edit

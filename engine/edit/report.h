@@ -1,0 +1,46 @@
+// What an edit tells about itself.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "engine/core/vec.h"
+#include "engine/edit/request.h"
+
+namespace engine::edit {
+
+/// What is known about one handle once the edit has looked at the scene.
+struct HandleReport {
+  std::size_t gaussians = 0;     ///< |P_h^i| at the start.
+  std::vector<DVec3> relocated;  ///< Position after each interval, world units. An anchor stays where it is.
+};
+
+/// One view the edit looks through.
+struct ViewReport {
+  std::string name;
+  double mask_area = 0;  ///< Union of its 2D masks over all intervals, fraction of the picture, 0..1.
+};
+
+/// Wall time of one stage, seconds.
+struct StageTime {
+  std::string stage;
+  double seconds = 0;
+};
+
+/// Everything a user may want to know afterwards.
+struct Report {
+  Params resolved;  ///< With every default filled in (intervals is never 0 here).
+  std::vector<HandleReport> handles;
+  std::vector<ViewReport> views;
+  std::size_t input_gaussians = 0;
+  std::size_t output_gaussians = 0;
+  std::size_t changeable = 0;  ///< Size of the 3D mask M at the end.
+  std::size_t copies = 0;      ///< New rows in the output: deformed copies, and children that the optimisation added.
+  std::size_t removed = 0;     ///< Input rows that are not in the output.
+  std::vector<double> losses;  ///< Per interval: mean over the views of the last epoch. Empty without optimisation.
+  std::vector<std::string> warnings;
+  std::vector<StageTime> times;
+};
+
+}  // namespace engine::edit

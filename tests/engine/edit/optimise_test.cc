@@ -1,0 +1,291 @@
+// Edits that optimise.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "engine/core/parallel.h"
+#include "engine/edit/checkpoint.h"
+#include "engine/edit/edit.h"
+#include "engine/render/forward.h"
+#include "tests/engine/edit/likeness.h"
+#include "tests/engine/edit/samples.h"
+
+namespace engine::edit {
+namespace {
+
+const DVec3 far_away(65536, -65536, 65536);
+
+struct Case {
+  scene::GaussianCloud scene;
+  std::vector<scene::Camera> cameras;
+  Request request;
+
+  explicit Case(Mode mode = Mode::move, DVec3 center = DVec3(0)) : scene(ball_before_wall(120, Vec3(center))) {
+    cameras = arc_of_cameras(3, 64, center);
+    request.mode = mode;
+    request.handles = {{center, center + DVec3(0.5, 0.2, 0), 0.25, 0}};
+    request.params.intervals = 2;
+    request.params.max_image_side = 64;
+    request.params.iterations = 12;
+    request.params.annealing_steps = 2;
+  }
+};
+
+Observer collecting(std::map<int, std::string>& checkpoints) {
+  Observer observer;
+  observer.interval_done = [&](const IntervalDone& done) {
+    checkpoints[done.interval] = encode(done.checkpoint);
+    return Result<void>{};
+  };
+  return observer;
+}
+
+TEST(Optimise, ChangesMembersOfTheMaskAndNothingElse) {
+  for (const Mode mode : {Mode::move, Mode::extend})
+    for (const DVec3 center : {DVec3(0), far_away}) {
+      const Case c(mode, center);
+      Case plain(mode, center);
+      plain.request.params.iterations = 0;
+      const auto optimised = run(c.scene, c.cameras, c.request);
+      const auto deformed = run(plain.scene, plain.cameras, plain.request);
+      ASSERT_TRUE(optimised) << optimised.error().message;
+      ASSERT_TRUE(deformed);
+      EXPECT_NE(optimised->overlay, deformed->overlay);
+      const std::set<std::uint32_t> changed(optimised->overlay.changed.begin(), optimised->overlay.changed.end());
+      const scene::GaussianCloud flat = scene::flatten(c.scene, optimised->overlay);
+      const auto survivors = survivors_of(c.scene.size(), optimised->overlay);
+      std::size_t stayed = 0;
+      for (std::size_t i = 0; i < survivors.size(); ++i) {
+        const bool same = same_row(flat, i, c.scene, survivors[i]);
+        EXPECT_EQ(same, changed.count(survivors[i]) == 0) << survivors[i];
+        const bool dragged = glm::distance(DVec3(c.scene.mean.get(survivors[i])), center) < 0.25;
+        if (!dragged) {
+          EXPECT_TRUE(same) << survivors[i];
+        }
+        stayed += same ? 1 : 0;
+      }
+      EXPECT_GE(stayed, 144u) << "the wall";
+      EXPECT_FALSE(scene::first_not_finite(flat));
+      EXPECT_EQ(flat.extra_stride, c.scene.extra_stride);
+    }
+}
+
+TEST(Optimise, BringsTheBackgroundBack) {
+  const Case c;
+  Case plain;
+  plain.request.params.iterations = 0;
+  Case longer;
+  longer.request.params.iterations = 60;
+  const auto deformed = run(c.scene, c.cameras, plain.request), optimised = run(c.scene, c.cameras, longer.request);
+  ASSERT_TRUE(deformed && optimised);
+  for (std::size_t v = 0; v < optimised->views.size(); ++v) {
+    const scene::Camera& view = optimised->views[v];
+    const scene::Mask& mask = optimised->masks[v];
+    const scene::Image input = render::forward(c.scene, view).color;
+    const auto outside = [&](const scene::Overlay& overlay) {
+      return psnr_where(input, render::forward(scene::flatten(c.scene, overlay), view).color, mask, 0);
+    };
+    EXPECT_GT(outside(optimised->overlay), outside(deformed->overlay)) << v;
+  }
+}
+
+TEST(Optimise, ReportsTheLossOfEveryIterationAndInterval) {
+  const Case c;
+  std::vector<double> of_intervals;
+  std::size_t iterations = 0;
+  double last = -1;
+  Observer observer;
+  observer.progress = [&](const Progress& progress) {
+    EXPECT_GE(progress.fraction, last);
+    last = progress.fraction;
+    EXPECT_EQ(progress.loss.has_value(), progress.stage == "optimise" && progress.loss.has_value());
+    if (progress.loss) ++iterations;
+  };
+  std::vector<std::string> stages;
+  observer.moment = [&](const Moment& moment) {
+    stages.push_back(moment.stage);
+    return Result<void>{};
+  };
+  observer.interval_done = [&](const IntervalDone& done) {
+    of_intervals.push_back(done.loss.value());
+    return Result<void>{};
+  };
+  const auto outcome = run(c.scene, c.cameras, c.request, observer);
+  ASSERT_TRUE(outcome);
+  EXPECT_GE(iterations, 2u * 2 * 12);
+  EXPECT_EQ(stages, (std::vector<std::string>{"before", "deformed", "optimised", "before", "deformed", "optimised"}));
+  EXPECT_EQ(of_intervals, outcome->report.losses);
+  for (const double loss : of_intervals) EXPECT_GT(loss, 0);
+}
+
+TEST(Optimise, WithoutIterationsThereIsNoLoss) {
+  Case c;
+  c.request.params.iterations = 0;
+  Observer observer;
+  observer.interval_done = [&](const IntervalDone& done) {
+    EXPECT_FALSE(done.loss);
+    return Result<void>{};
+  };
+  EXPECT_TRUE(run(c.scene, c.cameras, c.request, observer)->report.losses.empty());
+}
+
+TEST(Optimise, GivesTheSameBytesForAnyNumberOfThreads) {
+  std::optional<scene::Overlay> first;
+  for (const int threads : {1, 2, 4}) {
+    WorkArena arena(threads);
+    arena.run([&] {
+      const Case c;
+      const auto outcome = run(c.scene, c.cameras, c.request);
+      ASSERT_TRUE(outcome);
+      if (!first) first = outcome->overlay;
+      EXPECT_EQ(outcome->overlay, *first) << threads;
+    });
+  }
+}
+
+TEST(Optimise, AnotherSeedMayGiveOtherBytesTheSameSeedDoesNot) {
+  Case c;
+  const auto first = run(c.scene, c.cameras, c.request), again = run(c.scene, c.cameras, c.request);
+  c.request.params.seed = 9;
+  const auto other = run(c.scene, c.cameras, c.request);
+  EXPECT_EQ(first->overlay, again->overlay);
+  EXPECT_NE(first->overlay, other->overlay);
+}
+
+TEST(Optimise, GoesOnAfterAnIntervalToTheSameBytes) {
+  for (const Mode mode : {Mode::move, Mode::extend})
+    for (const DVec3 center : {DVec3(0), far_away}) {
+      const Case c(mode, center);
+      std::map<int, std::string> checkpoints;
+      const auto undisturbed = run(c.scene, c.cameras, c.request, collecting(checkpoints));
+      ASSERT_TRUE(undisturbed);
+      for (const auto& [interval, bytes] : checkpoints) {
+        const auto from = decode(bytes);
+        ASSERT_TRUE(from) << from.error().message;
+        EXPECT_EQ(encode(*from), bytes);
+        const auto resumed = run(c.scene, c.cameras, c.request, {}, &*from);
+        ASSERT_TRUE(resumed) << resumed.error().message;
+        EXPECT_EQ(resumed->overlay, undisturbed->overlay) << interval;
+        EXPECT_EQ(resumed->masks, undisturbed->masks) << interval;
+        EXPECT_EQ(resumed->report.losses, undisturbed->report.losses) << interval;
+      }
+    }
+}
+
+TEST(Optimise, EndedInTheMiddleOfAnIntervalItGoesOnFromTheLastOneToTheSameBytes) {
+  const Case c;
+  std::map<int, std::string> all, until;
+  const auto undisturbed = run(c.scene, c.cameras, c.request, collecting(all));
+  std::stop_source stop;
+  Observer observer = collecting(until);
+  observer.stop = stop.get_token();
+  int iterations = 0;
+  observer.progress = [&](const Progress& progress) {
+    if (progress.interval == 2 && progress.loss && ++iterations == 9) stop.request_stop();
+  };
+  const auto ended = run(c.scene, c.cameras, c.request, observer);
+  ASSERT_FALSE(ended);
+  EXPECT_EQ(ended.error().code, ErrorCode::cancelled);
+  EXPECT_EQ(iterations, 9) << "it ended at once";
+  ASSERT_EQ(until.size(), 1u);
+  const auto from = decode(until.at(1));
+  const auto resumed = run(c.scene, c.cameras, c.request, {}, &*from);
+  EXPECT_EQ(resumed->overlay, undisturbed->overlay);
+}
+
+TEST(Optimise, AZeroDragGivesBackTheInputHoweverLongItIsToOptimise) {
+  Case c;
+  c.request.handles[0].target = c.request.handles[0].source;
+  EXPECT_EQ(run(c.scene, c.cameras, c.request)->overlay, scene::no_change(c.scene));
+}
+
+TEST(Optimise, AZeroDragThatIsOptimisedByForceLooksLikeTheInput) {
+  Case c;
+  c.request.handles[0].target = c.request.handles[0].source;
+  c.request.params.optimise_unmoved = true;
+  c.request.params.iterations = 100;
+  const auto outcome = run(c.scene, c.cameras, c.request);
+  ASSERT_TRUE(outcome);
+  ASSERT_EQ(outcome->views.size(), 3u);
+  ASSERT_EQ(outcome->report.losses.size(), 2u);
+  const scene::GaussianCloud after = scene::flatten(c.scene, outcome->overlay);
+  for (std::size_t v = 0; v < outcome->views.size(); ++v) {
+    ASSERT_GT(outcome->masks[v].area(), 0u);
+    const scene::Image a = render::forward(c.scene, outcome->views[v]).color;
+    const scene::Image b = render::forward(after, outcome->views[v]).color;
+    EXPECT_GT(psnr_where(a, b, outcome->masks[v], 1), 55);
+    EXPECT_GT(psnr_where(a, b, outcome->masks[v], 0), 55);
+  }
+}
+
+/// Gives gradients that are not numbers.
+class Poison final : public optim::PerceptualLoss {
+ public:
+  Result<double> evaluate(const scene::Image& rendered, const scene::Image&, scene::Image& v) override {
+    v = scene::Image(rendered.width, rendered.height, 3, std::numeric_limits<float>::quiet_NaN());
+    return 1.0;
+  }
+};
+
+TEST(Optimise, APoisonedGradientEndsTheEditWithTheNameOfTheParameter) {
+  const Case c;
+  Poison poison;
+  const auto outcome = run(c.scene, c.cameras, c.request, {}, nullptr, &poison);
+  ASSERT_FALSE(outcome);
+  EXPECT_EQ(outcome.error().code, ErrorCode::internal);
+  EXPECT_TRUE(outcome.error().where.starts_with("gaussian[")) << outcome.error().where;
+}
+
+/// Fails as a library might.
+class Failing final : public optim::PerceptualLoss {
+ public:
+  Result<double> evaluate(const scene::Image&, const scene::Image&, scene::Image&) override {
+    return fail(ErrorCode::unavailable, "the loss is out of order", "loss");
+  }
+};
+
+TEST(Optimise, AnErrorOfTheLossEndsTheEdit) {
+  const Case c;
+  Failing failing;
+  const auto outcome = run(c.scene, c.cameras, c.request, {}, nullptr, &failing);
+  ASSERT_FALSE(outcome);
+  EXPECT_EQ(outcome.error().where, "loss");
+}
+
+TEST(Optimise, ExtremeParametersEndInAResultOrInAnErrorThatNamesOne) {
+  for (const float extreme : {1e30f, -1e30f, 3e38f, -3e38f}) {
+    for (int parameter = 0; parameter < 4; ++parameter) {
+      Case c;
+      // Row 0 is dragged.
+      if (parameter == 0) c.scene.opacity_logit[0] = extreme;
+      if (parameter == 1) c.scene.log_scale.x[0] = extreme;
+      if (parameter == 2) c.scene.rotation.w[0] = extreme;
+      if (parameter == 3) c.scene.sh[0] = extreme;
+      const auto outcome = run(c.scene, c.cameras, c.request);
+      if (outcome) {
+        EXPECT_FALSE(scene::first_not_finite(scene::flatten(c.scene, outcome->overlay))) << extreme << " " << parameter;
+      } else {
+        EXPECT_TRUE(outcome.error().where.starts_with("gaussian[")) << outcome.error().where;
+      }
+    }
+  }
+}
+
+TEST(Optimise, RelocatesHandlesByWhatTheOptimisationDidToo) {
+  Case c;
+  c.request.params.intervals = 1;
+  const auto with = run(c.scene, c.cameras, c.request);
+  c.request.params.iterations = 0;
+  const auto without = run(c.scene, c.cameras, c.request);
+  const DVec3 a = with->report.handles[0].relocated[0], b = without->report.handles[0].relocated[0];
+  EXPECT_NE(a, b);
+  EXPECT_LT(glm::distance(a, b), 0.05);
+}
+
+}  // namespace
+}  // namespace engine::edit

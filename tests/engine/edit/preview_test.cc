@@ -1,0 +1,135 @@
+#include "engine/edit/preview.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <vector>
+
+#include "engine/core/parallel.h"
+#include "engine/edit/edit.h"
+#include "tests/engine/edit/samples.h"
+
+namespace engine::edit {
+namespace {
+
+scene::LayeredCloud plain(const scene::GaussianCloud& cloud) {
+  return {std::make_shared<scene::GaussianCloud>(cloud), nullptr};
+}
+
+/// Two handles of one group, one of another, an anchor.
+Request four_handles(Mode mode, DVec3 center = DVec3(0)) {
+  Request request;
+  request.mode = mode;
+  request.handles = {{center + DVec3(-0.1, 0, 0), center + DVec3(0.5, 0.1, 0), 0.15, 0},
+                     {center + DVec3(0.1, 0, 0), center + DVec3(0.6, 0.4, 0.1), 0.15, 0},
+                     {center + DVec3(0, 0.1, 0), center + DVec3(0, 0.9, 0), 0.15, 1},
+                     {center + DVec3(0, 1.7, 2), std::nullopt, 0.9, 0}};
+  request.params.max_image_side = 32;
+  return request;
+}
+
+void expect_as_run(const scene::LayeredCloud& scene, const Request& request) {
+  const scene::GaussianCloud flat = scene::flatten(scene);
+  const auto edited = run(flat, arc_of_cameras(1, 32, request.handles[0].source), request);
+  const auto seen = preview(scene, request);
+  ASSERT_TRUE(edited) << edited.error().message;
+  ASSERT_TRUE(seen) << seen.error().message;
+  EXPECT_EQ(seen->overlay, edited->overlay);
+  EXPECT_TRUE(scene::validate(seen->overlay, flat));
+  EXPECT_EQ(seen->intervals, edited->report.resolved.intervals);
+  EXPECT_EQ(seen->changeable, edited->report.changeable);
+  EXPECT_EQ(seen->warnings, edited->report.warnings);
+  ASSERT_EQ(seen->counts.size(), request.handles.size());
+  for (std::size_t h = 0; h < request.handles.size(); ++h) {
+    EXPECT_EQ(seen->counts[h], edited->report.handles[h].gaussians);
+    EXPECT_EQ(seen->positions[h], edited->report.handles[h].relocated.back());
+  }
+}
+
+TEST(Preview, IsWhatTheEditWillBe) {
+  const auto scene = plain(ball_before_wall(200, Vec3(0), 3));
+  for (const Mode mode : {Mode::move, Mode::extend})
+    for (const int intervals : {0, 1, 5})
+      for (const Interpolation interpolation : {Interpolation::paper, Interpolation::smooth, Interpolation::rigid}) {
+        SCOPED_TRACE(::testing::Message() << int(mode) << " " << intervals << " " << int(interpolation));
+        Request request = four_handles(mode);
+        request.params.intervals = intervals;
+        request.params.interpolation = interpolation;
+        expect_as_run(scene, request);
+      }
+}
+
+TEST(Preview, WithinARegion) {
+  Request request = four_handles(Mode::move);
+  request.region = Region{DVec3(0, 0.5, 1), DVec3(4, 4, 2.5)};
+  expect_as_run(plain(ball_before_wall(200)), request);
+}
+
+TEST(Preview, FarFromTheOrigin) {
+  const DVec3 away(65536, -65536, 65536);
+  for (const Mode mode : {Mode::move, Mode::extend})
+    expect_as_run(plain(ball_before_wall(200, Vec3(away))), four_handles(mode, away));
+}
+
+TEST(Preview, OfAVersionThatIsAnOverlayItself) {
+  const auto base = std::make_shared<const scene::GaussianCloud>(ball_before_wall(200));
+  for (const Mode first : {Mode::move, Mode::extend})
+    for (const Mode second : {Mode::move, Mode::extend}) {
+      const auto before = preview({base, nullptr}, four_handles(first));
+      ASSERT_TRUE(before);
+      const scene::LayeredCloud version{base, std::make_shared<scene::Overlay>(before->overlay)};
+      Request request = four_handles(second);
+      request.handles[0] = {DVec3(0.5, 0.2, 0), DVec3(0.2, -0.3, 0.1), 0.4, 0};  // where the ball has gone
+      request.handles[1] = {DVec3(0, 0, 0), DVec3(0, 0, 0.4), 0.3, 1};           // where some of it may have stayed
+      request.handles.erase(request.handles.begin() + (first == Mode::move ? 1 : 2), request.handles.begin() + 3);
+      expect_as_run(version, request);
+      const auto seen = preview(version, request);
+      ASSERT_TRUE(seen);
+      EXPECT_EQ(scene::flatten(*base, scene::compose(base->size(), *version.overlay, seen->overlay)),
+                scene::flatten(scene::flatten(version), seen->overlay));
+    }
+}
+
+TEST(Preview, SaysWhatTheEditWouldSay) {
+  scene::GaussianCloud scene = ball_before_wall(60);
+  Request still = four_handles(Mode::move);
+  for (Handle& handle : still.handles) handle.target = handle.source;
+  expect_as_run(plain(scene), still);
+  EXPECT_EQ(preview(plain(scene), still)->overlay, scene::no_change(scene));
+  for (std::size_t i = 0; i < scene.size(); i += 2) scene.opacity_logit[i] = -9;
+  expect_as_run(plain(scene), four_handles(Mode::move));
+  EXPECT_EQ(preview(plain(scene), four_handles(Mode::move))->warnings.size(), 1u);
+}
+
+TEST(Preview, RefusesWhatTheEditRefuses) {
+  const auto scene = ball_before_wall(60);
+  Request request = four_handles(Mode::move);
+  request.handles[1].radius = -1;
+  EXPECT_EQ(preview(plain(scene), request).error().where, "handles[1].radius");
+  request = four_handles(Mode::move);
+  request.handles[2].source = DVec3(0, 0, -1);
+  const auto empty = preview(plain(scene), request);
+  ASSERT_FALSE(empty);
+  EXPECT_EQ(empty.error().code, ErrorCode::unprocessable);
+  EXPECT_EQ(empty.error().message, run(scene, {}, request).error().message);
+
+  std::vector<std::uint8_t> dragged(scene.size());
+  for (std::size_t i = 0; i < scene.size(); ++i) dragged[i] = glm::length(DVec3(scene.mean.get(i))) < 0.3;
+  scene::GaussianCloud faint = scene::select(scene, dragged);
+  std::fill(faint.opacity_logit.begin(), faint.opacity_logit.end(), -9.0f);
+  request.handles = {{DVec3(0), DVec3(1, 0, 0), 0.5, 0}};
+  const auto nothing_left = preview(plain(faint), request);
+  ASSERT_FALSE(nothing_left);
+  EXPECT_EQ(nothing_left.error().message, run(faint, {}, request).error().message);
+}
+
+TEST(Preview, GivesTheSameBytesForAnyNumberOfThreads) {
+  const auto scene = plain(ball_before_wall(3000, Vec3(0), 3));
+  const auto alone = preview(scene, four_handles(Mode::extend));
+  ASSERT_TRUE(alone);
+  for (const int threads : {1, 2, 4})
+    WorkArena(threads).run([&] { EXPECT_EQ(preview(scene, four_handles(Mode::extend))->overlay, alone->overlay); });
+}
+
+}  // namespace
+}  // namespace engine::edit
