@@ -15,6 +15,13 @@ find_package(nlohmann_json 3.11 REQUIRED)    # JSON
 find_package(tomlplusplus 3.3 REQUIRED)      # settings file
 find_package(CLI11 2.1 REQUIRED)             # command line
 find_package(tl-expected REQUIRED)           # Result
+find_package(spdlog 1.10 REQUIRED)           # logs
+find_package(prometheus-cpp REQUIRED)        # metrics (its package states no version)
+# HTTP. Debian compiles the library; pkg-config knows the definitions it was compiled with, which change its classes.
+find_package(PkgConfig REQUIRED)
+pkg_check_modules(httplib REQUIRED IMPORTED_TARGET cpp-httplib>=0.11)
+# Datasets sent as zip files. Debian's CMake package also wants libzip's programs installed; pkg-config does not.
+pkg_check_modules(libzip REQUIRED IMPORTED_TARGET libzip>=1.7)
 if(SPLATDRAG_TESTS)
   find_package(GTest 1.12 REQUIRED)
 endif()

@@ -5,7 +5,7 @@
 #
 # USES are the room's arrows: the only rooms whose headers it may include (tests/house holds the #include lines
 # against them). LINKS are third-party libraries. Tests live in tests/<folder>/ and carry the label of their list:
-# unit (milliseconds each), golden (reference vectors and real captures), slow.
+# unit (milliseconds each), golden (reference vectors and real captures), slow. Their names begin with the folder.
 
 add_library(splatdrag_warnings INTERFACE)
 target_compile_options(splatdrag_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
@@ -30,7 +30,7 @@ function(splatdrag_tests target label folder library)
   add_executable(${target} ${ARGN})
   target_link_libraries(${target} PRIVATE ${library} splatdrag_test_support splatdrag_warnings GTest::gtest_main)
   include(GoogleTest)
-  gtest_discover_tests(${target} DISCOVERY_TIMEOUT 60 PROPERTIES LABELS ${label} TIMEOUT 900)
+  gtest_discover_tests(${target} TEST_PREFIX ${folder}/ DISCOVERY_TIMEOUT 60 PROPERTIES LABELS ${label} TIMEOUT 900)
 endfunction()
 
 function(splatdrag_room kind folder name)

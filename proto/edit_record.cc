@@ -1,0 +1,105 @@
+#include "proto/edit_record.h"
+
+#include <exception>
+#include <nlohmann/json.hpp>
+
+namespace proto {
+namespace {
+
+using nlohmann::ordered_json;
+
+template <class T>
+ordered_json or_null(const std::optional<T>& value) {
+  return value ? ordered_json(*value) : ordered_json(nullptr);
+}
+
+template <class T>
+std::optional<T> optional_at(const ordered_json& object, const char* name) {
+  const ordered_json& value = object.at(name);
+  if (value.is_null()) return std::nullopt;
+  return value.get<T>();
+}
+
+ordered_json encode(const FinishedInterval& finished) {
+  ordered_json renders = ordered_json::array();
+  for (const IntervalRender& render : finished.renders)
+    renders.push_back({{"view", render.view}, {"stages", render.stages}});
+  return {{"interval", finished.interval},
+          {"seconds", finished.seconds},
+          {"positions", finished.positions},
+          {"loss", or_null(finished.loss)},
+          {"renders", std::move(renders)}};
+}
+
+FinishedInterval decode_interval(const ordered_json& object) {
+  FinishedInterval finished;
+  finished.interval = object.at("interval").get<int>();
+  finished.seconds = object.at("seconds").get<double>();
+  finished.positions = object.at("positions").get<std::vector<Point>>();
+  finished.loss = optional_at<double>(object, "loss");
+  for (const ordered_json& render : object.at("renders"))
+    finished.renders.push_back(
+        {render.at("view").get<std::string>(), render.at("stages").get<std::vector<std::string>>()});
+  return finished;
+}
+
+ordered_json encode(const std::optional<GaussianCounts>& counts) {
+  if (!counts) return nullptr;
+  return {counts->input, counts->output, counts->removed, counts->copies, counts->changeable};
+}
+
+EditRecord decode(const ordered_json& object) {
+  EditRecord record;
+  record.stage = object.at("stage").get<std::string>();
+  record.progress = object.at("progress").get<double>();
+  record.eta_seconds = optional_at<double>(object, "eta_seconds");
+  record.interval = object.at("interval").get<int>();
+  record.intervals = object.at("intervals").get<int>();
+  for (const ordered_json& finished : object.at("finished_intervals"))
+    record.finished_intervals.push_back(decode_interval(finished));
+  for (const ordered_json& count : object.at("handles")) record.handles.push_back({count.get<std::size_t>()});
+  if (const ordered_json& request = object.at("request"); !request.is_null())
+    record.request = parse_edit_request(request.dump()).value();
+  for (const ordered_json& timing : object.at("timings"))
+    record.timings.push_back({timing.at(0).get<std::string>(), timing.at(1).get<double>()});
+  if (const auto n = optional_at<std::array<std::size_t, 5>>(object, "gaussians"))
+    record.gaussians = {(*n)[0], (*n)[1], (*n)[2], (*n)[3], (*n)[4]};
+  record.warnings = object.at("warnings").get<std::vector<std::string>>();
+  record.result_version = optional_at<int>(object, "result_version");
+  record.simd = object.at("simd").get<std::string>();
+  return record;
+}
+
+}  // namespace
+
+std::string to_json(const EditRecord& record) {
+  ordered_json finished = ordered_json::array(), handles = ordered_json::array(), timings = ordered_json::array();
+  for (const FinishedInterval& interval : record.finished_intervals) finished.push_back(encode(interval));
+  for (const HandleCount& handle : record.handles) handles.push_back(handle.gaussians);
+  for (const StageSeconds& timing : record.timings) timings.push_back({timing.stage, timing.seconds});
+  ordered_json out{{"stage", record.stage},
+                   {"progress", record.progress},
+                   {"eta_seconds", or_null(record.eta_seconds)},
+                   {"interval", record.interval},
+                   {"intervals", record.intervals},
+                   {"finished_intervals", std::move(finished)},
+                   {"handles", std::move(handles)},
+                   {"request", nullptr},
+                   {"timings", std::move(timings)},
+                   {"gaussians", encode(record.gaussians)},
+                   {"warnings", record.warnings},
+                   {"result_version", or_null(record.result_version)},
+                   {"simd", record.simd}};
+  if (record.request) out["request"] = ordered_json::parse(to_json(*record.request));
+  return out.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
+}
+
+Result<EditRecord> parse_edit_record(std::string_view text) {
+  try {
+    return decode(ordered_json::parse(text));
+  } catch (const std::exception& e) {
+    return engine::fail(engine::ErrorCode::corrupt_data, std::string("an edit's record cannot be read: ") + e.what());
+  }
+}
+
+}  // namespace proto

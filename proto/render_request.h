@@ -1,0 +1,42 @@
+// What picture is wanted: as JSON, or as the query of a URL.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "proto/camera.h"
+
+namespace proto {
+
+enum class What { color, depth, alpha, mask };
+enum class PictureFormat { jpeg, png, exr };
+
+struct RenderRequest {
+  Viewpoint viewpoint;
+  What what = What::color;
+  std::optional<PictureFormat> format;  ///< Nothing: what the client accepts.
+  std::optional<int> max_side;          ///< Pixels, from 1: the camera is scaled down to it.
+  Point background{};                   ///< Colour, each 0 to 1.
+  int sh_degree = 3;                    ///< 0 to 3: bands above are left out.
+  int quality = 90;                     ///< 1 to 100, of a JPEG.
+  bool operator==(const RenderRequest&) const = default;
+};
+
+/// Strict, as parse_edit_request(), with its errors. `where` is such as "camera.fx" or "max_side".
+[[nodiscard]] Result<RenderRequest> parse_render_request(std::string_view text, const JsonLimits& limits = {});
+
+/// Names of the query parameters: view; eye, target, up, fov, width, height; what, format, max_side, background,
+/// sh_degree, quality.
+[[nodiscard]] std::vector<std::string> render_queries();
+
+/// The same from a query: view=NAME, or eye=x,y,z&target=x,y,z&width=px&height=px with up=x,y,z and fov=degrees if they
+/// are wanted.
+///   query   the parameter of that name, if it is there
+///   errors  invalid_argument: `where` is the parameter
+[[nodiscard]] Result<RenderRequest> parse_render_query(
+    const std::function<std::optional<std::string>(std::string_view)>& query);
+
+}  // namespace proto
