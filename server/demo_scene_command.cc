@@ -12,8 +12,8 @@
 #include "server/capture_files.h"
 #include "server/commands.h"
 #include "server/compute.h"
-#include "server/convert.h"
 #include "server/folders.h"
+#include "server/suggested_drag.h"
 
 namespace server {
 namespace {

@@ -15,10 +15,11 @@
 #include "engine/io/image_file.h"
 #include "engine/io/scene_file.h"
 #include "engine/render/forward.h"
+#include "engine/scene/overlay.h"
 #include "server/commands.h"
 #include "server/compute.h"
-#include "server/convert.h"
 #include "server/edit_report.h"
+#include "server/edits/convert.h"
 #include "server/folders.h"
 #include "server/picture_names.h"
 #include "server/pictures.h"
@@ -60,7 +61,7 @@ struct BothRequests {
 Result<BothRequests> load_request(const EditOptions& options) {
   auto asked = read_request(options.request, options.name);
   if (!asked) return propagate(asked);
-  auto request = to_engine(asked->request);
+  auto request = edits::to_engine(asked->request);
   if (request)
     if (const auto valid = edit::validate(*request); !valid) request = propagate(valid);
   if (!request) {
@@ -105,7 +106,7 @@ void summarise(std::ostream& out, const path& folder, const EditReport& report) 
       << edit.input_gaussians - edit.removed << " of the " << edit.input_gaussians << " before and " << edit.copies
       << " deformed copies\n";
   for (std::size_t i = 0; i < edit.handles.size(); ++i)
-    out << "handle " << i << ": " << edit.handles[i].gaussians << " Gaussians\n";
+    out << "handle " << i + 1 << ": " << edit.handles[i].gaussians << " Gaussians\n";
   for (const ViewPictures& pictures : report.pictures) {
     out << (folder / pictures.after).string() << ": outside the mask ";
     if (std::isfinite(pictures.psnr_outside_db))
@@ -127,18 +128,14 @@ Result<edit::Outcome> run_shown(const scene::GaussianCloud& input, const std::ve
 
 std::vector<std::string> all_warnings(const edit::Report& report, const proto::EditRequest& asked) {
   std::vector<std::string> warnings = report.warnings;
-  if (const auto unused = fields_without_effect(asked); !unused.empty()) {
-    std::string warning = "this build deforms, it does not correct or optimise; without effect:";
-    for (const std::string& field : unused) warning += " " + field;
-    warnings.push_back(std::move(warning));
-  }
+  for (std::string& warning : edits::warnings_about(asked)) warnings.push_back(std::move(warning));
   return warnings;
 }
 
 /// Everything in the output folder; the scene first, because it is what nobody wants to lose.
 Result<void> write_results(const path& folder, std::size_t pictured_views, const io::SceneFile& input,
-                           edit::Outcome outcome, EditReport& report) {
-  const io::SceneFile edited{std::move(outcome.cloud), input.layout};
+                           const edit::Outcome& outcome, EditReport& report) {
+  const io::SceneFile edited{scene::flatten(input.cloud, outcome.overlay), input.layout};
   if (auto saved = io::write_scene(folder / "scene.ply", edited, io::SceneFormat::ply); !saved) return saved;
   auto pictures = write_pictures(folder, input.cloud, edited.cloud, outcome, pictured_views);
   if (!pictures) return propagate(pictures);
@@ -169,11 +166,11 @@ Result<void> run(const EditOptions& options, Terminal& terminal) {
     report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     report.scene_file = path(options.scene).filename().string();
     report.machine = machine;
-    report.request = resolved(request->asked.request, outcome->report.resolved);
+    report.request = edits::resolved(request->asked.request, outcome->report.resolved);
     report.edit = outcome->report;
     report.edit.warnings = all_warnings(outcome->report, request->asked.request);
     for (const std::string& warning : report.edit.warnings) terminal.err << "warning: " << warning << '\n';
-    auto written = write_results(folder, std::size_t(options.pictures), *input, std::move(*outcome), report);
+    auto written = write_results(folder, std::size_t(options.pictures), *input, *outcome, report);
     if (written) summarise(terminal.out, folder, report);
     return written;
   });

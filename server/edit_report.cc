@@ -55,6 +55,7 @@ std::string to_json(const EditReport& report) {
                                            [](const auto& view) {
                                              return ordered_json{{"name", view.name}, {"mask_area", view.mask_area}};
                                            })},
+                         {"losses", edit.losses},
                          {"pictures", list_of(report.pictures, [](const auto& pictures) { return encode(pictures); })},
                          {"seconds", report.seconds},
                          {"stages", list_of(edit.times,

@@ -44,6 +44,7 @@ void describe(CLI::App& program, Action& action) {
       "file that --config names (max-side = 512 below [render]). The command line comes first, then the environment,\n"
       "then the file.\n";
   program.footer(sources + "See splatdrag --help for the exit status.");  // of the subcommands, which inherit it
+  add_serve_command(program, action);
   add_edit_command(program, action);
   add_render_command(program, action);
   add_info_command(program, action);

@@ -1,7 +1,9 @@
 #include "server/progress_display.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <utility>
 
 namespace server {
@@ -42,7 +44,13 @@ std::string ProgressDisplay::description(const engine::edit::Progress& progress)
   std::string text = std::to_string(int(std::floor(100 * progress.fraction))) + " %";
   if (progress.interval > 0)
     text += "  interval " + std::to_string(progress.interval) + " of " + std::to_string(progress.intervals);
-  return text + "  " + progress.stage + time_left(progress.fraction);
+  text += "  " + progress.stage;
+  if (progress.loss) {
+    std::array<char, 32> loss{};
+    std::snprintf(loss.data(), loss.size(), ", loss %.3g", *progress.loss);
+    text += loss.data();
+  }
+  return text + time_left(progress.fraction);
 }
 
 std::string ProgressDisplay::time_left(double fraction) const {

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/io/atomic_file.h"
 #include "engine/io/dataset.h"
 #include "engine/io/image_file.h"
 #include "engine/io/scene_file.h"
@@ -16,8 +17,9 @@
 #include "server/commands.h"
 #include "server/compute.h"
 #include "server/folders.h"
+#include "server/photo_comparison.h"
 #include "server/picture_names.h"
-#include "server/pictures.h"
+#include "server/shown_picture.h"
 
 namespace server {
 namespace {
@@ -28,8 +30,6 @@ using engine::ErrorCode;
 using engine::fail;
 using engine::propagate;
 using std::filesystem::path;
-
-enum class What { color, depth, alpha };
 
 struct RenderOptions {
   std::string scene, dataset, out, size = "800x600", format = "png", what = "color";
@@ -101,39 +101,13 @@ Result<std::vector<Shot>> choose_shots(const RenderOptions& options) {
   return dataset_shots(options);
 }
 
-/// Renders what is asked for and writes it in the format that the file's name asks for.
-Result<void> write_picture(const path& file, const engine::render::Rendering& rendering, What what) {
+/// Writes what is shown in the format that the file's name asks for.
+Result<void> write_picture(const path& file, const engine::render::Rendering& rendering, Shown shown) {
   const auto format = io::format_of(file);
   if (!format) return propagate(format);
-  const scene::Image depth =
-      rendering.depth.data.empty() ? scene::Image{} : mean_depth(rendering.depth, rendering.alpha);
-  if (*format == io::ImageFormat::exr) {
-    io::RenderLayers layers;
-    if (what == What::color) layers.color = &rendering.color;
-    if (what != What::depth) layers.alpha = &rendering.alpha;
-    if (what != What::alpha) layers.depth = &depth;
-    return io::write_exr(file, layers);
-  }
-  switch (what) {
-    case What::depth:
-      return io::write_image(file, shaded_depth(depth));
-    case What::alpha:
-      return io::write_image(file, rendering.alpha);
-    case What::color:
-      break;
-  }
-  return io::write_image(file, rendering.color);
-}
-
-/// PSNR of a rendering against the view's photo, in the rendering's size.
-Result<double> psnr_against_photo(const io::View& view, const scene::Image& color) {
-  auto photo = io::load_photo(view);
-  if (!photo) return propagate(photo);
-  if (photo->width != color.width || photo->height != color.height) {
-    photo = io::resized(*photo, color.width, color.height);
-    if (!photo) return propagate(photo);
-  }
-  return scene::psnr(clamped(color), *photo);
+  const auto bytes = encode_shown(rendering, shown, *format);
+  if (!bytes) return propagate(bytes);
+  return io::write_file(file, *bytes);
 }
 
 /// Where the pictures go. One picture may be given a file name, else `--out` is a folder.
@@ -180,8 +154,8 @@ Result<void> run(const RenderOptions& options, Terminal& terminal) {
     if (!input) return propagate(input);
     engine::render::ForwardOptions forward;
     forward.background = engine::Vec3(to_vec(options.background));
-    const What what = options.what == "depth" ? What::depth : options.what == "alpha" ? What::alpha : What::color;
-    forward.color = what == What::color || options.compare;
+    const Shown shown = options.what == "depth" ? Shown::depth : options.what == "alpha" ? Shown::alpha : Shown::color;
+    forward.color = needs_color(shown) || options.compare;
     forward.depth = true;
     engine::render::Workspace workspace;
     engine::render::Rendering rendering;
@@ -193,7 +167,7 @@ Result<void> run(const RenderOptions& options, Terminal& terminal) {
       engine::render::forward(input->cloud, camera, forward, {}, workspace, rendering);
       if (to) {
         const path file = to->of(shot);
-        if (auto saved = write_picture(file, rendering, what); !saved) return saved;
+        if (auto saved = write_picture(file, rendering, shown); !saved) return saved;
         if (!options.compare) terminal.out << file.string() << '\n';
       }
       if (options.compare) {

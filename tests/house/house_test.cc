@@ -97,6 +97,12 @@ TEST(HouseRules, ReportAHeaderThatIsNoGoodNeighbour) {
   EXPECT_EQ(complaints("engine/core/vec.cc", "using namespace std::chrono_literals;\n"), 0u);
 }
 
+TEST(HouseRules, KnowTheRoomsBelowTheServer) {
+  const Arrows arrows = parse_arrows("server/http: engine_core\nserver: server_http engine_core\nengine/core: \n");
+  EXPECT_EQ(violations(arrows, "server/routes/info.cc", "#include \"server/http/router.h\"\n").size(), 0u);
+  EXPECT_EQ(violations(arrows, "server/http/router.cc", "#include \"server/routes/info.h\"\n").size(), 1u);
+}
+
 TEST(HouseRules, SayWhere) {
   const auto found = violations(sample, "engine/scene/image.cc", "\n\n#include \"engine/io/ply.h\"\n");
   ASSERT_EQ(found.size(), 1u);

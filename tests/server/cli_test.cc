@@ -176,13 +176,13 @@ TEST_F(Cli, EditTakesReleasedConfigurationsAndNamedRequests) {
 
 TEST_F(Cli, EditWarnsOfFieldsWithoutEffect) {
   json document = json::parse(support::read_file(demo("drags/ball.json")));
-  document["params"]["iterations"] = 500;
+  document["params"]["strength_initial"] = 0.5;
   const Finished run = splatdrag("edit --scene " + demo("scene.ply") + " --pictures 0 --out " + at("out") +
                                  " --request " + request(document));
   ASSERT_EQ(run.status, 0) << run.err;
   EXPECT_NE(run.err.find("warning: this build deforms"), std::string::npos) << run.err;
-  EXPECT_NE(report("out")["warnings"].dump().find("params.iterations"), std::string::npos);
-  EXPECT_EQ(report("out")["request"]["params"]["iterations"], 500);
+  EXPECT_NE(report("out")["warnings"].dump().find("params.strength_initial"), std::string::npos);
+  EXPECT_EQ(report("out")["request"]["params"]["strength_initial"], 0.5);
 }
 
 TEST_F(Cli, EditNamesTheHandleThatHoldsNothing) {

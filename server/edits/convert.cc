@@ -1,8 +1,8 @@
-#include "server/convert.h"
+#include "server/edits/convert.h"
 
 #include <utility>
 
-namespace server {
+namespace server::edits {
 namespace {
 
 namespace edit = engine::edit;
@@ -13,7 +13,6 @@ static_assert(proto::max_handles == edit::max_handles && proto::max_coordinate =
 constexpr int paper_intervals = 5, paper_views = 50;
 
 engine::DVec3 to_vec(const proto::Point& p) { return {p[0], p[1], p[2]}; }
-proto::Point to_point(engine::DVec3 v) { return {v.x, v.y, v.z}; }
 
 edit::Mode to_engine(proto::Mode mode) { return mode == proto::Mode::extend ? edit::Mode::extend : edit::Mode::move; }
 
@@ -74,6 +73,8 @@ edit::Params to_engine(const proto::Params& given, std::optional<proto::Preset> 
   if (given.intervals) params.intervals = *given.intervals;
   if (given.views) params.views = *given.views;
   if (given.exclude_views) params.exclude_views = *given.exclude_views;
+  if (given.iterations) params.iterations = *given.iterations;
+  if (given.annealing_steps) params.annealing_steps = *given.annealing_steps;
   if (given.max_image_side) params.max_image_side = *given.max_image_side;
   if (given.rotation) params.rotation = to_engine(*given.rotation);
   if (given.interpolation) params.interpolation = to_engine(*given.interpolation);
@@ -91,6 +92,15 @@ engine::Result<edit::Request> to_engine(const proto::EditRequest& request) {
                         "this build has no corrector \"" + std::string(name_of(corrector)) +
                             "\"; available: \"none\", which is the default",
                         "params.corrector");
+  if (request.params.perceptual == proto::Perceptual::lpips)
+    return engine::fail(engine::ErrorCode::unsupported,
+                        "this build has no perceptual loss \"lpips\"; available: \"msssim\", which is the default",
+                        "params.perceptual");
+  if (request.params.background == proto::Background::photo)
+    return engine::fail(
+        engine::ErrorCode::unsupported,
+        "this build does not hold the background to photos; available: \"render\", which is the default",
+        "params.background");
   edit::Request out;
   out.mode = to_engine(request.mode);
   for (const proto::Handle& handle : request.handles) {
@@ -108,6 +118,10 @@ engine::Result<edit::Request> to_engine(const proto::EditRequest& request) {
 proto::EditRequest resolved(const proto::EditRequest& asked, const edit::Params& used) {
   proto::EditRequest out = asked;
   out.params.intervals = used.intervals;
+  out.params.iterations = used.iterations;
+  out.params.annealing_steps = used.annealing_steps;
+  out.params.perceptual = proto::Perceptual::msssim;
+  out.params.background = proto::Background::render;
   out.params.views = used.views;
   out.params.exclude_views = used.exclude_views;
   out.params.max_image_side = used.max_image_side;
@@ -127,26 +141,18 @@ std::vector<std::string> fields_without_effect(const proto::EditRequest& request
   const proto::Params& params = request.params;
   note(request.preset == proto::Preset::draft || request.preset == proto::Preset::standard, "preset");
   note(request.prompt.has_value(), "prompt");
-  note(params.annealing_steps.has_value(), "params.annealing_steps");
   note(params.strength_initial.has_value(), "params.strength_initial");
   note(params.strength_final.has_value(), "params.strength_final");
   note(params.annealing.has_value(), "params.annealing");
-  note(params.iterations.has_value(), "params.iterations");
-  note(params.perceptual.has_value(), "params.perceptual");
-  note(params.background.has_value(), "params.background");
   return fields;
 }
 
-proto::EditRequest to_request(const engine::procedural::SuggestedDrag& drag) {
-  proto::EditRequest request;
-  request.mode = drag.mode == "extend" ? proto::Mode::extend : proto::Mode::move;
-  for (const auto& handle : drag.handles) {
-    proto::Handle& made = request.handles.emplace_back();
-    made.source = to_point(handle.source);
-    if (handle.target) made.target = to_point(*handle.target);
-    made.radius = handle.radius;
-  }
-  return request;
+std::vector<std::string> warnings_about(const proto::EditRequest& request) {
+  const auto unused = fields_without_effect(request);
+  if (unused.empty()) return {};
+  std::string warning = "this build deforms and optimises, it does not correct; without effect:";
+  for (const std::string& field : unused) warning += " " + field;
+  return {std::move(warning)};
 }
 
-}  // namespace server
+}  // namespace server::edits

@@ -1,10 +1,10 @@
-#include "server/convert.h"
+#include "server/edits/convert.h"
 
 #include <gtest/gtest.h>
 
 #include "tests/proto/examples.h"
 
-namespace server {
+namespace server::edits {
 namespace {
 
 namespace edit = engine::edit;
@@ -74,6 +74,26 @@ TEST(Convert, RefusesACorrectorThisBuildHasNotAndNamesTheOneItHas) {
   }
 }
 
+TEST(Convert, RefusesALossOrABackgroundThisBuildHasNot) {
+  proto::EditRequest asked = full_request();
+  asked.params.perceptual = proto::Perceptual::lpips;
+  ASSERT_FALSE(to_engine(asked));
+  EXPECT_EQ(to_engine(asked).error().code, engine::ErrorCode::unsupported);
+  EXPECT_EQ(to_engine(asked).error().where, "params.perceptual");
+  asked.params.perceptual = proto::Perceptual::msssim;
+  asked.params.background = proto::Background::photo;
+  ASSERT_FALSE(to_engine(asked));
+  EXPECT_EQ(to_engine(asked).error().where, "params.background");
+}
+
+TEST(Convert, HandsTheParametersOfTheOptimisationOn) {
+  proto::EditRequest asked;
+  EXPECT_EQ(to_engine(asked)->params.iterations, 0);
+  asked.params.iterations = 70, asked.params.annealing_steps = 3;
+  EXPECT_EQ(to_engine(asked)->params.iterations, 70);
+  EXPECT_EQ(to_engine(asked)->params.annealing_steps, 3);
+}
+
 TEST(Convert, EchoesTheRequestWithEveryUsedParameterFilledIn) {
   const auto asked = proto::parse_edit_request(proto::example("stretch_apple.json")).value();
   edit::Params used = to_engine(asked)->params;
@@ -84,7 +104,9 @@ TEST(Convert, EchoesTheRequestWithEveryUsedParameterFilledIn) {
   EXPECT_EQ(echoed.params.corrector, proto::Corrector::none);
   EXPECT_EQ(echoed.params.rotation, proto::Rotation::shortest_arc);
   EXPECT_EQ(echoed.params.seed, 0u);
-  EXPECT_EQ(echoed.params.iterations, std::nullopt) << "nothing was optimised";
+  EXPECT_EQ(echoed.params.iterations, 0) << "nothing was optimised";
+  EXPECT_EQ(echoed.params.perceptual, proto::Perceptual::msssim);
+  EXPECT_EQ(echoed.params.background, proto::Background::render);
   const auto again = to_engine(echoed);
   ASSERT_TRUE(again);
   EXPECT_EQ(again->params.interpolation, used.interpolation);
@@ -107,10 +129,8 @@ TEST(Convert, EveryEnumeratorComesBack) {
 TEST(Convert, ListsFieldsThatHaveNoEffect) {
   proto::EditRequest asked = full_request();
   asked.prompt = "a ball";
-  EXPECT_EQ(
-      fields_without_effect(asked),
-      (std::vector<std::string>{"prompt", "params.annealing_steps", "params.strength_initial", "params.strength_final",
-                                "params.annealing", "params.iterations", "params.perceptual", "params.background"}));
+  EXPECT_EQ(fields_without_effect(asked), (std::vector<std::string>{"prompt", "params.strength_initial",
+                                                                    "params.strength_final", "params.annealing"}));
   for (const auto preset : {proto::Preset::draft, proto::Preset::standard}) {
     proto::EditRequest plain;
     plain.preset = preset;
@@ -119,17 +139,15 @@ TEST(Convert, ListsFieldsThatHaveNoEffect) {
   EXPECT_TRUE(fields_without_effect(proto::parse_edit_request(proto::example("stretch_apple.json")).value()).empty());
 }
 
-TEST(Convert, MakesARequestOfASuggestedDrag) {
-  const engine::procedural::SuggestedDrag drag{
-      "leaf", "extend", {{{1, 2, 3}, engine::DVec3(4, 5, 6), 0.5}, {{7, 8, 9}, std::nullopt, 0.25}}};
-  const auto request = proto::parse_edit_request(proto::to_json(to_request(drag)));
-  ASSERT_TRUE(request) << request.error().message;
-  EXPECT_EQ(request->mode, proto::Mode::extend);
-  ASSERT_EQ(request->handles.size(), 2u);
-  EXPECT_EQ(request->handles[0].target, (proto::Point{4, 5, 6}));
-  EXPECT_EQ(request->handles[1].target, std::nullopt);
-  EXPECT_EQ(request->handles[1].radius, 0.25);
+TEST(Convert, WarnsOnceOfAllFieldsThatHaveNoEffect) {
+  proto::EditRequest asked;
+  EXPECT_TRUE(warnings_about(asked).empty());
+  asked.prompt = "a ball";
+  asked.params.strength_final = 0.3;
+  const auto warnings = warnings_about(asked);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_TRUE(warnings[0].ends_with("without effect: prompt params.strength_final")) << warnings[0];
 }
 
 }  // namespace
-}  // namespace server
+}  // namespace server::edits

@@ -1,4 +1,4 @@
-// Between the edit request on the wire and the one the engine runs.
+// Between the edit request on the wire and the one the engine runs: for the program and the service alike.
 #pragma once
 
 #include <string>
@@ -6,23 +6,23 @@
 
 #include "engine/core/result.h"
 #include "engine/edit/request.h"
-#include "engine/procedural/demo_scene.h"
 #include "proto/edit_request.h"
 
-namespace server {
+namespace server::edits {
 
 /// The engine's request, with what was left open filled in from the preset, then from the engine's defaults.
-///   errors  unsupported: a corrector this build does not have (`where` is "params.corrector")
+///   errors  unsupported: a corrector, perceptual loss or background this build does not have (`where` is
+///           "params.corrector")
 [[nodiscard]] engine::Result<engine::edit::Request> to_engine(const proto::EditRequest& request);
 
 /// The request as it was carried out: `asked`, with every parameter that the edit used filled in.
 [[nodiscard]] proto::EditRequest resolved(const proto::EditRequest& asked, const engine::edit::Params& used);
 
-/// Fields of the request that concern correction and optimisation, which this build does not do: given, but without
+/// Fields of the request that concern correction, which this build does not do: given, but without
 /// effect.
 [[nodiscard]] std::vector<std::string> fields_without_effect(const proto::EditRequest& request);
 
-/// A suggested drag as the request that carries it out.
-[[nodiscard]] proto::EditRequest to_request(const engine::procedural::SuggestedDrag& drag);
+/// What a user should know about the request itself, one sentence each: that it has such fields.
+[[nodiscard]] std::vector<std::string> warnings_about(const proto::EditRequest& request);
 
-}  // namespace server
+}  // namespace server::edits

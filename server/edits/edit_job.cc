@@ -1,0 +1,256 @@
+#include "server/edits/edit_job.h"
+
+#include <spdlog/logger.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <memory>
+#include <new>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "engine/edit/drag.h"
+#include "engine/edit/edit.h"
+#include "engine/edit/handles.h"
+#include "engine/render/forward.h"
+#include "proto/edit_record.h"
+#include "server/edits/convert.h"
+#include "server/edits/interval_pictures.h"
+#include "server/edits/record_keeper.h"
+
+namespace server::edits {
+namespace {
+
+namespace edit = engine::edit;
+namespace scene = engine::scene;
+using engine::ErrorCode;
+using engine::fail;
+using engine::propagate;
+using engine::Result;
+using engine::jobs::JobContext;
+using engine::jobs::JobResult;
+
+constexpr int background_niceness = 10;
+
+/// On Linux, process 0 of PRIO_PROCESS is the calling thread alone. Where this fails, edits are merely less polite.
+void yield_to_others() { (void)::setpriority(PRIO_PROCESS, 0, background_niceness); }
+
+void log(const Workshop& workshop, spdlog::level::level_enum level, const JobContext& context,
+         const std::string& message) {
+  if (workshop.logger != nullptr) workshop.logger->log(level, context.id() + ": " + message);
+}
+
+std::vector<proto::Point> to_points(const std::vector<engine::DVec3>& positions) {
+  std::vector<proto::Point> points;
+  for (const engine::DVec3& p : positions) points.push_back({p.x, p.y, p.z});
+  return points;
+}
+
+/// The record of an earlier run, as far as its checkpoint bears it out.
+proto::EditRecord earlier_record(const JobContext& context) {
+  if (context.earlier_progress().empty()) return {};
+  auto record = proto::parse_edit_record(context.earlier_progress());
+  if (!record) return {};  // of another version of the program: the edit itself does not depend on it
+  std::erase_if(record->finished_intervals,
+                [&](const auto& finished) { return finished.interval > context.finished_intervals(); });
+  return std::move(*record);
+}
+
+class Run {
+ public:
+  Run(JobContext& context, const Workshop& workshop)
+      : context_(context),
+        workshop_(workshop),
+        keeper_(earlier_record(context), [&context](std::string text) { context.publish_progress(std::move(text)); }) {}
+
+  Result<void> operator()() {
+    if (auto loaded = load(); !loaded) return loaded;
+    Result<void> done;
+    workshop_.arena.run([&] { done = work(); });
+    return done;
+  }
+
+ private:
+  /// The request, and what it is about.
+  Result<void> load() {
+    keeper_.enter("load");
+    auto asked = proto::parse_edit_request(context_.payload());
+    if (!asked) return propagate(asked);
+    asked_ = std::move(*asked);
+    auto request = to_engine(asked_);
+    if (!request) return propagate(request);
+    request_ = std::move(*request);
+    const auto about = workshop_.scenes.find(scene_id());
+    if (!about) return propagate(about);
+    if (about->up) request_.up = *about->up;
+    const auto dataset = workshop_.scenes.dataset(scene_id());
+    if (!dataset) return propagate(dataset);
+    if (*dataset)
+      for (const auto& view : (*dataset)->views) cameras_.push_back(view.camera);
+    auto version = workshop_.scenes.load(scene_id(), std::to_string(version_number()));
+    if (!version) return propagate(version);
+    input_ = version->cloud.base;
+    if (version->cloud.overlay) input_ = std::make_shared<scene::GaussianCloud>(scene::flatten(version->cloud));
+    return {};
+  }
+
+  Result<void> work() {
+    if (auto begun = begin(); !begun) return begun;
+    pictures_.emplace(context_.folder(), *input_, workshop_.pictured_views);
+    auto outcome = run();
+    if (!outcome) return propagate(outcome);
+    return publish(*outcome);
+  }
+
+  /// Tells at once what will be done.
+  Result<void> begin() {
+    keeper_.enter("assign");
+    const auto assignment = edit::assign(input_->mean, request_);
+    if (!assignment) return propagate(assignment);
+    proto::EditRecord& record = keeper_.record();
+    edit::Params params = request_.params;
+    params.intervals = edit::resolved_intervals(request_);
+    record.intervals = params.intervals;
+    record.request = resolved(asked_, params);
+    record.simd = engine::render::simd_target();
+    record.handles.clear();
+    for (const std::size_t count : assignment->count) record.handles.push_back({count});
+    for (const std::string& warning : warnings_about(asked_)) keeper_.warn(warning);
+    keeper_.publish();
+    return {};
+  }
+
+  Result<edit::Outcome> run() {
+    edit::Observer observer;
+    observer.progress = [this](const edit::Progress& progress) { keeper_.advance(progress); };
+    observer.moment = [this](const edit::Moment& moment) { return picture(moment); };
+    observer.interval_done = [this](const edit::IntervalDone& done) { return finish_interval(done); };
+    // A checkpoint that could not be used is made up for first: the record promises its interval.
+    observer.keep = [this] { return context_.stop_requested() && last_interval_ >= context_.finished_intervals(); };
+    observer.stop = context_.cancel_token();
+    if (const auto checkpoint = last_checkpoint()) {
+      last_interval_ = checkpoint->interval;
+      auto outcome = edit::run(*input_, cameras_, request_, observer, &*checkpoint);
+      if (outcome || outcome.error().where != "checkpoint") return outcome;
+      begin_again(outcome.error());
+    }
+    last_interval_ = 0;
+    return edit::run(*input_, cameras_, request_, observer);
+  }
+
+  std::optional<edit::Checkpoint> last_checkpoint() {
+    if (context_.finished_intervals() == 0) return std::nullopt;
+    auto checkpoint = context_.load_checkpoint().and_then([](const std::string& bytes) { return edit::decode(bytes); });
+    if (checkpoint && checkpoint->interval == context_.finished_intervals()) {
+      note(spdlog::level::info, "goes on after interval " + std::to_string(checkpoint->interval));
+      return std::move(*checkpoint);
+    }
+    begin_again(checkpoint ? engine::Error{ErrorCode::corrupt_data, "it is that of another interval", {}}
+                           : checkpoint.error());
+    return std::nullopt;
+  }
+
+  void note(spdlog::level::level_enum level, const std::string& message) const {
+    log(workshop_, level, context_, message);
+  }
+
+  void begin_again(const engine::Error& error) {
+    note(spdlog::level::warn, "begins again, its checkpoint cannot be used: " + error.message);
+    keeper_.warn(
+        "the edit was interrupted and had to begin again: what it had saved could not be used; the result is "
+        "the same");
+  }
+
+  Result<void> picture(const edit::Moment& moment) {
+    const std::string stage = keeper_.record().stage;
+    keeper_.enter("pictures");
+    auto added = pictures_->add(moment);
+    keeper_.enter(stage);
+    return added;
+  }
+
+  Result<void> finish_interval(const edit::IntervalDone& done) {
+    last_interval_ = done.interval;
+    keeper_.add({.interval = done.interval,
+                 .seconds = done.seconds,
+                 .positions = to_points(done.positions),
+                 .loss = done.loss,
+                 .renders = pictures_->of(done.interval)});
+    keeper_.publish();
+    if (done.interval <= context_.finished_intervals()) return {};  // made up for
+    auto saved = context_.save_checkpoint(done.interval, edit::encode(done.checkpoint));
+    if (!saved && saved.error().code != ErrorCode::cancelled)
+      return fail(saved.error().code, "the checkpoint of interval " + std::to_string(done.interval) +
+                                          " cannot be kept: " + saved.error().message);
+    return saved;
+  }
+
+  Result<void> publish(const edit::Outcome& outcome) {
+    keeper_.enter("publish");
+    const auto hold = workshop_.results.own(context_.id());
+    // Asked once it can no longer be cancelled in between: a cancelled edit leaves no version.
+    if (context_.cancel_token().stop_requested())
+      return fail(ErrorCode::cancelled, context_.id() + " was interrupted before its result was published");
+    const auto version = workshop_.scenes.add_version(scene_id(), version_number(), context_.id(), outcome.overlay);
+    if (!version) return propagate(version);
+    const edit::Report& report = outcome.report;
+    proto::EditRecord& record = keeper_.record();
+    record.result_version = *version;
+    record.gaussians = {report.input_gaussians, report.output_gaussians, report.removed, report.copies,
+                        report.changeable};
+    for (const std::string& warning : report.warnings) keeper_.warn(warning);
+    stopped_early_ = outcome.stopped_early;
+    keeper_.finish();
+    return {};
+  }
+
+  [[nodiscard]] const std::string& scene_id() const { return *asked_.scene; }
+  [[nodiscard]] int version_number() const { return *asked_.version; }
+
+  JobContext& context_;
+  const Workshop& workshop_;
+  RecordKeeper keeper_;
+  proto::EditRequest asked_;
+  edit::Request request_;
+  std::vector<scene::Camera> cameras_;
+  std::shared_ptr<const scene::GaussianCloud> input_;
+  std::optional<IntervalPictures> pictures_;
+  int last_interval_ = 0;  ///< That this run has finished or taken over.
+  bool stopped_early_ = false;
+
+ public:
+  [[nodiscard]] bool stopped_early() const { return stopped_early_; }
+};
+
+}  // namespace
+
+std::optional<int> version_made_by(const scenes::SceneStore& scenes, const std::string& scene,
+                                   const std::string& edit) {
+  const auto info = scenes.find(scene);
+  if (!info) return std::nullopt;
+  for (const scenes::VersionInfo& version : info->versions)
+    if (version.edit == edit) return version.version;
+  return std::nullopt;
+}
+
+Result<JobResult> carry_out(JobContext& context, const Workshop& workshop) {
+  yield_to_others();
+  try {
+    Run run(context, workshop);
+    if (const auto done = run(); !done) {
+      if (done.error().code != ErrorCode::cancelled) log(workshop, spdlog::level::err, context, done.error().message);
+      return propagate(done);
+    }
+    log(workshop, spdlog::level::info, context, "done");
+    return JobResult{.text = {}, .stopped_early = run.stopped_early()};
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::too_large,
+                "the edit needs more memory than this machine has left: choose smaller radii, fewer views or a smaller "
+                "max_image_side, or edit a smaller scene");
+  }
+}
+
+}  // namespace server::edits

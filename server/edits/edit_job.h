@@ -1,0 +1,34 @@
+// One edit as a job: from a version of a scene to the next one, interval by interval.
+#pragma once
+
+#include <spdlog/logger.h>
+
+#include "engine/core/parallel.h"
+#include "engine/jobs/worker.h"
+#include "server/edits/gate.h"
+#include "server/scenes/scene_store.h"
+
+namespace server::edits {
+
+/// What an edit works with; all of it outlives the job.
+struct Workshop {
+  scenes::SceneStore& scenes;
+  engine::WorkArena& arena;
+  Gate& results;                     ///< An edit owns its id while it publishes its result: who cancels it shares it.
+  spdlog::logger* logger = nullptr;  ///< May be null.
+  int pictured_views = 4;            ///< Of each interval.
+};
+
+/// The version of a scene that an edit has made; nothing if it has not made one.
+[[nodiscard]] std::optional<int> version_made_by(const scenes::SceneStore& scenes, const std::string& scene,
+                                                 const std::string& edit);
+
+/// Carries out the job whose payload is an edit request with scene and version; its progress is a proto::EditRecord.
+/// Goes on after the last checkpoint. Where that cannot be used, it begins again, to the same bytes. The thread is
+/// given a low priority by the operating system, for good.
+///   errors  those of the engine, with their addresses; of the scene store; no_space, unavailable: a picture or a
+///           checkpoint cannot be written; too_large: out of memory
+[[nodiscard]] engine::Result<engine::jobs::JobResult> carry_out(engine::jobs::JobContext& context,
+                                                                const Workshop& workshop);
+
+}  // namespace server::edits

@@ -1,0 +1,402 @@
+#include "server/edits/edit_service.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "engine/edit/handles.h"
+#include "engine/edit/preview.h"
+#include "engine/jobs/durable_file.h"
+#include "engine/jobs/sqlite_store.h"
+#include "engine/jobs/worker.h"
+#include "engine/render/forward.h"
+#include "proto/time_text.h"
+#include "server/edits/convert.h"
+#include "server/edits/edit_job.h"
+#include "server/edits/estimate.h"
+#include "server/edits/gate.h"
+#include "server/edits/interval_pictures.h"
+#include "server/edits/status.h"
+#include "server/scenes/plain_error.h"
+
+namespace server::edits {
+namespace {
+
+namespace edit = engine::edit;
+namespace jobs = engine::jobs;
+namespace scene = engine::scene;
+using engine::ErrorCode;
+using engine::fail;
+using engine::propagate;
+using std::chrono::steady_clock;
+
+constexpr std::size_t all_jobs = 1'000'000;
+constexpr int probe_side = 256;  // pixels
+constexpr auto result_is_recorded_within = std::chrono::seconds(2);
+
+double seconds_since(steady_clock::time_point start) {
+  return std::chrono::duration<double>(steady_clock::now() - start).count();
+}
+
+/// The highest number of an edit that has made a version. A store of records that is new, because an old one was lost,
+/// must not give it away again: its edit would seem to have its result already.
+std::int64_t highest_edit(const scenes::SceneStore& scenes) {
+  std::int64_t highest = 0;
+  for (const scenes::SceneInfo& info : scenes.list())
+    for (const scenes::VersionInfo& version : info.versions)
+      highest = std::max(highest, jobs::number_of(version.edit).value_or(0));
+  return highest;
+}
+
+/// The answer about a job, in the words of those who ask about edits.
+Result<jobs::Job> about_edit(Result<jobs::Job> job, const std::string& id) {
+  if (job) return job;
+  if (job.error().code == ErrorCode::not_found)
+    job.error().message = "there is no edit \"" + id + "\"; ended ones are removed after a while";
+  if (job.error().where == id) job.error().where = "edit";
+  return job;
+}
+
+Result<proto::EditStatus> shown(const Result<jobs::Job>& job) {
+  return job.map([](const jobs::Job& known) { return status_of(known); });
+}
+
+/// The request with the scene and version it is about always there: what a job's payload says.
+Result<proto::EditRequest> canonical(proto::EditRequest request) {
+  if (!request.scene)
+    return fail(ErrorCode::invalid_argument, "say which scene to edit: its id, such as \"s000001\"", "scene");
+  if (!request.version) request.version = 0;
+  return request;
+}
+
+/// A request that can be carried out, with what was found out on the way.
+struct Checked {
+  edit::Request request;
+  scenes::LoadedVersion version;
+  edit::PreviewOutcome preview;
+
+  [[nodiscard]] proto::EditRequest resolved_for(const proto::EditRequest& asked) const {
+    edit::Params params = request.params;
+    params.intervals = preview.intervals;
+    return resolved(asked, params);
+  }
+  [[nodiscard]] std::vector<proto::HandleCount> handles() const {
+    std::vector<proto::HandleCount> counts;
+    for (const std::size_t count : preview.counts) counts.push_back({count});
+    return counts;
+  }
+  [[nodiscard]] std::vector<std::string> warnings(const proto::EditRequest& asked) const {
+    std::vector<std::string> all = preview.warnings;
+    for (std::string& warning : warnings_about(asked)) all.push_back(std::move(warning));
+    return all;
+  }
+};
+
+Result<Checked> check(scenes::SceneStore& scenes, const proto::EditRequest& asked) {
+  auto request = to_engine(asked);
+  if (!request) return propagate(request);
+  if (const auto valid = edit::validate(*request); !valid) return propagate(valid);
+  auto version = scenes.load(*asked.scene, std::to_string(*asked.version));
+  if (!version) return propagate(version);
+  auto preview = edit::preview(version->cloud, *request);
+  if (!preview) return propagate(preview);
+  return Checked{std::move(*request), std::move(*version), std::move(*preview)};
+}
+
+/// The cameras that the edit would choose from; without a dataset, one that stands for its virtual ones.
+struct Candidates {
+  std::vector<scene::Camera> cameras;
+  std::size_t count = 0, usable = 0;
+  bool are_virtual = false;
+};
+
+Result<Candidates> candidates_for(scenes::SceneStore& scenes, const std::string& scene_id, const edit::Params& params) {
+  const auto dataset = scenes.dataset(scene_id);
+  if (!dataset) return propagate(dataset);
+  Candidates found;
+  if (*dataset) {
+    for (const auto& view : (*dataset)->views) {
+      found.cameras.push_back(view.camera);
+      const auto& excluded = params.exclude_views;
+      if (std::find(excluded.begin(), excluded.end(), view.camera.name) == excluded.end()) ++found.usable;
+    }
+    found.count = found.cameras.size();
+  }
+  if (!found.cameras.empty()) return found;
+  const auto info = scenes.find(scene_id);
+  if (!info) return propagate(info);
+  const double distance = std::max(3 * info->radius, 1.0);
+  found.cameras.push_back(scene::look_at(info->centre - engine::DVec3(0, 0, distance), info->centre,
+                                         info->up.value_or(edit::Request().up), 0.87, params.max_image_side,
+                                         params.max_image_side));
+  found.count = found.usable = std::size_t(params.views);
+  found.are_virtual = true;
+  return found;
+}
+
+/// The better of two, seconds: the first one also warms up.
+double frame_time(const scene::GaussianCloud& cloud, const scene::Camera& camera) {
+  double best = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 2; ++i) {
+    const auto start = steady_clock::now();
+    (void)engine::render::forward(cloud, camera);
+    best = std::min(best, seconds_since(start));
+  }
+  return best;
+}
+
+}  // namespace
+
+struct EditService::Impl {
+  Impl(scenes::SceneStore& store, ServiceOptions given)
+      : scenes(store), options(std::move(given)), arena(options.threads, engine::Priority::low) {}
+
+  [[nodiscard]] std::filesystem::path jobs_folder() const { return options.folder / "jobs"; }
+
+  Result<void> open() {
+    auto opened = jobs::SqliteStore::open({.folder = options.folder, .used_numbers = highest_edit(scenes)});
+    if (!opened) return propagate(opened);
+    records = std::move(*opened);
+    auto made = jobs::Queue::open(
+        *records, {.folder = jobs_folder(), .max_queued = options.max_queued, .retention = options.retention});
+    if (!made) return propagate(made);
+    queue = std::move(*made);
+    worker.emplace(*queue, [workshop = Workshop{scenes, arena, results, options.logger, options.pictured_views}](
+                               jobs::JobContext& context) { return carry_out(context, workshop); });
+    return {};
+  }
+
+  /// The edit of an idempotency key, if the key is known; an error if it came with another request.
+  Result<std::optional<jobs::Job>> earlier(const std::string& key, const jobs::NewJob& job) {
+    if (key.empty()) return std::nullopt;
+    auto known = queue->find_key(key);
+    if (known && *known && ((*known)->payload != job.payload || (*known)->lane != job.lane))
+      return fail(ErrorCode::unprocessable,
+                  "this idempotency key came with another request before, edit " + (*known)->id +
+                      ": use a new key for a new request",
+                  "Idempotency-Key");
+    return known;
+  }
+
+  /// An edit that has its result can no longer be cancelled, though its record may not say so yet.
+  Result<jobs::Job> refuse_to_cancel(const std::string& id) {
+    const auto deadline = steady_clock::now() + result_is_recorded_within;
+    for (auto seen = queue->version(); steady_clock::now() < deadline;
+         seen = queue->wait_for_change(seen, std::chrono::milliseconds(100))) {
+      const auto job = queue->find(id);
+      if (!job || jobs::is_final(job->state)) break;
+    }
+    return fail(ErrorCode::conflict, id + " has its result already: it stays as it is", "edit");
+  }
+
+  scenes::SceneStore& scenes;
+  const ServiceOptions options;
+  engine::WorkArena arena;
+  Gate scenes_in_use;  ///< Shared by scene while an edit of it is accepted, owned by while_idle().
+  Gate results;        ///< By edit; see Workshop.
+  std::unique_ptr<jobs::SqliteStore> records;
+  std::unique_ptr<jobs::Queue> queue;
+  std::optional<jobs::Worker> worker;  ///< Last: it uses all of the above until it ends.
+};
+
+EditService::EditService(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+EditService::~EditService() = default;
+
+Result<std::unique_ptr<EditService>> EditService::open(scenes::SceneStore& scenes, const ServiceOptions& options) {
+  auto impl = std::make_unique<Impl>(scenes, options);
+  if (auto opened = impl->open(); !opened) return propagate(opened);
+  return std::unique_ptr<EditService>(new EditService(std::move(impl)));
+}
+
+Result<EditService::Submission> EditService::submit(const proto::EditRequest& request,
+                                                    const std::string& idempotency_key) {
+  const auto asked = canonical(request);
+  if (!asked) return propagate(asked);
+  const jobs::NewJob job{.lane = *asked->scene, .payload = proto::to_json(*asked), .idempotency_key = idempotency_key};
+  const auto earlier = impl_->earlier(idempotency_key, job);
+  if (!earlier) return propagate(earlier);
+  if (*earlier) return Submission{status_of(**earlier), false};
+  const auto hold = impl_->scenes_in_use.share(*asked->scene);
+  if (const auto checked = check(impl_->scenes, *asked); !checked) return propagate(checked);
+  const auto submission = impl_->queue->submit(job);
+  if (!submission) return propagate(submission);
+  return Submission{status_of(submission->job), submission->created};
+}
+
+Result<proto::EditEstimate> EditService::estimate(const proto::EditRequest& request) {
+  const auto asked = canonical(request);
+  if (!asked) return propagate(asked);
+  const auto checked = check(impl_->scenes, *asked);
+  if (!checked) return propagate(checked);
+  const edit::Params& params = checked->request.params;
+  const auto candidates = candidates_for(impl_->scenes, *asked->scene, params);
+  if (!candidates) return propagate(candidates);
+
+  const scene::LayeredCloud& cloud = checked->version.cloud;
+  const scene::Camera& camera = candidates->cameras[candidates->cameras.size() / 2];
+  const scene::Camera view = scene::fit_within(camera, params.max_image_side);
+  const scene::Camera probe = scene::fit_within(camera, std::min(probe_side, params.max_image_side));
+  Workload work;
+  work.gaussians = cloud.size();
+  work.row_bytes = cloud.base->size() == 0 ? 0 : scene::memory_bytes(*cloud.base) / cloud.base->size();
+  work.layered = cloud.overlay != nullptr;
+  for (const std::size_t count : checked->preview.counts) work.dragged += count;
+  work.copies = checked->preview.overlay.added();
+  work.intervals = checked->preview.intervals;
+  work.iterations = std::size_t(params.iterations) * std::size_t(params.annealing_steps);
+  work.candidates = candidates->count;
+  work.virtual_views = candidates->are_virtual;
+  work.views = std::min(candidates->usable, std::size_t(params.views));
+  work.pictured = std::min(work.views, std::size_t(std::max(0, impl_->options.pictured_views)));
+  work.view_pixels = std::size_t(view.width) * std::size_t(view.height);
+  work.probe_pixels = std::size_t(probe.width) * std::size_t(probe.height);
+  work.probe_seconds = frame_time(*cloud.base, probe);
+
+  proto::EditEstimate estimate;
+  estimate.handles = checked->handles();
+  estimate.views = work.views;
+  estimate.intervals = work.intervals;
+  estimate.seconds = std::round(100 * estimated_seconds(work)) / 100;
+  estimate.memory_bytes = estimated_bytes(work);
+  estimate.request = checked->resolved_for(*asked);
+  estimate.warnings = checked->warnings(*asked);
+  return estimate;
+}
+
+Result<proto::Preview> EditService::preview(const proto::EditRequest& request) {
+  const auto start = steady_clock::now();
+  const auto asked = canonical(request);
+  if (!asked) return propagate(asked);
+  const auto checked = check(impl_->scenes, *asked);
+  if (!checked) return propagate(checked);
+  const edit::PreviewOutcome& outcome = checked->preview;
+  const auto added = impl_->scenes.add_preview(*asked->scene, *asked->version, outcome.overlay);
+  if (!added) return propagate(added);
+
+  proto::Preview preview;
+  preview.scene = *asked->scene;
+  preview.version = added->version;
+  preview.parent = *asked->version;
+  preview.expires = proto::rfc3339(added->expires);
+  preview.handles = checked->handles();
+  for (const engine::DVec3& p : outcome.positions) preview.positions.push_back({p.x, p.y, p.z});
+  preview.intervals = outcome.intervals;
+  const std::size_t input = checked->version.cloud.size();
+  const std::size_t removed = outcome.overlay.removed.size(), copies = outcome.overlay.added();
+  preview.gaussians = {input, input - removed + copies, removed, copies, outcome.changeable};
+  preview.warnings = checked->warnings(*asked);
+  preview.seconds = seconds_since(start);
+  return preview;
+}
+
+Result<proto::EditStatus> EditService::find(const std::string& id) {
+  return shown(about_edit(impl_->queue->find(id), id));
+}
+
+Result<std::vector<proto::EditStatus>> EditService::list(const Filter& filter) {
+  const auto found =
+      impl_->queue->list({.lane = filter.scene, .active_only = filter.active_only, .limit = filter.limit});
+  if (!found) return propagate(found);
+  std::vector<proto::EditStatus> edits;
+  for (const jobs::Job& listed : *found) {
+    const auto job = impl_->queue->find(listed.id);                  // a list has no payloads
+    if (!job && job.error().code == ErrorCode::not_found) continue;  // removed meanwhile
+    if (!job) return propagate(job);
+    edits.push_back(status_of(*job));
+  }
+  return edits;
+}
+
+Result<proto::EditStatus> EditService::stop(const std::string& id) {
+  return shown(about_edit(impl_->queue->stop(id), id));
+}
+
+Result<proto::EditStatus> EditService::cancel(const std::string& id) {
+  const auto job = about_edit(impl_->queue->find(id), id);
+  if (!job) return propagate(job);
+  {
+    const auto hold = impl_->results.share(id);
+    if (jobs::is_final(job->state) || !version_made_by(impl_->scenes, job->lane, id))
+      return shown(about_edit(impl_->queue->cancel(id), id));
+  }
+  return shown(impl_->refuse_to_cancel(id));
+}
+
+Result<void> EditService::remove(const std::string& id) {
+  if (const auto job = about_edit(impl_->queue->find(id), id); !job) return propagate(job);
+  auto removed = impl_->queue->remove(id);
+  if (!removed && removed.error().where == id) removed.error().where = "edit";
+  return removed;
+}
+
+Result<std::string> EditService::interval_picture(const std::string& id, int interval, int view,
+                                                  const std::string& stage) {
+  const auto status = find(id);
+  if (!status) return propagate(status);
+  const auto& finished = status->finished_intervals;
+  const auto of_interval =
+      std::find_if(finished.begin(), finished.end(), [&](const auto& known) { return known.interval == interval; });
+  if (of_interval == finished.end())
+    return fail(ErrorCode::not_found,
+                id + " has no finished interval " + std::to_string(interval) + "; finished so far: " +
+                    (finished.empty() ? "none" : "1 to " + std::to_string(finished.back().interval)),
+                "interval");
+  const auto& renders = of_interval->renders;
+  if (view < 0 || std::size_t(view) >= renders.size())
+    return fail(ErrorCode::not_found,
+                "interval " + std::to_string(interval) + " of " + id + " has pictures of " +
+                    std::to_string(renders.size()) + " views, counted from 0",
+                "render");
+  const auto& stages = renders[std::size_t(view)].stages;
+  if (std::find(stages.begin(), stages.end(), stage) == stages.end()) {
+    std::string names;
+    for (const std::string& name : stages) names += (names.empty() ? "" : ", ") + name;
+    return fail(ErrorCode::not_found, "there is no picture of this stage; there are: " + names, "stage");
+  }
+  auto bytes = jobs::read_bytes(impl_->jobs_folder() / id / picture_name(interval, std::size_t(view), stage));
+  if (!bytes) return fail(bytes.error().code, "the picture is gone: " + bytes.error().message, id);
+  return bytes;
+}
+
+Result<void> EditService::while_idle(const std::string& scene, const std::function<Result<void>()>& change) {
+  const auto hold = impl_->scenes_in_use.own(scene);
+  const auto active = impl_->queue->list({.lane = scene, .active_only = true, .limit = 1});
+  if (!active) return propagate(active);
+  if (!active->empty())
+    return fail(ErrorCode::conflict,
+                active->front().id + ", an edit of this scene, is " + std::string(to_string(active->front().state)) +
+                    ": cancel it, or wait for its end",
+                scene);
+  return change();
+}
+
+Result<void> EditService::remove_scene(const std::string& scene) {
+  return while_idle(scene, [&] { return impl_->scenes.remove(scene); });
+}
+
+std::uint64_t EditService::version() const { return impl_->queue->version(); }
+
+std::uint64_t EditService::wait_for_change(std::uint64_t seen, std::chrono::milliseconds timeout) const {
+  return impl_->queue->wait_for_change(seen, timeout);
+}
+
+std::optional<engine::Error> EditService::trouble() const {
+  auto trouble = impl_->worker->trouble();
+  if (trouble) trouble = scenes::without_folder(std::move(*trouble), impl_->options.folder);
+  return trouble;
+}
+
+std::map<std::string, std::size_t> EditService::counts() {
+  std::map<std::string, std::size_t> counts;
+  for (int state = 0; state < jobs::state_count; ++state) counts[std::string(to_string(jobs::State(state)))] = 0;
+  const auto found = impl_->queue->list({.limit = all_jobs});
+  if (!found) return counts;
+  for (const jobs::Job& job : *found) ++counts[std::string(to_string(job.state))];
+  return counts;
+}
+
+void EditService::drain(std::chrono::milliseconds grace) { impl_->worker->drain(grace); }
+
+}  // namespace server::edits

@@ -1,0 +1,100 @@
+// Edits as a service: checked and accepted at once, carried out one after the other, durable at every interval.
+#pragma once
+
+#include <spdlog/logger.h>
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/core/parallel.h"
+#include "engine/core/result.h"
+#include "engine/jobs/queue.h"
+#include "proto/edit_request.h"
+#include "proto/edit_status.h"
+#include "server/scenes/scene_store.h"
+
+namespace server::edits {
+
+using engine::Result;
+
+struct ServiceOptions {
+  std::filesystem::path folder;  ///< <data-dir>/edits: job records and what running edits need.
+  std::size_t max_queued = 32;
+  engine::jobs::Retention retention = {};
+  int pictured_views = 4;            ///< Of each interval, for its intermediate renders.
+  int threads = 0;                   ///< 0: as many as the machine has cores.
+  spdlog::logger* logger = nullptr;  ///< Is told what becomes of edits; outlives the service. Null: nobody is.
+};
+
+/// Safe to call from any thread.
+class EditService {
+ public:
+  /// Takes up what was left unfinished.
+  ///   scenes  outlives the service
+  [[nodiscard]] static Result<std::unique_ptr<EditService>> open(scenes::SceneStore& scenes,
+                                                                 const ServiceOptions& options);
+  ~EditService();
+
+  struct Submission {
+    proto::EditStatus status;
+    bool created = true;  ///< false: the idempotency key had been used for this very request.
+  };
+  /// Accepts an edit: on disk when this returns. The scene, its version and every field are checked first, and each
+  /// handle is held against the scene.
+  ///   errors  invalid_argument, not_found (`where` "scene", "version"), unprocessable (a handle without Gaussians; a
+  ///           key used for another request), unsupported, busy
+  [[nodiscard]] Result<Submission> submit(const proto::EditRequest& request, const std::string& idempotency_key);
+  /// What submit() would do, and what it would cost. Errors as submit().
+  [[nodiscard]] Result<proto::EditEstimate> estimate(const proto::EditRequest& request);
+  /// The deformation alone, at once. Errors as submit().
+  [[nodiscard]] Result<proto::Preview> preview(const proto::EditRequest& request);
+
+  [[nodiscard]] Result<proto::EditStatus> find(const std::string& id);
+  struct Filter {
+    std::optional<std::string> scene = {};
+    bool active_only = false;
+    std::size_t limit = 100;
+  };
+  /// Youngest first.
+  [[nodiscard]] Result<std::vector<proto::EditStatus>> list(const Filter& filter);
+  [[nodiscard]] Result<proto::EditStatus> stop(const std::string& id);
+  [[nodiscard]] Result<proto::EditStatus> cancel(const std::string& id);
+  [[nodiscard]] Result<void> remove(const std::string& id);
+  /// A picture of a finished interval: JPEG bytes.
+  ///   stage   "before", "deformed", "corrected", "optimised"
+  ///   errors  not_found: no such interval, view or stage (the message lists those there are)
+  [[nodiscard]] Result<std::string> interval_picture(const std::string& id, int interval, int view,
+                                                     const std::string& stage);
+  /// Makes a change to a scene that no edit of it may see half-way: none waits or runs while `change` is at work.
+  ///   errors  conflict: names the edit; those of `change`
+  [[nodiscard]] Result<void> while_idle(const std::string& scene, const std::function<Result<void>()>& change);
+  /// Removes a scene, unless an edit of it waits or runs. Errors as while_idle().
+  [[nodiscard]] Result<void> remove_scene(const std::string& scene);
+
+  /// Counts changes of any edit; wait_for_change() returns when it is not `seen` any more, or after `timeout`.
+  [[nodiscard]] std::uint64_t version() const;
+  std::uint64_t wait_for_change(std::uint64_t seen, std::chrono::milliseconds timeout) const;
+
+  /// What keeps edits from being carried out, if anything does; names no folder of this machine.
+  [[nodiscard]] std::optional<engine::Error> trouble() const;
+  /// How many edits are in each state, by its name.
+  [[nodiscard]] std::map<std::string, std::size_t> counts();
+  /// Takes no more edits up; the running one ends at its next interval, or when `grace` is over, and goes on after the
+  /// next start.
+  void drain(std::chrono::milliseconds grace);
+
+ private:
+  struct Impl;
+  explicit EditService(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace server::edits

@@ -1,0 +1,70 @@
+#include "server/edits/interval_pictures.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "engine/io/image_file.h"
+#include "engine/jobs/durable_file.h"
+#include "engine/render/forward.h"
+
+namespace server::edits {
+namespace {
+
+constexpr int jpeg_quality = 90;
+
+}  // namespace
+
+std::string picture_name(int interval, std::size_t view, std::string_view stage) {
+  return "interval-" + std::to_string(interval) + "-view-" + std::to_string(view) + "-" + std::string(stage) + ".jpg";
+}
+
+IntervalPictures::IntervalPictures(std::filesystem::path folder, const engine::scene::GaussianCloud& input, int views)
+    : folder_(std::move(folder)), input_(input), count_(std::size_t(std::max(0, views))) {}
+
+Result<void> IntervalPictures::add(const engine::edit::Moment& moment) {
+  if (moment.interval != interval_) {
+    interval_ = moment.interval;
+    renders_.clear();
+  }
+  const std::size_t count = std::min(count_, moment.views.size());
+  if (count == 0) return {};
+  if (jpegs_.size() != count || shown_ != moment.overlay)
+    if (auto rendered = render(moment); !rendered) return rendered;
+  Result<void> written = engine::jobs::create_folder(folder_);
+  for (std::size_t v = 0; written && v < count; ++v)
+    written = engine::jobs::write_durably(folder_ / picture_name(moment.interval, v, moment.stage), jpegs_[v]);
+  if (!written)
+    return engine::fail(written.error().code, "the pictures of interval " + std::to_string(moment.interval) +
+                                                  " cannot be kept: " + written.error().message);
+  renders_.resize(count);
+  for (std::size_t v = 0; v < count; ++v) {
+    renders_[v].view = moment.views[v].name;
+    renders_[v].stages.push_back(moment.stage);
+  }
+  return {};
+}
+
+Result<void> IntervalPictures::render(const engine::edit::Moment& moment) {
+  const bool as_it_came = moment.overlay.removed.empty() && moment.overlay.rows.size() == 0;
+  engine::scene::GaussianCloud edited;
+  if (!as_it_came) edited = engine::scene::flatten(input_, moment.overlay);
+  const engine::scene::GaussianCloud& cloud = as_it_came ? input_ : edited;
+  jpegs_.clear();
+  engine::render::Workspace workspace;
+  engine::render::Rendering picture;
+  for (std::size_t v = 0; v < std::min(count_, moment.views.size()); ++v) {
+    engine::render::forward(cloud, moment.views[v], {}, {}, workspace, picture);
+    const auto bytes =
+        engine::io::encode_image(picture.color, engine::io::ImageFormat::jpeg, {.jpeg_quality = jpeg_quality});
+    if (!bytes) return engine::propagate(bytes);
+    jpegs_.emplace_back(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+  }
+  shown_ = moment.overlay;
+  return {};
+}
+
+std::vector<proto::IntervalRender> IntervalPictures::of(int interval) const {
+  return interval == interval_ ? renders_ : std::vector<proto::IntervalRender>{};
+}
+
+}  // namespace server::edits

@@ -1,0 +1,106 @@
+#include "server/edits/record_keeper.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace server::edits {
+namespace {
+
+using namespace std::chrono_literals;
+using Seconds = std::chrono::duration<double>;
+
+constexpr auto publish_every = 100ms;  // ten pictures a second look alive; each costs a JSON text
+constexpr double most_before_the_end = 0.99;
+
+double rounded(double value, double unit) { return std::round(value / unit) * unit; }
+
+}  // namespace
+
+RecordKeeper::RecordKeeper(proto::EditRecord record, Publish publish, Clock clock)
+    : record_(std::move(record)),
+      publish_(std::move(publish)),
+      clock_(std::move(clock)),
+      since_(clock_()),
+      published_(since_ - publish_every),
+      base_time_(since_) {
+  record_.stage.clear();
+  record_.eta_seconds.reset();
+}
+
+void RecordKeeper::enter(const std::string& stage) {
+  if (stage == record_.stage) return;
+  count_time();
+  record_.stage = stage;
+  publish();
+}
+
+void RecordKeeper::advance(const engine::edit::Progress& progress) {
+  const bool another_interval = progress.interval != record_.interval;
+  record_.interval = progress.interval;
+  record_.intervals = progress.intervals > 0 ? progress.intervals : record_.intervals;
+  record_.progress = std::max(record_.progress, std::min(rounded(progress.fraction, 1e-4), most_before_the_end));
+  // A run that goes on with an interval jumps there: only from then on does its pace mean anything.
+  if (base_interval_ == 0 && progress.interval > 0) {
+    if (progress.interval > 1) base_time_ = clock_(), base_fraction_ = progress.fraction;
+    base_interval_ = progress.interval;
+  }
+  if (progress.stage != record_.stage) {
+    count_time();
+    record_.stage = progress.stage;
+  } else if (!another_interval && clock_() - published_ < publish_every) {
+    return;
+  }
+  guess_time_left(progress.fraction);
+  publish();
+}
+
+void RecordKeeper::guess_time_left(double fraction) {
+  const double elapsed = Seconds(clock_() - base_time_).count(), done = fraction - base_fraction_;
+  // A guess from less than this would be noise.
+  if (done < 0.05 || elapsed < 1) return;
+  record_.eta_seconds = rounded(elapsed * (1 - fraction) / done, 0.1);
+}
+
+void RecordKeeper::add(proto::FinishedInterval finished) {
+  auto& all = record_.finished_intervals;
+  const auto at = std::lower_bound(all.begin(), all.end(), finished.interval,
+                                   [](const auto& known, int interval) { return known.interval < interval; });
+  if (at != all.end() && at->interval == finished.interval) {
+    *at = std::move(finished);
+  } else {
+    all.insert(at, std::move(finished));
+  }
+}
+
+void RecordKeeper::warn(const std::string& warning) {
+  auto& all = record_.warnings;
+  if (std::find(all.begin(), all.end(), warning) == all.end()) all.push_back(warning);
+}
+
+void RecordKeeper::publish() {
+  count_time();
+  published_ = clock_();
+  publish_(proto::to_json(record_));
+}
+
+void RecordKeeper::finish() {
+  count_time();
+  record_.stage.clear();
+  record_.eta_seconds.reset();
+  record_.progress = 1;
+  publish();
+}
+
+void RecordKeeper::count_time() {
+  const TimePoint now = clock_();
+  const double seconds = Seconds(now - since_).count();
+  since_ = now;
+  if (record_.stage.empty()) return;
+  auto& all = record_.timings;
+  auto found = std::find_if(all.begin(), all.end(), [&](const auto& timing) { return timing.stage == record_.stage; });
+  if (found == all.end()) found = all.insert(all.end(), {record_.stage, 0});
+  found->seconds += seconds;
+}
+
+}  // namespace server::edits

@@ -1,0 +1,54 @@
+// The Call that handlers see, over a connection.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "server/http/connection.h"
+#include "server/http/dispatcher.h"
+#include "server/http/route_table.h"
+#include "server/http/router.h"
+
+namespace server::http {
+
+/// The rest of a body, at most `limit` bytes.
+///   option  names the limit in messages
+///   errors  too_large, invalid_argument: it ended early or its framing is broken
+[[nodiscard]] Result<std::string> read_text(Connection& connection, std::uint64_t limit, const std::string& option);
+
+class HttpCall final : public Call {
+ public:
+  struct Parts {
+    const RequestHead& head;
+    const std::string& request_id;
+    PathValues path;
+    std::map<std::string, std::string, std::less<>> query;
+    std::string body;
+    bool is_json = false;
+    Connection& connection;
+    FormReader& form;
+    std::uint64_t max_upload_bytes;
+  };
+  explicit HttpCall(Parts parts) : parts_(std::move(parts)) {}
+
+  [[nodiscard]] const std::string& request_id() const override { return parts_.request_id; }
+  [[nodiscard]] const std::string& path(std::string_view name) const override;
+  [[nodiscard]] std::optional<std::string> query(std::string_view name) const override;
+  [[nodiscard]] std::string header(std::string_view name) const override;
+  [[nodiscard]] const std::string& body() const override { return parts_.body; }
+  [[nodiscard]] bool is_json() const override { return parts_.is_json; }
+  [[nodiscard]] Result<Received> receive(const std::filesystem::path& file) const override;
+  [[nodiscard]] bool has(const std::string& etag) const override;
+  [[nodiscard]] bool accepts(std::string_view media_type) const override;
+
+ private:
+  [[nodiscard]] Result<Received> receive_raw(class UploadFile& file) const;
+  [[nodiscard]] Result<Received> receive_form(class UploadFile& file) const;
+
+  Parts parts_;
+};
+
+}  // namespace server::http

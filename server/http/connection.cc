@@ -1,0 +1,289 @@
+#include "server/http/connection.h"
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+
+namespace server::http {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::size_t receive_bytes = 64 * 1024;
+constexpr std::size_t max_chunk_line = 256;  // a size and what extensions follow it
+constexpr std::size_t max_trailer_bytes = 8 * 1024;
+constexpr std::size_t max_empty_lines = 2;  // before a request (RFC 9112, section 2.2)
+constexpr auto crowd_check = 50ms;
+constexpr auto linger_time = 1s;
+constexpr std::string_view continue_line = "HTTP/1.1 100 Continue\r\n\r\n";
+
+bool would_block() { return errno == EAGAIN || errno == EWOULDBLOCK; }
+
+int milliseconds_until(std::chrono::steady_clock::time_point until) {
+  const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - std::chrono::steady_clock::now());
+  return int(std::clamp<std::int64_t>(left.count(), 0, 3'600'000));
+}
+
+Refusal not_http() { return {400, "invalid_argument", "that is no HTTP request", ""}; }
+
+}  // namespace
+
+Connection::Connection(int socket, const ConnectionLimits& limits, Surroundings surroundings)
+    : socket_(socket), limits_(limits), surroundings_(std::move(surroundings)) {}
+
+Connection::~Connection() { ::close(socket_); }
+
+bool Connection::stopping() const {
+  pollfd stop{surroundings_.stop_fd, POLLIN, 0};
+  return surroundings_.stop_fd >= 0 && ::poll(&stop, 1, 0) > 0;
+}
+
+Connection::Wait Connection::wait(short events, Clock::time_point until, bool watch_stop) const {
+  std::array<pollfd, 2> watched{{{socket_, events, 0}, {watch_stop ? surroundings_.stop_fd : -1, POLLIN, 0}}};
+  // Time that is over is over even if there is something to read: a client that always has a byte more gains none.
+  while (Clock::now() < until) {
+    const int ready = ::poll(watched.data(), watched.size(), milliseconds_until(until));
+    if (ready < 0 && errno == EINTR) continue;
+    if (watched[1].revents != 0) return Wait::stopping;
+    if (ready != 0) return Wait::ready;
+  }
+  return Wait::timeout;
+}
+
+Connection::Wait Connection::wait_while_idle(Clock::time_point until) const {
+  const auto patient_until = Clock::now() + limits_.patience_when_crowded;
+  for (;;) {
+    const Wait waited = wait(POLLIN, std::min<Clock::time_point>(until, Clock::now() + crowd_check), true);
+    if (waited != Wait::timeout || Clock::now() >= until) return waited;
+    // One that has had an answer, or has had the time to begin a request and did not, can do without its thread;
+    // clients know to try again on a new connection.
+    const bool has_had_its_turn = answered_ || Clock::now() >= patient_until;
+    if (has_had_its_turn && surroundings_.crowded && surroundings_.crowded()) return Wait::timeout;
+  }
+}
+
+/// Appends what has arrived to the input. 0: the client has closed; -1: nothing there, or a failure.
+std::ptrdiff_t Connection::receive() {
+  if (consumed_ > 0) {
+    input_.erase(0, consumed_);
+    consumed_ = 0;
+  }
+  const std::size_t before = input_.size();
+  input_.resize(before + receive_bytes);
+  const ssize_t got = ::recv(socket_, input_.data() + before, receive_bytes, 0);
+  const int error = errno;
+  input_.resize(before + std::size_t(std::max<ssize_t>(got, 0)));
+  errno = error;
+  return got;
+}
+
+tl::expected<std::optional<std::string>, Refusal> Connection::read_head() {
+  std::optional<Clock::time_point> until;  // of the head; none before its first byte
+  const auto idle_until = Clock::now() + limits_.idle_timeout;
+  std::size_t searched = 0, empty_lines = 0;
+  for (;;) {
+    for (; std::string_view(input_).substr(consumed_).starts_with("\r\n"); consumed_ += 2)
+      if (++empty_lines > max_empty_lines) return tl::make_unexpected(not_http());
+    const std::string_view arrived = std::string_view(input_).substr(consumed_);
+    // What does not begin like a method is no HTTP (a TLS handshake, say), and need not be waited for.
+    if (!arrived.empty() && arrived != "\r" && !(arrived.front() >= 'A' && arrived.front() <= 'Z'))
+      return tl::make_unexpected(not_http());
+    const std::size_t end = arrived.find("\r\n\r\n", searched);
+    const std::size_t length = end == std::string_view::npos ? arrived.size() : end + 4;
+    if (length + 2 * empty_lines > limits_.max_head_bytes)
+      return tl::make_unexpected(Refusal{
+          431, "too_large", "the head of a request may have " + std::to_string(limits_.max_head_bytes) + " bytes", ""});
+    if (end != std::string_view::npos) {
+      std::string head(arrived.substr(0, length));
+      consumed_ += length;
+      return head;
+    }
+    searched = arrived.size() < 3 ? 0 : arrived.size() - 3;
+    if (!arrived.empty() && !until) until = Clock::now() + limits_.head_timeout;
+    const Wait waited = until ? wait(POLLIN, *until, true) : wait_while_idle(idle_until);
+    if (waited == Wait::stopping) return std::nullopt;
+    if (waited == Wait::timeout) {
+      if (!until) return std::nullopt;
+      return tl::make_unexpected(Refusal{408, "request_timeout", "the request's head did not arrive in time", ""});
+    }
+    const std::ptrdiff_t got = receive();
+    if (got == 0 || (got < 0 && !would_block() && errno != EINTR)) return std::nullopt;
+  }
+}
+
+void Connection::begin_body(const RequestHead& head) {
+  left_ = head.content_length.value_or(0);
+  framing_ = head.chunked ? Framing::chunk_size : left_ > 0 ? Framing::length : Framing::done;
+  trailer_bytes_ = 0;
+  owes_continue_ = head.expects_continue && framing_ != Framing::done;
+  waits_for_body_ = true;
+  failure_ = BodyFailure::none;
+  body_waited_ = {};
+  body_bytes_ = 0;
+}
+
+bool Connection::fail(BodyFailure failure) {
+  failure_ = failure;
+  return false;
+}
+
+bool Connection::too_slow(Clock::duration waited, std::uint64_t bytes) const {
+  if (waited <= limits_.rate_grace) return false;
+  return double(bytes) < std::chrono::duration<double>(waited).count() * double(limits_.min_bytes_per_second);
+}
+
+/// Waits for more of the body.
+bool Connection::more_body() {
+  if (owes_continue_) {
+    owes_continue_ = false;
+    if (!write(continue_line)) return fail(BodyFailure::truncated);
+  }
+  for (;;) {
+    const std::ptrdiff_t got = receive();
+    if (got > 0) {
+      body_bytes_ += std::uint64_t(got);
+      return true;
+    }
+    if (got == 0 || (!would_block() && errno != EINTR)) return fail(BodyFailure::truncated);
+    if (!waits_for_body_) return fail(BodyFailure::too_slow);
+    const auto began = Clock::now();
+    const Wait waited = wait(POLLIN, began + limits_.stall_timeout, false);
+    body_waited_ += Clock::now() - began;
+    if (waited == Wait::timeout || too_slow(body_waited_, body_bytes_)) return fail(BodyFailure::too_slow);
+  }
+}
+
+/// A line of chunked framing, without its CRLF.
+std::optional<std::string> Connection::body_line() {
+  for (;;) {
+    const std::string_view arrived = std::string_view(input_).substr(consumed_);
+    const std::size_t end = arrived.find("\r\n");
+    // Of a line that is not complete, the last byte may be half of its CRLF.
+    const bool ends_in_cr = end == std::string_view::npos && arrived.ends_with('\r');
+    if (std::min(end, arrived.size()) > max_chunk_line ||
+        !is_header_text(arrived.substr(0, std::min(end, arrived.size() - (ends_in_cr ? 1 : 0))))) {
+      failure_ = BodyFailure::malformed;
+      return std::nullopt;
+    }
+    if (end != std::string_view::npos) {
+      std::string line(arrived.substr(0, end));
+      consumed_ += end + 2;
+      return line;
+    }
+    if (!more_body()) return std::nullopt;
+  }
+}
+
+/// Reads framing up to the next byte of the body, or its end.
+bool Connection::next_chunk() {
+  if (framing_ == Framing::chunk_end) {
+    const auto line = body_line();
+    if (!line) return false;
+    if (!line->empty()) return fail(BodyFailure::malformed);
+    framing_ = Framing::chunk_size;
+  }
+  if (framing_ == Framing::chunk_size) {
+    const auto line = body_line();
+    if (!line) return false;
+    const auto read = std::from_chars(line->data(), line->data() + line->size(), left_, 16);
+    const std::string_view rest(read.ptr, std::size_t(line->data() + line->size() - read.ptr));
+    if (read.ec != std::errc{} || !(rest.empty() || trim(rest).starts_with(';'))) return fail(BodyFailure::malformed);
+    framing_ = left_ > 0 ? Framing::chunk_data : Framing::trailer;
+  }
+  while (framing_ == Framing::trailer) {
+    const auto line = body_line();
+    if (!line) return false;
+    trailer_bytes_ += line->size() + 2;
+    if (trailer_bytes_ > max_trailer_bytes) return fail(BodyFailure::malformed);
+    if (line->empty()) framing_ = Framing::done;
+  }
+  return true;
+}
+
+std::ptrdiff_t Connection::read_body(char* to, std::size_t size) {
+  if (failure_ != BodyFailure::none) return -1;
+  if (framing_ != Framing::length && framing_ != Framing::chunk_data && framing_ != Framing::done && !next_chunk())
+    return -1;
+  if (framing_ == Framing::done) return 0;
+  if (consumed_ == input_.size() && !more_body()) return -1;
+  const std::size_t taken = std::size_t(std::min<std::uint64_t>({size, input_.size() - consumed_, left_}));
+  std::memcpy(to, input_.data() + consumed_, taken);
+  consumed_ += taken;
+  left_ -= taken;
+  if (left_ == 0) framing_ = framing_ == Framing::length ? Framing::done : Framing::chunk_end;
+  return std::ptrdiff_t(taken);
+}
+
+bool Connection::finish_body(std::size_t most, bool wait) {
+  waits_for_body_ = wait;
+  if (framing_ == Framing::done) return true;
+  // A client that waits to be told to go on will not send what nobody asked for, or will: nobody knows. Close.
+  if (owes_continue_) return false;
+  std::array<char, 4096> forgotten;
+  for (std::size_t total = 0; total <= most;) {
+    const std::ptrdiff_t got = read_body(forgotten.data(), forgotten.size());
+    if (got <= 0) return got == 0;
+    total += std::size_t(got);
+  }
+  return false;
+}
+
+void Connection::begin_answer() {
+  answered_ = true;
+  write_waited_ = {};
+  written_ = 0;
+}
+
+bool Connection::write(std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t sent = ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    if (sent > 0) {
+      written_ += std::uint64_t(sent);
+      bytes.remove_prefix(std::size_t(sent));
+      continue;
+    }
+    if (sent < 0 && !would_block() && errno != EINTR) return false;
+    const auto began = Clock::now();
+    const Wait waited = wait(POLLOUT, began + limits_.stall_timeout, false);
+    write_waited_ += Clock::now() - began;
+    if (waited == Wait::timeout || too_slow(write_waited_, written_)) return false;
+  }
+  return true;
+}
+
+bool Connection::open() const {
+  if (stopping()) return false;
+  pollfd peer{socket_, 0, 0};  // POLLERR and POLLHUP come unasked
+  return ::poll(&peer, 1, 0) == 0;
+}
+
+void Connection::linger() {
+  ::shutdown(socket_, SHUT_WR);
+  const auto until = Clock::now() + linger_time;
+  std::array<char, 16 * 1024> forgotten;
+  while (Clock::now() < until && wait(POLLIN, until, true) == Wait::ready) {
+    const ssize_t got = ::recv(socket_, forgotten.data(), forgotten.size(), 0);
+    if (got == 0 || (got < 0 && !would_block() && errno != EINTR)) return;
+  }
+}
+
+std::string Connection::client() const {
+  sockaddr_storage address{};
+  socklen_t size = sizeof address;
+  if (::getpeername(socket_, reinterpret_cast<sockaddr*>(&address), &size) != 0) return "unknown";
+  std::array<char, INET6_ADDRSTRLEN> text{};
+  const void* const bytes = address.ss_family == AF_INET6
+                                ? static_cast<const void*>(&reinterpret_cast<const sockaddr_in6&>(address).sin6_addr)
+                                : static_cast<const void*>(&reinterpret_cast<const sockaddr_in&>(address).sin_addr);
+  return ::inet_ntop(address.ss_family, bytes, text.data(), text.size()) == nullptr ? "unknown" : text.data();
+}
+
+}  // namespace server::http

@@ -1,0 +1,270 @@
+#include "server/http/dispatcher.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <exception>
+#include <new>
+
+#include "proto/error_code.h"
+#include "proto/problem.h"
+#include "server/http/call.h"
+#include "server/http/log.h"
+#include "server/http/negotiation.h"
+#include "server/http/url.h"
+
+namespace server::http {
+
+using engine::ErrorCode;
+
+namespace {
+
+Refusal refusal_of(const engine::Error& error) {
+  return {proto::http_status(error.code), std::string(proto::name_of(error.code)), error.message, error.where};
+}
+
+tl::unexpected<Refusal> refuse(int status, std::string code, std::string detail, std::string where = {}) {
+  return tl::make_unexpected(Refusal{status, std::move(code), std::move(detail), std::move(where)});
+}
+
+bool has_header(const Answer& answer, std::string_view name) {
+  return std::any_of(answer.headers.begin(), answer.headers.end(),
+                     [&](const auto& header) { return same_ignoring_case(header.first, name); });
+}
+
+void set_default(Answer& answer, const std::string& name, std::string value) {
+  if (!has_header(answer, name)) answer.headers.emplace_back(name, std::move(value));
+}
+
+/// A value as it may stand in a header: whatever would begin another line is dropped.
+std::string header_value(std::string value) {
+  std::erase_if(value, [](unsigned char c) { return c < 0x20 || c == 0x7f; });
+  return value;
+}
+
+void add_common_headers(Answer& answer, const std::string& request_id) {
+  set_default(answer, "X-Request-Id", request_id);
+  set_default(answer, "X-Content-Type-Options", "nosniff");
+  set_default(answer, "Cache-Control", "private, no-cache");
+  set_default(answer, "Cross-Origin-Resource-Policy", "same-origin");
+  set_default(answer, "Content-Security-Policy", "default-src 'none'; frame-ancestors 'none'");
+}
+
+bool is_empty_object(std::string text) {
+  std::erase_if(text, [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; });
+  return text.empty() || text == "{}";
+}
+
+bool names_other_charset(const std::string& content_type) {
+  const auto parameters = split_list(content_type, ';');
+  return std::any_of(parameters.begin(), parameters.end(), [](std::string_view parameter) {
+    return lower_case(parameter).starts_with("charset=") && !same_ignoring_case(parameter, "charset=utf-8") &&
+           !same_ignoring_case(parameter, "charset=\"utf-8\"");
+  });
+}
+
+std::shared_ptr<const int> open_file(const std::filesystem::path& path) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) return nullptr;
+  return {new int(descriptor), [](const int* opened) {
+            ::close(*opened);
+            delete opened;
+          }};
+}
+
+}  // namespace
+
+struct Dispatcher::Asked {
+  Match match;
+  std::map<std::string, std::string, std::less<>> query;
+};
+
+std::string request_id_of(const RequestHead& head) {
+  const std::string given = head.header("x-request-id");
+  const bool sane = !given.empty() && given.size() <= 64 && std::all_of(given.begin(), given.end(), [](char c) {
+    return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '-' || c == '_' ||
+           c == '.';
+  });
+  return sane ? given : random_id();
+}
+
+Answer Dispatcher::refused(const Refusal& refusal, const std::string& request_id) {
+  Reply reply = Reply::refusal(refusal, request_id);
+  Answer answer;
+  answer.status = reply.status;
+  answer.headers = std::move(reply.headers);
+  answer.headers.emplace_back("Content-Type", std::move(reply.media_type));
+  answer.body = std::move(reply.body);
+  add_common_headers(answer, request_id);
+  return answer;
+}
+
+tl::expected<Dispatcher::Asked, Refusal> Dispatcher::check(const RequestHead& head, Answer& answer) const {
+  if (auto refusal = gate_.check_origin(head)) return tl::make_unexpected(std::move(*refusal));
+  const auto segments = split_path(head.path);
+  Asked asked;
+  if (segments) asked.match = routes_.find(head.method, *segments);
+  // Whoever has no token learns nothing about routes but those that are open to all.
+  const bool open = asked.match.route != nullptr && asked.match.route->access == Access::open;
+  if (!open && !gate_.admits(head))
+    return refuse(401, "unauthorized", "this service wants a token: \"Authorization: Bearer ...\"");
+  if (!segments) return tl::make_unexpected(refusal_of(segments.error()));
+  if (asked.match.route == nullptr && !asked.match.allow.empty()) {
+    answer.headers.emplace_back("Allow", asked.match.allow);
+    return refuse(405, "method_not_allowed", "this address takes " + asked.match.allow);
+  }
+  if (asked.match.route == nullptr) return refuse(404, "not_found", "there is no such address in this service");
+  answer.route = asked.match.route->path;
+  const auto query = parse_query(head.query);
+  if (!query) return tl::make_unexpected(refusal_of(query.error()));
+  const auto& known = asked.match.route->queries;
+  for (const auto& [name, value] : *query) {
+    if (std::find(known.begin(), known.end(), name) == known.end())
+      return refuse(400, "invalid_argument", "this address has no such query parameter", name);
+    if (!asked.query.emplace(name, value).second)
+      return refuse(400, "invalid_argument", "this query parameter is given twice", name);
+  }
+  if (const auto checked = check_body(head, *asked.match.route); !checked) return tl::make_unexpected(checked.error());
+  return asked;
+}
+
+tl::expected<void, Refusal> Dispatcher::check_body(const RequestHead& head, const Route& route) const {
+  if (!head.has_body()) return {};
+  const std::string coding = head.header("content-encoding");
+  if (!coding.empty() && !same_ignoring_case(coding, "identity"))
+    return refuse(415, "unsupported_media_type", "a request's body may not be compressed (Content-Encoding)");
+  const std::string content_type = head.header("content-type"), media_type = media_type_of(content_type);
+  const bool is_json = media_type == "application/json";
+  if (route.body == Body::json && (!is_json || names_other_charset(content_type)))
+    return refuse(415, "unsupported_media_type", "this address takes application/json, in UTF-8");
+  if (route.body == Body::upload && media_type == "multipart/form-data" && !boundary_of(content_type))
+    return refuse(400, "invalid_argument", "a multipart form needs a boundary in its Content-Type");
+  const bool is_file = route.body == Body::upload && !is_json;
+  const std::uint64_t limit = is_file ? options_.max_upload_bytes : options_.max_json_bytes;
+  if (head.content_length.value_or(0) > limit)
+    return refuse(413, "too_large",
+                  "the request's body may have " + std::to_string(limit) + " bytes; the service's option " +
+                      (is_file ? "--max-upload-bytes" : "--max-json-bytes") + " sets this limit");
+  return {};
+}
+
+Result<Reply> Dispatcher::handle(const Asked& asked, const RequestHead& head, const std::string& request_id,
+                                 Connection& connection, FormReader& form) const {
+  const Route& route = *asked.match.route;
+  const bool is_json = route.body == Body::upload && media_type_of(head.header("content-type")) == "application/json";
+  std::string body;
+  if (head.has_body() && (route.body != Body::upload || is_json)) {
+    auto text = read_text(connection, options_.max_json_bytes, "--max-json-bytes");
+    if (!text) return engine::propagate(text);
+    if (route.body == Body::none && !is_empty_object(*text))
+      return engine::fail(ErrorCode::invalid_argument, "this address takes no body");
+    if (route.body != Body::none) body = std::move(*text);
+  }
+  const HttpCall call({head, request_id, asked.match.values, asked.query, std::move(body), is_json, connection, form,
+                       options_.max_upload_bytes});
+  return route.handler(call);
+}
+
+tl::expected<void, Refusal> Dispatcher::fill_with_file(Answer& answer, const Reply& reply,
+                                                       const RequestHead& head) const {
+  auto descriptor = open_file(*reply.file);
+  struct stat status {};
+  if (!descriptor || ::fstat(*descriptor, &status) != 0 || !S_ISREG(status.st_mode))
+    return refuse(503, "unavailable", "the file cannot be read just now");
+  const auto size = std::uint64_t(status.st_size);
+  answer.headers.emplace_back("Accept-Ranges", "bytes");
+  const std::string if_range = head.header("if-range");
+  // A client that goes on with a download wants the rest of that very file, or all of the present one.
+  // HEAD knows no ranges (RFC 9110, section 14.2).
+  const bool may_split =
+      head.method == "GET" && answer.status == 200 && (if_range.empty() || if_range == '"' + reply.etag + '"');
+  const RangeChoice choice = may_split ? choose_range(head.header("range"), size) : RangeChoice{};
+  if (choice.kind == RangeKind::unsatisfiable) {
+    answer.headers.emplace_back("Content-Range", "bytes */" + std::to_string(size));
+    return refuse(416, "invalid_argument", "the range begins beyond the file's " + std::to_string(size) + " bytes");
+  }
+  if (choice.kind == RangeKind::whole) {
+    answer.file = Answer::FilePart{std::move(descriptor), 0, size};
+    return {};
+  }
+  const auto [first, last] = choice.range;
+  answer.status = 206;
+  answer.headers.emplace_back(
+      "Content-Range", "bytes " + std::to_string(first) + "-" + std::to_string(last) + "/" + std::to_string(size));
+  answer.file = Answer::FilePart{std::move(descriptor), first, last - first + 1};
+  return {};
+}
+
+tl::expected<void, Refusal> Dispatcher::fill(Answer& answer, Reply reply, const RequestHead& head) {
+  for (auto& [name, value] : reply.headers) answer.headers.emplace_back(name, header_value(std::move(value)));
+  answer.status = reply.status;
+  answer.hold = std::move(reply.hold);
+  const bool plain = !reply.file && !reply.events;
+  if (reply.etag.empty() && head.only_reads() && reply.status == 200 && plain && reply.media_type == "application/json")
+    reply.etag = etag_of(reply.body);
+  if (!reply.etag.empty()) answer.headers.emplace_back("ETag", '"' + header_value(reply.etag) + '"');
+  const std::string known = head.header("if-none-match");
+  if (head.only_reads() && reply.status == 200 && !reply.etag.empty() && !known.empty() &&
+      names_etag(known, reply.etag))
+    answer.status = 304;
+  if (answer.status == 204 || answer.status == 304) return {};
+  answer.headers.emplace_back("Content-Type", header_value(reply.media_type));
+  if (reply.file) return fill_with_file(answer, reply, head);
+  if (!reply.events) {
+    answer.body = std::move(reply.body);
+    return {};
+  }
+  if (streams_.fetch_add(1) >= options_.max_streams) {
+    --streams_;
+    return refuse(429, "busy",
+                  "there may be " + std::to_string(options_.max_streams) +
+                      " streams of events at a time; the service's option --max-streams sets this limit");
+  }
+  count_stream_(1);
+  answer.hold = std::shared_ptr<const void>(nullptr, [this, held = std::move(answer.hold)](const void*) {
+    --streams_;
+    count_stream_(-1);
+  });
+  answer.headers.emplace_back("X-Accel-Buffering", "no");  // a proxy that buffers would hold events back
+  answer.events = std::move(reply.events);
+  return {};
+}
+
+Answer Dispatcher::answer(const RequestHead& head, const std::string& request_id, Connection& connection,
+                          FormReader& form) {
+  Answer answer;
+  const auto refuse_with = [&](const Refusal& refusal) {
+    Answer refusing = refused(refusal, request_id);
+    refusing.route = answer.route;
+    for (auto& header : answer.headers)
+      if (header.first == "Allow" || header.first == "Content-Range") refusing.headers.push_back(std::move(header));
+    return refusing;
+  };
+  try {
+    const auto asked = check(head, answer);
+    if (!asked) return refuse_with(asked.error());
+    auto reply = handle(*asked, head, request_id, connection, form);
+    if (!reply && connection.body_failure() == Connection::BodyFailure::too_slow)
+      return refuse_with({408, "request_timeout", "the request's body arrived too slowly", ""});
+    if (!reply) {
+      if (reply.error().code == ErrorCode::internal)
+        log(logger_, spdlog::level::err, "bug: " + reply.error().message,
+            {{"request_id", request_id}, {"route", answer.route}});
+      return refuse_with(refusal_of(reply.error()));
+    }
+    if (const auto filled = fill(answer, std::move(*reply), head); !filled) return refuse_with(filled.error());
+  } catch (const std::bad_alloc&) {
+    return refuse_with({503, "unavailable", "this machine has not enough memory for that just now", ""});
+  } catch (const std::exception& bug) {
+    log(logger_, spdlog::level::err, std::string("bug: ") + bug.what(),
+        {{"request_id", request_id}, {"route", answer.route}});
+    return refuse_with({500, "internal", "this is a bug of the service; its log says more", ""});
+  }
+  add_common_headers(answer, request_id);
+  return answer;
+}
+
+}  // namespace server::http

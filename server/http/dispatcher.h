@@ -1,0 +1,97 @@
+// From a request's head to its answer: the guards, in their order, then the route's handler. Knows sockets only through
+// Connection, and no HTTP library.
+#pragma once
+
+#include <spdlog/logger.h>
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "server/http/connection.h"
+#include "server/http/gate.h"
+#include "server/http/request_head.h"
+#include "server/http/route_table.h"
+#include "server/http/router.h"
+
+namespace server::http {
+
+struct DispatcherOptions {
+  std::uint64_t max_json_bytes = 1024 * 1024;
+  std::uint64_t max_upload_bytes = std::uint64_t{4} << 30;
+  std::size_t max_streams = 16;
+};
+
+/// Takes a multipart form apart while it arrives.
+class FormReader {
+ public:
+  virtual ~FormReader() = default;
+  /// Calls `part` for each part with its file name (empty: no file), then `data` for pieces of it. Either ends the
+  /// reading by false.
+  ///   returns  whether the form was read to its end
+  [[nodiscard]] virtual bool read(const std::function<bool(const std::string& filename)>& part,
+                                  const std::function<bool(std::string_view)>& data) = 0;
+};
+
+/// What is sent back.
+struct Answer {
+  int status = 200;
+  std::vector<std::pair<std::string, std::string>> headers;
+  std::string body;
+  /// The body is `length` bytes of this file from `offset` on.
+  struct FilePart {
+    std::shared_ptr<const int> descriptor;
+    std::uint64_t offset = 0, length = 0;
+  };
+  std::optional<FilePart> file;
+  std::function<void(EventSink&)> events;
+  std::shared_ptr<const void> hold;  ///< Lives until the answer is sent.
+  std::string route = "-";           ///< As declared; "-" if the request found none.
+};
+
+/// Safe to call from any thread. Gate and logger outlive it.
+class Dispatcher {
+ public:
+  Dispatcher(Router router, const Gate& gate, spdlog::logger& logger, const DispatcherOptions& options,
+             std::function<void(int)> count_stream)
+      : routes_(std::move(router)),
+        gate_(gate),
+        logger_(logger),
+        options_(options),
+        count_stream_(std::move(count_stream)) {}
+
+  /// Never throws what a handler threw: that is logged as a bug and answered by 500.
+  [[nodiscard]] Answer answer(const RequestHead& head, const std::string& request_id, Connection& connection,
+                              FormReader& form);
+  /// A refusal as an answer.
+  [[nodiscard]] static Answer refused(const Refusal& refusal, const std::string& request_id);
+
+ private:
+  struct Asked;
+
+  [[nodiscard]] tl::expected<Asked, Refusal> check(const RequestHead& head, Answer& answer) const;
+  [[nodiscard]] tl::expected<void, Refusal> check_body(const RequestHead& head, const Route& route) const;
+  [[nodiscard]] Result<Reply> handle(const Asked& asked, const RequestHead& head, const std::string& request_id,
+                                     Connection& connection, FormReader& form) const;
+  [[nodiscard]] tl::expected<void, Refusal> fill(Answer& answer, Reply reply, const RequestHead& head);
+  [[nodiscard]] tl::expected<void, Refusal> fill_with_file(Answer& answer, const Reply& reply,
+                                                           const RequestHead& head) const;
+
+  const RouteTable routes_;
+  const Gate& gate_;
+  spdlog::logger& logger_;
+  const DispatcherOptions options_;
+  const std::function<void(int)> count_stream_;
+  std::atomic<std::size_t> streams_ = 0;
+};
+
+/// The id a client gave its request, if it is fit to stand in logs, else a new one.
+[[nodiscard]] std::string request_id_of(const RequestHead& head);
+
+}  // namespace server::http

@@ -1,0 +1,129 @@
+#include "server/http/gate.h"
+
+#include <sys/random.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <stdexcept>
+
+namespace server::http {
+namespace {
+
+/// Compares all of both, so that the time taken tells nothing about where they differ.
+bool same_secret(std::string_view given, std::string_view expected) {
+  unsigned difference = given.size() == expected.size() ? 0 : 1;
+  for (std::size_t i = 0; i < given.size(); ++i)
+    difference |= unsigned(static_cast<unsigned char>(given[i]) ^
+                           static_cast<unsigned char>(expected.empty() ? '\0' : expected[i % expected.size()]));
+  return difference == 0;
+}
+
+std::string cookie_in(std::string_view cookies) {
+  for (const std::string_view cookie : split_list(cookies, ';'))
+    if (cookie.size() > Gate::cookie_name.size() && cookie.starts_with(Gate::cookie_name) &&
+        cookie[Gate::cookie_name.size()] == '=')
+      return std::string(cookie.substr(Gate::cookie_name.size() + 1));
+  return {};
+}
+
+bool is_safe(std::string_view method) { return method == "GET" || method == "HEAD" || method == "OPTIONS"; }
+
+}  // namespace
+
+std::string random_id() {
+  std::array<unsigned char, 16> bytes{};
+  while (::getrandom(bytes.data(), bytes.size(), 0) != ssize_t(bytes.size()))
+    if (errno != EINTR) throw std::runtime_error("the system gives no random numbers");
+  std::string text;
+  for (const unsigned char byte : bytes) {
+    text += "0123456789abcdef"[byte >> 4];
+    text += "0123456789abcdef"[byte & 15];
+  }
+  return text;
+}
+
+void Gate::bound_to(const std::string& host, int port) {
+  const std::string bracketed = host.find(':') == std::string::npos ? host : "[" + host + "]";
+  for (const std::string& name :
+       {bracketed, std::string("localhost"), std::string("127.0.0.1"), std::string("[::1]")}) {
+    own_hosts_.push_back(lower_case(name) + ":" + std::to_string(port));
+    if (port == 80) own_hosts_.push_back(lower_case(name));
+  }
+}
+
+bool Gate::is_own_host(std::string_view host) const {
+  const std::string given = lower_case(host);
+  if (std::find(own_hosts_.begin(), own_hosts_.end(), given) != own_hosts_.end()) return true;
+  const std::size_t colon = given.rfind(':');
+  const bool has_port = colon != std::string::npos && given.find(']', colon) == std::string::npos;
+  const std::string name = has_port ? given.substr(0, colon) : given;
+  return std::any_of(options_.allowed_hosts.begin(), options_.allowed_hosts.end(), [&](const std::string& allowed) {
+    return same_ignoring_case(allowed, given) || same_ignoring_case(allowed, name);
+  });
+}
+
+std::optional<Refusal> Gate::check_origin(const RequestHead& head) const {
+  const std::string host = head.header("host");
+  if (!is_own_host(host))
+    return Refusal{421, "misdirected_request",
+                   "this service does not go by the name in the Host header; --allowed-host adds names", ""};
+  const Refusal foreign{403, "forbidden",
+                        "a page of another site may not use this service; if the service goes by that name, behind a "
+                        "proxy, --allowed-origin says so",
+                        ""};
+  if (head.count("origin") > 0) {
+    const std::string origin = head.header("origin");
+    const bool own = same_ignoring_case(origin, "http://" + host) || same_ignoring_case(origin, "https://" + host);
+    const bool allowed = std::any_of(options_.allowed_origins.begin(), options_.allowed_origins.end(),
+                                     [&](const std::string& other) { return same_ignoring_case(origin, other); });
+    if (!own && !allowed) return foreign;
+    return std::nullopt;
+  }
+  // Without an Origin: a navigation, a picture, a program. Following a link to the page is fine; making the service
+  // work for another site's picture, or changing anything, is not.
+  const std::string site = head.header("sec-fetch-site");
+  const bool from_elsewhere = site == "cross-site" || site == "same-site";
+  const bool follows_link = is_safe(head.method) && head.header("sec-fetch-mode") == "navigate";
+  if (from_elsewhere && !follows_link) return foreign;
+  return std::nullopt;
+}
+
+bool Gate::is_token(std::string_view authorization) const {
+  constexpr std::string_view scheme = "bearer ";
+  if (authorization.size() < scheme.size() || !same_ignoring_case(authorization.substr(0, scheme.size()), scheme))
+    return false;
+  return needs_token() && same_secret(trim(authorization.substr(scheme.size())), options_.token);
+}
+
+bool Gate::has_session(std::string_view cookies) const {
+  const std::string secret = cookie_in(cookies);
+  if (secret.empty()) return false;
+  const std::lock_guard lock(mutex_);
+  bool found = false;
+  for (const auto& [known, opened] : sessions_)
+    if (same_secret(secret, known) && Clock::now() - opened < options_.session_lifetime) found = true;
+  return found;
+}
+
+bool Gate::admits(const RequestHead& head) const {
+  return !needs_token() || is_token(head.header("authorization")) || has_session(head.header("cookie"));
+}
+
+std::string Gate::open_session() {
+  const std::string secret = random_id();
+  const std::lock_guard lock(mutex_);
+  std::erase_if(sessions_, [&](const auto& s) { return Clock::now() - s.second >= options_.session_lifetime; });
+  while (!sessions_.empty() && sessions_.size() >= options_.max_sessions)
+    sessions_.erase(std::min_element(sessions_.begin(), sessions_.end(),
+                                     [](const auto& a, const auto& b) { return a.second < b.second; }));
+  sessions_[secret] = Clock::now();
+  return secret;
+}
+
+void Gate::close_session(std::string_view cookies) {
+  const std::lock_guard lock(mutex_);
+  sessions_.erase(cookie_in(cookies));
+}
+
+}  // namespace server::http

@@ -1,0 +1,67 @@
+// Who may speak to the service: which Host, from which Origin, with which token or session.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/http/request_head.h"
+
+namespace server::http {
+
+struct GateOptions {
+  std::string token;                         ///< Empty: none is needed.
+  std::vector<std::string> allowed_hosts;    ///< Beside the bound host and the loopback names: "name", or "name:port".
+  std::vector<std::string> allowed_origins;  ///< Beside the service's own: "https://example.org".
+  std::size_t max_sessions = 1000;           ///< The oldest makes room.
+  std::chrono::seconds session_lifetime{7 * 24 * 3600};
+};
+
+/// Safe to call from any thread.
+class Gate {
+ public:
+  explicit Gate(GateOptions options) : options_(std::move(options)) {}
+
+  /// Names the service goes by; called once, before the first request.
+  void bound_to(const std::string& host, int port);
+
+  /// Whether a request is meant for this service and comes from no foreign page. A browser sends a page's requests with
+  /// the page's Origin; a rebound DNS name shows in Host.
+  ///   returns  a refusal: 421 misdirected_request, 403 forbidden
+  [[nodiscard]] std::optional<Refusal> check_origin(const RequestHead& head) const;
+
+  [[nodiscard]] bool needs_token() const { return !options_.token.empty(); }
+  /// Whether an Authorization header carries the token. Takes the same time wherever the two differ.
+  [[nodiscard]] bool is_token(std::string_view authorization) const;
+  /// Whether a request carries the token or a session's cookie, or needs neither.
+  [[nodiscard]] bool admits(const RequestHead& head) const;
+
+  /// A new session.
+  ///   returns  its secret, for the cookie
+  [[nodiscard]] std::string open_session();
+  /// Ends the session that a Cookie header names, if it does.
+  void close_session(std::string_view cookies);
+
+  static constexpr std::string_view cookie_name = "splatdrag_session";
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  [[nodiscard]] bool is_own_host(std::string_view host) const;
+  [[nodiscard]] bool has_session(std::string_view cookies) const;
+
+  const GateOptions options_;
+  std::vector<std::string> own_hosts_;
+  mutable std::mutex mutex_;                           ///< Guards sessions_.
+  std::map<std::string, Clock::time_point> sessions_;  ///< By secret: when it was opened.
+};
+
+/// 32 random hexadecimal digits, from the system's own source.
+[[nodiscard]] std::string random_id();
+
+}  // namespace server::http

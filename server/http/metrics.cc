@@ -1,0 +1,109 @@
+#include "server/http/metrics.h"
+
+#include <prometheus/counter.h>
+#include <prometheus/gauge.h>
+#include <prometheus/histogram.h>
+#include <prometheus/registry.h>
+#include <prometheus/text_serializer.h>
+
+#include <mutex>
+#include <utility>
+#include <vector>
+
+namespace server::http {
+namespace {
+
+/// Seconds: a poll takes a millisecond, a render a tenth of a second, an upload minutes.
+const prometheus::Histogram::BucketBoundaries& buckets() {
+  static const prometheus::Histogram::BucketBoundaries seconds{0.001, 0.005, 0.02, 0.1, 0.5, 2, 10, 60, 300};
+  return seconds;
+}
+
+struct Asked {
+  std::string name, help, label;
+  std::function<std::map<std::string, double>()> values;
+};
+
+prometheus::MetricFamily family_of(const Asked& asked) {
+  prometheus::MetricFamily family;
+  family.name = asked.name;
+  family.help = asked.help;
+  family.type = prometheus::MetricType::Gauge;
+  for (const auto& [value, number] : asked.values()) {
+    prometheus::ClientMetric metric;
+    if (!asked.label.empty()) metric.label.push_back({asked.label, value});
+    metric.gauge.value = number;
+    family.metric.push_back(std::move(metric));
+  }
+  return family;
+}
+
+}  // namespace
+
+struct Metrics::Impl {
+  prometheus::Registry registry;
+  prometheus::Family<prometheus::Counter>& requests =
+      prometheus::BuildCounter().Name("splatdrag_http_requests_total").Help("Requests answered.").Register(registry);
+  prometheus::Family<prometheus::Histogram>& seconds = prometheus::BuildHistogram()
+                                                           .Name("splatdrag_http_request_seconds")
+                                                           .Help("Time from a request's head to the end of its answer.")
+                                                           .Register(registry);
+  prometheus::Gauge& in_flight = prometheus::BuildGauge()
+                                     .Name("splatdrag_http_requests_in_flight")
+                                     .Help("Requests being answered now.")
+                                     .Register(registry)
+                                     .Add({});
+  prometheus::Gauge& streams = prometheus::BuildGauge()
+                                   .Name("splatdrag_http_streams_open")
+                                   .Help("Streams of events open now.")
+                                   .Register(registry)
+                                   .Add({});
+  prometheus::Counter& refused = prometheus::BuildCounter()
+                                     .Name("splatdrag_http_connections_refused_total")
+                                     .Help("Connections turned away because too many waited.")
+                                     .Register(registry)
+                                     .Add({});
+  mutable std::mutex mutex;  ///< Guards asked.
+  std::vector<Asked> asked;
+};
+
+Metrics::Metrics() : impl_(std::make_unique<Impl>()) {}
+Metrics::~Metrics() = default;
+
+void Metrics::count_request(std::string_view method, std::string_view route, int status, double seconds) {
+  impl_->requests
+      .Add({{"method", std::string(method)}, {"route", std::string(route)}, {"status", std::to_string(status)}})
+      .Increment();
+  impl_->seconds.Add({{"route", std::string(route)}}, buckets()).Observe(seconds);
+}
+
+void Metrics::add_in_flight(int change) { impl_->in_flight.Increment(change); }
+
+void Metrics::add_stream(int change) { impl_->streams.Increment(change); }
+
+void Metrics::count_refused_connection() { impl_->refused.Increment(); }
+
+void Metrics::add_gauge(std::string name, std::string help, std::function<double()> value) {
+  add_gauges(std::move(name), std::move(help), "", [value = std::move(value)] {
+    return std::map<std::string, double>{{"", value()}};
+  });
+}
+
+void Metrics::add_gauges(std::string name, std::string help, std::string label,
+                         std::function<std::map<std::string, double>()> values) {
+  const std::lock_guard lock(impl_->mutex);
+  impl_->asked.push_back({std::move(name), std::move(help), std::move(label), std::move(values)});
+}
+
+std::string Metrics::text() const {
+  std::vector<Asked> asked;
+  {
+    const std::lock_guard lock(impl_->mutex);
+    asked = impl_->asked;
+  }
+  auto families = impl_->registry.Collect();
+  for (const Asked& one : asked) families.push_back(family_of(one));
+  return prometheus::TextSerializer().Serialize(families);
+}
+
+}  // namespace server::http

@@ -1,0 +1,44 @@
+// What the service counts, for Prometheus.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace server::http {
+
+/// Safe to call from any thread.
+class Metrics {
+ public:
+  Metrics();
+  ~Metrics();
+
+  /// A request has been answered.
+  ///   route  as declared ("/v1/scenes/{id}"), never the path as sent: that would make a series per client's whim
+  void count_request(std::string_view method, std::string_view route, int status, double seconds);
+  void add_in_flight(int change);
+  void add_stream(int change);
+  /// A connection was turned away because too many others waited.
+  void count_refused_connection();
+
+  /// A value that is asked for whenever somebody looks.
+  ///   name   "splatdrag_scenes"
+  ///   value  called on a thread of the server; what it refers to outlives the metrics
+  void add_gauge(std::string name, std::string help, std::function<double()> value);
+  /// Several values of one name, told apart by a label.
+  ///   values  by the label's value
+  void add_gauges(std::string name, std::string help, std::string label,
+                  std::function<std::map<std::string, double>()> values);
+
+  /// All of it, in the text format.
+  [[nodiscard]] std::string text() const;
+  static constexpr std::string_view media_type = "text/plain; version=0.0.4; charset=utf-8";
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace server::http

@@ -1,0 +1,66 @@
+#include "server/http/route_table.h"
+
+#include <algorithm>
+#include <optional>
+
+namespace server::http {
+namespace {
+
+std::vector<std::string> split(std::string_view path) {
+  std::vector<std::string> segments;
+  for (std::size_t begin = 1; begin <= path.size();) {
+    const std::size_t end = std::min(path.find('/', begin), path.size());
+    segments.emplace_back(path.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return segments;
+}
+
+bool is_open(const std::string& segment) {
+  return segment.size() > 2 && segment.front() == '{' && segment.back() == '}';
+}
+
+/// Which segments are spelt out, as a text whose order is that of preference; nothing if the path does not match.
+std::optional<std::string> fit(const std::vector<std::string>& pattern, const std::vector<std::string>& path) {
+  if (pattern.size() != path.size()) return std::nullopt;
+  std::string spelt;
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    const bool open = is_open(pattern[i]);
+    if (open ? path[i].empty() : pattern[i] != path[i]) return std::nullopt;
+    spelt += open ? '0' : '1';
+  }
+  return spelt;
+}
+
+}  // namespace
+
+RouteTable::RouteTable(Router router) : router_(std::move(router)) {
+  for (const Route& route : router_.routes())
+    segments_.push_back(route.path == "/" ? std::vector<std::string>{""} : split(route.path));
+}
+
+Match RouteTable::find(std::string_view method, const std::vector<std::string>& segments) const {
+  const std::string_view wanted = method == "HEAD" ? "GET" : method;
+  Match match;
+  std::string best;
+  std::vector<std::string> methods;
+  for (std::size_t i = 0; i < segments_.size(); ++i) {
+    const auto fitting = fit(segments_[i], segments);
+    if (!fitting) continue;
+    const Route& route = router_.routes()[i];
+    methods.push_back(route.method);
+    if (route.method == "GET") methods.push_back("HEAD");
+    if (route.method != wanted || (match.route != nullptr && *fitting <= best)) continue;
+    match.route = &route;
+    best = *fitting;
+    match.values.clear();
+    for (std::size_t k = 0; k < segments.size(); ++k)
+      if (is_open(segments_[i][k])) match.values[segments_[i][k].substr(1, segments_[i][k].size() - 2)] = segments[k];
+  }
+  std::sort(methods.begin(), methods.end());
+  methods.erase(std::unique(methods.begin(), methods.end()), methods.end());
+  for (const std::string& name : methods) match.allow += (match.allow.empty() ? "" : ", ") + name;
+  return match;
+}
+
+}  // namespace server::http

@@ -1,0 +1,35 @@
+// Finds the route of a request.
+#pragma once
+
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/http/router.h"
+
+namespace server::http {
+
+using PathValues = std::map<std::string, std::string, std::less<>>;
+
+struct Match {
+  const Route* route = nullptr;  ///< Null: none.
+  PathValues values;             ///< Of the {names} of its path.
+  std::string allow;             ///< Methods that the path has, if it has any: for 405.
+};
+
+class RouteTable {
+ public:
+  explicit RouteTable(Router router);
+
+  /// The route of a method and a path in its segments. HEAD finds the GET route. A segment that a path spells out comes
+  /// before one that it leaves open.
+  [[nodiscard]] Match find(std::string_view method, const std::vector<std::string>& segments) const;
+  [[nodiscard]] const std::vector<Route>& routes() const { return router_.routes(); }
+
+ private:
+  Router router_;
+  std::vector<std::vector<std::string>> segments_;  ///< Of each route's path.
+};
+
+}  // namespace server::http

@@ -1,0 +1,37 @@
+#include "server/http/router.h"
+
+#include "proto/problem.h"
+
+namespace server::http {
+
+Reply Reply::json(std::string text, int status) {
+  Reply reply;
+  reply.status = status;
+  reply.body = std::move(text);
+  return reply;
+}
+
+Reply Reply::not_modified(std::string etag) {
+  Reply reply;
+  reply.status = 304;
+  reply.etag = std::move(etag);
+  return reply;
+}
+
+Reply Reply::no_content() {
+  Reply reply;
+  reply.status = 204;
+  return reply;
+}
+
+Reply Reply::refusal(const Refusal& refusal, const std::string& request_id) {
+  Reply reply;
+  reply.status = refusal.status;
+  reply.media_type = "application/problem+json";
+  reply.body = proto::to_json(proto::Problem{refusal.status, refusal.code, refusal.detail, refusal.where, request_id});
+  if (refusal.status == 401) reply.headers.emplace_back("WWW-Authenticate", "Bearer");
+  if (refusal.status == 429 || refusal.status == 503) reply.headers.emplace_back("Retry-After", "1");
+  return reply;
+}
+
+}  // namespace server::http

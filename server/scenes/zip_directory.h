@@ -1,0 +1,23 @@
+// What a zip file says about its directory, before anybody loads that.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+
+#include "engine/core/result.h"
+
+namespace server::scenes {
+
+using engine::Result;
+
+struct ZipDirectory {
+  std::uint64_t entries = 0;
+  std::uint64_t bytes = 0;  ///< Of the directory itself.
+};
+
+/// The largest numbers that any end record within reach of the file's end gives, in its form for large files (zip64)
+/// too: which of several a reader will believe need not be known. Zeros if there is none: then it is no zip file.
+///   errors  those of io::InputFile
+[[nodiscard]] Result<ZipDirectory> largest_directory(const std::filesystem::path& zip);
+
+}  // namespace server::scenes

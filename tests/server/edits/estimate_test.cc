@@ -1,0 +1,74 @@
+#include "server/edits/estimate.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace server::edits {
+namespace {
+
+Workload typical() {
+  return {.gaussians = 150'000,
+          .row_bytes = 152,
+          .layered = false,
+          .dragged = 6000,
+          .copies = 6000,
+          .intervals = 4,
+          .candidates = 40,
+          .virtual_views = false,
+          .views = 40,
+          .pictured = 4,
+          .view_pixels = 512 * 384,
+          .probe_seconds = 0.01,
+          .probe_pixels = 256 * 192};
+}
+
+TEST(Estimate, GrowsWithEverythingThatCosts) {
+  struct Growth {
+    std::string what;
+    std::function<void(Workload&)> grow;
+    bool takes_time, takes_memory;
+  };
+  const std::vector<Growth> growths = {{"gaussians", [](Workload& w) { w.gaussians *= 2; }, true, true},
+                                       {"row bytes", [](Workload& w) { w.row_bytes *= 2; }, false, true},
+                                       {"layered", [](Workload& w) { w.layered = true; }, true, true},
+                                       {"dragged", [](Workload& w) { w.dragged *= 2; }, true, false},
+                                       {"copies", [](Workload& w) { w.copies *= 2; }, false, true},
+                                       {"intervals", [](Workload& w) { ++w.intervals; }, true, true},
+                                       {"candidates", [](Workload& w) { ++w.candidates; }, true, false},
+                                       {"virtual views", [](Workload& w) { w.virtual_views = true; }, true, false},
+                                       {"views", [](Workload& w) { ++w.views; }, true, true},
+                                       {"pictures", [](Workload& w) { ++w.pictured; }, true, false},
+                                       {"picture size", [](Workload& w) { w.view_pixels *= 2; }, true, true},
+                                       {"a slower machine", [](Workload& w) { w.probe_seconds *= 2; }, true, false}};
+  for (const Growth& growth : growths) {
+    SCOPED_TRACE(growth.what);
+    Workload more = typical();
+    growth.grow(more);
+    EXPECT_EQ(estimated_seconds(more) > estimated_seconds(typical()), growth.takes_time);
+    EXPECT_GE(estimated_seconds(more), estimated_seconds(typical()));
+    EXPECT_EQ(estimated_bytes(more) > estimated_bytes(typical()), growth.takes_memory);
+    EXPECT_GE(estimated_bytes(more), estimated_bytes(typical()));
+  }
+}
+
+TEST(Estimate, AFrameCostsWhatTheProbeSaysAtItsSizeAndGrowsWithPixels) {
+  const Workload work = typical();
+  EXPECT_DOUBLE_EQ(frame_seconds(work, work.probe_pixels), work.probe_seconds);
+  EXPECT_GT(frame_seconds(work, 2 * work.probe_pixels), work.probe_seconds);
+  EXPECT_LT(frame_seconds(work, 2 * work.probe_pixels), 2 * work.probe_seconds);
+  EXPECT_EQ(frame_seconds({}, 1000), 0);
+}
+
+TEST(Estimate, MemoryHoldsTheWorkingCopyAndAPicturesScene) {
+  Workload work = typical();
+  EXPECT_GE(estimated_bytes(work), 2 * work.gaussians * work.row_bytes);
+  const auto flat = estimated_bytes(work);
+  work.layered = true;
+  EXPECT_EQ(estimated_bytes(work) - flat, work.gaussians * work.row_bytes);
+}
+
+}  // namespace
+}  // namespace server::edits

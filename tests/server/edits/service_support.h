@@ -1,0 +1,111 @@
+// What the tests of the edit service share: a small scene in a store, and edits of it.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "engine/io/scene_file.h"
+#include "server/edits/edit_service.h"
+#include "tests/engine/edit/samples.h"
+#include "tests/engine/jobs/jobs_support.h"
+#include "tests/support/data.h"
+
+namespace server::edits {
+
+using engine::ErrorCode;
+using engine::jobs::code_of;
+using engine::jobs::value;
+
+inline std::unique_ptr<scenes::SceneStore> open_scenes(const std::filesystem::path& data) {
+  return value(scenes::SceneStore::open({.folder = data / "scenes", .scene_root = {}}));
+}
+
+/// One thread to compute with: results are the same for any number, as the engine's tests show, and ThreadSanitizer,
+/// which does not see through oneTBB, then watches the service and nothing else.
+inline std::unique_ptr<EditService> open_service(scenes::SceneStore& store, const std::filesystem::path& data,
+                                                 std::size_t max_queued = 32) {
+  return value(EditService::open(
+      store, {.folder = data / "edits", .max_queued = max_queued, .pictured_views = 2, .threads = 1}));
+}
+
+/// A ball of 200 Gaussians at the origin before a wall; without a dataset.
+inline std::string add_ball(scenes::SceneStore& store, const std::filesystem::path& data) {
+  namespace io = engine::io;
+  io::SceneFile file{engine::edit::ball_before_wall(200), io::inria_layout(2)};
+  file.cloud.extra_stride = 0;
+  file.cloud.extra.clear();
+  const auto path = data / "ball.ply";
+  value(io::write_scene(path, file, io::SceneFormat::ply));
+  return value(store.add_upload(path, "ball.ply", "ball")).id;
+}
+
+/// Moves the ball to the right, in small pictures.
+inline proto::EditRequest move_ball(const std::string& scene, int intervals = 2) {
+  proto::EditRequest request;
+  request.scene = scene;
+  request.handles.push_back({.source = {0, 0, 0}, .target = proto::Point{0.5, 0, 0}, .radius = 0.3});
+  request.params.intervals = intervals;
+  request.params.views = 3;
+  request.params.max_image_side = 48;
+  return request;
+}
+
+/// The same with so many pictures that there is time to interfere: half a second in all.
+inline proto::EditRequest move_ball_slowly(const std::string& scene) {
+  proto::EditRequest request = move_ball(scene, 20);
+  request.params.views = 40;
+  request.params.max_image_side = 256;
+  return request;
+}
+
+/// The edit once `wanted(status)` holds; ends the test after a minute.
+template <class Wanted>
+proto::EditStatus wait_for(EditService& service, const std::string& id, Wanted wanted) {
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::minutes(1);
+  for (auto seen = service.version();; seen = service.wait_for_change(seen, std::chrono::seconds(1))) {
+    proto::EditStatus status = value(service.find(id));
+    if (wanted(status)) return status;
+    if (std::chrono::steady_clock::now() > deadline) throw std::runtime_error(id + " still is " + status.state);
+  }
+}
+inline proto::EditStatus wait_for_end(EditService& service, const std::string& id) {
+  return wait_for(service, id, [](const auto& status) { return status.ended.has_value(); });
+}
+inline proto::EditStatus wait_for_interval(EditService& service, const std::string& id, std::size_t count = 1) {
+  return wait_for(service, id, [=](const auto& status) {
+    return status.finished_intervals.size() >= count || status.ended.has_value();
+  });
+}
+
+/// The Gaussians of a version as the bytes of a file.
+inline std::string version_bytes(scenes::SceneStore& store, const std::string& scene, int version) {
+  return support::read_file(value(store.file(scene, std::to_string(version), scenes::FileFormat::ply)).path);
+}
+
+/// A data folder with one scene and the service on it.
+class ServiceTest : public testing::Test {
+ protected:
+  void reopen(std::size_t max_queued = 32) {
+    service.reset();
+    store.reset();
+    store = open_scenes(dir.path());
+    service = open_service(*store, dir.path(), max_queued);
+  }
+  std::string submit(const proto::EditRequest& request, const std::string& key = "") {
+    return value(service->submit(request, key)).status.id;
+  }
+  std::size_t versions() { return value(store->find(scene)).versions.size(); }
+
+  support::TempDir dir;
+  std::unique_ptr<scenes::SceneStore> store = open_scenes(dir.path());
+  std::unique_ptr<EditService> service = open_service(*store, dir.path());
+  std::string scene = add_ball(*store, dir.path());
+};
+
+}  // namespace server::edits
