@@ -4,7 +4,8 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-bash deploy/install-packages.sh
+bash deploy/install-packages.sh tests
+npm ci --prefix tests/service --no-audit --no-fund --loglevel=error
 cmake --preset release
 cmake --build --preset release --parallel "$(nproc)"
 exec ctest --preset release --parallel 2 --no-tests=error

@@ -1,0 +1,265 @@
+import assert from "node:assert/strict";
+import { webcrypto } from "node:crypto";
+import { afterEach, beforeEach, test } from "node:test";
+
+import { Editor, NOTHING_OPEN, parentOf, shownVersion } from "../../../web/editor.js";
+import { SceneMemory, Store } from "../../../web/store.js";
+
+globalThis.crypto ??= webcrypto; // a browser's global that Node 18 lacks
+
+const CAMERA = { eye: [0, 0, -5], target: [0, 0, 0], up: [0, -1, 0], fov: 50, width: 400, height: 300 };
+const original = { fetch: globalThis.fetch, EventSource: globalThis.EventSource };
+let service;
+let streams;
+let editor;
+let storage;
+let said;
+
+const scene = () => ({
+  id: "s000001",
+  name: "chair",
+  created: "2026-01-01",
+  up: null,
+  centre: [0, 0, 0],
+  radius: 2,
+  dataset: null,
+  versions: [{ version: 0, parent: null }],
+});
+
+function open(items = storage) {
+  const store = new Store({ ...NOTHING_OPEN, info: null });
+  editor = new Editor(store, new SceneMemory(items), (message) => said.push(message));
+  return editor.open("s000001");
+}
+
+const settle = async () => {
+  for (let i = 0; i < 20; ++i) await new Promise((resolve) => setImmediate(resolve));
+};
+
+beforeEach(async () => {
+  said = [];
+  streams = [];
+  const items = new Map();
+  storage = {
+    getItem: (key) => items.get(key) ?? null,
+    setItem: (key, value) => void items.set(key, value),
+    removeItem: (key) => void items.delete(key),
+  };
+  service = {
+    "GET /v1/scenes/s000001": scene,
+    "GET /v1/scenes/s000001/views": () => ({ kind: "virtual", views: [] }),
+    "GET /v1/edits?scene=s000001&limit=30": () => ({ edits: [] }),
+    "POST /v1/scenes/s000001/versions/0/pick": (body) =>
+      body.point ? { hit: true, gaussians_in_radius: 42 } : { hit: true, point: [0.5, 0, 0], normal: [0, 0, -1] },
+  };
+  globalThis.fetch = async (path, { method = "GET", body, headers } = {}) => {
+    const answer = service[`${method} ${path}`];
+    if (!answer) throw new TypeError(`nobody answers ${method} ${path}`);
+    const value = answer(body && JSON.parse(body), headers);
+    if (value instanceof Error) throw value;
+    return value instanceof Response ? value : new Response(JSON.stringify(value), { status: 200 });
+  };
+  globalThis.EventSource = class extends EventTarget {
+    constructor(url) {
+      super();
+      streams.push(Object.assign(this, { url }));
+    }
+    close() {
+      this.closed = true;
+    }
+    send(edit) {
+      this.dispatchEvent(Object.assign(new Event("edit"), { data: JSON.stringify(edit) }));
+    }
+  };
+  await open();
+});
+
+afterEach(() => {
+  editor.close();
+  Object.assign(globalThis, original);
+});
+
+const problem = (where, status = 422) =>
+  new Response(JSON.stringify({ detail: "no", where, code: "unprocessable" }), { status });
+const edit = (patch) => ({
+  id: "e000001",
+  scene: "s000001",
+  version: 0,
+  state: "queued",
+  progress: 0,
+  finished_intervals: [],
+  handles: [],
+  request: { handles: [] },
+  warnings: [],
+  timings: [],
+  result_version: null,
+  error: null,
+  ...patch,
+});
+
+test("what is on the screen: the version, its preview, or what it is compared with", () => {
+  const two = {
+    versions: [
+      { version: 0, parent: null },
+      { version: 1, parent: 0 },
+      { version: 2, parent: 0 },
+    ],
+  };
+  const state = { scene: two, version: 2, preview: null, comparing: false, compareWith: null };
+  assert.equal(shownVersion(state), 2);
+  assert.equal(shownVersion({ ...state, comparing: true }), 0);
+  assert.equal(shownVersion({ ...state, comparing: true, compareWith: 1 }), 1);
+  const previewing = { ...state, preview: { version: "p000001" } };
+  assert.equal(shownVersion(previewing), "p000001");
+  assert.equal(shownVersion({ ...previewing, comparing: true }), 2);
+  assert.equal(shownVersion({ ...state, version: 0, comparing: true }), 0, "there is nothing before the first");
+  assert.equal(parentOf(two, 1), 0);
+});
+
+test("a click places a handle on the surface, and a miss says so", async () => {
+  await editor.place(CAMERA, 200, 150);
+  const [handle] = editor.state.handles;
+  assert.deepEqual(handle.source, [0.5, 0, 0]);
+  assert.equal(handle.target, null);
+  assert.ok(handle.radius > 0);
+  assert.equal(editor.state.selected, handle.id);
+  service["POST /v1/scenes/s000001/versions/0/pick"] = () => ({ hit: false, point: null });
+  await editor.place(CAMERA, 1, 1);
+  assert.equal(editor.state.handles.length, 1);
+  assert.equal(said.length, 1);
+});
+
+test("a drag sets the target in the view plane, is one step of undo, and can be given up", async () => {
+  await editor.place(CAMERA, 200, 150);
+  const { id } = editor.state.handles[0];
+  const drag = editor.dragTarget(id, CAMERA, { x: 230, y: 150 });
+  drag.move(240, 140);
+  drag.move(260, 120);
+  drag.end();
+  const { target } = editor.state.handles[0];
+  assert.ok(target[0] > 0.5 && target[1] < 0 && Math.abs(target[2]) < 1e-9, String(target));
+  const second = editor.dragTarget(id, CAMERA, { x: 0, y: 0 });
+  second.move(50, 50);
+  second.giveUp();
+  assert.deepEqual(editor.state.handles[0].target, target);
+  editor.undo();
+  assert.equal(editor.state.handles[0].target, null);
+  editor.redo();
+  assert.deepEqual(editor.state.handles[0].target, target);
+});
+
+test("what the service refuses is kept until the request is another one", async () => {
+  service["POST /v1/edits?validate_only=true"] = () => problem("handles[0].radius");
+  await editor.place(CAMERA, 200, 150);
+  await editor.estimate();
+  assert.equal(editor.state.problem.error.where, "handles[0].radius");
+  editor.change(editor.state.handles[0].id, { radius: 9 });
+  await settle();
+  assert.equal(editor.state.problem, null);
+});
+
+test("a submission whose answer was lost is repeated under the same key; another one gets another", async () => {
+  const keys = [];
+  let fails = true;
+  service["POST /v1/edits"] = (body, headers) => {
+    keys.push(headers["Idempotency-Key"]);
+    return fails ? new TypeError("lost") : edit();
+  };
+  await editor.place(CAMERA, 200, 150);
+  await editor.run();
+  assert.equal(editor.state.problem.error.code, "unreachable");
+  fails = false;
+  await editor.run();
+  assert.equal(editor.state.edits[0].id, "e000001");
+  await editor.run();
+  assert.equal(keys[0], keys[1]);
+  assert.notEqual(keys[1], keys[2]);
+  assert.match(keys[0], /^[0-9a-f]{32}$/);
+});
+
+test("when its edit is done, the page shows the result and the handles have done their work", async () => {
+  service["POST /v1/edits"] = () => edit();
+  await editor.place(CAMERA, 200, 150);
+  await editor.run();
+  streams[0].send(edit({ state: "running", progress: 0.5 }));
+  assert.equal(editor.state.edits[0].progress, 0.5);
+  service["GET /v1/scenes/s000001"] = () => ({
+    ...scene(),
+    versions: [...scene().versions, { version: 1, parent: 0 }],
+  });
+  streams[0].send(edit({ state: "succeeded", progress: 1, result_version: 1 }));
+  await settle();
+  assert.equal(editor.state.version, 1);
+  assert.deepEqual(editor.state.handles, []);
+  assert.ok(streams[0].closed);
+  editor.showVersion(parentOf(editor.state.scene, 1));
+  assert.equal(editor.state.version, 0);
+});
+
+test("a result of another version than the one looked at does not take the screen", async () => {
+  service["POST /v1/edits"] = () => edit({ version: 3 });
+  await editor.place(CAMERA, 200, 150);
+  await editor.run();
+  service["GET /v1/scenes/s000001"] = () => ({
+    ...scene(),
+    versions: [...scene().versions, { version: 4, parent: 3 }],
+  });
+  streams[0].send(edit({ version: 3, state: "succeeded", progress: 1, result_version: 4 }));
+  await settle();
+  assert.equal(editor.state.version, 0);
+  assert.equal(editor.state.handles.length, 1);
+});
+
+test("a preview that is gone is taken off the screen, and said to be", async () => {
+  service["POST /v1/previews"] = () => ({
+    version: "p000001",
+    parent: 0,
+    handles: [{ gaussians: 42 }],
+    gaussians: { changeable: 84 },
+  });
+  await editor.place(CAMERA, 200, 150);
+  editor.change(editor.state.handles[0].id, { target: [1, 0, 0] });
+  await editor.preview();
+  assert.ok(editor.previewIsCurrent);
+  editor.change(editor.state.handles[0].id, { target: [2, 0, 0] });
+  assert.ok(!editor.previewIsCurrent);
+  editor.previewExpired("p000001");
+  assert.equal(editor.state.preview, null);
+  assert.match(said.at(-1), /expired/);
+});
+
+test("handles, version and camera survive a reload, and a running edit is followed again", async () => {
+  await editor.place(CAMERA, 200, 150);
+  editor.setPose({ eye: [1, 2, 3], target: [0, 0, 0], up: [0, -1, 0], fov: 40 });
+  editor.store.set({ mode: "extend" });
+  editor.flush();
+  service["GET /v1/edits?scene=s000001&limit=30"] = () => ({ edits: [edit({ state: "running", progress: 0.3 })] });
+  editor.close();
+  await open();
+  assert.equal(editor.state.handles.length, 1);
+  assert.deepEqual(editor.state.pose.eye, [1, 2, 3]);
+  assert.equal(editor.state.mode, "extend");
+  assert.equal(streams.at(-1).url, "/v1/edits/e000001/events");
+  const { id } = editor.state.handles[0];
+  await editor.place(CAMERA, 200, 150);
+  assert.notEqual(editor.state.handles[1].id, id);
+});
+
+test("only the first edit that is open takes a stream", async () => {
+  service["GET /v1/edits?scene=s000001&limit=30"] = () => ({
+    edits: [edit({ id: "e000003" }), edit({ id: "e000002" }), edit({ id: "e000001", state: "running" })],
+  });
+  for (const id of ["e000002", "e000003"]) service[`GET /v1/edits/${id}`] = () => edit({ id });
+  editor.close();
+  await open();
+  assert.deepEqual(
+    streams.map((s) => s.url),
+    ["/v1/edits/e000001/events"],
+  );
+  streams[0].send(edit({ state: "cancelled" }));
+  await settle();
+  assert.deepEqual(
+    streams.map((s) => s.url),
+    ["/v1/edits/e000001/events", "/v1/edits/e000002/events"],
+  );
+});

@@ -1,0 +1,126 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { AdaptiveSide, FrameQueue, Recent } from "../../../web/frames.js";
+
+/** A queue whose loads are answered by hand. */
+function byHand() {
+  const asked = [];
+  const shown = [];
+  const failed = [];
+  const queue = new FrameQueue({
+    load: (job, signal) =>
+      new Promise((resolve, reject) => {
+        asked.push({ job, resolve, reject, signal });
+        signal.addEventListener("abort", () => reject(Object.assign(new Error("given up"), { name: "AbortError" })));
+      }),
+    show: (picture, job) => shown.push([picture, job.key]),
+    failed: (error, job) => failed.push([error.message, job.key]),
+  });
+  return { queue, asked, shown, failed };
+}
+const settle = () => new Promise((resolve) => setImmediate(resolve));
+
+test("one picture is asked for at a time, and of those wished for meanwhile only the latest", async () => {
+  const { queue, asked, shown } = byHand();
+  for (const key of ["a", "b", "c", "d"]) queue.want({ key });
+  assert.deepEqual(
+    asked.map((a) => a.job.key),
+    ["a"],
+  );
+  asked[0].resolve("A");
+  await settle();
+  assert.deepEqual(
+    asked.map((a) => a.job.key),
+    ["a", "d"],
+  );
+  asked[1].resolve("D");
+  await settle();
+  assert.deepEqual(shown, [
+    ["A", "a"],
+    ["D", "d"],
+  ]);
+  assert.equal(queue.busy, false);
+});
+
+test("a large picture is given up for a newer wish, and is never shown", async () => {
+  const { queue, asked, shown, failed } = byHand();
+  queue.want({ key: "large", large: true });
+  queue.want({ key: "small" });
+  asked[0].resolve("too late");
+  await settle();
+  assert.ok(asked[0].signal.aborted);
+  assert.deepEqual(
+    asked.map((a) => a.job.key),
+    ["large", "small"],
+  );
+  asked[1].resolve("S");
+  await settle();
+  assert.deepEqual(shown, [["S", "small"]]);
+  assert.deepEqual(failed, []);
+});
+
+test("a wish for what is under way cancels what was wished for in between", async () => {
+  const { queue, asked } = byHand();
+  queue.want({ key: "a" });
+  queue.want({ key: "b" });
+  queue.want({ key: "a" });
+  asked[0].resolve("A");
+  await settle();
+  assert.equal(asked.length, 1);
+});
+
+test("after a failure the next wish is still met", async () => {
+  const { queue, asked, failed } = byHand();
+  queue.want({ key: "a" });
+  queue.want({ key: "b" });
+  asked[0].reject(new Error("no"));
+  await settle();
+  assert.deepEqual(failed, [["no", "a"]]);
+  assert.equal(asked[1].job.key, "b");
+});
+
+test("a queue that was cleared shows nothing more", async () => {
+  const { queue, asked, shown } = byHand();
+  queue.want({ key: "a" });
+  queue.want({ key: "b" });
+  queue.clear();
+  asked[0].resolve("A");
+  await settle();
+  assert.deepEqual(shown, []);
+  assert.equal(asked.length, 1);
+  assert.equal(queue.busy, false);
+});
+
+test("slow answers make moving pictures smaller, quick ones larger, within limits", () => {
+  const side = new AdaptiveSide({ start: 400, min: 160, max: 960, goal: 90 });
+  assert.equal(side.side, 400);
+  side.record(400);
+  assert.ok(side.side < 400 && side.side >= 288, "one slow answer is no catastrophe");
+  for (let i = 0; i < 50; ++i) side.record(5000);
+  assert.equal(side.side, 160);
+  for (let i = 0; i < 50; ++i) side.record(1);
+  assert.equal(side.side, 960);
+});
+
+test("the size settles where pictures take as long as they may", () => {
+  const side = new AdaptiveSide({ start: 400, min: 160, max: 960, goal: 90 });
+  for (let i = 0; i < 60; ++i) side.record(10 + side.side ** 2 * 2e-4);
+  const ms = 10 + side.side ** 2 * 2e-4;
+  assert.ok(Math.abs(ms - 90) < 15, `${side.side} px take ${ms} ms`);
+});
+
+test("the least recently used goes first", () => {
+  const gone = [];
+  const recent = new Recent(2, (value) => gone.push(value));
+  recent.put("a", 1);
+  recent.put("b", 2);
+  assert.equal(recent.get("a"), 1);
+  recent.put("c", 3);
+  assert.deepEqual(gone, [2]);
+  assert.equal(recent.get("b"), undefined);
+  recent.put("a", 4);
+  assert.deepEqual(gone, [2, 1]);
+  recent.clear();
+  assert.deepEqual(gone, [2, 1, 3, 4]);
+});

@@ -1,0 +1,145 @@
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { test } from "node:test";
+
+import { ImportError, partOf, previewKey, readRequests, requestOf } from "../../../web/requests.js";
+
+const example = (name) => readFileSync(new URL(`../../../proto/examples/${name}`, import.meta.url), "utf8");
+const only = (text) => {
+  const requests = readRequests(text);
+  assert.equal(requests.length, 1);
+  return requests[0].request;
+};
+const refused = (document, where) =>
+  assert.throws(
+    () => readRequests(JSON.stringify(document)),
+    (error) => {
+      assert.ok(error instanceof ImportError, String(error));
+      assert.equal(error.where, where, error.message);
+      return true;
+    },
+  );
+
+test("a released 3DGS-Drag configuration becomes a request", () => {
+  const request = only(example("released_config.json"));
+  assert.equal(request.mode, "move");
+  assert.deepEqual(request.handles[0].source, [-1.22, -0.26, -0.42]);
+  assert.deepEqual(request.handles[0].target, [-1.22 + -0.1, -0.26 + -0.2, -0.42 + 0.05]);
+  assert.equal(request.handles[1].target, null, "no direction: an anchor");
+  assert.deepEqual(
+    request.handles.map((h) => h.group),
+    [0, 0, 1],
+  );
+  assert.deepEqual(
+    request.handles.map((h) => h.radius),
+    [0.12, 0.12, 0.12],
+  );
+  assert.deepEqual(request.region, { center: [-0.6, -0.2, -0.5], size: [2, 1, 1] });
+});
+
+test("a released configuration needs neither cluster nor mask nor mode", () => {
+  const request = only('{"start": [[1, 2, 3]], "direction": [[0, 0, 1]], "voxel_size": 0.5}');
+  assert.deepEqual(request.handles, [{ source: [1, 2, 3], target: [1, 2, 4], radius: 0.5, group: 0 }]);
+  assert.equal(request.region, null);
+  assert.equal(request.mode, "move");
+});
+
+test("a request with every parameter is kept whole", () => {
+  const text = example("move_ball.json");
+  const request = only(text);
+  assert.deepEqual(request.params, JSON.parse(text).params);
+  assert.equal(request.preset, "paper");
+  assert.deepEqual(request.region, JSON.parse(text).region);
+});
+
+test("what is exported can be imported again", () => {
+  for (const name of ["move_ball.json", "stretch_apple.json", "released_config.json"]) {
+    const request = only(example(name));
+    const exported = requestOf({ ...request, scene: "s000001", version: 2 });
+    assert.deepEqual(only(JSON.stringify(exported)), request);
+  }
+});
+
+test("a file of several requests keeps their names and drops comments", () => {
+  const requests = readRequests(example("named_requests.json"));
+  assert.deepEqual(
+    requests.map((r) => r.name),
+    ["ball_right", "apple_up"],
+  );
+  assert.equal(requests[1].request.handles[0].radius, 0.2);
+});
+
+test("what is wrong in a file is named", () => {
+  const released = (patch) => ({ start: [[1, 2, 3]], direction: [[0, 0, 1]], voxel_size: 0.5, ...patch });
+  refused(released({ start: [] }), "start");
+  refused(released({ start: [[1, 2]] }), "start[0]");
+  refused(
+    released({
+      direction: [
+        [0, 0, 1],
+        [1, 0, 0],
+      ],
+    }),
+    "direction",
+  );
+  refused(released({ direction: [[0, "1", 1]] }), "direction[0]");
+  refused(released({ voxel_size: 0 }), "voxel_size");
+  refused(released({ cluster: [-1] }), "cluster[0]");
+  refused(released({ local_mask: { center: [0, 0, 0], xyz: [1, 0, 1] } }), "local_mask.xyz[1]");
+  refused(released({ local_mask: { center: [0, 0, 0], size: [1, 1, 1] } }), "local_mask.size");
+  refused(released({ mode: "copy" }), "mode");
+  refused(released({ radius: 1 }), "radius");
+  refused({ handles: [{ source: [0, 0, 0], radius: -1 }] }, "handles[0].radius");
+  refused({ handles: [{ source: [0, 0, 0], radius: 1, group: 1.5 }] }, "handles[0].group");
+  refused({ handles: [{ source: [0, 0, 0], radius: 1, target: null }] }, "handles[0].target");
+  refused({ handles: [{ source: [0, 0, 0], radius: 1 }], extra: 1 }, "extra");
+  refused({ named: { handles: [] } }, "named.handles");
+  refused([1], "");
+  refused({ hello: 1 }, "");
+  assert.throws(() => readRequests("{"), ImportError);
+});
+
+test("a request leaves to the service what nobody chose", () => {
+  const request = requestOf({
+    scene: "s000001",
+    version: 0,
+    mode: "move",
+    preset: "",
+    prompt: null,
+    region: null,
+    handles: [{ id: 7, source: [0, 0, 0], target: null, radius: 1, group: 0, count: 12 }],
+    params: { intervals: null, seed: 0, rotation: "" },
+  });
+  assert.deepEqual(request, {
+    scene: "s000001",
+    version: 0,
+    mode: "move",
+    handles: [{ source: [0, 0, 0], radius: 1, group: 0 }],
+    params: { seed: 0 },
+  });
+});
+
+test("a preview is stale when what it shows has changed, and only then", () => {
+  const base = {
+    scene: "s",
+    version: 0,
+    mode: "move",
+    handles: [{ source: [0, 0, 0], radius: 1, group: 0 }],
+    params: {},
+  };
+  assert.equal(previewKey(base), previewKey({ ...base, params: { views: 10, seed: 4, max_image_side: 256 } }));
+  assert.notEqual(previewKey(base), previewKey({ ...base, mode: "extend" }));
+  assert.notEqual(previewKey(base), previewKey({ ...base, params: { intervals: 3 } }));
+  assert.notEqual(previewKey(base), previewKey({ ...base, handles: [{ ...base.handles[0], radius: 2 }] }));
+});
+
+test("an error's address leads to the part of the page it is about", () => {
+  assert.deepEqual(partOf("handles[2].radius"), { part: "handle", index: 2, field: "radius" });
+  assert.deepEqual(partOf("handles[0].source[1]"), { part: "handle", index: 0, field: "source" });
+  assert.deepEqual(partOf("handles[1]"), { part: "handle", index: 1, field: "" });
+  assert.deepEqual(partOf("params.views"), { part: "param", name: "views" });
+  assert.deepEqual(partOf("region.size[0]"), { part: "region" });
+  assert.deepEqual(partOf("mode"), { part: "mode" });
+  assert.deepEqual(partOf("version"), { part: "request" });
+  assert.deepEqual(partOf(undefined), { part: "request" });
+});

@@ -1,0 +1,79 @@
+// Elements from code. Text is always text: nothing is ever parsed as HTML.
+
+const SVG = "http://www.w3.org/2000/svg";
+
+function fill(element, props, children) {
+  for (const [name, value] of Object.entries(props ?? {})) {
+    if (value === null || value === undefined || value === false) continue;
+    if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
+    else if (name === "testid") element.setAttribute("data-testid", value);
+    else if (name === "value") element.value = value;
+    else element.setAttribute(name, value === true ? "" : value);
+  }
+  element.append(...children.flat().filter((child) => child !== null && child !== undefined && child !== false));
+  return element;
+}
+
+/** h("button", {class: "primary", onclick: go, testid: "run"}, "Run"). */
+export const h = (tag, props, ...children) => fill(document.createElement(tag), props, children);
+export const s = (tag, props, ...children) => fill(document.createElementNS(SVG, tag), props, children);
+
+export const byId = (id) => document.getElementById(id);
+
+/** Sets attributes of an element; null removes one. */
+export function attrs(element, values) {
+  for (const [name, value] of Object.entries(values)) {
+    if (value === null || value === undefined || value === false) element.removeAttribute(name);
+    else {
+      const text = value === true ? "" : String(value);
+      if (element.getAttribute(name) !== text) element.setAttribute(name, text);
+    }
+  }
+}
+
+/** Sets the text of an element, if it is another. */
+export function text(element, value) {
+  if (element.textContent !== value) element.textContent = value;
+}
+
+/** Sets the value of a field, unless somebody is writing in it. */
+export function fieldValue(field, value) {
+  if (document.activeElement !== field && field.value !== String(value)) field.value = value;
+}
+
+/** A message of an error for people: what, and where. */
+export function problemText(error) {
+  const detail = error?.detail || error?.message || String(error);
+  return error?.where ? `${detail} (${error.where})` : detail;
+}
+
+/** Shows an error in a place made for it (class "problem"), or clears it. */
+export function showProblem(place, error) {
+  place.hidden = !error;
+  if (!error) return place.replaceChildren();
+  place.replaceChildren(
+    h("span", {}, error.detail || error.message || String(error)),
+    error.where ? h("code", { class: "where" }, error.where) : "",
+  );
+}
+
+/** Children of `parent`, one per item, made once and kept: focus and selection survive an update.
+ *    key(item)            what tells items apart
+ *    make(item)           -> {element, update(item, index)} */
+export function keyedList(parent, key, make) {
+  const kept = new Map();
+  return (items) => {
+    const wanted = new Set(items.map(key));
+    for (const [k, entry] of kept)
+      if (!wanted.has(k)) {
+        entry.element.remove();
+        kept.delete(k);
+      }
+    items.forEach((item, i) => {
+      let entry = kept.get(key(item));
+      if (!entry) kept.set(key(item), (entry = make(item)));
+      entry.update?.(item, i);
+      if (parent.children[i] !== entry.element) parent.insertBefore(entry.element, parent.children[i] ?? null);
+    });
+  };
+}

@@ -1,0 +1,667 @@
+// What can be done with a scene, and the state it leaves. No elements here: the panels watch the store.
+
+import * as api from "./api.js";
+import {
+  DEFAULT_UP,
+  dragged,
+  firstPose,
+  isPose,
+  levelled,
+  onTheWire,
+  pivotedAt,
+  poseOfView,
+  project,
+  upOf,
+} from "./camera.js";
+import { History } from "./history.js";
+import { previewKey, requestOf } from "./requests.js";
+import { follow, hasEnded, merged } from "./watch.js";
+
+const COUNT_DELAY_MS = 150;
+const PREVIEW_DELAY_MS = 300;
+const SAVE_DELAY_MS = 400;
+
+/** What there is before a scene is open. */
+export const NOTHING_OPEN = {
+  scene: null,
+  views: [],
+  viewsKind: null,
+  viewName: null, // The view that the pose was taken from; null once it has been moved.
+  pose: null,
+  version: 0, // The version that is looked at and edited.
+  layer: "color",
+  comparing: false,
+  compareWith: null, // A version; null: the one before.
+  handles: [], // {id, source, normal, target, radius, group}
+  selected: null, // Id of a handle.
+  dragging: false,
+  constraint: "view",
+  counts: {}, // By handle id: {key, gaussians, error}
+  region: null,
+  mode: "move",
+  preset: "",
+  prompt: null,
+  params: {},
+  autoPreview: true,
+  preview: null, // What the service answered, and `key`: of what it is a preview.
+  previewing: false,
+  problem: null, // {error, key, from: "preview" | "run"}: what the service refused.
+  estimate: null, // {key, ...}: what the service expects of a run.
+  submitting: false,
+  edits: [],
+  tab: "drag",
+};
+
+/** The number of the version before another one; null for the first. */
+export function parentOf(scene, version) {
+  return scene?.versions.find((v) => v.version === version)?.parent ?? null;
+}
+
+/** Which version is on the screen: a number, or the id of a preview. */
+export function shownVersion({ scene, version, preview, comparing, compareWith }) {
+  if (!comparing) return preview ? preview.version : version;
+  if (compareWith !== null) return compareWith;
+  return preview ? version : (parentOf(scene, version) ?? version);
+}
+
+export class Editor {
+  #history = new History();
+  #timers = new Map();
+  #following = new Map();
+  #counting = null;
+  #previewing = null;
+  #placing = null;
+  #nextId = 1;
+  #pending = null; // {body, key} of a submission whose answer never came.
+  #opened = 0;
+  #lastView = null;
+
+  /**   say(message, options)  a short message to the user */
+  constructor(store, memory, say) {
+    Object.assign(this, { store, memory, say });
+    store.watch(["handles", "version", "scene", "dragging"], () => this.#countSoon());
+    store.watch(["layer", "version", "preview"], ({ layer, version, preview }) => {
+      // Version 0 does not differ from itself.
+      if (layer === "mask" && version === 0 && !preview) store.set({ layer: "color" });
+    });
+    store.watch(["handles", "version", "region", "mode", "preset", "params", "autoPreview", "dragging"], () =>
+      this.#requestChanged(),
+    );
+    store.watch(
+      [
+        "pose",
+        "version",
+        "handles",
+        "region",
+        "mode",
+        "preset",
+        "prompt",
+        "params",
+        "autoPreview",
+        "layer",
+        "viewName",
+        "tab",
+        "constraint",
+      ],
+      () => this.#saveSoon(),
+    );
+  }
+
+  get state() {
+    return this.store.state;
+  }
+
+  // --- opening ---------------------------------------------------------------------------------------------------
+
+  /** Opens a scene where it was left. Throws what the service answers if there is no such scene. */
+  async open(id) {
+    this.close();
+    const opening = this.#opened;
+    const scene = await api.scene(id);
+    if (opening !== this.#opened) return;
+    const kept = this.memory.load(scene) ?? {};
+    const version = scene.versions.some((v) => v.version === kept.version)
+      ? kept.version
+      : scene.versions.at(-1).version;
+    const handles = kept.version === version && Array.isArray(kept.handles) ? kept.handles : [];
+    this.#nextId = Math.max(0, ...handles.map((h) => h.id)) + 1;
+    const pose = isPose(kept.pose) ? kept.pose : null;
+    this.#lastView = kept.viewName ?? null;
+    const remembered = {};
+    for (const key of ["region", "mode", "preset", "prompt", "params", "autoPreview", "layer", "tab", "constraint"])
+      if (kept[key] !== undefined) remembered[key] = kept[key];
+    this.store.set({
+      ...remembered,
+      scene,
+      version,
+      handles,
+      pose: pose ?? (scene.dataset ? null : firstPose(scene)),
+      viewName: pose ? (kept.viewName ?? null) : null,
+    });
+    await Promise.allSettled([this.#loadViews(opening), this.#loadEdits(opening)]);
+  }
+
+  close() {
+    this.#opened += 1;
+    for (const timer of this.#timers.values()) clearTimeout(timer);
+    this.#timers.clear();
+    for (const end of this.#following.values()) end();
+    this.#following.clear();
+    for (const abort of [this.#counting, this.#previewing, this.#placing]) abort?.abort();
+    this.#previewing = null;
+    this.#pending = null;
+    this.#history.clear();
+    if (this.state.scene) this.#save();
+    this.store.set({ ...NOTHING_OPEN });
+  }
+
+  async #loadViews(opening) {
+    const fallback = () => this.state.pose ?? firstPose(this.state.scene);
+    try {
+      const { views, kind } = await api.views(this.state.scene.id);
+      if (opening !== this.#opened) return;
+      this.store.set({ views, viewsKind: kind });
+      if (this.state.pose === null && views.length) this.lookFrom(views[0].name);
+      else this.store.set({ pose: fallback() });
+    } catch (error) {
+      if (opening !== this.#opened) return;
+      this.store.set({ pose: fallback() });
+      this.say(`The views of this scene could not be listed: ${error.message}`, { kind: "bad" });
+    }
+  }
+
+  async reloadScene() {
+    const { scene } = this.state;
+    if (!scene) return;
+    const opening = this.#opened;
+    const fresh = await api.scene(scene.id);
+    if (opening === this.#opened) this.store.set({ scene: fresh });
+  }
+
+  /** After a new dataset: its views, and its first one to look from. */
+  async datasetChanged(scene) {
+    this.store.set({ scene, pose: null, viewName: null });
+    await this.#loadViews(this.#opened);
+  }
+
+  // --- looking ---------------------------------------------------------------------------------------------------
+
+  get worldUp() {
+    return this.state.scene?.up ?? DEFAULT_UP;
+  }
+
+  setPose(pose) {
+    this.store.set({ pose, viewName: null });
+  }
+
+  /** Width / height of the picture; told by the viewer. */
+  aspect = 1.5;
+
+  lookFrom(name) {
+    const view = this.state.views.find((v) => v.name === name);
+    if (!view) return;
+    this.#lastView = name;
+    const pose = poseOfView(view, this.state.scene, this.aspect);
+    this.store.set({ pose, viewName: name });
+    this.#pivotOnSurface(pose);
+  }
+
+  /** Puts the pivot of a pose onto what is in the middle of its picture: an orbit then turns about that. */
+  async #pivotOnSurface(pose) {
+    const { scene, version } = this.state;
+    const camera = onTheWire({ ...pose, width: 200, height: 200 });
+    try {
+      const found = await api.pick(scene.id, version, { camera, x: 100, y: 100 });
+      if (found.hit && this.state.pose === pose) this.store.set({ pose: pivotedAt(pose, found.point) });
+    } catch {
+      // The pivot stays near the scene's centre: good enough, and not worth a message.
+    }
+  }
+
+  /** The next view of the list (step 1), the one before (-1). */
+  stepView(step) {
+    const { views } = this.state;
+    if (views.length === 0) return;
+    const at = views.findIndex((v) => v.name === this.#lastView);
+    const next = at < 0 ? (step > 0 ? 0 : views.length - 1) : (at + step + views.length) % views.length;
+    this.lookFrom(views[next].name);
+  }
+
+  home() {
+    const { scene, views } = this.state;
+    if (scene?.dataset && views.length) this.lookFrom(views[0].name);
+    else if (scene) this.store.set({ pose: firstPose(scene), viewName: null });
+  }
+
+  /** Declares the top of the screen to be the scene's up. */
+  async setUp(up) {
+    const scene = await api.patchScene(this.state.scene.id, { up });
+    this.store.set({ scene });
+    if (this.state.pose) this.setPose(levelled(this.state.pose, this.worldUp));
+  }
+
+  setUpFromView() {
+    return this.setUp(upOf(this.state.pose));
+  }
+
+  async rename(name) {
+    this.store.set({ scene: await api.patchScene(this.state.scene.id, { name }) });
+  }
+
+  /** Looks at, and from now on edits, another version. Handles were placed on the old one: they stay, since versions
+   *  share the frame, and can be undone. */
+  showVersion(version) {
+    this.store.set({ version, comparing: false, compareWith: null, preview: null, problem: null, estimate: null });
+  }
+
+  // --- handles ---------------------------------------------------------------------------------------------------
+
+  #setHandles(handles, note = true) {
+    if (note) this.#history.note(this.state.handles);
+    const { selected } = this.state;
+    this.store.set({ handles, selected: handles.some((h) => h.id === selected) ? selected : null });
+  }
+
+  undo() {
+    const handles = this.#history.undo(this.state.handles);
+    if (handles) this.#setHandles(handles, false);
+  }
+
+  redo() {
+    const handles = this.#history.redo(this.state.handles);
+    if (handles) this.#setHandles(handles, false);
+  }
+
+  get canUndo() {
+    return this.#history.canUndo;
+  }
+
+  get canRedo() {
+    return this.#history.canRedo;
+  }
+
+  #defaultRadius() {
+    const last = this.state.handles.at(-1);
+    return last ? last.radius : Number(((this.state.scene.radius || 1) * 0.12).toPrecision(3));
+  }
+
+  /** Places a handle on the surface under a pixel of a camera. */
+  async place(camera, x, y) {
+    this.#placing?.abort();
+    const abort = (this.#placing = new AbortController());
+    const { scene, version } = this.state;
+    try {
+      const found = await api.pick(scene.id, version, { camera: onTheWire(camera), x, y }, abort.signal);
+      if (abort.signal.aborted) return;
+      if (!found.hit) return this.say("There is nothing here to take hold of.", { seconds: 3 });
+      const handle = {
+        id: this.#nextId++,
+        source: found.point,
+        normal: found.normal ?? null,
+        target: null,
+        radius: this.#defaultRadius(),
+        group: this.state.handles.at(-1)?.group ?? 0,
+      };
+      this.#setHandles([...this.state.handles, handle]);
+      // The handle is on the version, not on what a preview has made of it.
+      this.store.set({ selected: handle.id, tab: "drag" });
+    } catch (error) {
+      if (!api.wasGivenUp(error)) this.say(`No handle could be placed: ${error.message}`, { kind: "bad" });
+    }
+  }
+
+  /** The point of the surface under a pixel; null if there is none. */
+  async surfaceAt(camera, x, y) {
+    const { scene, version } = this.state;
+    const found = await api.pick(scene.id, version, { camera: onTheWire(camera), x, y });
+    return found.hit ? found.point : null;
+  }
+
+  /** Changes a handle. `note`: can be undone (not each step of a drag). */
+  change(id, patch, note = true) {
+    this.#setHandles(
+      this.state.handles.map((h) => (h.id === id ? { ...h, ...patch } : h)),
+      note,
+    );
+  }
+
+  remove(id) {
+    this.#setHandles(this.state.handles.filter((h) => h.id !== id));
+  }
+
+  removeAll() {
+    if (this.state.handles.length) this.#setHandles([]);
+  }
+
+  select(id) {
+    this.store.set({ selected: id });
+  }
+
+  /** Drags the target of a handle from where it is (its source, if it has none yet).
+   *    at  {x, y} where the pointer took hold, pixels
+   *  Returns {move(x, y), end(), giveUp()}. */
+  dragTarget(id, camera, at) {
+    const before = this.state.handles;
+    const handle = before.find((h) => h.id === id);
+    const from = handle.target ?? handle.source;
+    const seen = project(camera, from) ?? at;
+    const [gripX, gripY] = [seen.x - at.x, seen.y - at.y];
+    let moved = false;
+    this.store.set({ selected: id });
+    return {
+      move: (x, y) => {
+        if (!moved) this.#history.note(before);
+        moved = true;
+        const target = dragged(camera, from, x + gripX, y + gripY, this.state.constraint, handle.normal);
+        this.store.set({ dragging: true });
+        this.change(id, { target }, false);
+      },
+      end: () => this.store.set({ dragging: false }),
+      giveUp: () => {
+        if (moved) this.undo();
+        this.store.set({ dragging: false });
+      },
+    };
+  }
+
+  // --- counts ----------------------------------------------------------------------------------------------------
+
+  #later(name, ms, fn) {
+    clearTimeout(this.#timers.get(name));
+    this.#timers.set(name, setTimeout(fn, ms));
+  }
+
+  #countKey({ source, radius }) {
+    return JSON.stringify([this.state.version, source, radius]);
+  }
+
+  #countSoon() {
+    if (this.state.scene) this.#later("count", COUNT_DELAY_MS, () => this.#count());
+  }
+
+  async #count() {
+    this.#counting?.abort();
+    const abort = (this.#counting = new AbortController());
+    const { scene, version } = this.state;
+    for (const handle of this.state.handles) {
+      const key = this.#countKey(handle);
+      if (this.state.counts[handle.id]?.key === key) continue;
+      let count;
+      try {
+        const found = await api.pick(scene.id, version, { point: handle.source, radius: handle.radius }, abort.signal);
+        count = { key, gaussians: found.gaussians_in_radius ?? 0 };
+      } catch (error) {
+        if (api.wasGivenUp(error)) return;
+        count = { key, gaussians: null, error };
+      }
+      if (abort.signal.aborted) return;
+      this.store.set({ counts: { ...this.state.counts, [handle.id]: count } });
+    }
+  }
+
+  /** How many Gaussians lie within a handle's radius: {gaussians, error}; null while that is not known. */
+  countOf(handle) {
+    const count = this.state.counts[handle.id];
+    return count?.key === this.#countKey(handle) ? count : null;
+  }
+
+  // --- requests --------------------------------------------------------------------------------------------------
+
+  request() {
+    return requestOf({ ...this.state, scene: this.state.scene.id });
+  }
+
+  #requestChanged() {
+    const { scene, handles, preview, problem, autoPreview, dragging } = this.state;
+    if (!scene) return;
+    const key = previewKey(this.request());
+    if (problem && problem.key !== JSON.stringify(this.request())) this.store.set({ problem: null });
+    if (!handles.some((h) => h.target)) {
+      this.#later("preview", 0, () => {});
+      this.#previewing?.abort();
+      if (preview) this.store.set({ preview: null });
+      return;
+    }
+    if (autoPreview && !dragging && preview?.key !== key && this.state.problem === null)
+      this.#later("preview", PREVIEW_DELAY_MS, () => this.preview());
+  }
+
+  /** Whether the preview on the screen shows what is asked for now. */
+  get previewIsCurrent() {
+    const { preview } = this.state;
+    return preview !== null && preview.key === previewKey(this.request());
+  }
+
+  async preview() {
+    const { scene, handles } = this.state;
+    if (!scene || !handles.some((h) => h.target)) return;
+    this.#previewing?.abort();
+    const abort = (this.#previewing = new AbortController());
+    const request = this.request();
+    const key = previewKey(request);
+    this.store.set({ previewing: true });
+    try {
+      const preview = await api.createPreview(request, abort.signal);
+      if (!abort.signal.aborted) this.store.set({ preview: { ...preview, key }, problem: null });
+    } catch (error) {
+      if (!api.wasGivenUp(error) && !abort.signal.aborted)
+        this.store.set({ preview: null, problem: { error, key: JSON.stringify(request), from: "preview" } });
+    }
+    if (this.#previewing === abort) {
+      this.#previewing = null;
+      this.store.set({ previewing: false });
+    }
+  }
+
+  dropPreview() {
+    this.store.set({ preview: null });
+  }
+
+  /** The service has forgotten the preview on the screen. */
+  previewExpired(version) {
+    if (this.state.preview?.version !== version) return;
+    this.store.set({ preview: null });
+    this.say("The preview has expired.", { action: { label: "Preview again", run: () => this.preview() } });
+  }
+
+  async estimate() {
+    const request = this.request();
+    const key = JSON.stringify(request);
+    this.store.set({ submitting: true });
+    try {
+      this.store.set({ estimate: { ...(await api.estimateEdit(request)), key }, problem: null });
+    } catch (error) {
+      this.store.set({ estimate: null, problem: { error, key, from: "run" } });
+    }
+    this.store.set({ submitting: false });
+  }
+
+  async run() {
+    const request = this.request();
+    const body = JSON.stringify(request);
+    // If the answer to a submission was lost, the same one again under the same key is answered, not queued twice.
+    if (this.#pending?.body !== body) this.#pending = { body, key: freshKey() };
+    this.store.set({ submitting: true });
+    try {
+      const edit = await api.createEdit(request, this.#pending.key);
+      this.#pending = null;
+      this.store.set({ edits: merged(this.state.edits, edit), tab: "edits", problem: null });
+      this.#followAll();
+    } catch (error) {
+      if (error.status > 0) this.#pending = null;
+      this.store.set({ problem: { error, key: body, from: "run" } });
+    }
+    this.store.set({ submitting: false });
+  }
+
+  /** Puts a request on the screen, in place of what is there. */
+  load(request) {
+    const handles = request.handles.map((handle) => ({
+      id: this.#nextId++,
+      source: handle.source,
+      normal: null,
+      target: handle.target ?? null,
+      radius: handle.radius,
+      group: handle.group ?? 0,
+    }));
+    this.#setHandles(handles);
+    this.store.set({
+      selected: null,
+      mode: request.mode ?? "move",
+      preset: request.preset ?? "",
+      prompt: request.prompt ?? null,
+      region: request.region ?? null,
+      params: request.params ?? {},
+      problem: null,
+      tab: "drag",
+    });
+  }
+
+  // --- edits -----------------------------------------------------------------------------------------------------
+
+  async #loadEdits(opening) {
+    try {
+      const edits = await api.edits(this.state.scene.id);
+      if (opening !== this.#opened) return;
+      this.store.set({ edits });
+      this.#followAll();
+    } catch (error) {
+      if (opening === this.#opened)
+        this.say(`The edits of this scene could not be listed: ${error.message}`, { kind: "bad" });
+    }
+  }
+
+  /** Follows every edit that has not ended: the oldest of them, which runs or is next to, by events; the others, which
+   *  wait, by asking. Browsers allow few connections at once. */
+  #followAll() {
+    const open = this.state.edits.filter((e) => !hasEnded(e)).reverse();
+    open.forEach((edit, i) => {
+      const how = i === 0 ? "events" : "ask";
+      const current = this.#following.get(edit.id);
+      if (current?.how === how) return;
+      current?.();
+      const end = follow(edit.id, {
+        told: (news) => this.#editTold(news),
+        gone: () => this.#editGone(edit.id),
+        events: how === "events" ? api.editEvents : null,
+        ask: api.edit,
+        every: how === "events" ? 1000 : 3000,
+      });
+      this.#following.set(
+        edit.id,
+        Object.assign(() => end(), { how }),
+      );
+    });
+  }
+
+  #editTold(edit) {
+    const before = this.state.edits.find((e) => e.id === edit.id);
+    this.store.set({ edits: merged(this.state.edits, edit) });
+    if (!hasEnded(edit)) return;
+    this.#following.delete(edit.id);
+    if (before && !hasEnded(before)) this.#editEnded(edit);
+    this.#followAll();
+  }
+
+  #editGone(id) {
+    this.#following.delete(id);
+    this.store.set({ edits: this.state.edits.filter((e) => e.id !== id) });
+    this.#followAll();
+  }
+
+  async #editEnded(edit) {
+    if (edit.state === "failed") {
+      this.say(`The edit failed: ${edit.error?.detail ?? "no reason was given"}`, { kind: "bad", seconds: 12 });
+      return;
+    }
+    if (edit.state !== "succeeded" || edit.result_version === null) return;
+    const opening = this.#opened;
+    try {
+      await this.reloadScene();
+    } catch (error) {
+      return this.say(`The result is version ${edit.result_version}, but: ${error.message}`, { kind: "bad" });
+    }
+    if (opening !== this.#opened) return;
+    const say = (text, action) => this.say(text, { kind: "good", seconds: 10, action });
+    if (this.state.version !== edit.version)
+      return say(`Version ${edit.result_version} is ready.`, {
+        label: "Show",
+        run: () => this.showVersion(edit.result_version),
+      });
+    // What was dragged is where it should be: the handles have done their work. They can be had back by undo.
+    this.#setHandles([]);
+    this.showVersion(edit.result_version);
+    say(`Version ${edit.result_version} is ready. Hold B to compare it with version ${edit.version}.`);
+  }
+
+  async stopEdit(id) {
+    this.#editTold(await api.stopEdit(id));
+  }
+
+  async cancelEdit(id) {
+    this.#editTold(await api.cancelEdit(id));
+  }
+
+  async deleteEdit(id) {
+    await api.deleteEdit(id);
+    this.#editGone(id);
+  }
+
+  // --- remembering -----------------------------------------------------------------------------------------------
+
+  #saveSoon() {
+    if (this.state.scene) this.#later("save", SAVE_DELAY_MS, () => this.#save());
+  }
+
+  #save() {
+    const {
+      scene,
+      pose,
+      version,
+      handles,
+      region,
+      mode,
+      preset,
+      prompt,
+      params,
+      autoPreview,
+      layer,
+      viewName,
+      tab,
+      constraint,
+    } = this.state;
+    const { thumbnail } = this.memory.load(scene) ?? {};
+    this.memory.save(scene, {
+      pose,
+      version,
+      handles,
+      region,
+      mode,
+      preset,
+      prompt,
+      params,
+      autoPreview,
+      layer,
+      viewName,
+      tab,
+      constraint,
+      thumbnail,
+    });
+  }
+
+  /** Keeps a small picture of the scene, for the list of scenes. */
+  keepThumbnail(url) {
+    const { scene } = this.state;
+    if (scene) this.memory.save(scene, { ...(this.memory.load(scene) ?? {}), thumbnail: url });
+  }
+
+  /** What is not saved yet is saved now: the page is about to go. */
+  flush() {
+    if (this.state.scene) this.#save();
+  }
+}
+
+/** 128 random bits. crypto.randomUUID() is not there on a page without TLS that is not on this machine. */
+function freshKey() {
+  return [...crypto.getRandomValues(new Uint8Array(16))].map((b) => b.toString(16).padStart(2, "0")).join("");
+}

@@ -1,0 +1,228 @@
+// The edits of a scene: the queue, the one that runs, those that ended.
+
+import { confirmed, say, showPictures } from "./dialogs.js";
+import { attrs, h, keyedList, showProblem, text } from "./dom.js";
+import { count, duration, when } from "./format.js";
+import { warnings } from "./run.js";
+import { hasEnded } from "./watch.js";
+
+const STATES = {
+  queued: "Waiting",
+  running: "Running",
+  succeeded: "Done",
+  failed: "Failed",
+  cancelled: "Cancelled",
+  stop_requested: "Stopping",
+  cancel_requested: "Cancelling",
+};
+const STAGES = {
+  assign: "Finding the Gaussians",
+  views: "Choosing views",
+  deform: "Deforming",
+  mask: "Masking",
+  relocate: "Relocating handles",
+  correct: "Correcting",
+  optimise: "Optimising",
+  renders: "Rendering pictures",
+  checkpoint: "Saving",
+  finish: "Finishing",
+  publish: "Publishing",
+};
+
+/** A sentence on where an edit is. */
+export function statusLine(edit) {
+  if (edit.state === "queued") {
+    if (!edit.queue_position || edit.queue_position <= 1) return "Next in the queue";
+    return `Number ${edit.queue_position} in the queue`;
+  }
+  if (!hasEnded(edit)) {
+    const stage = edit.stage ? (STAGES[edit.stage] ?? edit.stage) : "Starting";
+    const interval = edit.intervals > 0 && edit.interval > 0 ? ` · interval ${edit.interval} of ${edit.intervals}` : "";
+    const eta = typeof edit.eta_seconds === "number" ? ` · about ${duration(edit.eta_seconds)} left` : "";
+    return `${stage}${interval}${eta}`;
+  }
+  if (edit.state === "succeeded") {
+    const kept = edit.stopped_early
+      ? `, stopped after interval ${edit.finished_intervals.length} of ${edit.intervals}`
+      : "";
+    return `Version ${edit.result_version}${kept}`;
+  }
+  return edit.ended ? when(edit.ended) : "";
+}
+
+export function buildEdits(editor) {
+  const list = h("ol", { class: "edits", testid: "edits" });
+  const empty = h(
+    "p",
+    { class: "empty", testid: "no-edits" },
+    "No edits yet. Place handles and press “Run edit”: its progress shows here.",
+  );
+  const update = keyedList(
+    list,
+    (edit) => edit.id,
+    (edit) => card(editor, edit.id),
+  );
+  editor.store.watch(["edits", "version", "scene"], ({ edits }) => {
+    empty.hidden = edits.length > 0;
+    update(edits);
+  });
+  return h("section", {}, h("h2", {}, "Edits"), empty, list);
+}
+
+function card(editor, id) {
+  const current = () => editor.state.edits.find((e) => e.id === id);
+  const problem = h("p", { class: "problem", role: "alert", hidden: true, testid: "edit-problem" });
+  let refused = null;
+  const asking = (ask) => async () => {
+    try {
+      refused = null;
+      await ask();
+    } catch (error) {
+      refused = error;
+    }
+    showProblem(problem, refused ?? current()?.error);
+  };
+  const button = (label, testid, onclick, extra = {}) =>
+    h("button", { type: "button", class: "small", testid, onclick, ...extra }, label);
+
+  const name = h("span", { class: "edit-name" });
+  const state = h("span", { class: "state", testid: "edit-state" });
+  const line = h("p", { class: "line", testid: "edit-line" });
+  const progress = h("progress", { max: 1, testid: "edit-progress" });
+  const stop = button(
+    "Stop and keep",
+    "edit-stop",
+    asking(() => editor.stopEdit(id)),
+    { title: "Ends with the last finished interval as the result" },
+  );
+  const cancel = button(
+    "Cancel",
+    "edit-cancel",
+    asking(async () => {
+      const started = current()?.state !== "queued";
+      const sure =
+        !started ||
+        (await confirmed({
+          title: "Cancel this edit?",
+          detail: "What it has done so far is lost.",
+          yes: "Cancel the edit",
+        }));
+      if (sure) await editor.cancelEdit(id);
+    }),
+  );
+  const show = button("Show result", "edit-show", () => editor.showVersion(current().result_version));
+  const reuse = button("Load its handles", "edit-reuse", () => {
+    const edit = current();
+    if (edit.version !== editor.state.version) editor.showVersion(edit.version);
+    editor.load(edit.request);
+    say(`The handles of ${id} are back on version ${edit.version}.`);
+  });
+  const forget = button(
+    "✕",
+    "edit-forget",
+    asking(() => editor.deleteEdit(id)),
+    { class: "icon", title: "Remove from the list", "aria-label": "Remove from the list" },
+  );
+  const intervals = h("div", { class: "intervals" });
+  const updateIntervals = keyedList(
+    intervals,
+    (u) => u.interval,
+    (u) => intervalRow(id, u),
+  );
+  const notes = h("div", {});
+  const facts = h("dl", { class: "facts" });
+  const details = h("details", { class: "more" }, h("summary", {}, "Details"), facts);
+
+  const element = h(
+    "li",
+    { class: "edit" },
+    h("div", { class: "row between" }, h("div", { class: "row" }, name, state), forget),
+    line,
+    progress,
+    problem,
+    intervals,
+    notes,
+    h("div", { class: "row wrap" }, stop, cancel, show, reuse),
+    details,
+  );
+  return {
+    element,
+    update: (edit) => {
+      const ended = hasEnded(edit);
+      attrs(element, { "data-state": edit.state, "data-testid": `edit-${edit.id}` });
+      const n = edit.request.handles.length;
+      text(name, `${edit.id} · ${n} handle${n === 1 ? "" : "s"} on version ${edit.version}`);
+      text(state, STATES[edit.state] ?? edit.state);
+      text(line, statusLine(edit));
+      progress.hidden = ended || edit.state === "queued";
+      progress.value = edit.progress;
+      attrs(progress, { "aria-label": `Progress of ${edit.id}` });
+      stop.hidden = edit.state !== "running";
+      stop.disabled = edit.finished_intervals.length === 0;
+      cancel.hidden = ended || edit.state === "cancel_requested";
+      const there =
+        edit.result_version !== null && editor.state.scene?.versions.some((v) => v.version === edit.result_version);
+      show.hidden = !there;
+      show.disabled = editor.state.version === edit.result_version;
+      reuse.hidden = !ended;
+      forget.hidden = !ended;
+      showProblem(problem, refused ?? edit.error);
+      updateIntervals(edit.finished_intervals);
+      notes.replaceChildren(...warnings(edit.warnings));
+      facts.replaceChildren(...factsOf(edit).flatMap(([key, value]) => [h("dt", {}, key), h("dd", {}, value)]));
+    },
+  };
+}
+
+/** The pictures of a finished interval, as it found the scene and as it left it. */
+function intervalRow(id, { interval, seconds, renders }) {
+  const pictures = renders.slice(0, 4).map(({ view, stages }, k) => {
+    const shown = Object.entries(stages);
+    const [, last] = shown.at(-1);
+    return h(
+      "button",
+      {
+        type: "button",
+        class: "thumb",
+        testid: `thumb-${interval}-${k}`,
+        title: `${view}: before and after interval ${interval}`,
+        "aria-label": `Interval ${interval}, view ${view}: show before and after`,
+        onclick: () =>
+          showPictures(
+            `${id}, interval ${interval}, ${view}`,
+            shown.map(([label, url]) => ({ label, url })),
+          ),
+      },
+      h("img", { src: last, alt: "", loading: "lazy" }),
+      stages.before && shown.length > 1
+        ? h("img", { class: "before", src: stages.before, alt: "", loading: "lazy" })
+        : null,
+    );
+  });
+  return {
+    element: h(
+      "div",
+      { class: "interval", testid: `interval-${interval}` },
+      h("span", { class: "interval-name" }, `Interval ${interval}`, h("small", {}, duration(seconds))),
+      h("div", { class: "thumbs" }, pictures),
+    ),
+  };
+}
+
+function factsOf(edit) {
+  const facts = [["Submitted", when(edit.created)]];
+  if (edit.started && edit.ended)
+    facts.push(["Took", duration((new Date(edit.ended) - new Date(edit.started)) / 1000)]);
+  edit.handles.forEach(({ gaussians }, i) => facts.push([`Handle ${i + 1}`, `${count(gaussians)} Gaussians`]));
+  if (edit.gaussians) {
+    const { input, output, removed, copies } = edit.gaussians;
+    facts.push(["Gaussians", `${count(input)} → ${count(output)} (${count(removed)} removed, ${count(copies)} new)`]);
+  }
+  for (const { stage, seconds } of edit.timings) facts.push([STAGES[stage] ?? stage, duration(seconds)]);
+  const { mode, preset, params = {} } = edit.request;
+  facts.push(["Mode", mode], ...(preset ? [["Preset", preset]] : []));
+  for (const [key, value] of Object.entries(params))
+    facts.push([key, Array.isArray(value) ? value.join(", ") || "none" : String(value)]);
+  if (edit.simd) facts.push(["Ran on", edit.simd]);
+  return facts;
+}

@@ -1,0 +1,267 @@
+// The list of handles: coordinates, radius, group, and how many Gaussians each holds.
+
+import { attrs, h, keyedList, showProblem, text } from "./dom.js";
+import { numberField, pointField } from "./fields.js";
+import { coordinate, count, gaussians } from "./format.js";
+import { groupClass } from "./overlay.js";
+import { partOf } from "./requests.js";
+import { distance } from "./vectors.js";
+
+// The radius slider covers this range around the scene's radius, on a logarithmic scale of this many steps.
+const SLIDER = { low: 1e-3, high: 2, steps: 400 };
+
+function sliderOf(radius, sceneRadius) {
+  const { low, high, steps } = SLIDER;
+  return Math.round((steps * Math.log(radius / (low * sceneRadius))) / Math.log(high / low));
+}
+
+function radiusOf(slider, sceneRadius) {
+  const { low, high, steps } = SLIDER;
+  return Number((low * sceneRadius * (high / low) ** (slider / steps)).toPrecision(3));
+}
+
+export class HandleList {
+  #editor;
+  #update;
+
+  constructor(editor) {
+    this.#editor = editor;
+    const list = h("ol", { class: "handles", testid: "handles" });
+    this.#update = keyedList(
+      list,
+      (handle) => handle.id,
+      (handle) => this.#card(handle.id),
+    );
+    const undo = h(
+      "button",
+      {
+        type: "button",
+        class: "icon",
+        title: "Undo (Ctrl + Z)",
+        "aria-label": "Undo",
+        testid: "undo-handles",
+        onclick: () => editor.undo(),
+      },
+      "↶",
+    );
+    const redo = h(
+      "button",
+      {
+        type: "button",
+        class: "icon",
+        title: "Redo (Ctrl + Shift + Z)",
+        "aria-label": "Redo",
+        testid: "redo-handles",
+        onclick: () => editor.redo(),
+      },
+      "↷",
+    );
+    const clear = h(
+      "button",
+      { type: "button", class: "small", testid: "clear-handles", onclick: () => editor.removeAll() },
+      "Clear",
+    );
+    const empty = h(
+      "p",
+      { class: "empty", testid: "no-handles" },
+      "No handles yet. Click a part of the scene to take hold of it, then drag the dot to where it should go.",
+    );
+    this.element = h(
+      "section",
+      {},
+      h("div", { class: "row between" }, h("h2", {}, "Handles"), h("div", { class: "row" }, undo, redo, clear)),
+      empty,
+      list,
+    );
+    editor.store.watch(["handles", "selected", "counts", "preview", "problem", "scene", "version"], ({ handles }) => {
+      empty.hidden = handles.length > 0;
+      clear.disabled = handles.length === 0;
+      undo.disabled = !editor.canUndo;
+      redo.disabled = !editor.canRedo;
+      this.#update(handles);
+    });
+  }
+
+  #card(id) {
+    const editor = this.#editor;
+    const change = (patch) => editor.change(id, patch);
+    const current = () => editor.state.handles.find((handle) => handle.id === id);
+
+    const swatch = h("span", { class: "swatch", "aria-hidden": "true" });
+    const name = h("span", { class: "handle-name" });
+    const kind = h("span", { class: "kind", title: "How far its target is" });
+    const held = h("span", { class: "held" });
+    const head = h(
+      "button",
+      { type: "button", class: "handle-head", onclick: () => editor.select(editor.state.selected === id ? null : id) },
+      swatch,
+      name,
+      kind,
+      held,
+    );
+    const remove = h(
+      "button",
+      {
+        type: "button",
+        class: "icon",
+        "aria-label": "Remove handle",
+        title: "Remove (Del)",
+        onclick: () => editor.remove(id),
+      },
+      "✕",
+    );
+
+    const source = pointField({
+      label: "Source",
+      testid: "source",
+      changed: (p) => change({ source: p, normal: null }),
+    });
+    const target = pointField({ label: "Target", testid: "target", changed: (p) => change({ target: p }) });
+    const anchor = h(
+      "button",
+      {
+        type: "button",
+        class: "small",
+        testid: "make-anchor",
+        title: "Without a target, what the handle holds stays where it is",
+        onclick: () => change({ target: null }),
+      },
+      "Make anchor",
+    );
+    const release = h(
+      "button",
+      { type: "button", class: "small", testid: "add-target", onclick: () => change({ target: current().source }) },
+      "Give it a target",
+    );
+    const targetRow = h(
+      "div",
+      { class: "field" },
+      h("div", { class: "row between" }, h("span", { class: "name" }, "Target"), anchor),
+      target.element,
+    );
+    const anchorRow = h(
+      "div",
+      { class: "field" },
+      h("div", { class: "row between" }, h("span", { class: "name" }, "Anchor: what it holds stays"), release),
+    );
+
+    const radius = numberField({
+      label: "Radius",
+      testid: "radius",
+      min: 0,
+      changed: (r) => r > 0 && change({ radius: r }),
+    });
+    const slider = h("input", {
+      type: "range",
+      min: 0,
+      max: SLIDER.steps,
+      step: 1,
+      "aria-label": "Radius, logarithmic",
+      testid: "radius-slider",
+    });
+    let noted = false;
+    slider.addEventListener("input", () => {
+      // One step of undo for one pull of the slider.
+      editor.change(id, { radius: radiusOf(slider.valueAsNumber, editor.state.scene.radius || 1) }, !noted);
+      noted = true;
+    });
+    slider.addEventListener("change", () => (noted = false));
+    const group = numberField({
+      label: "Group",
+      testid: "group",
+      min: 0,
+      max: 255,
+      whole: true,
+      changed: (g) => change({ group: g }),
+    });
+    const note = h("p", { class: "note", hidden: true });
+    const problem = h("p", { class: "problem", role: "alert", hidden: true });
+
+    const body = h(
+      "div",
+      { class: "handle-body" },
+      h("div", { class: "field" }, h("span", { class: "name" }, "Source"), source.element),
+      targetRow,
+      anchorRow,
+      h(
+        "div",
+        { class: "radius-row" },
+        h(
+          "div",
+          { class: "field" },
+          h("span", { class: "name" }, "Radius"),
+          h("div", { class: "row" }, slider, radius.element),
+        ),
+        h(
+          "div",
+          {
+            class: "field narrow",
+            title: "Handles of one group turn together; those of different groups do not know of one another",
+          },
+          h("span", { class: "name" }, "Group"),
+          group.element,
+        ),
+      ),
+      note,
+    );
+    const element = h("li", { class: "handle-card" }, h("div", { class: "row" }, head, remove), problem, body);
+
+    return {
+      element,
+      update: (handle, i) => {
+        const selected = editor.state.selected === id;
+        attrs(element, {
+          class: `handle-card ${groupClass(handle.group)}${selected ? " selected" : ""}`,
+          "data-testid": `handle-card-${i}`,
+        });
+        attrs(head, { "aria-expanded": String(selected), "data-testid": `handle-head-${i}` });
+        attrs(held, { "data-testid": `handle-count-${i}` });
+        attrs(remove, { "aria-label": `Remove handle ${i + 1}`, "data-testid": `handle-remove-${i}` });
+        attrs(problem, { "data-testid": `handle-problem-${i}` });
+        text(name, `Handle ${i + 1}`);
+        text(
+          kind,
+          handle.target ? `→ ${coordinate(Number(distance(handle.source, handle.target).toPrecision(3)))}` : "anchor",
+        );
+        body.hidden = !selected;
+        targetRow.hidden = !handle.target;
+        anchorRow.hidden = !!handle.target;
+        source.update(handle.source);
+        if (handle.target) target.update(handle.target);
+        radius.update(handle.radius);
+        const sceneRadius = editor.state.scene?.radius || 1;
+        if (document.activeElement !== slider || !noted) slider.valueAsNumber = sliderOf(handle.radius, sceneRadius);
+        group.update(handle.group);
+        this.#counts(handle, i, held, note);
+        this.#problem(handle, i, problem);
+        attrs(element, { "data-bad": !problem.hidden });
+      },
+    };
+  }
+
+  #counts(handle, i, held, note) {
+    const found = this.#editor.countOf(handle);
+    const preview = this.#editor.previewIsCurrent ? this.#editor.state.preview : null;
+    const own = preview?.handles[i]?.gaussians;
+    text(held, found === null ? "…" : found.gaussians === null ? "?" : gaussians(found.gaussians));
+    attrs(held, { "data-empty": found?.gaussians === 0 });
+    const shares = own !== undefined && found?.gaussians > own;
+    note.hidden = !shares;
+    if (shares)
+      text(note, `Moves ${count(own)} of them; the others are nearer to another handle, or outside of the region.`);
+  }
+
+  #problem(handle, i, place) {
+    const { problem } = this.#editor.state;
+    const at = problem ? partOf(problem.error.where) : {};
+    if (at.part === "handle" && at.index === i) return showProblem(place, problem.error);
+    const found = this.#editor.countOf(handle);
+    if (found?.error) return showProblem(place, found.error);
+    showProblem(
+      place,
+      found?.gaussians === 0
+        ? { detail: "There is no Gaussian within the radius: raise it, or move the handle." }
+        : null,
+    );
+  }
+}

@@ -1,0 +1,120 @@
+// What is drawn over the picture: handles with their spheres and targets, the region. Geometry comes from camera.js.
+
+import { boxEdges, project, projectSegment, sphereOutline } from "./camera.js";
+import { attrs, keyedList, s } from "./dom.js";
+
+const GROUP_COLOURS = 8;
+
+/** The class that gives a group its colour. */
+export const groupClass = (group) => `group-${group % GROUP_COLOURS}`;
+
+const path = (points, closed) =>
+  points.map(([x, y], i) => `${i ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`).join("") + (closed ? "Z" : "");
+
+const at = ({ x, y }) => `translate(${x.toFixed(2)} ${y.toFixed(2)})`;
+
+/** The overlay.
+ *    grab(id, event)          the pointer went down on a handle's dot
+ *    nudge(id, event)         a key was pressed on it
+ *    wheel(id, event)         the wheel turned over it
+ *    focused(id)              it has the keyboard's focus */
+export class Overlay {
+  #camera = null;
+  #svg;
+  #region;
+  #update;
+
+  constructor(svg, { grab, nudge, wheel, focused }) {
+    this.#svg = svg;
+    this.#region = s("path", { class: "region", testid: "region-outline" });
+    const handles = s("g");
+    svg.append(this.#region, handles);
+    this.#update = keyedList(
+      handles,
+      (item) => item.handle.id,
+      ({ handle: { id } }) => {
+        const sphere = s("path", { class: "sphere" });
+        const line = s("path", { class: "motion" });
+        const dot = (kind) =>
+          s(
+            "g",
+            {
+              class: `dot ${kind}`,
+              tabindex: "0",
+              role: "button",
+              onpointerdown: (event) => grab(id, event),
+              onkeydown: (event) => nudge(id, event),
+              onwheel: (event) => wheel(id, event),
+              onfocus: () => focused(id),
+            },
+            // The larger, invisible circle makes it easier to hit.
+            s("circle", { class: "reach", r: 14 }),
+            s("circle", { class: "mark", r: kind === "target" ? 7 : 5 }),
+            kind === "source" ? s("text", { class: "label", x: 10, y: -9 }) : null,
+          );
+        const source = dot("source");
+        const target = dot("target");
+        const element = s("g", {}, sphere, line, source, target);
+        return { element, update: (item, i) => this.#draw(item, i, { element, sphere, line, source, target }) };
+      },
+    );
+  }
+
+  /** Draws.
+   *    camera   that of the picture on the screen, in CSS pixels
+   *    items    [{handle, selected, bad}] */
+  draw(camera, items, region) {
+    this.#camera = camera;
+    attrs(this.#svg, { viewBox: `0 0 ${camera.width} ${camera.height}` });
+    this.#update(items);
+    const edges = region ? boxEdges(region.center, region.size) : [];
+    const lines = edges.map(([a, b]) => projectSegment(camera, a, b)).filter(Boolean);
+    attrs(this.#region, {
+      d: lines
+        .map(([a, b]) =>
+          path(
+            [
+              [a.x, a.y],
+              [b.x, b.y],
+            ],
+            false,
+          ),
+        )
+        .join(""),
+    });
+  }
+
+  #draw({ handle, selected, bad }, i, { element, sphere, line, source, target }) {
+    const camera = this.#camera;
+    attrs(element, {
+      class: `handle ${groupClass(handle.group)}${selected ? " selected" : ""}${bad ? " bad" : ""}`,
+      "data-testid": `handle-${i}`,
+    });
+    const from = project(camera, handle.source);
+    const to = handle.target ? project(camera, handle.target) : null;
+    const outline = sphereOutline(camera, handle.source, handle.radius);
+    attrs(sphere, { d: outline ? path(outline, true) : null });
+    attrs(source, {
+      transform: from ? at(from) : null,
+      display: from ? null : "none",
+      "data-testid": `handle-${i}-source`,
+      "aria-label": handle.target ? `Handle ${i + 1}` : `Handle ${i + 1}: drag to set its target`,
+    });
+    source.querySelector(".label").textContent = String(i + 1);
+    attrs(target, {
+      transform: to ? at(to) : null,
+      display: to ? null : "none",
+      "data-testid": `handle-${i}-target`,
+      "aria-label": `Target of handle ${i + 1}`,
+    });
+    const seen = handle.target ? projectSegment(camera, handle.source, handle.target) : null;
+    attrs(line, {
+      d: seen
+        ? path(
+            seen.map(({ x, y }) => [x, y]),
+            false,
+          )
+        : null,
+    });
+  }
+}

@@ -1,0 +1,192 @@
+// Edit requests: from what is on the screen, and from and to files. The names are those of the service's contract.
+
+import { add } from "./vectors.js";
+
+/** A file that cannot be imported: what is wrong, and where in it. */
+export class ImportError extends Error {
+  constructor(detail, where = "") {
+    super(where ? `${where}: ${detail}` : detail);
+    Object.assign(this, { name: "ImportError", detail, where });
+  }
+}
+
+/** The request that the screen describes. What is left to the service's defaults is left out. */
+export function requestOf({ scene, version, mode, preset, prompt, handles, region, params }) {
+  const given = Object.entries(params ?? {}).filter(
+    ([, value]) => value !== null && value !== undefined && value !== "",
+  );
+  return {
+    scene,
+    version,
+    mode,
+    ...(preset ? { preset } : {}),
+    ...(prompt ? { prompt } : {}),
+    handles: handles.map(({ source, target, radius, group }) => ({
+      source,
+      ...(target ? { target } : {}),
+      radius,
+      group,
+    })),
+    ...(region ? { region } : {}),
+    ...(given.length ? { params: Object.fromEntries(given) } : {}),
+  };
+}
+
+/** What of the screen decides how a preview looks: two equal texts, the same preview. */
+export function previewKey(request) {
+  const { handles, mode, region, params = {}, preset, scene, version } = request;
+  const { intervals, rotation, interpolation, rotate_sh } = params;
+  return JSON.stringify({
+    scene,
+    version,
+    handles,
+    mode,
+    region,
+    preset,
+    intervals,
+    rotation,
+    interpolation,
+    rotate_sh,
+  });
+}
+
+/** What an error's address points to: {part: "handle", index, field}, {part: "param", name}, {part: "region"},
+ *  {part: "mode" | "preset" | ...}, or {part: "request"} for anything else. */
+export function partOf(where = "") {
+  const handle = /^handles\[(\d+)\](?:\.(\w+))?/.exec(where);
+  if (handle) return { part: "handle", index: Number(handle[1]), field: handle[2] ?? "" };
+  const param = /^params\.(\w+)/.exec(where);
+  if (param) return { part: "param", name: param[1] };
+  if (/^region\b/.test(where)) return { part: "region" };
+  if (/^(mode|preset|handles|prompt)$/.test(where)) return { part: where };
+  return { part: "request" };
+}
+
+/** Reads a request file: an edit request, a configuration as released with 3DGS-Drag, or several of either by name.
+ *    returns  [{name, request}], at least one; name is "" in a file of one
+ *    throws   ImportError */
+export function readRequests(text) {
+  let document;
+  try {
+    document = JSON.parse(text);
+  } catch (error) {
+    throw new ImportError(`this is not JSON (${error.message})`);
+  }
+  if (!isObject(document)) throw new ImportError("expected a JSON object");
+  if (isEither(document)) return [{ name: "", request: readEither(document, "") }];
+  const named = Object.entries(document).filter(([, value]) => typeof value !== "string");
+  if (named.length === 0 || !named.every(([, value]) => isObject(value) && isEither(value)))
+    throw new ImportError(
+      "expected an edit request (with handles) or a 3DGS-Drag configuration (with start, direction and voxel_size)",
+    );
+  return named.map(([name, value]) => ({ name, request: readEither(value, name) }));
+}
+
+const isObject = (value) => typeof value === "object" && value !== null && !Array.isArray(value);
+const isRequest = (document) => "handles" in document;
+const isReleased = (document) => ["start", "direction", "voxel_size"].some((name) => name in document);
+const isEither = (document) => isRequest(document) || isReleased(document);
+
+function readEither(document, where) {
+  return isRequest(document) ? readRequest(document, where) : readReleased(document, where);
+}
+
+const within = (where, name) => (where ? `${where}.${name}` : name);
+
+function known(document, names, where) {
+  for (const name of Object.keys(document))
+    if (!names.includes(name))
+      throw new ImportError(`unknown field; known here: ${names.join(", ")}`, within(where, name));
+}
+
+function point(value, where) {
+  if (Array.isArray(value) && value.length === 3 && value.every(Number.isFinite)) return [...value];
+  throw new ImportError("expected three numbers", where);
+}
+
+function positive(value, where) {
+  if (Number.isFinite(value) && value > 0) return value;
+  throw new ImportError("expected a number above 0", where);
+}
+
+function edges(value, where) {
+  return point(value, where).map((edge, i) => positive(edge, `${where}[${i}]`));
+}
+
+function groupNumber(value, where) {
+  if (Number.isInteger(value) && value >= 0) return value;
+  throw new ImportError("expected a whole number from 0 up", where);
+}
+
+function list(value, where, count) {
+  if (!Array.isArray(value) || value.length === 0) throw new ImportError("expected a list with something in it", where);
+  if (count !== undefined && value.length !== count)
+    throw new ImportError(`expected ${count} elements, as many as start has; found ${value.length}`, where);
+  return value;
+}
+
+function modeOf(value, where) {
+  if (value === "move" || value === "extend") return value;
+  throw new ImportError('expected "move" or "extend"', where);
+}
+
+function readRequest(document, where) {
+  known(document, ["scene", "version", "mode", "preset", "prompt", "handles", "region", "params"], where);
+  const handles = list(document.handles, within(where, "handles")).map((handle, i) => {
+    const at = within(where, `handles[${i}]`);
+    if (!isObject(handle)) throw new ImportError("expected an object", at);
+    known(handle, ["source", "target", "radius", "group"], at);
+    return {
+      source: point(handle.source, `${at}.source`),
+      target: handle.target === undefined ? null : point(handle.target, `${at}.target`),
+      radius: positive(handle.radius, `${at}.radius`),
+      group: groupNumber(handle.group ?? 0, `${at}.group`),
+    };
+  });
+  let region = null;
+  if (document.region !== undefined) {
+    const at = within(where, "region");
+    if (!isObject(document.region)) throw new ImportError("expected an object", at);
+    known(document.region, ["center", "size"], at);
+    region = { center: point(document.region.center, `${at}.center`), size: edges(document.region.size, `${at}.size`) };
+  }
+  const params = document.params ?? {};
+  if (!isObject(params)) throw new ImportError("expected an object", within(where, "params"));
+  return {
+    mode: modeOf(document.mode ?? "move", within(where, "mode")),
+    preset: document.preset ?? null,
+    prompt: document.prompt ?? null,
+    handles,
+    region,
+    params: { ...params },
+  };
+}
+
+function readReleased(document, where) {
+  known(document, ["start", "direction", "voxel_size", "cluster", "local_mask", "mode"], where);
+  const at = (name) => within(where, name);
+  const start = list(document.start, at("start"));
+  const directions = list(document.direction, at("direction"), start.length);
+  const radius = positive(document.voxel_size, at("voxel_size"));
+  const cluster = document.cluster === undefined ? null : list(document.cluster, at("cluster"), start.length);
+  const handles = start.map((value, i) => {
+    const source = point(value, at(`start[${i}]`));
+    const direction = point(directions[i], at(`direction[${i}]`));
+    // The released program moves a handle of zero direction by nothing: an anchor.
+    const still = direction.every((d) => d === 0);
+    return {
+      source,
+      target: still ? null : add(source, direction),
+      radius,
+      group: cluster ? groupNumber(cluster[i], at(`cluster[${i}]`)) : 0,
+    };
+  });
+  let region = null;
+  if (document.local_mask !== undefined) {
+    const mask = document.local_mask;
+    if (!isObject(mask)) throw new ImportError("expected an object", at("local_mask"));
+    known(mask, ["center", "xyz"], at("local_mask"));
+    region = { center: point(mask.center, at("local_mask.center")), size: edges(mask.xyz, at("local_mask.xyz")) };
+  }
+  return { mode: modeOf(document.mode ?? "move", at("mode")), preset: null, prompt: null, handles, region, params: {} };
+}

@@ -1,0 +1,400 @@
+// What is asked for besides handles, and the buttons that ask: preview, estimate, run; import and export.
+
+import { chosen, say } from "./dialogs.js";
+import { attrs, h, problemText, showProblem, text } from "./dom.js";
+import { choice, labelled, numberField, pointField, segments, toggle } from "./fields.js";
+import { bytes, count, duration, gaussians } from "./format.js";
+import { partOf, readRequests } from "./requests.js";
+
+const CONSTRAINTS = [
+  ["view", "View", "In the plane that faces you (V)"],
+  ["x", "X", "Along the x axis (X)"],
+  ["y", "Y", "Along the y axis (Y)"],
+  ["z", "Z", "Along the z axis (Z)"],
+  ["normal", "Normal", "Along the surface normal where the handle was placed (N)"],
+];
+const ROTATIONS = [
+  ["", "default"],
+  ["shortest_arc", "shortest arc"],
+  ["paper", "paper"],
+  ["none", "none"],
+];
+const INTERPOLATIONS = [
+  ["", "default"],
+  ["paper", "paper"],
+  ["smooth", "smooth"],
+  ["rigid", "rigid"],
+];
+
+/** Presets that make sense for a run: `preview` is what the Preview button does. */
+const runPresets = (info) => (info?.presets ?? ["draft", "standard", "paper"]).filter((name) => name !== "preview");
+
+export function buildRun(editor) {
+  const { store } = editor;
+  const setParam = (name, value) => {
+    const { [name]: _, ...rest } = store.state.params;
+    store.set({ params: value === null || value === "" ? rest : { ...rest, [name]: value } });
+  };
+
+  // --- how targets are dragged, and what the drag does
+  const constraint = segments({
+    label: "Drag targets",
+    testid: "constraint",
+    options: CONSTRAINTS,
+    changed: (value) => store.set({ constraint: value }),
+  });
+  const mode = segments({
+    label: "Mode",
+    testid: "mode",
+    options: [
+      ["move", "Move", "What is dragged leaves its old place"],
+      ["extend", "Extend", "What is dragged is drawn out: the old place stays filled"],
+    ],
+    changed: (value) => store.set({ mode: value }),
+  });
+
+  // --- region
+  const regionOn = toggle({
+    label: "Only within a box",
+    testid: "region-on",
+    title: "Only Gaussians inside of the box are dragged",
+    changed: (on) => store.set({ region: on ? boxAround(editor) : null }),
+  });
+  const centre = pointField({
+    label: "Box centre",
+    testid: "region-center",
+    changed: (p) => store.set({ region: { ...store.state.region, center: p } }),
+  });
+  const size = pointField({
+    label: "Box size",
+    testid: "region-size",
+    min: 0,
+    changed: (p) => p.every((e) => e > 0) && store.set({ region: { ...store.state.region, size: p } }),
+  });
+  const regionProblem = h("p", { class: "problem", role: "alert", hidden: true, testid: "region-problem" });
+  const regionFields = h("div", {}, labelled("Centre", centre.element), labelled("Size (full edges)", size.element));
+
+  // --- parameters
+  const preset = choice({
+    label: "Preset",
+    testid: "preset",
+    options: [["", "default"]],
+    changed: (value) => store.set({ preset: value }),
+  });
+  const corrector = choice({
+    label: "Corrector",
+    testid: "corrector",
+    options: [["", "default"]],
+    changed: (value) => setParam("corrector", value),
+  });
+  const params = {
+    intervals: numberField({
+      label: "Intervals",
+      testid: "param-intervals",
+      min: 1,
+      max: 20,
+      whole: true,
+      optional: true,
+      placeholder: "auto",
+      changed: (v) => setParam("intervals", v),
+    }),
+    views: numberField({
+      label: "Views",
+      testid: "param-views",
+      min: 1,
+      max: 1000,
+      whole: true,
+      optional: true,
+      placeholder: "auto",
+      changed: (v) => setParam("views", v),
+    }),
+    max_image_side: numberField({
+      label: "Image side, pixels",
+      testid: "param-image-side",
+      min: 16,
+      max: 16384,
+      whole: true,
+      optional: true,
+      placeholder: "auto",
+      changed: (v) => setParam("max_image_side", v),
+    }),
+    seed: numberField({
+      label: "Seed",
+      testid: "param-seed",
+      min: 0,
+      whole: true,
+      optional: true,
+      placeholder: "0",
+      changed: (v) => setParam("seed", v),
+    }),
+    rotation: choice({
+      label: "Rotation",
+      testid: "param-rotation",
+      options: ROTATIONS,
+      changed: (v) => setParam("rotation", v),
+    }),
+    interpolation: choice({
+      label: "Interpolation",
+      testid: "param-interpolation",
+      options: INTERPOLATIONS,
+      changed: (v) => setParam("interpolation", v),
+    }),
+  };
+  const rotateSh = toggle({
+    label: "Colours turn with what they are on",
+    testid: "param-rotate-sh",
+    title: "rotate_sh: view-dependent colour turns with its Gaussian",
+    changed: (on) => setParam("rotate_sh", on ? null : false),
+  });
+  const also = h("p", { class: "note", hidden: true, testid: "other-params" });
+  const paramProblem = h("p", { class: "problem", role: "alert", hidden: true, testid: "param-problem" });
+  const correctorNote = h("p", { class: "note", hidden: true });
+  const settings = h(
+    "details",
+    { class: "settings", testid: "settings" },
+    h("summary", {}, "Settings"),
+    h(
+      "div",
+      { class: "grid2" },
+      labelled("Preset", preset.element),
+      labelled("Corrector", corrector.element),
+      labelled("Intervals", params.intervals.element),
+      labelled("Views", params.views.element),
+      labelled("Image side, px", params.max_image_side.element),
+      labelled("Seed", params.seed.element),
+      labelled("Rotation", params.rotation.element),
+      labelled("Interpolation", params.interpolation.element),
+    ),
+    correctorNote,
+    rotateSh.element,
+    regionOn.element,
+    regionFields,
+    regionProblem,
+    also,
+  );
+
+  // --- files
+  const file = h("input", {
+    type: "file",
+    accept: ".json,application/json",
+    hidden: true,
+    testid: "import-file",
+    "aria-label": "Request file",
+  });
+  const importProblem = h("p", { class: "problem", role: "alert", hidden: true, testid: "import-problem" });
+  file.addEventListener("change", async () => {
+    const [chosenFile] = file.files;
+    file.value = "";
+    if (chosenFile) await importFile(editor, chosenFile, importProblem);
+  });
+  const files = h(
+    "div",
+    { class: "row" },
+    h(
+      "button",
+      {
+        type: "button",
+        class: "small",
+        testid: "import",
+        title: "An edit request, or a configuration as released with 3DGS-Drag",
+        onclick: () => file.click(),
+      },
+      "Import…",
+    ),
+    h("button", { type: "button", class: "small", testid: "export", onclick: () => exportFile(editor) }, "Export"),
+    file,
+  );
+
+  // --- preview and run
+  const auto = toggle({
+    label: "Preview by itself",
+    testid: "auto-preview",
+    title: "Preview again whenever a handle has been moved",
+    changed: (on) => store.set({ autoPreview: on }),
+  });
+  const preview = h(
+    "button",
+    { type: "button", testid: "preview", title: "Preview (P)", onclick: () => editor.preview() },
+    "Preview",
+  );
+  const estimate = h(
+    "button",
+    { type: "button", testid: "estimate", title: "What a run will take", onclick: () => editor.estimate() },
+    "Estimate",
+  );
+  const run = h("button", { type: "button", class: "primary", testid: "run", onclick: () => editor.run() }, "Run edit");
+  const problem = h("p", { class: "problem", role: "alert", hidden: true, testid: "run-problem" });
+  const answer = h("div", { class: "answer", role: "status", testid: "run-answer" });
+
+  const element = h(
+    "section",
+    { class: "run" },
+    h("div", { class: "field" }, h("span", { class: "name" }, "Drag targets"), constraint.element),
+    h("div", { class: "field" }, h("span", { class: "name" }, "Mode"), mode.element),
+    settings,
+    paramProblem,
+    h("div", { class: "row between" }, files, auto.element),
+    importProblem,
+  );
+  const footer = h(
+    "div",
+    { class: "footer" },
+    answer,
+    problem,
+    h("div", { class: "row buttons" }, preview, estimate, run),
+  );
+
+  store.watch(
+    ["constraint", "mode", "region", "preset", "params", "autoPreview", "info", "handles", "scene", "prompt"],
+    (state) => {
+      constraint.update(state.constraint);
+      mode.update(state.mode);
+      regionOn.update(state.region !== null);
+      regionFields.hidden = state.region === null;
+      if (state.region) {
+        centre.update(state.region.center);
+        size.update(state.region.size);
+      }
+      preset.options([["", "default"], ...runPresets(state.info).map((name) => [name, name])]);
+      preset.update(state.preset);
+      corrector.options([
+        ["", "default"],
+        ...(state.info?.correctors ?? []).map(({ name, available, reason }) => [
+          name,
+          name,
+          reason ?? undefined,
+          !available,
+        ]),
+      ]);
+      corrector.update(state.params.corrector ?? "");
+      const missing = (state.info?.correctors ?? []).filter((c) => !c.available);
+      correctorNote.hidden = missing.length === 0;
+      text(correctorNote, missing.map((c) => `${c.name}: ${c.reason ?? "not available"}`).join(" · "));
+      for (const name of ["intervals", "views", "max_image_side", "seed"]) params[name].update(state.params[name]);
+      for (const name of ["rotation", "interpolation"]) params[name].update(state.params[name] ?? "");
+      rotateSh.update(state.params.rotate_sh !== false);
+      auto.update(state.autoPreview);
+      const shown = [...Object.keys(params), "corrector", "rotate_sh"];
+      const others = Object.keys(state.params).filter((name) => !shown.includes(name));
+      if (state.prompt) others.push(`prompt “${state.prompt}”`);
+      also.hidden = others.length === 0;
+      text(also, `Also set, by the imported request: ${others.join(", ")}`);
+    },
+  );
+
+  store.watch(
+    [
+      "handles",
+      "previewing",
+      "submitting",
+      "problem",
+      "preview",
+      "estimate",
+      "scene",
+      "version",
+      "region",
+      "mode",
+      "preset",
+      "params",
+      "prompt",
+    ],
+    (state) => {
+      const ready = state.scene !== null && state.handles.length > 0;
+      const moves = state.handles.some((handle) => handle.target);
+      preview.disabled = !ready || !moves;
+      estimate.disabled = !ready || state.submitting;
+      run.disabled = !ready || !moves || state.submitting;
+      attrs(preview, { "aria-busy": String(state.previewing) });
+      text(preview, state.previewing ? "Previewing…" : "Preview");
+      const at = state.problem ? partOf(state.problem.error.where) : {};
+      const here = (...parts) => (state.problem && parts.includes(at.part) ? state.problem.error : null);
+      showProblem(regionProblem, here("region"));
+      showProblem(paramProblem, here("param", "mode", "preset"));
+      showProblem(problem, here("request", "handles", "prompt"));
+      if (here("region") || here("param", "preset")) settings.open = true;
+      if (here("handle") && !state.handles[at.index]) showProblem(problem, state.problem.error);
+      answer.replaceChildren(...answers(editor, state));
+    },
+  );
+
+  return { element, footer };
+}
+
+/** What the service last said about this very request. */
+function answers(editor, { preview, estimate, scene }) {
+  if (!scene) return [];
+  const lines = [];
+  if (estimate && estimate.key === JSON.stringify(editor.request())) {
+    lines.push(
+      h(
+        "p",
+        { testid: "estimate-answer" },
+        `A run takes about ${duration(estimate.estimate.seconds)} and ${bytes(estimate.estimate.memory_bytes)}: ` +
+          `${estimate.intervals} interval${estimate.intervals === 1 ? "" : "s"}, ${count(estimate.views)} views.`,
+      ),
+    );
+    lines.push(...warnings(estimate.warnings));
+  } else if (preview) {
+    const current = editor.previewIsCurrent;
+    const { changeable } = preview.gaussians;
+    lines.push(
+      h(
+        "p",
+        { testid: "preview-answer", class: current ? "" : "stale" },
+        current
+          ? `Preview of ${gaussians(changeable)} in ${duration(preview.seconds)}.`
+          : "The preview is of an earlier state of the handles.",
+      ),
+    );
+    if (current) lines.push(...warnings(preview.warnings));
+  }
+  return lines;
+}
+
+export const warnings = (list) => (list ?? []).map((warning) => h("p", { class: "warning" }, warning));
+
+/** A box to start from: around the handles and where they go. */
+function boxAround(editor) {
+  const { handles, scene } = editor.state;
+  const points = handles.flatMap((x) => [x.source, ...(x.target ? [x.target] : [])]);
+  if (points.length === 0) {
+    const { low, high } = scene.bounds;
+    return { center: scene.centre, size: low.map((l, i) => Math.max(high[i] - l, 1e-3)) };
+  }
+  const margin = 2 * Math.max(...handles.map((x) => x.radius));
+  const low = [0, 1, 2].map((i) => Math.min(...points.map((p) => p[i])) - margin);
+  const high = [0, 1, 2].map((i) => Math.max(...points.map((p) => p[i])) + margin);
+  const digits = (x) => Number(x.toPrecision(5));
+  return { center: low.map((l, i) => digits((l + high[i]) / 2)), size: low.map((l, i) => digits(high[i] - l)) };
+}
+
+/** Reads a request file and puts it on the screen. */
+export async function importFile(editor, file, place) {
+  showProblem(place, null);
+  try {
+    const requests = readRequests(await file.text());
+    const name =
+      requests.length === 1
+        ? requests[0].name
+        : await chosen({ title: `Which request of ${file.name}?`, options: requests.map((r) => r.name) });
+    if (name === null) return;
+    const { request } = requests.find((r) => r.name === name);
+    editor.load(request);
+    say(`${request.handles.length} handle${request.handles.length === 1 ? "" : "s"} imported from ${file.name}.`);
+  } catch (error) {
+    showProblem(place, { detail: `${file.name}: ${error.detail ?? problemText(error)}`, where: error.where });
+  }
+}
+
+function exportFile(editor) {
+  const { scene, handles } = editor.state;
+  if (handles.length === 0) return say("There is nothing to export: no handle has been placed.");
+  const url = URL.createObjectURL(
+    new Blob([`${JSON.stringify(editor.request(), null, 2)}\n`], { type: "application/json" }),
+  );
+  const link = h("a", { href: url, download: `${scene.name.replace(/[^\w.-]+/g, "_")}-drag.json` });
+  document.body.append(link);
+  link.click();
+  link.remove();
+  setTimeout(() => URL.revokeObjectURL(url), 10_000);
+}

@@ -1,0 +1,204 @@
+// The first page: the scenes there are, and how to bring one.
+
+import * as api from "./api.js";
+import { asked, confirmed } from "./dialogs.js";
+import { h, keyedList, showProblem, text } from "./dom.js";
+import { bytes, count, gaussians, nameOfFile, when } from "./format.js";
+import { showUpload } from "./uploads.js";
+
+export const SCENE_FILES = /\.(ply|splat|spz)$/i;
+
+/** The page.  open(id): go to a scene. */
+export function buildScenes(home, { store, memory, open }) {
+  const file = h("input", {
+    type: "file",
+    multiple: true,
+    accept: ".ply,.splat,.spz",
+    hidden: true,
+    testid: "scene-file",
+    "aria-label": "Scene file",
+  });
+  const uploads = h("div", { class: "uploads", testid: "uploads" });
+  const problem = h("p", { class: "problem", role: "alert", hidden: true, testid: "scenes-problem" });
+  const grid = h("ul", { class: "cards", testid: "scenes" });
+  const limit = h("span", {});
+
+  const upload = async (files) => {
+    // One after the other: they would only share the line.
+    for (const one of files)
+      await showUpload(
+        uploads,
+        one,
+        (options) => api.uploadScene(one, nameOfFile(one.name), options),
+        (scene) => {
+          refresh();
+          if (files.length === 1) open(scene.id);
+        },
+      );
+  };
+  file.addEventListener("change", () => {
+    const files = [...file.files];
+    file.value = "";
+    upload(files);
+  });
+
+  const path = h("input", {
+    type: "text",
+    placeholder: "chair/point_cloud.ply",
+    testid: "scene-path",
+    "aria-label": "Path below the service's scene folder",
+  });
+  const pathProblem = h("p", { class: "problem", role: "alert", hidden: true, testid: "path-problem" });
+  const pathForm = h(
+    "form",
+    {
+      class: "path-form",
+      hidden: true,
+      testid: "path-form",
+      onsubmit: async (event) => {
+        event.preventDefault();
+        if (!path.value.trim()) return;
+        pathForm.classList.add("waiting");
+        try {
+          showProblem(pathProblem, null);
+          const scene = await api.addScenePath(path.value.trim());
+          path.value = "";
+          open(scene.id);
+        } catch (error) {
+          showProblem(pathProblem, error);
+        }
+        pathForm.classList.remove("waiting");
+      },
+    },
+    h("label", { class: "muted" }, "or open a file of the service's scene folder"),
+    h("div", { class: "row" }, path, h("button", { testid: "scene-path-open" }, "Open")),
+    pathProblem,
+  );
+
+  const drop = h(
+    "div",
+    { class: "drop-area" },
+    h("p", { class: "lead" }, "Drop a scene here"),
+    h("p", { class: "muted" }, "A trained 3D Gaussian Splatting scene: .ply, compressed .ply, .splat or .spz", limit),
+    h(
+      "button",
+      { type: "button", class: "primary", testid: "upload-button", onclick: () => file.click() },
+      "Choose a file…",
+    ),
+    file,
+    pathForm,
+  );
+  const empty = h("p", { class: "empty", testid: "no-scenes", hidden: true }, "There are no scenes yet.");
+
+  home.append(
+    h(
+      "div",
+      { class: "home-head" },
+      h("h1", {}, "Scenes"),
+      h(
+        "p",
+        { class: "muted" },
+        "Edit trained 3D Gaussian Splatting scenes by dragging points. Every edit makes a new version; the original stays.",
+      ),
+    ),
+    drop,
+    uploads,
+    problem,
+    empty,
+    grid,
+  );
+
+  const update = keyedList(
+    grid,
+    (scene) => scene.id,
+    (scene) => card(scene.id, { memory, open, refresh: () => refresh() }),
+  );
+  store.watch(["scenes", "info"], ({ scenes, info }) => {
+    update(scenes ?? []);
+    empty.hidden = scenes === null || scenes.length > 0;
+    pathForm.hidden = !info?.scene_root;
+    text(limit, info?.limits?.upload_bytes ? `, up to ${bytes(info.limits.upload_bytes)}` : "");
+  });
+
+  async function refresh() {
+    try {
+      const scenes = await api.scenes();
+      // Youngest first: ids count up.
+      store.set({ scenes: [...scenes].sort((a, b) => (a.id < b.id ? 1 : -1)) });
+      showProblem(problem, null);
+    } catch (error) {
+      showProblem(problem, error);
+    }
+  }
+  return { refresh, upload };
+}
+
+function card(id, { memory, open, refresh }) {
+  const picture = h("img", { alt: "", hidden: true });
+  const blank = h("span", { class: "blank", "aria-hidden": "true" });
+  const name = h("a", { class: "scene-name", href: `#/scenes/${id}`, testid: "scene-open" });
+  const facts = h("p", { class: "muted" });
+  const more = h("p", { class: "muted" });
+  const problem = h("p", { class: "problem", role: "alert", hidden: true, testid: "scene-problem" });
+  let current = null;
+  const asking = (ask) => async () => {
+    try {
+      showProblem(problem, null);
+      await ask();
+    } catch (error) {
+      showProblem(problem, error);
+    }
+  };
+  const rename = asking(async () => {
+    const wish = await asked({ title: "Rename the scene", label: "Name", value: current.name });
+    if (!wish) return;
+    await api.patchScene(id, { name: wish });
+    await refresh();
+  });
+  const remove = asking(async () => {
+    const n = current.versions.length - 1;
+    const sure = await confirmed({
+      title: `Delete “${current.name}”?`,
+      detail: `The scene${n > 0 ? ` and its ${n} edited version${n === 1 ? "" : "s"}` : ""} will be gone from the service. This cannot be undone.`,
+      yes: "Delete",
+    });
+    if (!sure) return;
+    await api.deleteScene(id);
+    memory.forget(id);
+    await refresh();
+  });
+  const element = h(
+    "li",
+    { class: "card", testid: `scene-${id}` },
+    h(
+      "button",
+      { type: "button", class: "picture", tabindex: "-1", "aria-hidden": "true", onclick: () => open(id) },
+      blank,
+      picture,
+    ),
+    h("div", { class: "card-body" }, name, facts, more, problem),
+    h(
+      "div",
+      { class: "row card-actions" },
+      h("button", { type: "button", class: "small", testid: "scene-rename", onclick: rename }, "Rename"),
+      h("button", { type: "button", class: "small quiet-danger", testid: "scene-delete", onclick: remove }, "Delete"),
+    ),
+  );
+  return {
+    element,
+    update: (scene) => {
+      current = scene;
+      const thumbnail = memory.load(scene)?.thumbnail;
+      picture.hidden = !thumbnail;
+      if (thumbnail && picture.src !== thumbnail) picture.src = thumbnail;
+      text(name, scene.name);
+      const versions = scene.versions.length;
+      text(
+        facts,
+        `${gaussians(scene.gaussians)} · SH degree ${scene.sh_degree} · ${scene.format.replace("_", " ")} · ${bytes(scene.disk_bytes)}`,
+      );
+      const views = scene.dataset ? `${count(scene.dataset.views)} views` : "no dataset";
+      text(more, `${versions} version${versions === 1 ? "" : "s"} · ${views} · ${when(scene.created)} · ${scene.id}`);
+    },
+  };
+}

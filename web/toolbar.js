@@ -1,0 +1,138 @@
+// Above the picture: versions, views, layers, the comparison. On it: what it shows. Below it: what it took.
+
+import { attrs, byId, h, text } from "./dom.js";
+import { parentOf, shownVersion } from "./editor.js";
+import { choice, segments } from "./fields.js";
+import { gaussians } from "./format.js";
+
+const LAYERS = [
+  ["color", "Colour", "The scene"],
+  ["depth", "Depth", "How far it is"],
+  ["mask", "Changed", "White: what differs from version 0"],
+];
+
+export function buildToolbar(editor, viewer) {
+  const { store } = editor;
+  const icon = (label, testid, title, onclick) =>
+    h("button", { type: "button", class: "icon", testid, title, "aria-label": title, onclick }, label);
+
+  const version = choice({
+    label: "Version",
+    testid: "version-select",
+    options: [],
+    changed: (value) => editor.showVersion(Number(value)),
+  });
+  const view = choice({
+    label: "View to look from",
+    testid: "view-select",
+    options: [],
+    changed: (value) => value && editor.lookFrom(value),
+  });
+  const previous = icon("‹", "view-previous", "Previous view ([)", () => editor.stepView(-1));
+  const next = icon("›", "view-next", "Next view (])", () => editor.stepView(1));
+  const layer = segments({
+    label: "Layer",
+    testid: "layer",
+    options: LAYERS,
+    changed: (value) => store.set({ layer: value }),
+  });
+  const compareWith = choice({
+    label: "Compare with",
+    testid: "compare-with",
+    options: [],
+    changed: (value) => store.set({ compareWith: value === "" ? null : Number(value) }),
+  });
+  const compare = h(
+    "button",
+    { type: "button", class: "small hold", testid: "compare", title: "Hold to see the scene before (B)" },
+    "Hold to compare",
+  );
+  const hold = (on) => () => store.set({ comparing: on });
+  compare.addEventListener("pointerdown", (event) => {
+    compare.setPointerCapture(event.pointerId);
+    hold(true)();
+  });
+  for (const name of ["pointerup", "pointercancel", "blur"]) compare.addEventListener(name, hold(false));
+  const pressed = (on) => (event) => {
+    if (event.key !== " " && event.key !== "Enter") return;
+    event.preventDefault();
+    hold(on)();
+  };
+  compare.addEventListener("keydown", pressed(true));
+  compare.addEventListener("keyup", pressed(false));
+
+  byId("toolbar").append(
+    version.element,
+    h("div", { class: "row tight" }, previous, view.element, next),
+    layer.element,
+    h("div", { class: "row tight" }, compare, compareWith.element),
+  );
+  byId("view-tools").append(
+    icon("⊕", "focus", "Turn about the point under the pointer (F); here: about the middle", () => viewer.focusHere()),
+    icon("⌂", "reset-view", "Back to the start (R)", () => editor.home()),
+  );
+
+  const chip = h("span", { class: "chip", testid: "shown-chip" });
+  const back = h(
+    "button",
+    { type: "button", class: "small", testid: "drop-preview", onclick: () => editor.dropPreview() },
+    "End preview",
+  );
+  byId("chips").append(chip, back);
+
+  byId("status").append(
+    h("span", { id: "picture-size", testid: "picture-size" }),
+    h("span", { class: "spacer" }),
+    h("span", { class: "muted keys-line" }, "Drag: orbit · Right drag: move · Wheel: nearer · Click: place a handle"),
+  );
+
+  byId("hint").append(
+    h("strong", {}, "Click the part you want to move"),
+    h("span", {}, "A handle takes hold of it. Then drag its dot to where it should go."),
+  );
+
+  store.watch(
+    ["scene", "version", "views", "viewName", "viewsKind", "layer", "comparing", "compareWith", "preview", "handles"],
+    (state) => {
+      const { scene } = state;
+      if (!scene) return;
+      const numbers = scene.versions.map((v) => v.version);
+      version.options(numbers.toReversed ? numbers.toReversed().map(named) : [...numbers].reverse().map(named));
+      version.update(String(state.version));
+      const kind = state.viewsKind === "dataset" ? "Views" : "Virtual views";
+      view.options([
+        ["", state.views.length ? `${kind} (${state.views.length})` : "No views"],
+        ...state.views.map((v) => [v.name, v.name]),
+      ]);
+      view.update(state.viewName ?? "");
+      previous.disabled = next.disabled = state.views.length === 0;
+      layer.update(state.layer);
+      layer.buttons.mask.disabled = state.version === 0 && !state.preview;
+
+      const before = state.preview ? state.version : parentOf(scene, state.version);
+      compare.disabled = before === null && state.compareWith === null;
+      compareWith.options([
+        ["", before === null ? "with before" : `with version ${before}`],
+        ...numbers.filter((n) => n !== before).map((n) => [String(n), `with version ${n}`]),
+      ]);
+      compareWith.update(state.compareWith === null ? "" : String(state.compareWith));
+      compareWith.element.hidden = numbers.length < 2;
+      attrs(compare, { "aria-pressed": String(state.comparing) });
+
+      const shown = shownVersion(state);
+      const previewing = String(shown).startsWith("p");
+      const inVersion = scene.versions.find((v) => v.version === shown);
+      text(
+        chip,
+        previewing
+          ? `Preview of version ${state.version}`
+          : `Version ${shown}${inVersion ? ` · ${gaussians(inVersion.gaussians)}` : ""}`,
+      );
+      attrs(chip, { class: previewing ? "chip preview" : state.comparing ? "chip compare" : "chip" });
+      back.hidden = !previewing;
+      byId("hint").hidden = state.handles.length > 0 || scene.versions.length > 1;
+    },
+  );
+}
+
+const named = (number) => [String(number), number === 0 ? "Version 0 (original)" : `Version ${number}`];

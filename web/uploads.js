@@ -1,0 +1,47 @@
+// A file on its way to the service: name, how far it is, and what went wrong.
+
+import { wasGivenUp } from "./api.js";
+import { attrs, h, showProblem, text } from "./dom.js";
+import { bytes } from "./format.js";
+
+/** Shows an upload as a row in `place`.
+ *    send({progress, signal})  -> a promise of the service's answer
+ *    done(answer)              it went well; the row is gone
+ *  A row whose upload was refused stays until it is dismissed. */
+export async function showUpload(place, file, send, done) {
+  const abort = new AbortController();
+  const bar = h("progress", { max: 1, value: 0, "aria-label": `Upload of ${file.name}`, testid: "upload-progress" });
+  const state = h("span", { class: "muted" }, "0 %");
+  const problem = h("p", { class: "problem", role: "alert", hidden: true, testid: "upload-problem" });
+  const close = h(
+    "button",
+    { type: "button", class: "small", testid: "upload-cancel", onclick: () => abort.abort() },
+    "Cancel",
+  );
+  const row = h(
+    "div",
+    { class: "upload", testid: "upload" },
+    h("div", { class: "row between" }, h("strong", {}, file.name), h("span", { class: "row" }, state, close)),
+    bar,
+    problem,
+  );
+  place.append(row);
+  try {
+    const progress = (sent, total) => {
+      bar.value = total > 0 ? sent / total : 0;
+      text(state, sent < total ? `${bytes(sent)} of ${bytes(total)}` : "The service is reading it…");
+      // It does not say how long that takes.
+      if (sent >= total) attrs(bar, { value: null });
+    };
+    const answer = await send({ progress, signal: abort.signal });
+    row.remove();
+    done(answer);
+  } catch (error) {
+    if (wasGivenUp(error)) return row.remove();
+    bar.hidden = true;
+    text(state, "Not accepted");
+    text(close, "Dismiss");
+    close.addEventListener("click", () => row.remove());
+    showProblem(problem, error);
+  }
+}

@@ -1,0 +1,457 @@
+// The picture of the scene and the hand on it: asks the service for pictures, and turns pointer, wheel and keys into
+// camera moves and drags.
+
+import * as api from "./api.js";
+import {
+  centredOn,
+  dollied,
+  dragged,
+  onTheWire,
+  orbited,
+  panned,
+  pictureKey,
+  pictureSize,
+  project,
+  samePose,
+} from "./camera.js";
+import { attrs, byId, text } from "./dom.js";
+import { shownVersion } from "./editor.js";
+import { AdaptiveSide, FrameQueue, Recent } from "./frames.js";
+import { Overlay } from "./overlay.js";
+import { partOf } from "./requests.js";
+
+const MAX_SIDE = 1600;
+const STILL_AFTER_MS = 160;
+const CLICK_PX = 4;
+const ORBIT_PER_PX = 0.0055; // Radians.
+const KEPT_PICTURES = 6;
+const THUMBNAIL = { width: 320, height: 200 };
+
+/** How much a turn of the wheel multiplies by. */
+function wheelFactor({ deltaY, deltaMode }) {
+  // Lines and pages, where a browser counts in those.
+  const pixels = deltaY * [1, 16, 400][deltaMode];
+  return Math.exp(Math.max(-300, Math.min(300, pixels)) * 0.0015);
+}
+
+export class Viewer {
+  #editor;
+  #view = byId("view");
+  #canvas = byId("picture");
+  #overlay;
+  #adaptive = new AdaptiveSide();
+  #recent = new Recent(KEPT_PICTURES);
+  #shown = null; // {picture, job}: what is on the canvas.
+  #queue;
+  #size = { width: 1, height: 1 };
+  #pointers = new Map();
+  #gesture = null;
+  #pointerAt = null;
+  #movingUntil = 0;
+  #stillTimer = null;
+  #busyTimer = null;
+  #thumbnailTimer = null;
+
+  constructor(editor) {
+    this.#editor = editor;
+    this.#queue = new FrameQueue({
+      load: (job, signal) => this.#load(job, signal),
+      show: (picture, job) => this.#arrived(picture, job),
+      failed: (error, job) => this.#failed(error, job),
+    });
+    this.#overlay = new Overlay(byId("overlay"), {
+      grab: (id, event) => this.#grab(id, event),
+      nudge: (id, event) => this.#nudge(id, event),
+      wheel: (id, event) => this.#resize(id, event),
+      focused: (id) => editor.select(id),
+    });
+    this.#listen();
+    const { store } = editor;
+    store.watch(["pose", "layer", "version", "preview", "comparing", "compareWith"], () => this.refresh());
+    store.watch(["scene"], ({ scene }) => this.#sceneChanged(scene));
+    store.watch(["handles", "selected", "region", "problem", "pose"], () => this.#drawOverlay());
+    new ResizeObserver(() => this.#resized()).observe(this.#view);
+  }
+
+  get #state() {
+    return this.#editor.state;
+  }
+
+  /** The camera of the picture on the screen, in CSS pixels: what the user sees is what they point at. */
+  get camera() {
+    const { pose } = this.#state;
+    const shown = this.#shown?.job;
+    const seen = shown && shown.scene === this.#state.scene?.id ? shown.pose : pose;
+    return seen && { ...seen, ...this.#size };
+  }
+
+  #sceneChanged(scene) {
+    if (this.#shown && this.#shown.job.scene !== scene?.id) {
+      this.#queue.clear();
+      this.#recent.clear();
+      this.#shown = null;
+      this.#canvas.getContext("2d").clearRect(0, 0, this.#canvas.width, this.#canvas.height);
+      this.#message("");
+    }
+    this.refresh();
+  }
+
+  #resized() {
+    const { clientWidth: width, clientHeight: height } = this.#view;
+    if (!width || !height) return;
+    this.#size = { width, height };
+    this.#editor.aspect = width / height;
+    const density = Math.min(window.devicePixelRatio || 1, MAX_SIDE / Math.max(width, height));
+    Object.assign(this.#canvas, pictureSize(width * Math.max(density, 0.5), height * Math.max(density, 0.5), MAX_SIDE));
+    this.#paint();
+    this.refresh();
+  }
+
+  // --- pictures --------------------------------------------------------------------------------------------------
+
+  #job(large) {
+    const { scene, pose, layer } = this.#state;
+    const limit = Math.min(MAX_SIDE, this.#state.info?.limits?.render_side ?? MAX_SIDE);
+    const { width, height } = this.#size;
+    const density = window.devicePixelRatio || 1;
+    const full = pictureSize(width * density, height * density, limit);
+    const size = large ? full : pictureSize(full.width, full.height, this.#adaptive.side);
+    const version = shownVersion(this.#state);
+    const key = JSON.stringify([scene.id, version, layer, pictureKey(pose), size]);
+    // On a fast service, pictures while moving are as large as any.
+    const complete = size.width === full.width && size.height === full.height;
+    return { key, large, complete, scene: scene.id, version, layer, pose, size };
+  }
+
+  /** Asks for what the state says should be on the screen: a small picture at once, the full one when it is still. */
+  refresh() {
+    const { scene, pose } = this.#state;
+    if (!scene || !pose || this.#size.width <= 1) return;
+    const full = this.#job(true);
+    if (this.#shown?.job.key === full.key) return this.#queue.clear();
+    clearTimeout(this.#stillTimer);
+    const kept = this.#recent.get(full.key);
+    if (kept) {
+      this.#queue.clear();
+      return this.#show(kept, full);
+    }
+    const small = this.#job(false);
+    if (!this.#shows(small)) this.#queue.want(small);
+    const left = this.#movingUntil - performance.now();
+    if (left > 0) this.#stillTimer = setTimeout(() => this.refresh(), left);
+    else this.#queue.want(full);
+    this.#busySoon();
+  }
+
+  /** Whether the picture on the screen is the one asked for, of whatever size. */
+  #shows(job) {
+    const shown = this.#shown?.job;
+    return (
+      !!shown &&
+      shown.version === job.version &&
+      shown.layer === job.layer &&
+      pictureKey(shown.pose) === pictureKey(job.pose)
+    );
+  }
+
+  async #load(job, signal) {
+    const asked = performance.now();
+    const blob = await api.render(
+      job.scene,
+      job.version,
+      {
+        camera: onTheWire({ ...job.pose, ...job.size }),
+        what: job.layer,
+        format: "jpeg",
+        quality: job.complete ? 92 : 75,
+      },
+      signal,
+    );
+    const picture = await createImageBitmap(blob);
+    if (!job.large) this.#adaptive.record(performance.now() - asked);
+    return { picture, ms: performance.now() - asked };
+  }
+
+  #arrived({ picture, ms }, job) {
+    if (job.scene !== this.#state.scene?.id) return;
+    if (job.complete) {
+      this.#recent.put(job.key, picture);
+      this.#thumbnailSoon();
+    }
+    this.#message("");
+    this.#show(picture, job, ms);
+  }
+
+  #show(picture, job, ms = null) {
+    this.#shown = { picture, job };
+    this.#paint();
+    this.#drawOverlay();
+    this.#notBusy();
+    attrs(this.#view, {
+      "data-version": job.version,
+      "data-layer": job.layer,
+      "data-quality": job.complete ? "full" : "moving",
+    });
+    const time = ms === null ? "" : ` · ${Math.round(ms)} ms`;
+    text(byId("picture-size"), `${job.size.width} × ${job.size.height}${time}`);
+  }
+
+  #paint() {
+    if (!this.#shown) return;
+    const context = this.#canvas.getContext("2d");
+    context.imageSmoothingQuality = "high";
+    context.drawImage(this.#shown.picture, 0, 0, this.#canvas.width, this.#canvas.height);
+  }
+
+  #failed(error, job) {
+    this.#notBusy();
+    if (job.scene !== this.#state.scene?.id) return;
+    if (error.status === 404 && String(job.version).startsWith("p")) return this.#editor.previewExpired(job.version);
+    this.#message(`No picture: ${error.detail ?? error.message}`);
+    // The service is full, restarting, or loads the scene: it will answer later. Anything else stays as it is.
+    if ([0, 429, 503].includes(error.status)) {
+      clearTimeout(this.#stillTimer);
+      this.#stillTimer = setTimeout(() => this.refresh(), 1000 * (error.retryAfter ?? 2));
+    }
+  }
+
+  #message(message) {
+    const place = byId("view-message");
+    place.hidden = !message;
+    text(place, message);
+  }
+
+  #busySoon() {
+    this.#busyTimer ??= setTimeout(() => (byId("busy").hidden = false), 500);
+  }
+
+  #notBusy() {
+    if (this.#queue.busy) return;
+    clearTimeout(this.#busyTimer);
+    this.#busyTimer = null;
+    byId("busy").hidden = true;
+  }
+
+  #thumbnailSoon() {
+    clearTimeout(this.#thumbnailTimer);
+    this.#thumbnailTimer = setTimeout(() => {
+      if (this.#shown?.job.layer !== "color" || this.#shown.job.scene !== this.#state.scene?.id) return;
+      const small = Object.assign(document.createElement("canvas"), THUMBNAIL);
+      const { width, height } = this.#shown.picture;
+      const factor = Math.max(THUMBNAIL.width / width, THUMBNAIL.height / height);
+      const [w, h] = [width * factor, height * factor];
+      const context = small.getContext("2d");
+      context.drawImage(this.#shown.picture, (THUMBNAIL.width - w) / 2, (THUMBNAIL.height - h) / 2, w, h);
+      this.#editor.keepThumbnail(small.toDataURL("image/jpeg", 0.75));
+    }, 1500);
+  }
+
+  #drawOverlay() {
+    const { camera } = this;
+    if (!camera) return;
+    const { handles, selected, problem, region } = this.#state;
+    const at = problem ? partOf(problem.error.where) : {};
+    const items = handles.map((handle, i) => ({
+      handle,
+      selected: handle.id === selected,
+      bad: at.part === "handle" && at.index === i,
+    }));
+    this.#overlay.draw(camera, items, region);
+  }
+
+  // --- the hand --------------------------------------------------------------------------------------------------
+
+  #listen() {
+    const view = this.#view;
+    const on = (name, fn, options) => view.addEventListener(name, fn, options);
+    on("pointerdown", (event) => this.#down(event));
+    on("pointermove", (event) => this.#move(event));
+    on("pointerup", (event) => this.#up(event));
+    on("pointercancel", (event) => this.#cancel(event));
+    on("pointerleave", () => (this.#pointerAt = null));
+    on("contextmenu", (event) => event.preventDefault());
+    on("wheel", (event) => this.#wheel(event), { passive: false });
+    on("keydown", (event) => this.#key(event));
+  }
+
+  #place(event) {
+    const box = this.#view.getBoundingClientRect();
+    return { x: event.clientX - box.left, y: event.clientY - box.top };
+  }
+
+  #down(event) {
+    if (event.target.closest("button, a, input, select") || !this.camera) return;
+    this.#view.focus({ preventScroll: true });
+    this.#view.classList.remove("by-keyboard");
+    this.#pointers.set(event.pointerId, this.#place(event));
+    this.#view.setPointerCapture(event.pointerId);
+    if (this.#pointers.size === 2) {
+      if (this.#gesture?.drag) this.#gesture.drag.giveUp();
+      this.#gesture = { kind: "pinch", ...this.#pinch() };
+    } else if (this.#pointers.size === 1 && !this.#gesture) {
+      const sideways = event.button === 2 || event.button === 1 || event.shiftKey;
+      this.#gesture = { kind: sideways ? "pan" : "orbit", from: this.#place(event), button: event.button };
+    }
+  }
+
+  /** The pointer took hold of a handle's dot. */
+  #grab(id, event) {
+    if (event.button !== 0 || event.shiftKey || !this.camera) return;
+    event.stopPropagation();
+    event.preventDefault();
+    event.currentTarget.focus({ preventScroll: true });
+    this.#pointers.set(event.pointerId, this.#place(event));
+    this.#view.setPointerCapture(event.pointerId);
+    const from = this.#place(event);
+    this.#gesture = { kind: "drag", from, drag: this.#editor.dragTarget(id, this.camera, from) };
+  }
+
+  #pinch() {
+    const [a, b] = [...this.#pointers.values()];
+    return { centre: { x: (a.x + b.x) / 2, y: (a.y + b.y) / 2 }, apart: Math.max(1, Math.hypot(a.x - b.x, a.y - b.y)) };
+  }
+
+  #move(event) {
+    const to = this.#place(event);
+    this.#pointerAt = to;
+    const from = this.#pointers.get(event.pointerId);
+    const gesture = this.#gesture;
+    if (!from || !gesture) return;
+    if (gesture.kind === "pinch") {
+      this.#pointers.set(event.pointerId, to);
+      const now = this.#pinch();
+      this.#turn((pose) => {
+        const moved = panned(
+          { ...pose, ...this.#size },
+          now.centre.x - gesture.centre.x,
+          now.centre.y - gesture.centre.y,
+        );
+        return dollied(moved, gesture.apart / now.apart, this.#nearest());
+      });
+      Object.assign(gesture, now);
+      return;
+    }
+    if (!gesture.started) {
+      if (Math.hypot(to.x - gesture.from.x, to.y - gesture.from.y) < CLICK_PX) return;
+      gesture.started = true;
+    }
+    this.#pointers.set(event.pointerId, to);
+    if (gesture.kind === "drag") return gesture.drag.move(to.x, to.y);
+    const [dx, dy] = [to.x - from.x, to.y - from.y];
+    if (gesture.kind === "orbit")
+      this.#turn((pose) => orbited(pose, dx * ORBIT_PER_PX, dy * ORBIT_PER_PX, this.#editor.worldUp));
+    else this.#turn((pose) => panned({ ...pose, ...this.#size }, dx, dy));
+  }
+
+  #up(event) {
+    const gesture = this.#gesture;
+    if (!this.#pointers.delete(event.pointerId) || !gesture) return;
+    if (gesture.kind === "pinch" && this.#pointers.size > 0) {
+      // One finger is left: it turns the scene on.
+      if (this.#pointers.size === 1) this.#gesture = { kind: "orbit", started: true };
+      return;
+    }
+    this.#gesture = null;
+    if (gesture.kind === "drag") gesture.drag.end();
+    else if (!gesture.started && gesture.kind === "orbit" && gesture.button === 0) this.#click(gesture.from);
+  }
+
+  #cancel(event) {
+    this.#pointers.delete(event.pointerId);
+    this.#gesture?.drag?.giveUp();
+    this.#gesture = null;
+  }
+
+  #click({ x, y }) {
+    this.#editor.place(this.camera, x, y);
+  }
+
+  #turn(change) {
+    const { pose } = this.#state;
+    const next = change(pose);
+    if (samePose(pose, next)) return;
+    this.#movingUntil = performance.now() + STILL_AFTER_MS;
+    this.#editor.setPose(next);
+  }
+
+  #nearest() {
+    return (this.#state.scene.radius || 1) * 1e-3;
+  }
+
+  #wheel(event) {
+    event.preventDefault();
+    if (this.camera) this.#turn((pose) => dollied(pose, wheelFactor(event), this.#nearest()));
+  }
+
+  /** The wheel turned over a handle's dot: towards the user, a larger sphere. */
+  #resize(id, event) {
+    event.preventDefault();
+    event.stopPropagation();
+    const { radius } = this.#state.handles.find((h) => h.id === id);
+    this.#editor.select(id);
+    this.#editor.change(id, { radius: Number((radius * wheelFactor(event)).toPrecision(4)) });
+  }
+
+  // --- the keyboard ----------------------------------------------------------------------------------------------
+
+  #key(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey || event.target !== this.#view || !this.camera) return;
+    const arrow = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
+    if (arrow && event.shiftKey)
+      this.#turn((pose) => panned({ ...pose, ...this.#size }, -30 * arrow[0], -30 * arrow[1]));
+    else if (arrow) this.#turn((pose) => orbited(pose, 0.09 * arrow[0], 0.09 * arrow[1], this.#editor.worldUp));
+    else if (event.key === "+" || event.key === "=") this.#turn((pose) => dollied(pose, 0.9, this.#nearest()));
+    else if (event.key === "-" || event.key === "_") this.#turn((pose) => dollied(pose, 1 / 0.9, this.#nearest()));
+    else if (event.key === "Enter") this.#click({ x: this.#size.width / 2, y: this.#size.height / 2 });
+    else return;
+    // Only who works by keyboard needs to see where the middle is.
+    this.#view.classList.add("by-keyboard");
+    event.preventDefault();
+  }
+
+  /** Arrow keys on a handle's dot move its target by some pixels, as a drag would. */
+  #nudge(id, event) {
+    const arrow = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
+    if (!arrow || event.ctrlKey || event.metaKey || !this.camera) return;
+    event.preventDefault();
+    event.stopPropagation();
+    const handle = this.#state.handles.find((h) => h.id === id);
+    const from = handle.target ?? handle.source;
+    const seen = project(this.camera, from);
+    const step = event.shiftKey ? 1 : 8;
+    if (seen)
+      this.#editor.change(id, {
+        target: dragged(
+          this.camera,
+          from,
+          seen.x + step * arrow[0],
+          seen.y + step * arrow[1],
+          this.#state.constraint,
+          handle.normal,
+        ),
+      });
+  }
+
+  /** Gives up the drag under way, if there is one. */
+  giveUpDrag() {
+    if (!this.#gesture?.drag) return false;
+    this.#gesture.drag.giveUp();
+    this.#gesture = null;
+    this.#pointers.clear();
+    return true;
+  }
+
+  /** Turns about the point under the pointer from now on (the middle of the picture, without a pointer). */
+  async focusHere() {
+    const { camera } = this;
+    if (!camera) return;
+    const { x, y } = this.#pointerAt ?? { x: camera.width / 2, y: camera.height / 2 };
+    try {
+      const point = await this.#editor.surfaceAt(camera, x, y);
+      if (!point) return this.#editor.say("There is nothing here to turn about.", { seconds: 3 });
+      this.#editor.setPose(centredOn(this.#state.pose, point));
+    } catch (error) {
+      this.#editor.say(error.message, { kind: "bad" });
+    }
+  }
+}
