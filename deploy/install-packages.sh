@@ -1,16 +1,31 @@
 #!/usr/bin/env bash
-# Installs what splatdrag needs to build and test on Debian 12. Asks nothing, and does nothing where all is installed.
+# Installs what splatdrag needs on Debian 12. Asks nothing, and does nothing where all is installed.
+#
+#   install-packages.sh          to build and run it
+#   install-packages.sh tests    to run all tests, too: a browser, and Node.js to drive it
 set -euo pipefail
 
 packages=(
-  g++ cmake ninja-build ccache git ca-certificates
+  g++ cmake ninja-build pkg-config ccache git ca-certificates
   libopenimageio-dev openimageio-tools libopenexr-dev  # pictures
   libglm-dev libexpected-dev libtbb-dev libhwy-dev     # mathematics, results, threads, SIMD
   nlohmann-json3-dev libtomlplusplus-dev libcli11-dev
   zlib1g-dev libzstd-dev                               # compressed scenes
-  libsqlite3-dev                                       # job records
+  libsqlite3-dev libzip-dev                            # job records, datasets as zip files
+  libcpp-httplib-dev libspdlog-dev prometheus-cpp-dev  # the service: HTTP, logs, metrics
   libgtest-dev libbenchmark-dev                        # tests and benchmarks
+  curl jq                                              # the demo talks to the service
 )
+if [[ "${1:-}" == tests ]]; then
+  packages+=(chromium)
+  # A newer Node.js from elsewhere will do.
+  if ! command -v node >/dev/null || ! command -v npm >/dev/null; then
+    packages+=(nodejs npm)
+  fi
+elif (($# > 0)); then
+  echo "usage: install-packages.sh [tests]" >&2
+  exit 2
+fi
 
 installed() { [[ "$(dpkg-query --show --showformat='${db:Status-Status}' "$1" 2>/dev/null)" == installed ]]; }
 
