@@ -9,8 +9,8 @@
 #include <string>
 #include <utility>
 
+#include "engine/core/atomic_file.h"
 #include "engine/core/vec.h"
-#include "engine/io/atomic_file.h"
 #include "engine/io/quantised.h"
 
 namespace server {
@@ -75,7 +75,7 @@ Result<void> write_colmap_text(const std::filesystem::path& folder, const std::v
   for (const auto& [name, content] : {std::pair<const char*, std::string>{"cameras.txt", cameras_text(views)},
                                       {"images.txt", images_text(views)},
                                       {"points3D.txt", points_text(cloud, max_points)}}) {
-    auto written = engine::io::write_file(folder / name, std::as_bytes(std::span(content)));
+    auto written = engine::write_file(folder / name, std::as_bytes(std::span(content)));
     if (!written) return written;
   }
   return {};

@@ -14,7 +14,7 @@ namespace server {
 /// Writes cameras.txt, images.txt and points3D.txt into `folder`, which exists. Each view is a PINHOLE camera of its
 /// own; poses carry enough digits to come back the same. The points are a sample of the Gaussians, for programs that
 /// start from points.
-///   errors  those of io::AtomicFile
+///   errors  those of AtomicFile
 [[nodiscard]] engine::Result<void> write_colmap_text(const std::filesystem::path& folder,
                                                      const std::vector<engine::scene::Camera>& views,
                                                      const engine::scene::GaussianCloud& cloud,

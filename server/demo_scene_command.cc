@@ -4,7 +4,7 @@
 #include <span>
 #include <string>
 
-#include "engine/io/atomic_file.h"
+#include "engine/core/atomic_file.h"
 #include "engine/io/image_file.h"
 #include "engine/io/scene_file.h"
 #include "engine/procedural/demo_scene.h"
@@ -35,7 +35,7 @@ Result<void> write_drags(const path& folder, const std::vector<procedural::Sugge
   if (auto made = make_folder(folder); !made) return made;
   for (const auto& drag : drags) {
     const std::string json = proto::to_json(to_request(drag)) + "\n";
-    if (auto saved = io::write_file(folder / (drag.name + ".json"), std::as_bytes(std::span(json))); !saved)
+    if (auto saved = engine::write_file(folder / (drag.name + ".json"), std::as_bytes(std::span(json))); !saved)
       return saved;
   }
   return {};

@@ -9,8 +9,8 @@
 #include <system_error>
 #include <vector>
 
+#include "engine/core/atomic_file.h"
 #include "engine/edit/edit.h"
-#include "engine/io/atomic_file.h"
 #include "engine/io/dataset.h"
 #include "engine/io/image_file.h"
 #include "engine/io/scene_file.h"
@@ -141,7 +141,7 @@ Result<void> write_results(const path& folder, std::size_t pictured_views, const
   if (!pictures) return propagate(pictures);
   report.pictures = std::move(*pictures);
   const std::string json = to_json(report);
-  return io::write_file(folder / "report.json", std::as_bytes(std::span(json)));
+  return engine::write_file(folder / "report.json", std::as_bytes(std::span(json)));
 }
 
 Result<void> run(const EditOptions& options, Terminal& terminal) {

@@ -3,6 +3,8 @@
 #include <string>
 #include <system_error>
 
+#include "engine/core/file_descriptor.h"
+
 namespace server {
 
 using engine::ErrorCode;
@@ -16,7 +18,7 @@ engine::Result<void> make_folder(const std::filesystem::path& path) {
   if (!error || error == std::errc::not_a_directory || error == std::errc::file_exists)
     return fail(ErrorCode::invalid_argument, "the results need a folder, but there is a file in its place",
                 path.string());
-  if (error == std::errc::no_space_on_device)
+  if (engine::means_no_space(error.value()))
     return fail(ErrorCode::no_space, "the disk has no room for a new folder", path.string());
   return fail(ErrorCode::unavailable, "cannot make the folder: " + error.message(), path.string());
 }

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "engine/io/atomic_file.h"
+#include "engine/core/atomic_file.h"
 #include "engine/io/dataset.h"
 #include "engine/io/image_file.h"
 #include "engine/io/scene_file.h"
@@ -107,7 +107,7 @@ Result<void> write_picture(const path& file, const engine::render::Rendering& re
   if (!format) return propagate(format);
   const auto bytes = encode_shown(rendering, shown, *format);
   if (!bytes) return propagate(bytes);
-  return io::write_file(file, *bytes);
+  return engine::write_file(file, *bytes);
 }
 
 /// Where the pictures go. One picture may be given a file name, else `--out` is a folder.

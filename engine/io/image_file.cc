@@ -17,8 +17,8 @@
 #include <optional>
 #include <string_view>
 
+#include "engine/core/atomic_file.h"
 #include "engine/core/finite.h"
-#include "engine/io/atomic_file.h"
 #include "engine/io/input_file.h"
 #include "engine/io/read_bytes.h"
 

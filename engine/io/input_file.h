@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "engine/core/file_descriptor.h"
 #include "engine/core/result.h"
-#include "engine/io/file_descriptor.h"
 
 namespace engine::io {
 

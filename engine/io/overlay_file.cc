@@ -8,9 +8,9 @@
 #include <string>
 #include <string_view>
 
+#include "engine/core/atomic_file.h"
 #include "engine/core/byte_reader.h"
 #include "engine/core/byte_writer.h"
-#include "engine/io/atomic_file.h"
 #include "engine/io/checks.h"
 #include "engine/io/input_file.h"
 #include "engine/scene/cloud_bytes.h"

@@ -9,8 +9,8 @@
 #include <limits>
 #include <type_traits>
 
+#include "engine/core/atomic_file.h"
 #include "engine/core/parallel.h"
-#include "engine/io/atomic_file.h"
 #include "engine/io/checks.h"
 
 namespace engine::io {

@@ -5,7 +5,7 @@
 #include <cctype>
 #include <string>
 
-#include "engine/io/atomic_file.h"
+#include "engine/core/atomic_file.h"
 #include "engine/io/checks.h"
 #include "engine/io/compressed_ply.h"
 #include "engine/io/input_file.h"

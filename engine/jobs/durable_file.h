@@ -1,4 +1,5 @@
-// Files that are there, whole, after a power cut, or not at all.
+// The queue's files: whole after a power cut, or not there at all. What is said of one that cannot be written names no
+// folder, and says no more than no_space or unavailable: both may be over in a moment.
 #pragma once
 
 #include <filesystem>
@@ -13,15 +14,12 @@ namespace engine::jobs {
 ///   errors  no_space, unavailable; `where` is the folder
 [[nodiscard]] Result<void> create_folder(const std::filesystem::path& folder);
 
-/// Writes the file under a temporary name, waits until it is on disk, renames it: a reader sees the old bytes or the
-/// new ones, even after a power cut. The folder must exist.
+/// Writes a file through AtomicFile: a reader sees the old bytes or the new ones, even after a power cut. The folder
+/// must exist.
 ///   errors  no_space: what was there before is unchanged; unavailable; `where` is the file
 [[nodiscard]] Result<void> write_durably(const std::filesystem::path& file, std::string_view bytes);
 
 ///   errors  not_found, unavailable; `where` is the file
 [[nodiscard]] Result<std::string> read_bytes(const std::filesystem::path& file);
-
-/// Whether this errno says that there is no room: disk full, quota used up, file larger than allowed.
-[[nodiscard]] bool means_no_space(int error_number);
 
 }  // namespace engine::jobs

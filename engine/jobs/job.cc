@@ -3,9 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <iterator>
+#include <limits>
+
+#include "engine/core/numbers.h"
 
 namespace engine::jobs {
 namespace {
+
+constexpr char id_kind = 'e';
 
 constexpr std::array<std::string_view, state_count> state_names = {
     "queued", "running", "stop_requested", "cancel_requested", "succeeded", "failed", "cancelled"};
@@ -68,21 +73,12 @@ std::optional<State> parse_state(std::string_view name) {
 
 bool is_final(State state) { return state == State::succeeded || state == State::failed || state == State::cancelled; }
 
-std::string id_of(std::int64_t number) {
-  const std::string digits = std::to_string(number);
-  return "e" + std::string(digits.size() < 6 ? 6 - digits.size() : 0, '0') + digits;
-}
+std::string id_of(std::int64_t number) { return numbered_id(id_kind, std::uint64_t(number)); }
 
 std::optional<std::int64_t> number_of(std::string_view id) {
-  // 15 digits fit the type; nobody ever counted so far.
-  if (id.size() < 7 || id.size() > 16 || id[0] != 'e') return std::nullopt;
-  std::int64_t number = 0;
-  for (const char c : id.substr(1)) {
-    if (c < '0' || c > '9') return std::nullopt;
-    number = 10 * number + (c - '0');
-  }
-  if (id_of(number) != id) return std::nullopt;  // zeros too many
-  return number;
+  const auto number = number_of_id(id_kind, id);
+  if (!number || *number > std::uint64_t(std::numeric_limits<std::int64_t>::max())) return std::nullopt;
+  return std::int64_t(*number);
 }
 
 Result<Job> after(Job job, const Change& change, Time now) {

@@ -12,6 +12,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "engine/core/file_descriptor.h"
 #include "engine/jobs/durable_file.h"
 
 namespace engine::jobs {

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/core/atomic_file.h"
 #include "engine/jobs/durable_file.h"
 #include "engine/jobs/live.h"
 
@@ -21,11 +22,12 @@ bool worth_retrying(const Error& error) {
   return error.code == ErrorCode::no_space || error.code == ErrorCode::unavailable || error.code == ErrorCode::busy;
 }
 
-void remove_checkpoints(const fs::path& folder) {
+/// Removes what in a folder is called so.
+void remove_files(const fs::path& folder, std::string_view prefix) {
   std::error_code error;
   std::vector<fs::path> found;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
-    if (entry->path().filename().string().starts_with(checkpoint_prefix)) found.push_back(entry->path());
+    if (entry->path().filename().string().starts_with(prefix)) found.push_back(entry->path());
   for (const fs::path& file : found) fs::remove(file, error);
 }
 
@@ -144,6 +146,7 @@ void Worker::run(const Job& job) {
   if (state == State::cancel_requested) live->interrupt.request_stop();
   if (state == State::stop_requested) live->stop = true;
   queue_.touch();
+  remove_files(queue_.folder_of(job.id), temporary_prefix);  // left by a run that was killed while it wrote
 
   JobContext context(queue_, job, *live, draining_, options_);
   const auto outcome = call(context);
@@ -185,7 +188,7 @@ void Worker::record_end(const std::string& id, const Change& change) {
         std::error_code ignored;
         fs::remove_all(queue_.folder_of(id), ignored);
       } else if (is_final(job->state)) {
-        remove_checkpoints(queue_.folder_of(id));
+        remove_files(queue_.folder_of(id), checkpoint_prefix);
       }
       return;
     }

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <vector>
 
+#include "engine/core/file_descriptor.h"
 #include "server/http/negotiation.h"
 
 namespace server::http {
@@ -35,7 +36,7 @@ engine::Error limit_error(std::uint64_t limit, const std::string& option) {
 }
 
 engine::Error write_error(int error) {
-  if (error == ENOSPC || error == EDQUOT) return {ErrorCode::no_space, "the disk is full: the upload was not kept", ""};
+  if (engine::means_no_space(error)) return {ErrorCode::no_space, "the disk is full: the upload was not kept", ""};
   return {ErrorCode::unavailable, std::string("the upload cannot be written: ") + std::strerror(error), ""};
 }
 
@@ -45,13 +46,11 @@ engine::Error write_error(int error) {
 class UploadFile {
  public:
   UploadFile(const std::filesystem::path& path, std::uint64_t limit)
-      : path_(path), limit_(limit), descriptor_(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600)) {
-    if (descriptor_ < 0) error_ = write_error(errno);
+      : path_(path), limit_(limit), file_(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600)) {
+    if (file_.get() < 0) error_ = write_error(errno);
   }
   ~UploadFile() {
-    if (descriptor_ < 0) return;
-    ::close(descriptor_);
-    if (!kept_) ::unlink(path_.c_str());
+    if (file_.get() >= 0 && !kept_) ::unlink(path_.c_str());
   }
   UploadFile(const UploadFile&) = delete;
   UploadFile& operator=(const UploadFile&) = delete;
@@ -64,7 +63,7 @@ class UploadFile {
     bytes_ += data.size();
     if (bytes_ > limit_) return fail(limit_error(limit_, "--max-upload-bytes"));
     while (!data.empty()) {
-      const ssize_t written = ::write(descriptor_, data.data(), data.size());
+      const ssize_t written = ::write(file_.get(), data.data(), data.size());
       if (written < 0 && errno == EINTR) continue;
       if (written < 0) return fail(write_error(errno));
       data.remove_prefix(std::size_t(written));
@@ -75,7 +74,7 @@ class UploadFile {
   bool keep() {
     if (error_) return false;
     if (bytes_ == 0) return fail({ErrorCode::invalid_argument, "the upload is empty", ""});
-    if (::fsync(descriptor_) != 0) return fail(write_error(errno));
+    if (::fsync(file_.get()) != 0) return fail(write_error(errno));
     return kept_ = true;
   }
 
@@ -87,7 +86,7 @@ class UploadFile {
  private:
   const std::filesystem::path path_;
   const std::uint64_t limit_;
-  const int descriptor_;
+  const engine::FileDescriptor file_;
   std::uint64_t bytes_ = 0;
   bool kept_ = false;
   std::optional<engine::Error> error_;

@@ -2,10 +2,8 @@
 
 #include <fcntl.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <exception>
 #include <new>
 
@@ -64,15 +62,6 @@ bool names_other_charset(const std::string& content_type) {
     return lower_case(parameter).starts_with("charset=") && !same_ignoring_case(parameter, "charset=utf-8") &&
            !same_ignoring_case(parameter, "charset=\"utf-8\"");
   });
-}
-
-std::shared_ptr<const int> open_file(const std::filesystem::path& path) {
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) return nullptr;
-  return {new int(descriptor), [](const int* opened) {
-            ::close(*opened);
-            delete opened;
-          }};
 }
 
 }  // namespace
@@ -170,9 +159,9 @@ Result<Reply> Dispatcher::handle(const Asked& asked, const RequestHead& head, co
 
 tl::expected<void, Refusal> Dispatcher::fill_with_file(Answer& answer, const Reply& reply,
                                                        const RequestHead& head) const {
-  auto descriptor = open_file(*reply.file);
+  auto file = std::make_shared<const engine::FileDescriptor>(::open(reply.file->c_str(), O_RDONLY | O_CLOEXEC));
   struct stat status {};
-  if (!descriptor || ::fstat(*descriptor, &status) != 0 || !S_ISREG(status.st_mode))
+  if (file->get() < 0 || ::fstat(file->get(), &status) != 0 || !S_ISREG(status.st_mode))
     return refuse(503, "unavailable", "the file cannot be read just now");
   const auto size = std::uint64_t(status.st_size);
   answer.headers.emplace_back("Accept-Ranges", "bytes");
@@ -187,14 +176,14 @@ tl::expected<void, Refusal> Dispatcher::fill_with_file(Answer& answer, const Rep
     return refuse(416, "invalid_argument", "the range begins beyond the file's " + std::to_string(size) + " bytes");
   }
   if (choice.kind == RangeKind::whole) {
-    answer.file = Answer::FilePart{std::move(descriptor), 0, size};
+    answer.file = Answer::FilePart{std::move(file), 0, size};
     return {};
   }
   const auto [first, last] = choice.range;
   answer.status = 206;
   answer.headers.emplace_back(
       "Content-Range", "bytes " + std::to_string(first) + "-" + std::to_string(last) + "/" + std::to_string(size));
-  answer.file = Answer::FilePart{std::move(descriptor), first, last - first + 1};
+  answer.file = Answer::FilePart{std::move(file), first, last - first + 1};
   return {};
 }
 

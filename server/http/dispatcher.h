@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/core/file_descriptor.h"
 #include "server/http/connection.h"
 #include "server/http/gate.h"
 #include "server/http/request_head.h"
@@ -46,7 +47,7 @@ struct Answer {
   std::string body;
   /// The body is `length` bytes of this file from `offset` on.
   struct FilePart {
-    std::shared_ptr<const int> descriptor;
+    std::shared_ptr<const engine::FileDescriptor> descriptor;
     std::uint64_t offset = 0, length = 0;
   };
   std::optional<FilePart> file;

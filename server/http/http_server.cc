@@ -121,7 +121,7 @@ class Sink final : public EventSink {
 
 bool send_file(const Answer::FilePart& file, std::size_t begin, std::size_t length, httplib::DataSink& sink) {
   std::vector<char> piece(std::min<std::size_t>(file_piece, length));
-  const ssize_t got = ::pread(*file.descriptor, piece.data(), piece.size(), off_t(file.offset + begin));
+  const ssize_t got = ::pread(file.descriptor->get(), piece.data(), piece.size(), off_t(file.offset + begin));
   // A file that has become shorter cannot be sent as promised; breaking off says so.
   return got > 0 && sink.write(piece.data(), std::size_t(got));
 }

@@ -6,6 +6,7 @@
 #include <span>
 
 #include "engine/core/checksum.h"
+#include "engine/core/numbers.h"
 #include "server/http/request_head.h"
 #include "server/http/url.h"
 
@@ -24,13 +25,6 @@ int closeness(std::string_view pattern, std::string_view media_type) {
 /// Whether a weight is zero: "0", "0.", "0.000".
 bool is_zero(std::string_view weight) {
   return !weight.empty() && weight.find_first_not_of("0.") == std::string_view::npos;
-}
-
-std::optional<std::uint64_t> number(std::string_view text) {
-  std::uint64_t value = 0;
-  const auto read = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (text.empty() || read.ec != std::errc{} || read.ptr != text.data() + text.size()) return std::nullopt;
-  return value;
 }
 
 std::string_view unquoted(std::string_view text) {
@@ -80,7 +74,8 @@ RangeChoice choose_range(std::string_view range, std::uint64_t size) {
   if (!same_ignoring_case(range.substr(0, unit.size()), unit) || spec.find(',') != std::string_view::npos ||
       dash == std::string_view::npos)
     return {};
-  const auto first = number(spec.substr(0, dash)), last = number(spec.substr(dash + 1));
+  const auto first = engine::number_in<std::uint64_t>(spec.substr(0, dash)),
+             last = engine::number_in<std::uint64_t>(spec.substr(dash + 1));
   const bool open_ended = dash + 1 == spec.size(), suffix = dash == 0;
   if ((!first && !suffix) || (!last && !open_ended) || (suffix && open_ended)) return {};
   if (suffix) {

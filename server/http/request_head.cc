@@ -1,7 +1,8 @@
 #include "server/http/request_head.h"
 
 #include <algorithm>
-#include <charconv>
+
+#include "engine/core/numbers.h"
 
 namespace server::http {
 namespace {
@@ -73,12 +74,8 @@ tl::expected<void, Refusal> read_framing(RequestHead& head) {
     head.chunked = true;
   }
   if (lengths > 0) {
-    const std::string text = head.header("content-length");
-    std::uint64_t length = 0;
-    const auto read = std::from_chars(text.data(), text.data() + text.size(), length);
-    if (text.empty() || read.ec != std::errc{} || read.ptr != text.data() + text.size())
-      return refuse(400, "Content-Length must be a number of bytes");
-    head.content_length = length;
+    head.content_length = engine::number_in<std::uint64_t>(head.header("content-length"));
+    if (!head.content_length) return refuse(400, "Content-Length must be a number of bytes");
   }
   return {};
 }

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cerrno>
-
 #include "tests/engine/jobs/jobs_support.h"
 
 namespace engine::jobs {
@@ -51,11 +49,6 @@ TEST(DurableFile, NamesWhatIsMissingOrInTheWay) {
   const auto made = create_folder(dir.path() / "file" / "below");
   ASSERT_EQ(code_of(made), ErrorCode::unavailable);
   EXPECT_EQ(made.error().where, (dir.path() / "file").string());
-}
-
-TEST(DurableFile, CountsQuotasAsAFullDisk) {
-  for (const int number : {ENOSPC, EDQUOT, EFBIG}) EXPECT_TRUE(means_no_space(number)) << number;
-  EXPECT_FALSE(means_no_space(EACCES));
 }
 
 }  // namespace

@@ -2,10 +2,8 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include <chrono>
-#include <csignal>
 #include <filesystem>
 #include <memory>
 #include <stdexcept>
@@ -16,8 +14,18 @@
 #include "engine/jobs/queue.h"
 #include "engine/jobs/sqlite_store.h"
 #include "tests/support/data.h"
+#include "tests/support/full_disk.h"
 
 namespace engine::jobs {
+
+using support::FullDisk;
+
+/// How long a test waits for what has to come. Only a failure takes so long; on a busy machine a sanitizer needs more.
+#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+inline constexpr std::chrono::minutes patience{5};
+#else
+inline constexpr std::chrono::minutes patience{1};
+#endif
 
 /// The value, or a test that ends with the error's message.
 template <class T>
@@ -42,10 +50,10 @@ inline std::unique_ptr<Queue> open_queue(Store& store, const std::filesystem::pa
   return value(Queue::open(store, {.folder = folder / "jobs", .max_queued = max_queued}));
 }
 
-/// The job once `wanted(job)` holds; ends the test after 20 s.
+/// The job once `wanted(job)` holds; ends the test when patience does.
 template <class Wanted>
 Job wait_for(Queue& queue, const std::string& id, Wanted wanted) {
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  const auto deadline = std::chrono::steady_clock::now() + patience;
   for (auto seen = queue.version();; seen = queue.wait_for_change(seen, std::chrono::seconds(1))) {
     Job job = value(queue.find(id));
     if (wanted(job)) return job;
@@ -59,25 +67,5 @@ inline Job wait_for_end(Queue& queue, const std::string& id) {
 inline Job wait_for_interval(Queue& queue, const std::string& id, int interval) {
   return wait_for(queue, id, [=](const Job& job) { return job.finished_intervals >= interval; });
 }
-
-/// As long as it lives, no file of this process can grow beyond `bytes`: to whoever writes, a full disk.
-class FullDisk {
- public:
-  explicit FullDisk(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit limit{.rlim_cur = bytes, .rlim_max = before_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FullDisk() {
-    setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-  FullDisk(const FullDisk&) = delete;
-  FullDisk& operator=(const FullDisk&) = delete;
-
- private:
-  rlimit before_{};
-  void (*handler_)(int);
-};
 
 }  // namespace engine::jobs

@@ -22,12 +22,12 @@ namespace {
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 
-/// Passes when it is opened once for every passage; gives up after 20 s.
+/// Passes when it is opened once for every passage; gives up when patience ends.
 class Gate {
  public:
   void open() { semaphore_.release(); }
   void pass() {
-    if (!semaphore_.try_acquire_for(20s)) throw std::runtime_error("the gate stayed shut");
+    if (!semaphore_.try_acquire_for(patience)) throw std::runtime_error("the gate stayed shut");
   }
 
  private:
@@ -200,7 +200,7 @@ TEST_F(WorkerTest, ShowsProgressAtOnce) {
   EXPECT_EQ(value(queue->list())[0].progress, "half");
   const auto seen = queue->version();
   gate.open();
-  EXPECT_NE(queue->wait_for_change(seen, 20s), seen);
+  EXPECT_NE(queue->wait_for_change(seen, patience), seen);
   wait_for_end(*queue, id);
   EXPECT_EQ(value(store->find(id)).progress, "all") << "the last word is on disk";
 }
@@ -228,7 +228,7 @@ TEST_F(WorkerTest, WaitsNoLongerThanAsked) {
   const auto seen = queue->version();
   EXPECT_EQ(queue->wait_for_change(seen, 1ms), seen);
   submit();
-  EXPECT_NE(queue->wait_for_change(seen, 20s), seen);
+  EXPECT_NE(queue->wait_for_change(seen, patience), seen);
 }
 
 TEST_F(WorkerTest, DrainsAtTheEndOfAnIntervalAndGoesOnAfterARestart) {
@@ -238,8 +238,8 @@ TEST_F(WorkerTest, DrainsAtTheEndOfAnIntervalAndGoesOnAfterARestart) {
   gate.open();
   for (int u = 1; u <= 2; ++u) arrived.pass();
   const auto seen = queue->version();  // the worker changes nothing while it waits: the next change is the drain's
-  std::thread drain([&] { worker->drain(20s); });
-  EXPECT_NE(queue->wait_for_change(seen, 20s), seen);
+  std::thread drain([&] { worker->drain(patience); });
+  EXPECT_NE(queue->wait_for_change(seen, patience), seen);
   gate.open();  // the running interval may end
   drain.join();
   const Job left = value(queue->find(id));
@@ -290,8 +290,8 @@ TEST_F(WorkerTest, InterruptsAJobThatTakesLongerThanTheGrace) {
 TEST_F(WorkerTest, DrainsAnIdleWorkerWithoutDelay) {
   start(three_intervals());
   const auto begin = std::chrono::steady_clock::now();
-  worker->drain(20s);
-  worker->drain(20s);
+  worker->drain(patience);
+  worker->drain(patience);
   EXPECT_LT(std::chrono::steady_clock::now() - begin, 10s);
   submit();
   EXPECT_EQ(value(queue->find("e000001")).state, State::queued);
@@ -340,12 +340,25 @@ TEST_F(WorkerTest, ExpiresEndedJobsAsItWorks) {
     if (auto saved = context.save_checkpoint(1, "x"); !saved) return propagate(saved);
     return JobResult{};
   });
-  const auto deadline = std::chrono::steady_clock::now() + 20s;
+  const auto deadline = std::chrono::steady_clock::now() + patience;
   while (value(queue->list()).size() > 1 && std::chrono::steady_clock::now() < deadline)
     queue->wait_for_change(queue->version(), 10ms);
   EXPECT_EQ(value(queue->list())[0].id, "e000003");
   worker.reset();
   EXPECT_FALSE(fs::exists(folder("e000001")));
+}
+
+TEST_F(WorkerTest, RemovesWhatAKilledRunLeftHalfWritten) {
+  const std::string id = submit();
+  fs::create_directories(folder(id));
+  support::write_file(folder(id) / ".splatdrag-1-0.tmp", "half a checkpoint");
+  support::write_file(folder(id) / "picture.jpg", "x");
+  start([&](JobContext&) -> Result<JobResult> {
+    EXPECT_FALSE(fs::exists(folder(id) / ".splatdrag-1-0.tmp"));
+    EXPECT_TRUE(fs::exists(folder(id) / "picture.jpg"));
+    return JobResult{};
+  });
+  EXPECT_EQ(wait_for_end(*queue, id).state, State::succeeded);
 }
 
 TEST_F(WorkerTest, NeverOverwritesACheckpointByAWrongNumber) {
@@ -370,7 +383,7 @@ TEST_F(WorkerTest, FailsTheJobOnAFullDiskAndHarmsNothingElse) {
     return JobResult{};
   });
   // Not even the failure can be recorded now; the worker says so and tries again.
-  const auto deadline = std::chrono::steady_clock::now() + 20s;
+  const auto deadline = std::chrono::steady_clock::now() + patience;
   while (!worker->trouble() && std::chrono::steady_clock::now() < deadline) std::this_thread::sleep_for(1ms);
   ASSERT_TRUE(worker->trouble());
   EXPECT_EQ(worker->trouble()->code, ErrorCode::no_space);
@@ -381,7 +394,7 @@ TEST_F(WorkerTest, FailsTheJobOnAFullDiskAndHarmsNothingElse) {
   EXPECT_EQ(job.finished_intervals, 1);
   EXPECT_FALSE(fs::exists(folder(id))) << "its files may be what took the last bytes";
   EXPECT_EQ(wait_for_end(*queue, next).result, "fine");
-  worker->drain(20s);
+  worker->drain(patience);
   EXPECT_FALSE(worker->trouble());
 }
 

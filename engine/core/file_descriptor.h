@@ -7,7 +7,7 @@
 
 #include "engine/core/result.h"
 
-namespace engine::io {
+namespace engine {
 
 /// Owns an open POSIX file descriptor; -1 is none.
 class FileDescriptor {
@@ -27,9 +27,11 @@ class FileDescriptor {
   int fd_ = -1;
 };
 
+/// Whether this errno says that there is no room: disk full, quota used up, file larger than allowed.
+[[nodiscard]] bool means_no_space(int error_number);
+
 /// The error for a system call that failed with `error_number` (errno). `action` completes "cannot ... PATH": "write".
-/// Full disk, quota or size limit: no_space. No such file or folder: not_found. Not permitted: unavailable.
-/// `where` is the path.
+/// No room: no_space. No such file or folder: not_found. Not permitted: unavailable. `where` is the path.
 [[nodiscard]] Error file_error(int error_number, const std::string& action, const std::filesystem::path& path);
 
-}  // namespace engine::io
+}  // namespace engine

@@ -1,19 +1,16 @@
-#include "engine/io/file_descriptor.h"
+#include "engine/core/file_descriptor.h"
 
 #include <unistd.h>
 
 #include <cerrno>
 #include <system_error>
 
-namespace engine::io {
+namespace engine {
 namespace {
 
 ErrorCode code_for(int error_number) {
+  if (means_no_space(error_number)) return ErrorCode::no_space;
   switch (error_number) {
-    case ENOSPC:
-    case EDQUOT:
-    case EFBIG:
-      return ErrorCode::no_space;
     case ENOENT:
     case ENOTDIR:
       return ErrorCode::not_found;
@@ -36,10 +33,14 @@ FileDescriptor::~FileDescriptor() {
   if (fd_ >= 0) ::close(fd_);
 }
 
+bool means_no_space(int error_number) {
+  return error_number == ENOSPC || error_number == EDQUOT || error_number == EFBIG;
+}
+
 Error file_error(int error_number, const std::string& action, const std::filesystem::path& path) {
   return {code_for(error_number),
           "cannot " + action + " " + path.string() + ": " + std::generic_category().message(error_number),
           path.string()};
 }
 
-}  // namespace engine::io
+}  // namespace engine

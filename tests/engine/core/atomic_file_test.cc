@@ -1,16 +1,17 @@
-#include "engine/io/atomic_file.h"
+#include "engine/core/atomic_file.h"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include <cerrno>
-#include <csignal>
+#include <string>
 
-#include "tests/engine/io/samples.h"
 #include "tests/support/data.h"
+#include "tests/support/full_disk.h"
 
-namespace engine::io {
+namespace engine {
 namespace {
+
+std::span<const std::byte> as_span(const std::string& bytes) { return std::as_bytes(std::span(bytes)); }
 
 std::size_t files_in(const std::filesystem::path& folder) {
   return std::size_t(std::distance(std::filesystem::directory_iterator(folder), {}));
@@ -62,32 +63,13 @@ TEST(AtomicFile, NamesAFolderThatIsNotThereAndAPathThatIsAFolder) {
   EXPECT_EQ(is_folder.error().code, ErrorCode::invalid_argument);
 }
 
-/// Bounds the size of any file this process writes, so that write() fails half way.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) : old_handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    getrlimit(RLIMIT_FSIZE, &old_limit_);
-    rlimit limit = old_limit_;
-    limit.rlim_cur = bytes;
-    setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FileSizeLimit() {
-    setrlimit(RLIMIT_FSIZE, &old_limit_);
-    std::signal(SIGXFSZ, old_handler_);
-  }
-
- private:
-  rlimit old_limit_{};
-  void (*old_handler_)(int);
-};
-
 TEST(AtomicFile, AWriteThatFailsHalfWayKeepsTheOldFileAndNamesThePath) {
   const support::TempDir folder;
   const auto path = folder.path() / "scene.ply";
   support::write_file(path, "old");
   Result<void> written;
   {
-    const FileSizeLimit limit(1000);
+    const support::FullDisk full(1000);
     written = write_file(path, as_span(std::string(5000, 'x')));
   }
   ASSERT_FALSE(written);
@@ -95,6 +77,23 @@ TEST(AtomicFile, AWriteThatFailsHalfWayKeepsTheOldFileAndNamesThePath) {
   EXPECT_EQ(written.error().where, path.string());
   EXPECT_EQ(support::read_file(path), "old");
   EXPECT_EQ(files_in(folder.path()), 1u);
+}
+
+TEST(AtomicFile, SaysWhatWentWrongInTheWordsItWasGiven) {
+  const support::TempDir folder;
+  const auto path = folder.path() / "no" / "scene.ply";
+  const auto written = write_file(path, {}, [](int number, const std::string& action, const std::filesystem::path& at) {
+    return Error{ErrorCode::busy, action + " " + std::to_string(number), at.string()};
+  });
+  ASSERT_FALSE(written);
+  EXPECT_EQ(written.error().code, ErrorCode::busy);
+  EXPECT_EQ(written.error().message, "write " + std::to_string(ENOENT));
+  EXPECT_EQ(written.error().where, path.string());
+}
+
+TEST(MeansNoSpace, CountsQuotasAndLimitsAsAFullDisk) {
+  for (const int number : {ENOSPC, EDQUOT, EFBIG}) EXPECT_TRUE(means_no_space(number)) << number;
+  EXPECT_FALSE(means_no_space(EACCES));
 }
 
 TEST(FileError, TellsAFullDiskFromOtherTrouble) {
@@ -106,4 +105,4 @@ TEST(FileError, TellsAFullDiskFromOtherTrouble) {
 }
 
 }  // namespace
-}  // namespace engine::io
+}  // namespace engine
