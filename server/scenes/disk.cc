@@ -12,8 +12,8 @@
 #include <system_error>
 #include <vector>
 
-#include "engine/io/atomic_file.h"
-#include "engine/io/file_descriptor.h"
+#include "engine/core/atomic_file.h"
+#include "engine/core/file_descriptor.h"
 #include "engine/io/input_file.h"
 
 namespace server::scenes {
@@ -24,12 +24,12 @@ namespace io = engine::io;
 using engine::propagate;
 
 tl::unexpected<engine::Error> failed(const std::string& action, const fs::path& path, int error_number) {
-  return tl::make_unexpected(io::file_error(error_number, action, path));
+  return tl::make_unexpected(engine::file_error(error_number, action, path));
 }
 
 template <class Sync>
 Result<void> sync_opened(const fs::path& path, int flags, Sync sync) {
-  const io::FileDescriptor opened(::open(path.c_str(), flags | O_RDONLY | O_CLOEXEC));
+  const engine::FileDescriptor opened(::open(path.c_str(), flags | O_RDONLY | O_CLOEXEC));
   if (opened.get() < 0 || sync(opened.get()) != 0) return failed("write", path, errno);
   return {};
 }
@@ -43,20 +43,19 @@ Result<void> make_folder(const fs::path& folder) {
   return {};
 }
 
-Result<void> sync_folder(const fs::path& folder) { return sync_opened(folder, O_DIRECTORY, ::fsync); }
 Result<void> sync_file(const fs::path& file) { return sync_opened(file, 0, ::fsync); }
 Result<void> sync_file_system(const fs::path& folder) { return sync_opened(folder, O_DIRECTORY, ::syncfs); }
 
 Result<void> move_durably(const fs::path& from, const fs::path& to) {
   if (::rename(from.c_str(), to.c_str()) != 0) return failed("move to", to, errno);
-  if (auto synced = sync_folder(to.parent_path()); !synced) return synced;
-  return sync_folder(from.parent_path());
+  if (auto synced = engine::sync_folder(to.parent_path()); !synced) return synced;
+  return engine::sync_folder(from.parent_path());
 }
 
 Result<void> copy_file(const fs::path& from, const fs::path& to) {
   const auto source = io::InputFile::open(from);
   if (!source) return propagate(source);
-  auto target = io::AtomicFile::create(to);
+  auto target = engine::AtomicFile::create(to);
   if (!target) return propagate(target);
   std::vector<std::byte> chunk(std::size_t{1} << 20);
   for (std::uint64_t at = 0; at < source->size(); at += chunk.size()) {

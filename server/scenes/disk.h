@@ -13,11 +13,9 @@ namespace server::scenes {
 using engine::Result;
 
 /// Makes the folder and those above it. One that exists is left as it is.
-///   errors  those of io::file_error()
+///   errors  those of file_error()
 [[nodiscard]] Result<void> make_folder(const std::filesystem::path& folder);
 
-/// Waits until the names in a folder are on disk.
-[[nodiscard]] Result<void> sync_folder(const std::filesystem::path& folder);
 /// Waits until a file's bytes are on disk.
 [[nodiscard]] Result<void> sync_file(const std::filesystem::path& file);
 /// Waits until everything written to the file system that holds `folder` is on disk: for folders of thousands of files,

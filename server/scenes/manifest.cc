@@ -6,7 +6,7 @@
 #include <span>
 #include <string_view>
 
-#include "engine/io/atomic_file.h"
+#include "engine/core/atomic_file.h"
 #include "engine/io/read_bytes.h"
 
 namespace server::scenes {
@@ -241,7 +241,7 @@ Result<Manifest> read_manifest(const std::filesystem::path& folder) {
 
 Result<void> write_manifest(const std::filesystem::path& folder, const Manifest& manifest) {
   const std::string text = text_of(manifest);
-  return engine::io::write_file(folder / manifest_name, std::as_bytes(std::span(text)));
+  return engine::write_file(folder / manifest_name, std::as_bytes(std::span(text)));
 }
 
 bool is_written(const std::filesystem::path& folder, const Manifest& manifest) {

@@ -8,9 +8,11 @@
 #include <vector>
 
 #include "engine/core/result.h"
-#include "server/scenes/scene_store.h"
+#include "server/scenes/scene_info.h"
 
 namespace server::scenes {
+
+using engine::Result;
 
 /// Where a dataset is.
 struct DatasetPlace {

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <filesystem>
+#include <utility>
+#include <vector>
 
 #include "engine/core/result.h"
 
@@ -11,5 +13,25 @@ namespace server::scenes {
 /// "s000001/base.ply". What is said of other places stays.
 ///   folder  absolute, as errors spell it
 [[nodiscard]] engine::Error without_folder(engine::Error error, const std::filesystem::path& folder);
+
+/// Errors on their way out of the store: without its folders, and with the engine's limits called as the service's
+/// options are.
+class PlainErrors {
+ public:
+  explicit PlainErrors(std::vector<std::filesystem::path> folders) : folders_(std::move(folders)) {}
+
+  /// What a failure is called outside.
+  ///   within  paths are relative to it first, if given
+  template <class T>
+  [[nodiscard]] tl::unexpected<engine::Error> operator()(const engine::Result<T>& failed,
+                                                         const std::filesystem::path& within = {}) const {
+    return (*this)(failed.error(), within);
+  }
+  [[nodiscard]] tl::unexpected<engine::Error> operator()(engine::Error error,
+                                                         const std::filesystem::path& within = {}) const;
+
+ private:
+  std::vector<std::filesystem::path> folders_;
+};
 
 }  // namespace server::scenes

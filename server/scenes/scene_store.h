@@ -11,88 +11,25 @@
 // removed at the next start.
 #pragma once
 
-#include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "engine/core/result.h"
 #include "engine/core/vec.h"
 #include "engine/io/dataset.h"
-#include "engine/io/read_options.h"
-#include "engine/io/scene_file.h"
 #include "engine/scene/overlay.h"
+#include "server/scenes/scene_info.h"
+#include "server/scenes/scratch.h"
+#include "server/scenes/store_options.h"
 
 namespace server::scenes {
 
 using engine::Result;
-using Time = std::chrono::sys_time<std::chrono::milliseconds>;
-
-struct StoreOptions {
-  std::filesystem::path folder;                              ///< <data-dir>/scenes
-  std::filesystem::path scene_root;                          ///< Files may be opened below it; empty: none may.
-  std::uint64_t memory_bytes = std::uint64_t{4} << 30;       ///< Budget of clouds, overlays and previews in memory.
-  std::uint64_t max_dataset_bytes = std::uint64_t{8} << 30;  ///< Unpacked.
-  std::size_t max_dataset_files = 20'000;
-  std::uint64_t file_cache_bytes = std::uint64_t{8} << 30;  ///< Of versions written for download; those in use may
-                                                            ///< exceed it.
-  std::size_t max_scenes = 1000;
-  std::size_t max_previews = 16;
-  std::chrono::seconds preview_lifetime{600};  ///< Since it was last looked at.
-  engine::io::ReadOptions read = {};           ///< Its max_memory_bytes becomes `memory_bytes`.
-  std::string program_version = {};  ///< Part of all keys: another version may write or draw a scene differently.
-  std::function<Time()> clock = {};  ///< Empty: the machine's.
-};
-
-/// One link of a scene's chain. Version 0 is the file as it came.
-struct VersionInfo {
-  int version = 0;
-  std::optional<int> parent;  ///< None for version 0.
-  std::string edit;           ///< Id of the edit that made it; empty for version 0.
-  Time created{};
-  std::size_t gaussians = 0;
-  std::uint64_t disk_bytes = 0;  ///< Of what this version needs beside version 0.
-};
-
-struct DatasetInfo {
-  std::string kind;  ///< "colmap", "transforms", "inria"
-  std::size_t views = 0, photos = 0;
-  std::optional<double> psnr_mean_db;  ///< Renders of version 0 against photos; none without photos.
-  std::optional<double> psnr_worst_db;
-  std::string psnr_worst_view;
-  std::vector<std::string> warnings;
-  int number = 0;  ///< Which of the scene's datasets, one after the other, it is; not kept in a manifest.
-};
-
-struct SceneInfo {
-  std::string id;  ///< "s000001": counts up, never used twice.
-  std::string name;
-  Time created{};
-  std::string format;  ///< "ply", "splat", "spz", "compressed_ply"
-  int sh_degree = 0;
-  engine::DVec3 low{0.0}, high{0.0};  ///< Box of the means, world units.
-  engine::DVec3 centre{0.0};          ///< Median of the means.
-  double radius = 0;                  ///< Half of the means are nearer to the centre than this.
-  std::optional<engine::DVec3> up;    ///< As the user set it.
-  std::uint64_t disk_bytes = 0;
-  std::uint64_t memory_bytes = 0;  ///< Held in memory right now.
-  std::optional<DatasetInfo> dataset;
-  std::vector<VersionInfo> versions;  ///< By number.
-};
-
-/// A version in memory. Holding it keeps it there.
-struct LoadedVersion {
-  engine::scene::LayeredCloud cloud;
-  std::string key;  ///< Names these very Gaussians, as this version of the program reads and draws them, for ever,
-                    ///< across restarts: for ETags.
-};
-
-enum class FileFormat { ply, splat, spz };
 
 /// Safe to call from any thread. `where` of errors: "scene" for an unknown id, "version" for an unknown version, the
 /// file's own address where a file is to blame. Memory that others use is `busy`. Errors name no folder of this
@@ -106,17 +43,7 @@ class SceneStore {
   /// may want to save them.
   [[nodiscard]] const std::vector<engine::Error>& damaged() const;
 
-  /// A new, empty folder for an upload to go to, below the data folder; gone when the returned guard is.
-  class Scratch {
-   public:
-    explicit Scratch(std::filesystem::path folder) : folder_(std::move(folder)) {}
-    ~Scratch();
-    Scratch(Scratch&& other) noexcept : folder_(std::exchange(other.folder_, {})) {}
-    [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
-
-   private:
-    std::filesystem::path folder_;
-  };
+  /// A new, empty folder for an upload to go to, below the data folder; gone when what is returned is.
   [[nodiscard]] Result<Scratch> scratch();
 
   /// A new scene from an uploaded file, which is moved into the store. The file is read whole, once.
@@ -162,20 +89,11 @@ class SceneStore {
   ///   overlay  over the parent
   [[nodiscard]] Result<int> add_version(const std::string& id, int parent, const std::string& edit,
                                         const engine::scene::Overlay& overlay);
-  /// A version that lives in memory only, for a while.
-  ///   returns  "p000001"
-  struct Preview {
-    std::string version;
-    Time expires;
-  };
+  /// A version that lives in memory only, for a while. It is dropped early where others need its place.
   [[nodiscard]] Result<Preview> add_preview(const std::string& id, int parent, const engine::scene::Overlay& overlay);
 
-  /// A version as a file for download; made on demand, kept as a cache. `hold` keeps it from being removed.
-  struct VersionFile {
-    std::filesystem::path path;
-    std::string etag, download_name;
-    std::shared_ptr<const void> hold;
-  };
+  /// A version as a file for download; made on demand, kept as a cache.
+  ///   errors  those of load(); those of io::write_scene()
   [[nodiscard]] Result<VersionFile> file(const std::string& id, const std::string& version, FileFormat format);
 
   struct Usage {

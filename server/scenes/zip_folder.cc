@@ -14,7 +14,7 @@
 #include <string_view>
 #include <vector>
 
-#include "engine/io/file_descriptor.h"
+#include "engine/core/file_descriptor.h"
 #include "server/scenes/disk.h"
 #include "server/scenes/zip_directory.h"
 
@@ -22,7 +22,6 @@ namespace server::scenes {
 namespace {
 
 namespace fs = std::filesystem;
-namespace io = engine::io;
 using engine::ErrorCode;
 using engine::fail;
 using engine::propagate;
@@ -169,11 +168,11 @@ class Unzip {
   Result<void> unpack(zip_uint64_t index, const fs::path& to, const std::string& where) {
     const Entry entry(zip_fopen_index(archive_.get(), index, 0));
     if (!entry) return failed(zip_get_error(archive_.get()), where);
-    const io::FileDescriptor file(::open(to.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644));
+    const engine::FileDescriptor file(::open(to.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644));
     if (file.get() < 0) {
       const int error = errno;  // a folder of that name, or a name that this file system takes for another one's
-      return fail(error == EEXIST || error == EISDIR ? ErrorCode::corrupt_data : io::file_error(error, "", to).code,
-                  "the entry cannot be unpacked: " + io::file_error(error, "write", to.filename()).message, where);
+      return fail(error == EEXIST || error == EISDIR ? ErrorCode::corrupt_data : engine::file_error(error, "", to).code,
+                  "the entry cannot be unpacked: " + engine::file_error(error, "write", to.filename()).message, where);
     }
     for (;;) {
       const zip_int64_t got = zip_fread(entry.get(), chunk_.data(), chunk_.size());
@@ -193,7 +192,7 @@ class Unzip {
     while (size > 0) {
       const auto written = ::write(fd, bytes, size);
       if (written < 0 && errno == EINTR) continue;
-      if (written < 0) return tl::make_unexpected(io::file_error(errno, "write", to.filename()));
+      if (written < 0) return tl::make_unexpected(engine::file_error(errno, "write", to.filename()));
       bytes += written, size -= std::size_t(written);
     }
     return {};

@@ -1,0 +1,25 @@
+// What files and scenes are called: as strangers ask for it, and as it is fit for folders and messages.
+#pragma once
+
+#include <string>
+
+#include "engine/core/result.h"
+
+namespace server::scenes {
+
+using engine::Result;
+
+/// The base name of a file as a stranger calls it, fit for a folder and for messages; "upload" where nothing is left.
+[[nodiscard]] std::string safe_file_name(const std::string& filename);
+
+/// A scene's name.
+///   errors  invalid_argument: empty, longer than 200 bytes, or with control characters (`where` is "name")
+[[nodiscard]] Result<std::string> checked_name(const std::string& name);
+
+/// The name asked for, else that of the file without its extension. Errors as checked_name().
+[[nodiscard]] Result<std::string> name_for(const std::string& asked, const std::string& file_name);
+
+/// 16 random hexadecimal digits: tells things of one name apart that belong to different folders or runs.
+[[nodiscard]] std::string random_nonce();
+
+}  // namespace server::scenes
