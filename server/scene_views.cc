@@ -5,21 +5,20 @@
 #include <sstream>
 
 #include "engine/views/views.h"
+#include "server/edits/points.h"
 
 namespace server {
 namespace {
 
+using edits::to_vec;
 using engine::DVec3;
 using engine::ErrorCode;
 using engine::fail;
 using engine::propagate;
 using engine::scene::Camera;
-using proto::Point;
 
 constexpr std::uint64_t virtual_memory_bytes = std::uint64_t{16} << 20;
 const DVec3 default_up{0.0, -1.0, 0.0};  // COLMAP's habit: y down
-
-DVec3 to_vec(const Point& point) { return {point[0], point[1], point[2]}; }
 
 Camera to_camera(const proto::PinholeCamera& given) {
   Camera camera;

@@ -85,8 +85,7 @@ proto::ServiceInfo service_info(const ServeOptions& options, const Machine& mach
   info.correctors = {{"none", true, ""},
                      {"scene", false, "this version does not correct pictures yet"},
                      {"sd", false, "this version does not correct pictures yet"}};
-  info.perceptual = {{"msssim", false, "this version does not optimise yet"},
-                     {"lpips", false, "this version does not optimise yet"}};
+  info.perceptual = {{"msssim", true, ""}, {"lpips", false, "this version has no network to compare pictures with"}};
   info.read_formats = {"ply", "compressed_ply", "splat", "spz"};
   info.write_formats = {"ply", "splat", "spz"};
   info.picture_formats = {"png", "jpeg", "exr"};

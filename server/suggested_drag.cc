@@ -1,11 +1,10 @@
 #include "server/suggested_drag.h"
 
+#include "server/edits/points.h"
+
 namespace server {
-namespace {
 
-proto::Point to_point(engine::DVec3 v) { return {v.x, v.y, v.z}; }
-
-}  // namespace
+using edits::to_point;
 
 proto::EditRequest to_request(const engine::procedural::SuggestedDrag& drag) {
   proto::EditRequest request;

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "server/edits/points.h"
+
 namespace server::edits {
 namespace {
 
@@ -11,8 +13,6 @@ static_assert(proto::max_handles == edit::max_handles && proto::max_coordinate =
 
 // The numbers of `paper`; the other presets leave the deformation to the engine's defaults.
 constexpr int paper_intervals = 5, paper_views = 50;
-
-engine::DVec3 to_vec(const proto::Point& p) { return {p[0], p[1], p[2]}; }
 
 edit::Mode to_engine(proto::Mode mode) { return mode == proto::Mode::extend ? edit::Mode::extend : edit::Mode::move; }
 

@@ -1,19 +1,14 @@
 #include "server/routes/edit_routes.h"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
-#include <cstdio>
 #include <optional>
-#include <span>
 #include <string>
-#include <string_view>
-#include <system_error>
 #include <utility>
 
-#include "engine/core/checksum.h"
+#include "engine/core/numbers.h"
 #include "proto/edit_request.h"
 #include "proto/edit_status.h"
+#include "server/http/negotiation.h"
 
 namespace server::routes {
 namespace {
@@ -31,13 +26,6 @@ constexpr int most_listed = 1000;
 constexpr std::size_t longest_key = 200;
 constexpr std::chrono::milliseconds look_around_every{500};  // a stream notices so fast that it is to end
 
-std::optional<int> number_in(std::string_view text) {
-  int number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return number;
-}
-
 Result<bool> flag(const Call& call, const std::string& name) {
   const auto text = call.query(name);
   if (!text || *text == "false") return false;
@@ -47,7 +35,7 @@ Result<bool> flag(const Call& call, const std::string& name) {
 
 /// A part of the path that is a number; what is none names nothing that exists.
 Result<int> number_in_path(const Call& call, const std::string& name) {
-  if (const auto number = number_in(call.path(name))) return *number;
+  if (const auto number = engine::number_in<int>(call.path(name))) return *number;
   return fail(ErrorCode::not_found, "the path has a whole number here", name);
 }
 
@@ -131,7 +119,7 @@ Result<Reply> list_edits(const Call& call, EditService& service) {
   if (!active) return propagate(active);
   filter.active_only = *active;
   if (const auto text = call.query("limit")) {
-    const auto limit = number_in(*text);
+    const auto limit = engine::number_in<int>(*text);
     if (!limit || *limit < 1 || *limit > most_listed)
       return fail(ErrorCode::invalid_argument, "limit is a whole number from 1 to 1000", "limit");
     filter.limit = std::size_t(*limit);
@@ -173,13 +161,6 @@ Result<Reply> get_events(const Call& call, EditService& service, const EditRoute
   return reply;
 }
 
-std::string checksum(const std::string& bytes) {
-  std::array<char, 17> text{};
-  std::snprintf(text.data(), text.size(), "%016llx",
-                static_cast<unsigned long long>(engine::fnv1a(std::as_bytes(std::span(bytes)))));
-  return text.data();
-}
-
 Result<Reply> get_interval_render(const Call& call, EditService& service) {
   const auto interval = number_in_path(call, "u");
   if (!interval) return propagate(interval);
@@ -192,7 +173,7 @@ Result<Reply> get_interval_render(const Call& call, EditService& service) {
   if (!picture) return propagate(picture);
   Reply reply;
   reply.media_type = "image/jpeg";
-  reply.etag = checksum(*picture);
+  reply.etag = http::etag_of(*picture);
   if (call.has(reply.etag)) return Reply::not_modified(std::move(reply.etag));
   reply.body = std::move(*picture);
   return reply;

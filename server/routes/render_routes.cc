@@ -11,6 +11,7 @@
 #include "engine/scene/overlay.h"
 #include "proto/pick.h"
 #include "proto/render_request.h"
+#include "server/edits/points.h"
 
 namespace server::routes {
 namespace {
@@ -136,12 +137,11 @@ Result<std::size_t> count(const Parts& parts, const LoadedVersion& version, engi
 
 Result<proto::PickResult> pick_point(const Parts& parts, const LoadedVersion& version,
                                      const proto::PickRequest& request) {
-  const proto::Point& at = *request.point;
-  const auto within = count(parts, version, {at[0], at[1], at[2]}, *request.radius);
+  const auto within = count(parts, version, edits::to_vec(*request.point), *request.radius);
   if (!within) return propagate(within);
   proto::PickResult result;
   result.hit = true;
-  result.point = at;
+  result.point = request.point;
   result.gaussians_in_radius = *within;
   return result;
 }
@@ -175,9 +175,9 @@ Result<proto::PickResult> pick_pixel(const std::string& id, const Parts& parts, 
   if (!*hit || !is_nameable((*hit)->point)) return result;
   const engine::render::PixelHit& found = **hit;
   result.hit = true;
-  result.point = proto::Point{found.point.x, found.point.y, found.point.z};
+  result.point = edits::to_point(found.point);
   result.depth = found.depth;
-  result.normal = proto::Point{found.normal.x, found.normal.y, found.normal.z};
+  result.normal = edits::to_point(found.normal);
   result.gaussian = found.row;
   if (request.radius) {
     const auto within = count(parts, version, found.point, *request.radius);

@@ -6,11 +6,14 @@
 
 #include "proto/scene.h"
 #include "proto/time_text.h"
+#include "server/edits/points.h"
 #include "server/photo_comparison.h"
 
 namespace server::routes {
 namespace {
 
+using edits::to_point;
+using edits::to_vec;
 using engine::ErrorCode;
 using engine::fail;
 using engine::propagate;
@@ -22,9 +25,6 @@ using scenes::SceneInfo;
 using scenes::SceneStore;
 
 constexpr const char* upload_name = "upload";  // of a file that its client does not name
-
-proto::Point to_point(engine::DVec3 v) { return {v.x, v.y, v.z}; }
-engine::DVec3 to_vec(const proto::Point& point) { return {point[0], point[1], point[2]}; }
 
 proto::SceneVersion to_proto(const scenes::VersionInfo& version) {
   return {version.version,   version.parent,    version.edit, proto::rfc3339(version.created),
