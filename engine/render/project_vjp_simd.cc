@@ -217,7 +217,7 @@ HWY_INLINE void ColorVjpRow(const float* sh, std::size_t stored, int degree, std
       v_basis[k] += v_color * sh[k];
     }
   }
-  const auto v_to = sh_basis_vjp(degree, x, y, z, v_basis);
+  const auto v_to = scene::sh_basis_vjp(degree, x, y, z, v_basis);
   const float along = v_to[0] * x + v_to[1] * y + v_to[2] * z;
   const float to[3] = {x, y, z};
   for (std::size_t axis = 0; axis < 3; ++axis)

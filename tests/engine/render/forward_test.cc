@@ -7,34 +7,11 @@
 
 #include "engine/core/finite.h"
 #include "engine/core/parallel.h"
-#include "engine/core/rng.h"
 #include "engine/render/project.h"
+#include "tests/engine/render/test_scenes.h"
 
 namespace engine::render {
 namespace {
-
-scene::Camera test_camera(int width = 70, int height = 50) {
-  scene::Camera camera = scene::look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 1.0, width, height);
-  camera.cx += 3.3;  // off centre: nothing may assume the middle
-  return camera;
-}
-
-/// Gaussians in front of the camera, of all sizes; seeded.
-scene::GaussianCloud random_cloud(std::size_t n, std::uint64_t seed, int degree = 3) {
-  scene::GaussianCloud cloud;
-  cloud.sh_degree = degree;
-  cloud.resize(n);
-  Rng rng(seed);
-  for (std::size_t i = 0; i < n; ++i) {
-    const float z = rng.uniform(0.5f, 6.0f);
-    cloud.mean.set(i, {z * rng.uniform(-0.9f, 0.9f), z * rng.uniform(-0.7f, 0.7f), z});
-    cloud.log_scale.set(i, {rng.uniform(-5.0f, -1.0f), rng.uniform(-5.0f, -1.0f), rng.uniform(-5.0f, -1.0f)});
-    cloud.rotation.set(i, {rng.normal(), rng.normal(), rng.normal(), rng.normal()});
-    cloud.opacity_logit[i] = rng.uniform(-4.0f, 4.0f);
-  }
-  for (float& value : cloud.sh) value = 0.4f * rng.normal();
-  return cloud;
-}
 
 /// One Gaussian, grey with a given brightness (SH degree 0).
 scene::GaussianCloud one_gaussian(Vec3 mean, float log_scale, float opacity_logit, float brightness) {
@@ -73,14 +50,14 @@ INSTANTIATE_TEST_SUITE_P(Backends, BackendTest, testing::Values(Backend::referen
                          [](const auto& backend) { return backend.param == Backend::simd ? "simd" : "reference"; });
 
 TEST_P(BackendTest, AnEmptySceneShowsTheBackground) {
-  const Rendering seen = forward(scene::GaussianCloud{}, test_camera(), everything(GetParam()));
+  const Rendering seen = forward(scene::GaussianCloud{}, off_centre_camera(), everything(GetParam()));
   for (int c = 0; c < 3; ++c)
     for (const float value : seen.color.plane(c)) EXPECT_EQ(value, everything().background[c]);
   for (const float alpha : seen.alpha.data) EXPECT_EQ(alpha, 0.0f);
 }
 
 TEST_P(BackendTest, OneWideOpaqueGaussianHidesAllButOnePercent) {
-  const auto seen = forward(one_gaussian({0, 0, 2}, 5, 30, 1.0f), test_camera(), everything(GetParam()));
+  const auto seen = forward(one_gaussian({0, 0, 2}, 5, 30, 1.0f), off_centre_camera(), everything(GetParam()));
   EXPECT_NEAR(seen.alpha.at(35, 25), 0.99f, 1e-6f);
   EXPECT_NEAR(seen.color.at(35, 25, 0), 0.99f * 1.0f + 0.01f * 0.1f, 1e-6f);
   EXPECT_NEAR(seen.depth.at(35, 25), 0.99f * 2.0f, 1e-5f);
@@ -94,28 +71,28 @@ TEST_P(BackendTest, MedianDepthIsWhereTransmittanceFallsBelowOneHalf) {
     const auto next = one_gaussian({0, 0, z}, 5, -0.6f, 0.5f);
     scene::append_rows(cloud, next, std::vector<std::uint32_t>{0});
   }
-  const auto seen = forward(cloud, test_camera(), everything(GetParam()));
+  const auto seen = forward(cloud, off_centre_camera(), everything(GetParam()));
   EXPECT_EQ(seen.median_depth.at(35, 25), 3.0f);
   cloud = one_gaussian({0, 0, 2}, 5, -0.6f, 0.5f);
-  EXPECT_EQ(forward(cloud, test_camera(), everything(GetParam())).median_depth.at(35, 25), 0.0f)
+  EXPECT_EQ(forward(cloud, off_centre_camera(), everything(GetParam())).median_depth.at(35, 25), 0.0f)
       << "never below one half";
 }
 
 TEST_P(BackendTest, WhiteOnWhiteStaysWhite) {
-  auto cloud = random_cloud(300, 3, 0);
+  auto cloud = cloud_in_view(300, 3, 0);
   for (float& value : cloud.sh) value = 0.5f / 0.28209479177387814f;
   ForwardOptions options = everything(GetParam());
   options.background = Vec3(1.0f);
-  for (const float value : forward(cloud, test_camera(), options).color.data) EXPECT_NEAR(value, 1.0f, 2e-6f);
+  for (const float value : forward(cloud, off_centre_camera(), options).color.data) EXPECT_NEAR(value, 1.0f, 2e-6f);
 }
 
 TEST_P(BackendTest, AWeightOfOneBlendsToAlphaAndTheSumOfMasksIsTheirUnion) {
-  const auto cloud = random_cloud(200, 4);
+  const auto cloud = cloud_in_view(200, 4);
   std::vector<float> one(cloud.size(), 1.0f), odd(cloud.size()), even(cloud.size());
   for (std::size_t i = 0; i < cloud.size(); ++i) odd[i] = float(i % 2), even[i] = 1 - odd[i];
-  const auto all = forward(cloud, test_camera(), everything(GetParam()), one);
-  const auto a = forward(cloud, test_camera(), everything(GetParam()), odd);
-  const auto b = forward(cloud, test_camera(), everything(GetParam()), even);
+  const auto all = forward(cloud, off_centre_camera(), everything(GetParam()), one);
+  const auto a = forward(cloud, off_centre_camera(), everything(GetParam()), odd);
+  const auto b = forward(cloud, off_centre_camera(), everything(GetParam()), even);
   for (std::size_t i = 0; i < all.alpha.data.size(); ++i) {
     EXPECT_NEAR(all.weight.data[i], all.alpha.data[i], 2e-6f);
     EXPECT_NEAR(a.weight.data[i] + b.weight.data[i], all.alpha.data[i], 2e-6f);
@@ -123,12 +100,12 @@ TEST_P(BackendTest, AWeightOfOneBlendsToAlphaAndTheSumOfMasksIsTheirUnion) {
 }
 
 TEST_P(BackendTest, ARectangleIsACutOutOfTheWholePicture) {
-  const auto cloud = random_cloud(400, 5);
+  const auto cloud = cloud_in_view(400, 5);
   const std::vector<float> weight(cloud.size(), 0.7f);
-  const auto whole = forward(cloud, test_camera(), everything(GetParam()), weight);
+  const auto whole = forward(cloud, off_centre_camera(), everything(GetParam()), weight);
   ForwardOptions options = everything(GetParam());
   options.rect = scene::Rect{13, 7, 50, 49};
-  const auto part = forward(cloud, test_camera(), options, weight);
+  const auto part = forward(cloud, off_centre_camera(), options, weight);
   ASSERT_EQ(part.color.width, 37);
   ASSERT_EQ(part.color.height, 42);
   for (int y = 0; y < part.color.height; ++y)
@@ -140,11 +117,11 @@ TEST_P(BackendTest, ARectangleIsACutOutOfTheWholePicture) {
 }
 
 TEST_P(BackendTest, WantedTilesAreThoseOfTheWholePictureAndTheRestIsZero) {
-  const auto cloud = random_cloud(400, 6);
-  const auto whole = forward(cloud, test_camera(), everything(GetParam()));
+  const auto cloud = cloud_in_view(400, 6);
+  const auto whole = forward(cloud, off_centre_camera(), everything(GetParam()));
   ForwardOptions options = everything(GetParam());
   options.tiles = {1, 7, 19};  // of 5 columns and 4 rows; 19 is cut by the picture's corner
-  const auto part = forward(cloud, test_camera(), options);
+  const auto part = forward(cloud, off_centre_camera(), options);
   for (int y = 0; y < 50; ++y)
     for (int x = 0; x < 70; ++x) {
       const int tile = y / tile_size * tile_columns(70) + x / tile_size;
@@ -157,29 +134,29 @@ TEST_P(BackendTest, WantedTilesAreThoseOfTheWholePictureAndTheRestIsZero) {
 TEST_P(BackendTest, AFrameIntoUsedMemoryIsTheSameFrame) {
   Workspace workspace;
   Rendering out;
-  forward(random_cloud(900, 7), test_camera(64, 80), everything(GetParam()), {}, workspace, out);
-  const auto cloud = random_cloud(300, 8);
-  forward(cloud, test_camera(), everything(GetParam()), {}, workspace, out);
-  EXPECT_TRUE(same_pictures(out, forward(cloud, test_camera(), everything(GetParam()))));
+  forward(cloud_in_view(900, 7), off_centre_camera(64, 80), everything(GetParam()), {}, workspace, out);
+  const auto cloud = cloud_in_view(300, 8);
+  forward(cloud, off_centre_camera(), everything(GetParam()), {}, workspace, out);
+  EXPECT_TRUE(same_pictures(out, forward(cloud, off_centre_camera(), everything(GetParam()))));
   ForwardOptions options = everything(GetParam());
   options.tiles = {3};
-  forward(cloud, test_camera(), options, {}, workspace, out);
-  EXPECT_TRUE(same_pictures(out, forward(cloud, test_camera(), options)));
+  forward(cloud, off_centre_camera(), options, {}, workspace, out);
+  EXPECT_TRUE(same_pictures(out, forward(cloud, off_centre_camera(), options)));
 }
 
 TEST_P(BackendTest, EqualDepthsBlendInRowOrder) {
   auto cloud = one_gaussian({0, 0, 2}, 3, 0, 1.0f);
   scene::append_rows(cloud, one_gaussian({0, 0, 2}, 3, 0, 0.0f), std::vector<std::uint32_t>{0});
   ForwardOptions options{.backend = GetParam()};
-  EXPECT_NEAR(forward(cloud, test_camera(), options).color.at(35, 25), 0.5f, 1e-3f);
+  EXPECT_NEAR(forward(cloud, off_centre_camera(), options).color.at(35, 25), 0.5f, 1e-3f);
   cloud.sh_row(0)[0] = cloud.sh_row(0)[1] = cloud.sh_row(0)[2] = -0.5f / 0.28209479177387814f;  // now black is first
   cloud.sh_row(1)[0] = cloud.sh_row(1)[1] = cloud.sh_row(1)[2] = 0.5f / 0.28209479177387814f;
-  EXPECT_NEAR(forward(cloud, test_camera(), options).color.at(35, 25), 0.25f, 1e-3f);
+  EXPECT_NEAR(forward(cloud, off_centre_camera(), options).color.at(35, 25), 0.25f, 1e-3f);
 }
 
 TEST_P(BackendTest, FarFromTheOriginThePictureIsThatAtTheOrigin) {
   // At 2^20 world units a float steps by 1/8: means are put on that grid, so that both scenes hold the same numbers.
-  auto cloud = random_cloud(300, 9);
+  auto cloud = cloud_in_view(300, 9);
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const Vec3 mean = cloud.mean.get(i) * 20.0f;
     cloud.mean.set(i, {std::round(mean.x * 8) / 8, std::round(mean.y * 8) / 8, std::round(mean.z * 8) / 8});
@@ -198,88 +175,24 @@ TEST_P(BackendTest, FarFromTheOriginThePictureIsThatAtTheOrigin) {
 }
 
 // What design section 5 lists, and more: each must give finite pictures on both backends. See docs/numerics.md.
-struct Extreme {
-  const char* name;
-  void (*spoil)(scene::GaussianCloud&);
+class ExtremeTest : public testing::TestWithParam<Extreme> {
+ protected:
+  /// A cloud of which every row is spoilt.
+  static scene::GaussianCloud spoilt_cloud(std::size_t n, std::uint64_t seed) {
+    auto cloud = cloud_in_view(n, seed);
+    for (std::size_t i = 0; i < n; ++i) GetParam().spoil(cloud, i);
+    return cloud;
+  }
 };
 
-class ExtremeTest : public testing::TestWithParam<Extreme> {};
-
-INSTANTIATE_TEST_SUITE_P(Extremes, ExtremeTest,
-                         testing::Values(Extreme{"NeedlesOfAxisRatioMillion",
-                                                 [](scene::GaussianCloud& c) {
-                                                   for (std::size_t i = 0; i < c.size(); ++i)
-                                                     c.log_scale.set(i, {2.0f, -11.8f, -11.8f});
-                                                 }},
-                                         Extreme{"SubPixelSplats",
-                                                 [](scene::GaussianCloud& c) {
-                                                   for (std::size_t i = 0; i < c.size(); ++i)
-                                                     c.log_scale.set(i, Vec3(-19.0f));
-                                                 }},
-                                         Extreme{"SplatsThatCoverTheScreen",
-                                                 [](scene::GaussianCloud& c) {
-                                                   for (std::size_t i = 0; i < c.size(); ++i)
-                                                     c.log_scale.set(i, Vec3(12.0f));
-                                                 }},
-                                         Extreme{"LogScalesBeyondSaturation",
-                                                 [](scene::GaussianCloud& c) {
-                                                   for (std::size_t i = 0; i < c.size(); ++i)
-                                                     c.log_scale.set(i, {3e38f, -3e38f, 50.0f});
-                                                 }},
-                                         Extreme{"OpacityLogitsBeyondSaturation",
-                                                 [](scene::GaussianCloud& c) {
-                                                   for (std::size_t i = 0; i < c.size(); ++i)
-                                                     c.opacity_logit[i] = i % 2 ? 3e38f : -3e38f;
-                                                 }},
-                                         Extreme{"JustBeyondTheNearPlane",
-                                                 [](scene::GaussianCloud& c) {
-                                                   for (std::size_t i = 0; i < c.size(); ++i) {
-                                                     c.mean.z[i] = std::nextafter(0.2f, 1.0f);
-                                                     c.log_scale.set(i, {10.0f, -10.0f, 15.0f});
-                                                   }
-                                                 }},
-                                         Extreme{"AroundAndBehindTheCamera",
-                                                 [](scene::GaussianCloud& c) {
-                                                   for (std::size_t i = 0; i < c.size(); ++i)
-                                                     c.mean.z[i] = 0.1f - 0.01f * float(i);
-                                                 }},
-                                         Extreme{"MeansAtTheEndOfFloat",
-                                                 [](scene::GaussianCloud& c) {
-                                                   for (std::size_t i = 0; i < c.size(); ++i)
-                                                     c.mean.set(i, {3e38f, i % 2 ? -3e38f : 1.0f, 3e38f});
-                                                 }},
-                                         Extreme{"ZeroQuaternions",
-                                                 [](scene::GaussianCloud& c) {
-                                                   for (std::size_t i = 0; i < c.size(); ++i)
-                                                     c.rotation.set(i, {0, 0, 0, 0});
-                                                 }},
-                                         Extreme{"QuaternionsOfLength1e-20",
-                                                 [](scene::GaussianCloud& c) {
-                                                   for (std::size_t i = 0; i < c.size(); ++i)
-                                                     c.rotation.set(i, c.rotation.get(i) * 1e-20f);
-                                                 }},
-                                         Extreme{"QuaternionsOfLength1e38",
-                                                 [](scene::GaussianCloud& c) {
-                                                   for (std::size_t i = 0; i < c.size(); ++i)
-                                                     c.rotation.set(i, {3e38f, -3e38f, 3e38f, 1e38f});
-                                                 }},
-                                         Extreme{"ColoursAtTheEndOfFloat",
-                                                 [](scene::GaussianCloud& c) {
-                                                   for (std::size_t k = 0; k < c.sh.size(); ++k)
-                                                     c.sh[k] = k % 3 ? 3e38f : -3e38f;
-                                                 }}),
-                         [](const auto& extreme) {
-                           std::string name = extreme.param.name;
-                           std::erase(name, '-');
-                           return name;
-                         });
+INSTANTIATE_TEST_SUITE_P(Extremes, ExtremeTest, testing::ValuesIn(extremes()),
+                         [](const auto& extreme) { return extreme.param.name; });
 
 TEST_P(ExtremeTest, GivesFinitePicturesThatBothBackendsAgreeOn) {
-  auto cloud = random_cloud(97, 11);
-  GetParam().spoil(cloud);
+  const auto cloud = spoilt_cloud(97, 11);
   const std::vector<float> weight(cloud.size(), 1.0f);
-  const auto expected = forward(cloud, test_camera(), everything(Backend::reference), weight);
-  const auto seen = forward(cloud, test_camera(), everything(), weight);
+  const auto expected = forward(cloud, off_centre_camera(), everything(Backend::reference), weight);
+  const auto seen = forward(cloud, off_centre_camera(), everything(), weight);
   expect_finite(expected);
   expect_finite(seen);
   // Splats so close to a cut that rounding decides flip whole contributions; they must stay rare.
@@ -291,15 +204,14 @@ TEST_P(ExtremeTest, GivesFinitePicturesThatBothBackendsAgreeOn) {
 
 TEST_P(ExtremeTest, ASmallRectangleIsACutOutOfTheWholePicture) {
   // What a small rectangle does not need is left out by a bound on its extent, which must never leave out too much.
-  auto cloud = random_cloud(197, 17);
-  GetParam().spoil(cloud);
+  const auto cloud = spoilt_cloud(197, 17);
   const std::vector<float> weight(cloud.size(), 0.7f);
-  const auto whole = forward(cloud, test_camera(), everything(), weight);
+  const auto whole = forward(cloud, off_centre_camera(), everything(), weight);
   for (int y0 = 0; y0 + 9 <= 50; y0 += 8)
     for (int x0 = 0; x0 + 11 <= 70; x0 += 10) {
       ForwardOptions options = everything();
       options.rect = scene::Rect{x0, y0, x0 + 11, y0 + 9};
-      const auto part = forward(cloud, test_camera(), options, weight);
+      const auto part = forward(cloud, off_centre_camera(), options, weight);
       for (int y = 0; y < 9; ++y)
         for (int x = 0; x < 11; ++x) {
           ASSERT_EQ(part.color.at(x, y, 1), whole.color.at(x0 + x, y0 + y, 1)) << x0 + x << ", " << y0 + y;
@@ -310,22 +222,22 @@ TEST_P(ExtremeTest, ASmallRectangleIsACutOutOfTheWholePicture) {
 }
 
 TEST(Forward, ASmallRectangleOfACrowdedSceneIsACutOutOfTheWholePicture) {
-  const auto cloud = random_cloud(4000, 18);
-  const auto whole = forward(cloud, test_camera(), everything());
+  const auto cloud = cloud_in_view(4000, 18);
+  const auto whole = forward(cloud, off_centre_camera(), everything());
   for (int y = 0; y < 50; y += 7)
     for (int x = 0; x < 70; x += 3) {
       ForwardOptions options = everything();
       options.rect = scene::Rect{x, y, x + 1, y + 1};
-      const auto part = forward(cloud, test_camera(), options);
+      const auto part = forward(cloud, off_centre_camera(), options);
       ASSERT_EQ(part.alpha.at(0, 0), whole.alpha.at(x, y)) << x << ", " << y;
       ASSERT_EQ(part.color.at(0, 0, 2), whole.color.at(x, y, 2)) << x << ", " << y;
     }
 }
 
 TEST(Forward, BackendsAgreeOnACrowdedScene) {
-  const auto cloud = random_cloud(3000, 12);
-  const auto expected = forward(cloud, test_camera(), everything(Backend::reference));
-  const auto seen = forward(cloud, test_camera(), everything());
+  const auto cloud = cloud_in_view(3000, 12);
+  const auto expected = forward(cloud, off_centre_camera(), everything(Backend::reference));
+  const auto seen = forward(cloud, off_centre_camera(), everything());
   double sum = 0;
   for (std::size_t i = 0; i < seen.color.data.size(); ++i) {
     const double difference = std::abs(double(seen.color.data[i]) - double(expected.color.data[i]));
@@ -336,12 +248,12 @@ TEST(Forward, BackendsAgreeOnACrowdedScene) {
 }
 
 TEST(Forward, IsTheSameToTheBitForAnyNumberOfThreads) {
-  const auto cloud = random_cloud(5000, 13);
+  const auto cloud = cloud_in_view(5000, 13);
   const std::vector<float> weight(cloud.size(), 0.3f);
   std::vector<Rendering> seen(3);
   for (const std::size_t k : {0u, 1u, 2u}) {
     WorkArena arena(1 << k);
-    arena.run([&] { seen[k] = forward(cloud, test_camera(300, 200), everything(), weight); });
+    arena.run([&] { seen[k] = forward(cloud, off_centre_camera(300, 200), everything(), weight); });
   }
   EXPECT_TRUE(same_pictures(seen[0], seen[1]));
   EXPECT_TRUE(same_pictures(seen[0], seen[2]));
@@ -350,16 +262,16 @@ TEST(Forward, IsTheSameToTheBitForAnyNumberOfThreads) {
 TEST(Forward, APinnedInstructionSetStaysPinnedWhenItsNameIsAsked) {
   const std::string best = simd_target();
   const std::string plainest = simd_targets().back();
-  const auto cloud = random_cloud(500, 14);
-  const auto with_best = forward(cloud, test_camera(), everything());
+  const auto cloud = cloud_in_view(500, 14);
+  const auto with_best = forward(cloud, off_centre_camera(), everything());
   ASSERT_TRUE(pin_simd_target(plainest));
-  const auto pinned = forward(cloud, test_camera(), everything());
+  const auto pinned = forward(cloud, off_centre_camera(), everything());
   EXPECT_EQ(simd_target(), plainest);
-  EXPECT_TRUE(same_pictures(forward(cloud, test_camera(), everything()), pinned));
+  EXPECT_TRUE(same_pictures(forward(cloud, off_centre_camera(), everything()), pinned));
   // Instruction sets round differently: had the pin not held, these would be equal to the bit.
   EXPECT_EQ(same_pictures(pinned, with_best), plainest == best);
   ASSERT_TRUE(pin_simd_target(best));
-  EXPECT_TRUE(same_pictures(forward(cloud, test_camera(), everything()), with_best));
+  EXPECT_TRUE(same_pictures(forward(cloud, off_centre_camera(), everything()), with_best));
 }
 
 TEST(Forward, PinningAnUnknownInstructionSetNamesTheKnownOnes) {
@@ -376,7 +288,7 @@ TEST(Project, AZeroQuaternionIsTheIdentity) {
 
 TEST(Project, ALongNeedleKeepsItsThicknessInFloat) {
   // 1000 pixels long at 45 degrees and as thin as the low pass leaves it: float must agree with double along it.
-  const auto camera = test_camera(1280, 1280);
+  const auto camera = off_centre_camera(1280, 1280);
   const std::array<float, 3> mean{0, 0, 2}, log_scale{2.0f, -12.0f, -12.0f};
   const std::array<float, 4> rotation{0.92387953f, 0, 0, 0.38268343f};
   const auto f = project<float>(view_params<float>(camera), mean, log_scale, rotation);

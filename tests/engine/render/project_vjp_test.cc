@@ -253,25 +253,6 @@ TEST(OpacityVjp, ASaturatedLogitHasTheDerivativeFromInsideAtTheBoundAndNoneBeyon
   EXPECT_EQ(opacity_vjp(std::numeric_limits<double>::quiet_NaN(), 1.0), 0.0);
 }
 
-TEST(ShBasisVjp, MatchesCentralDifferencesOfEveryFunctionOfEveryDegree) {
-  Rng rng(8);
-  for (int degree = 0; degree <= 3; ++degree)
-    for (std::size_t k = 0; k < scene::sh_coefficients(degree); ++k) {
-      SCOPED_TRACE(k);
-      std::array<double, 16> v_basis{};
-      v_basis[k] = 1;
-      const auto x = uniform(rng, 3, -1.0f, 1.0f);
-      const auto v = sh_basis_vjp(degree, x[0], x[1], x[2], v_basis.data());
-      EXPECT_TRUE(gradient_matches(
-          [&](const std::vector<double>& at) {
-            std::array<double, 16> basis;
-            scene::sh_basis(degree, at[0], at[1], at[2], basis.data());
-            return basis[k];
-          },
-          x, {v.begin(), v.end()}));
-    }
-}
-
 /// SH of one Gaussian, floats; `stored` bands.
 std::vector<float> random_sh(Rng& rng, int stored) {
   std::vector<float> sh(3 * scene::sh_coefficients(stored));

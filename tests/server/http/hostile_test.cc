@@ -16,6 +16,10 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
+/// An answer within this time has waited for no limit, and not for the client to take it either (a second).
+constexpr auto at_once = 900ms;
+
+/// What is wrong with a request shows without waiting: the server is as patient as in service.
 class Hostile : public testing::Test {
  protected:
   RawAnswer send(const std::string& bytes) {
@@ -25,6 +29,13 @@ class Hostile : public testing::Test {
   }
   std::string host() const { return "Host: 127.0.0.1:" + std::to_string(server.port()) + "\r\n"; }
 
+  support::TempDir folder;
+  TestServer server{sample_routes(folder.path())};
+};
+
+/// Clients that a limit on time must end.
+class Dawdler : public testing::Test {
+ protected:
   support::TempDir folder;
   TestServer server{sample_routes(folder.path()), impatient()};
 };
@@ -37,7 +48,7 @@ TEST_F(Hostile, GarbageIsRefusedAtOnce) {
         "GET /\x80 HTTP/1.1\r\n" + host() + "\r\n", "GET http://evil/ HTTP/1.1\r\n" + host() + "\r\n"}) {
     const auto began = Clock::now();
     EXPECT_EQ(send(bytes).status, 400) << bytes;
-    EXPECT_LT(Clock::now() - began, 350ms) << bytes;
+    EXPECT_LT(Clock::now() - began, at_once) << bytes;
   }
   EXPECT_EQ(send("GET / HTTP/2.0\r\n" + host() + "\r\n").status, 505);
   EXPECT_EQ(send("GET / HTTP/1.1\r\n\r\n").status, 400) << "no Host";
@@ -74,7 +85,7 @@ TEST_F(Hostile, AHeadMayNotBeEndless) {
             200);
 }
 
-TEST_F(Hostile, AHeadThatDripsIsCutOff) {
+TEST_F(Dawdler, AHeadThatDripsIsCutOff) {
   RawClient client(server.port());
   const auto began = Clock::now();
   client.send("GET /json HTTP/1.1\r\n");
@@ -103,7 +114,7 @@ TEST_F(Hostile, EmptyLinesBuyNoTime) {
   EXPECT_LT(Clock::now() - began, 3s) << "a refusal waits a second for the client to take it, no longer";
 }
 
-TEST_F(Hostile, AHeadThatAlwaysHasAByteMoreIsCutOffToo) {
+TEST_F(Dawdler, AHeadThatAlwaysHasAByteMoreIsCutOffToo) {
   ServerOptions options = impatient();
   options.connection.max_head_bytes = std::size_t{1} << 30;
   TestServer roomy(sample_routes(folder.path()), options);
@@ -121,7 +132,7 @@ TEST_F(Hostile, ARefusalDoesNotWaitForTheBody) {
     const auto began = Clock::now();
     client.send(request(port, "POST", target, more + "Content-Length: 10\r\n"));
     const auto answer = client.answer().value_or(RawAnswer{});
-    EXPECT_LT(Clock::now() - began, 300ms) << target << " " << more;
+    EXPECT_LT(Clock::now() - began, at_once) << target << " " << more;
     EXPECT_EQ(answer.header("connection"), "close");
     return answer.status;
   };
@@ -129,8 +140,7 @@ TEST_F(Hostile, ARefusalDoesNotWaitForTheBody) {
   EXPECT_EQ(refused(server.port(), "/json", ""), 415);
   EXPECT_EQ(refused(server.port(), "/json", "Host: evil.example\r\n"), 421);
   EXPECT_EQ(refused(server.port(), "/json", "Origin: https://evil.example\r\n"), 403);
-  TestServer closed(sample_routes(folder.path()), impatient(),
-                    {.token = "hush", .allowed_hosts = {}, .allowed_origins = {}});
+  TestServer closed(sample_routes(folder.path()), {}, {.token = "hush", .allowed_hosts = {}, .allowed_origins = {}});
   EXPECT_EQ(refused(closed.port(), "/json", ""), 401);
 }
 
@@ -150,7 +160,7 @@ TEST_F(Hostile, ChunksHoldNoControlCharacters) {
   EXPECT_EQ(status("2\r\n{}\r\n0\r\nName: a\x7f\r\n\r\n"), 400);
 }
 
-TEST_F(Hostile, ABodyThatDripsIsCutOff) {
+TEST_F(Dawdler, ABodyThatDripsIsCutOff) {
   RawClient client(server.port());
   const auto began = Clock::now();
   client.send(request(server.port(), "POST", "/upload", "Content-Length: 100000\r\n"));
@@ -169,13 +179,13 @@ TEST_F(Hostile, ABodyThatDripsIsCutOff) {
   EXPECT_FALSE(std::filesystem::exists(folder.path() / "upload.bin"));
 }
 
-TEST_F(Hostile, ABodyThatNeverComesIsNotWaitedFor) {
+TEST_F(Dawdler, ABodyThatNeverComesIsNotWaitedFor) {
   RawClient client(server.port());
   client.send(request(server.port(), "POST", "/json", "Content-Type: application/json\r\nContent-Length: 10\r\n"));
   EXPECT_EQ(client.answer().value_or(RawAnswer{}).status, 408);
 }
 
-TEST_F(Hostile, ASilentConnectionIsClosedWithoutAWord) {
+TEST_F(Dawdler, ASilentConnectionIsClosedWithoutAWord) {
   RawClient fresh(server.port()), used(server.port());
   used.send(request(server.port(), "GET", "/json"));
   EXPECT_EQ(used.answer().value_or(RawAnswer{}).status, 200);
@@ -183,7 +193,7 @@ TEST_F(Hostile, ASilentConnectionIsClosedWithoutAWord) {
   EXPECT_TRUE(used.is_closed_within(2s));
 }
 
-TEST_F(Hostile, AClientThatTakesNoAnswerIsCutOff) {
+TEST_F(Dawdler, AClientThatTakesNoAnswerIsCutOff) {
   std::ofstream(folder.path() / "file.bin") << std::string(50'000'000, 'x');
   RawClient client(server.port());
   client.send(request(server.port(), "GET", "/file"));
@@ -222,7 +232,8 @@ TEST(HostileCrowd, MoreConnectionsThanItTakesAreTurnedAway) {
   EXPECT_EQ(answer->header("retry-after"), "1");
   EXPECT_NE(server.metrics.text().find("splatdrag_http_connections_refused_total 1"), std::string::npos);
   holders.clear();
-  std::this_thread::sleep_for(200ms);
+  const auto left = Clock::now();  // once it has noticed
+  while (ask(server.port(), "GET", "/json").status != 200 && Clock::now() - left < 10s) std::this_thread::sleep_for(20ms);
   EXPECT_EQ(ask(server.port(), "GET", "/json").status, 200) << "and then it serves again";
 }
 

@@ -34,7 +34,7 @@ std::string chunked(const std::string& body, std::size_t piece) {
 class Upload : public testing::Test {
  protected:
   static ServerOptions options() {
-    ServerOptions options = impatient();
+    ServerOptions options;
     options.dispatcher.max_json_bytes = 1000;
     options.dispatcher.max_upload_bytes = 1'000'000;
     return options;
