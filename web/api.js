@@ -111,7 +111,7 @@ export const deleteSession = () => send("/v1/session", { method: "DELETE" });
 export const scenes = async () => (await json("/v1/scenes")).scenes;
 export const scene = (id) => json(`/v1/scenes/${part(id)}`);
 export const uploadScene = (file, name, options) => upload("POST", `/v1/scenes?name=${part(name)}`, file, options);
-export const addScenePath = (path, name) => json("/v1/scenes", jsonBody("POST", name ? { path, name } : { path }));
+export const addScenePath = (path) => json("/v1/scenes", jsonBody("POST", { path }));
 export const patchScene = (id, patch) => json(`/v1/scenes/${part(id)}`, jsonBody("PATCH", patch));
 export const deleteScene = (id) => send(`/v1/scenes/${part(id)}`, { method: "DELETE" });
 export const uploadDataset = (id, file, options) => upload("PUT", `/v1/scenes/${part(id)}/dataset`, file, options);
@@ -138,8 +138,7 @@ export const createPreview = (request, signal) => json("/v1/previews", jsonBody(
 
 export const createEdit = (request, key) =>
   json("/v1/edits", jsonBody("POST", request, { headers: { "Idempotency-Key": key } }));
-export const estimateEdit = (request, signal) =>
-  json("/v1/edits?validate_only=true", jsonBody("POST", request, { signal }));
+export const estimateEdit = (request) => json("/v1/edits?validate_only=true", jsonBody("POST", request));
 export const edits = async (scene, limit = 30) => (await json(`/v1/edits?scene=${part(scene)}&limit=${limit}`)).edits;
 
 /** An edit and its ETag; null if it still is what that ETag names. */

@@ -1,7 +1,7 @@
 // Questions, the token, and short messages.
 
 import * as api from "./api.js";
-import { byId, h, showProblem } from "./dom.js";
+import { byId, h, problemPlace, showProblem } from "./dom.js";
 
 /** A short message at the foot of the page; read out by screen readers.
  *    kind    "good", "bad", or nothing
@@ -200,7 +200,7 @@ function askForToken() {
       testid: "token",
       id: "token",
     });
-    const problem = h("p", { class: "problem", role: "alert", hidden: true, testid: "token-problem" });
+    const problem = problemPlace("token-problem");
     const button = h("button", { class: "primary", testid: "token-submit" }, "Sign in");
     const submit = async (event) => {
       event.preventDefault();

@@ -47,7 +47,10 @@ export function problemText(error) {
   return error?.where ? `${detail} (${error.where})` : detail;
 }
 
-/** Shows an error in a place made for it (class "problem"), or clears it. */
+/** A place for an error; empty and hidden until showProblem() fills it. */
+export const problemPlace = (testid) => h("p", { class: "problem", role: "alert", hidden: true, testid });
+
+/** Shows an error in a place made for it, or clears it. */
 export function showProblem(place, error) {
   place.hidden = !error;
   if (!error) return place.replaceChildren();
@@ -56,6 +59,16 @@ export function showProblem(place, error) {
     error.where ? h("code", { class: "where" }, error.where) : "",
   );
 }
+
+/** A handler that does `ask`; what that throws is shown in `place` until the next time. */
+export const asking = (place, ask) => async () => {
+  try {
+    showProblem(place, null);
+    await ask();
+  } catch (error) {
+    showProblem(place, error);
+  }
+};
 
 /** Children of `parent`, one per item, made once and kept: focus and selection survive an update.
  *    key(item)            what tells items apart

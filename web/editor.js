@@ -52,6 +52,14 @@ export const NOTHING_OPEN = {
   tab: "drag",
 };
 
+// What outlives a reload: as it is; and all, of which open() puts back what still fits the scene.
+const REMEMBERED = ["region", "mode", "preset", "prompt", "params", "autoPreview", "layer", "tab", "constraint"];
+const KEPT = ["pose", "version", "handles", "viewName", ...REMEMBERED];
+
+/** The members of an object that have these names, as far as it has them. */
+const only = (names, from) =>
+  Object.fromEntries(names.filter((name) => from[name] !== undefined).map((name) => [name, from[name]]));
+
 /** The number of the version before another one; null for the first. */
 export function parentOf(scene, version) {
   return scene?.versions.find((v) => v.version === version)?.parent ?? null;
@@ -87,24 +95,7 @@ export class Editor {
     store.watch(["handles", "version", "region", "mode", "preset", "params", "autoPreview", "dragging"], () =>
       this.#requestChanged(),
     );
-    store.watch(
-      [
-        "pose",
-        "version",
-        "handles",
-        "region",
-        "mode",
-        "preset",
-        "prompt",
-        "params",
-        "autoPreview",
-        "layer",
-        "viewName",
-        "tab",
-        "constraint",
-      ],
-      () => this.#saveSoon(),
-    );
+    store.watch(KEPT, () => this.#saveSoon());
   }
 
   get state() {
@@ -127,11 +118,8 @@ export class Editor {
     this.#nextId = Math.max(0, ...handles.map((h) => h.id)) + 1;
     const pose = isPose(kept.pose) ? kept.pose : null;
     this.#lastView = kept.viewName ?? null;
-    const remembered = {};
-    for (const key of ["region", "mode", "preset", "prompt", "params", "autoPreview", "layer", "tab", "constraint"])
-      if (kept[key] !== undefined) remembered[key] = kept[key];
     this.store.set({
-      ...remembered,
+      ...only(REMEMBERED, kept),
       scene,
       version,
       handles,
@@ -414,8 +402,9 @@ export class Editor {
   #requestChanged() {
     const { scene, handles, preview, problem, autoPreview, dragging } = this.state;
     if (!scene) return;
-    const key = previewKey(this.request());
-    if (problem && problem.key !== JSON.stringify(this.request())) this.store.set({ problem: null });
+    const request = this.request();
+    const key = previewKey(request);
+    if (problem && problem.key !== JSON.stringify(request)) this.store.set({ problem: null });
     if (!handles.some((h) => h.target)) {
       this.#later("preview", 0, () => {});
       this.#previewing?.abort();
@@ -614,39 +603,9 @@ export class Editor {
   }
 
   #save() {
-    const {
-      scene,
-      pose,
-      version,
-      handles,
-      region,
-      mode,
-      preset,
-      prompt,
-      params,
-      autoPreview,
-      layer,
-      viewName,
-      tab,
-      constraint,
-    } = this.state;
+    const { scene } = this.state;
     const { thumbnail } = this.memory.load(scene) ?? {};
-    this.memory.save(scene, {
-      pose,
-      version,
-      handles,
-      region,
-      mode,
-      preset,
-      prompt,
-      params,
-      autoPreview,
-      layer,
-      viewName,
-      tab,
-      constraint,
-      thumbnail,
-    });
+    this.memory.save(scene, { ...only(KEPT, this.state), thumbnail });
   }
 
   /** Keeps a small picture of the scene, for the list of scenes. */

@@ -1,8 +1,8 @@
 // The edits of a scene: the queue, the one that runs, those that ended.
 
 import { confirmed, say, showPictures } from "./dialogs.js";
-import { attrs, h, keyedList, showProblem, text } from "./dom.js";
-import { count, duration, when } from "./format.js";
+import { attrs, h, keyedList, problemPlace, showProblem, text } from "./dom.js";
+import { count, counted, duration, gaussians, when } from "./format.js";
 import { warnings } from "./run.js";
 import { hasEnded } from "./watch.js";
 
@@ -16,6 +16,7 @@ const STATES = {
   cancel_requested: "Cancelling",
 };
 const STAGES = {
+  load: "Reading the scene",
   assign: "Finding the Gaussians",
   views: "Choosing views",
   deform: "Deforming",
@@ -24,6 +25,7 @@ const STAGES = {
   correct: "Correcting",
   optimise: "Optimising",
   renders: "Rendering pictures",
+  pictures: "Rendering pictures",
   checkpoint: "Saving",
   finish: "Finishing",
   publish: "Publishing",
@@ -71,7 +73,7 @@ export function buildEdits(editor) {
 
 function card(editor, id) {
   const current = () => editor.state.edits.find((e) => e.id === id);
-  const problem = h("p", { class: "problem", role: "alert", hidden: true, testid: "edit-problem" });
+  const problem = problemPlace("edit-problem");
   let refused = null;
   const asking = (ask) => async () => {
     try {
@@ -150,8 +152,7 @@ function card(editor, id) {
     update: (edit) => {
       const ended = hasEnded(edit);
       attrs(element, { "data-state": edit.state, "data-testid": `edit-${edit.id}` });
-      const n = edit.request.handles.length;
-      text(name, `${edit.id} · ${n} handle${n === 1 ? "" : "s"} on version ${edit.version}`);
+      text(name, `${edit.id} · ${counted(edit.request.handles.length, "handle")} on version ${edit.version}`);
       text(state, STATES[edit.state] ?? edit.state);
       text(line, statusLine(edit));
       progress.hidden = ended || edit.state === "queued";
@@ -213,7 +214,7 @@ function factsOf(edit) {
   const facts = [["Submitted", when(edit.created)]];
   if (edit.started && edit.ended)
     facts.push(["Took", duration((new Date(edit.ended) - new Date(edit.started)) / 1000)]);
-  edit.handles.forEach(({ gaussians }, i) => facts.push([`Handle ${i + 1}`, `${count(gaussians)} Gaussians`]));
+  edit.handles.forEach((handle, i) => facts.push([`Handle ${i + 1}`, gaussians(handle.gaussians)]));
   if (edit.gaussians) {
     const { input, output, removed, copies } = edit.gaussians;
     facts.push(["Gaussians", `${count(input)} → ${count(output)} (${count(removed)} removed, ${count(copies)} new)`]);

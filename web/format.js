@@ -3,8 +3,10 @@
 /** 62000 -> "62,000". */
 export const count = (n) => Math.round(n).toLocaleString("en-US");
 
-/** "1 Gaussian", "2 Gaussians". */
-export const gaussians = (n) => `${count(n)} Gaussian${n === 1 ? "" : "s"}`;
+/** "1 handle", "2 handles". */
+export const counted = (n, noun) => `${count(n)} ${noun}${n === 1 ? "" : "s"}`;
+
+export const gaussians = (n) => counted(n, "Gaussian");
 
 /** Bytes in powers of 1000: "14.2 MB". */
 export function bytes(n) {

@@ -1,6 +1,6 @@
 // The list of handles: coordinates, radius, group, and how many Gaussians each holds.
 
-import { attrs, h, keyedList, showProblem, text } from "./dom.js";
+import { attrs, h, keyedList, problemPlace, showProblem, text } from "./dom.js";
 import { numberField, pointField } from "./fields.js";
 import { coordinate, count, gaussians } from "./format.js";
 import { groupClass } from "./overlay.js";
@@ -175,7 +175,7 @@ export class HandleList {
       changed: (g) => change({ group: g }),
     });
     const note = h("p", { class: "note", hidden: true });
-    const problem = h("p", { class: "problem", role: "alert", hidden: true });
+    const problem = problemPlace();
 
     const body = h(
       "div",

@@ -6,6 +6,7 @@ import { say, showHelp, signIn } from "./dialogs.js";
 import { attrs, byId, h, problemText, showProblem, text } from "./dom.js";
 import { buildEdits } from "./edits.js";
 import { Editor, NOTHING_OPEN } from "./editor.js";
+import { counted } from "./format.js";
 import { HandleList } from "./handles.js";
 import { buildRun, importFile } from "./run.js";
 import { buildScenes, SCENE_FILES } from "./scenes.js";
@@ -58,7 +59,7 @@ store.watch(["info"], ({ info }) => {
   if (!info) return;
   text(
     byId("service"),
-    `${info.version} · ${info.simd?.target ?? "scalar"} · ${info.threads} thread${info.threads === 1 ? "" : "s"}`,
+    `${info.version} · ${info.simd?.target ?? "scalar"} · ${counted(info.threads, "thread")}`,
   );
   byId("sign-out").hidden = !info.token_required;
 });

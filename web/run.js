@@ -1,9 +1,9 @@
 // What is asked for besides handles, and the buttons that ask: preview, estimate, run; import and export.
 
 import { chosen, say } from "./dialogs.js";
-import { attrs, h, problemText, showProblem, text } from "./dom.js";
+import { attrs, h, problemPlace, problemText, showProblem, text } from "./dom.js";
 import { choice, labelled, numberField, pointField, segments, toggle } from "./fields.js";
-import { bytes, count, duration, gaussians } from "./format.js";
+import { bytes, count, counted, duration, gaussians } from "./format.js";
 import { partOf, readRequests } from "./requests.js";
 
 const CONSTRAINTS = [
@@ -71,7 +71,7 @@ export function buildRun(editor) {
     min: 0,
     changed: (p) => p.every((e) => e > 0) && store.set({ region: { ...store.state.region, size: p } }),
   });
-  const regionProblem = h("p", { class: "problem", role: "alert", hidden: true, testid: "region-problem" });
+  const regionProblem = problemPlace("region-problem");
   const regionFields = h("div", {}, labelled("Centre", centre.element), labelled("Size (full edges)", size.element));
 
   // --- parameters
@@ -147,7 +147,7 @@ export function buildRun(editor) {
     changed: (on) => setParam("rotate_sh", on ? null : false),
   });
   const also = h("p", { class: "note", hidden: true, testid: "other-params" });
-  const paramProblem = h("p", { class: "problem", role: "alert", hidden: true, testid: "param-problem" });
+  const paramProblem = problemPlace("param-problem");
   const correctorNote = h("p", { class: "note", hidden: true });
   const settings = h(
     "details",
@@ -181,7 +181,7 @@ export function buildRun(editor) {
     testid: "import-file",
     "aria-label": "Request file",
   });
-  const importProblem = h("p", { class: "problem", role: "alert", hidden: true, testid: "import-problem" });
+  const importProblem = problemPlace("import-problem");
   file.addEventListener("change", async () => {
     const [chosenFile] = file.files;
     file.value = "";
@@ -223,7 +223,7 @@ export function buildRun(editor) {
     "Estimate",
   );
   const run = h("button", { type: "button", class: "primary", testid: "run", onclick: () => editor.run() }, "Run edit");
-  const problem = h("p", { class: "problem", role: "alert", hidden: true, testid: "run-problem" });
+  const problem = problemPlace("run-problem");
   const answer = h("div", { class: "answer", role: "status", testid: "run-answer" });
 
   const element = h(
@@ -330,7 +330,7 @@ function answers(editor, { preview, estimate, scene }) {
         "p",
         { testid: "estimate-answer" },
         `A run takes about ${duration(estimate.estimate.seconds)} and ${bytes(estimate.estimate.memory_bytes)}: ` +
-          `${estimate.intervals} interval${estimate.intervals === 1 ? "" : "s"}, ${count(estimate.views)} views.`,
+          `${counted(estimate.intervals, "interval")}, ${count(estimate.views)} views.`,
       ),
     );
     lines.push(...warnings(estimate.warnings));
@@ -380,7 +380,7 @@ export async function importFile(editor, file, place) {
     if (name === null) return;
     const { request } = requests.find((r) => r.name === name);
     editor.load(request);
-    say(`${request.handles.length} handle${request.handles.length === 1 ? "" : "s"} imported from ${file.name}.`);
+    say(`${counted(request.handles.length, "handle")} imported from ${file.name}.`);
   } catch (error) {
     showProblem(place, { detail: `${file.name}: ${error.detail ?? problemText(error)}`, where: error.where });
   }

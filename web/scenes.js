@@ -2,9 +2,9 @@
 
 import * as api from "./api.js";
 import { asked, confirmed } from "./dialogs.js";
-import { h, keyedList, showProblem, text } from "./dom.js";
-import { bytes, count, gaussians, nameOfFile, when } from "./format.js";
-import { showUpload } from "./uploads.js";
+import { asking, h, keyedList, problemPlace, showProblem, text } from "./dom.js";
+import { bytes, count, counted, gaussians, nameOfFile, when } from "./format.js";
+import { pathForm, showUpload } from "./uploads.js";
 
 export const SCENE_FILES = /\.(ply|splat|spz)$/i;
 
@@ -19,7 +19,7 @@ export function buildScenes(home, { store, memory, open }) {
     "aria-label": "Scene file",
   });
   const uploads = h("div", { class: "uploads", testid: "uploads" });
-  const problem = h("p", { class: "problem", role: "alert", hidden: true, testid: "scenes-problem" });
+  const problem = problemPlace("scenes-problem");
   const grid = h("ul", { class: "cards", testid: "scenes" });
   const limit = h("span", {});
 
@@ -42,38 +42,19 @@ export function buildScenes(home, { store, memory, open }) {
     upload(files);
   });
 
-  const path = h("input", {
-    type: "text",
-    placeholder: "chair/point_cloud.ply",
-    testid: "scene-path",
-    "aria-label": "Path below the service's scene folder",
-  });
-  const pathProblem = h("p", { class: "problem", role: "alert", hidden: true, testid: "path-problem" });
-  const pathForm = h(
-    "form",
-    {
-      class: "path-form",
-      hidden: true,
-      testid: "path-form",
-      onsubmit: async (event) => {
-        event.preventDefault();
-        if (!path.value.trim()) return;
-        pathForm.classList.add("waiting");
-        try {
-          showProblem(pathProblem, null);
-          const scene = await api.addScenePath(path.value.trim());
-          path.value = "";
-          open(scene.id);
-        } catch (error) {
-          showProblem(pathProblem, error);
-        }
-        pathForm.classList.remove("waiting");
-      },
+  const paths = pathForm({
+    label: h("label", { class: "muted" }, "or open a file of the service's scene folder"),
+    field: {
+      placeholder: "chair/point_cloud.ply",
+      testid: "scene-path",
+      "aria-label": "Path below the service's scene folder",
     },
-    h("label", { class: "muted" }, "or open a file of the service's scene folder"),
-    h("div", { class: "row" }, path, h("button", { testid: "scene-path-open" }, "Open")),
-    pathProblem,
-  );
+    button: ["Open", { testid: "scene-path-open" }],
+    problem: "path-problem",
+    testid: "path-form",
+    send: api.addScenePath,
+    done: (scene) => open(scene.id),
+  });
 
   const drop = h(
     "div",
@@ -86,7 +67,7 @@ export function buildScenes(home, { store, memory, open }) {
       "Choose a file…",
     ),
     file,
-    pathForm,
+    paths,
   );
   const empty = h("p", { class: "empty", testid: "no-scenes", hidden: true }, "There are no scenes yet.");
 
@@ -116,7 +97,7 @@ export function buildScenes(home, { store, memory, open }) {
   store.watch(["scenes", "info"], ({ scenes, info }) => {
     update(scenes ?? []);
     empty.hidden = scenes === null || scenes.length > 0;
-    pathForm.hidden = !info?.scene_root;
+    paths.hidden = !info?.scene_root;
     text(limit, info?.limits?.upload_bytes ? `, up to ${bytes(info.limits.upload_bytes)}` : "");
   });
 
@@ -139,27 +120,19 @@ function card(id, { memory, open, refresh }) {
   const name = h("a", { class: "scene-name", href: `#/scenes/${id}`, testid: "scene-open" });
   const facts = h("p", { class: "muted" });
   const more = h("p", { class: "muted" });
-  const problem = h("p", { class: "problem", role: "alert", hidden: true, testid: "scene-problem" });
+  const problem = problemPlace("scene-problem");
   let current = null;
-  const asking = (ask) => async () => {
-    try {
-      showProblem(problem, null);
-      await ask();
-    } catch (error) {
-      showProblem(problem, error);
-    }
-  };
-  const rename = asking(async () => {
+  const rename = asking(problem, async () => {
     const wish = await asked({ title: "Rename the scene", label: "Name", value: current.name });
     if (!wish) return;
     await api.patchScene(id, { name: wish });
     await refresh();
   });
-  const remove = asking(async () => {
+  const remove = asking(problem, async () => {
     const n = current.versions.length - 1;
     const sure = await confirmed({
       title: `Delete “${current.name}”?`,
-      detail: `The scene${n > 0 ? ` and its ${n} edited version${n === 1 ? "" : "s"}` : ""} will be gone from the service. This cannot be undone.`,
+      detail: `The scene${n > 0 ? ` and its ${counted(n, "edited version")}` : ""} will be gone from the service. This cannot be undone.`,
       yes: "Delete",
     });
     if (!sure) return;
@@ -192,13 +165,13 @@ function card(id, { memory, open, refresh }) {
       picture.hidden = !thumbnail;
       if (thumbnail && picture.src !== thumbnail) picture.src = thumbnail;
       text(name, scene.name);
-      const versions = scene.versions.length;
+      const versions = counted(scene.versions.length, "version");
       text(
         facts,
         `${gaussians(scene.gaussians)} · SH degree ${scene.sh_degree} · ${scene.format.replace("_", " ")} · ${bytes(scene.disk_bytes)}`,
       );
       const views = scene.dataset ? `${count(scene.dataset.views)} views` : "no dataset";
-      text(more, `${versions} version${versions === 1 ? "" : "s"} · ${views} · ${when(scene.created)} · ${scene.id}`);
+      text(more, `${versions} · ${views} · ${when(scene.created)} · ${scene.id}`);
     },
   };
 }

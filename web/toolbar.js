@@ -97,7 +97,7 @@ export function buildToolbar(editor, viewer) {
       const { scene } = state;
       if (!scene) return;
       const numbers = scene.versions.map((v) => v.version);
-      version.options(numbers.toReversed ? numbers.toReversed().map(named) : [...numbers].reverse().map(named));
+      version.options([...numbers].reverse().map(named));
       version.update(String(state.version));
       const kind = state.viewsKind === "dataset" ? "Views" : "Virtual views";
       view.options([

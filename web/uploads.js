@@ -1,7 +1,7 @@
-// A file on its way to the service: name, how far it is, and what went wrong.
+// A file on its way to the service: name, how far it is, and what went wrong; or the path of one that is there already.
 
 import { wasGivenUp } from "./api.js";
-import { attrs, h, showProblem, text } from "./dom.js";
+import { asking, attrs, h, problemPlace, showProblem, text } from "./dom.js";
 import { bytes } from "./format.js";
 
 /** Shows an upload as a row in `place`.
@@ -12,7 +12,7 @@ export async function showUpload(place, file, send, done) {
   const abort = new AbortController();
   const bar = h("progress", { max: 1, value: 0, "aria-label": `Upload of ${file.name}`, testid: "upload-progress" });
   const state = h("span", { class: "muted" }, "0 %");
-  const problem = h("p", { class: "problem", role: "alert", hidden: true, testid: "upload-problem" });
+  const problem = problemPlace("upload-problem");
   const close = h(
     "button",
     { type: "button", class: "small", testid: "upload-cancel", onclick: () => abort.abort() },
@@ -44,4 +44,40 @@ export async function showUpload(place, file, send, done) {
     close.addEventListener("click", () => row.remove());
     showProblem(problem, error);
   }
+}
+
+/** A form for a path below the service's scene folder; hidden until that is known to be there.
+ *    label         in front of it
+ *    field         of the text: testid, placeholder, aria-label
+ *    button        [label, {testid, ...}]
+ *    problem       test id of the place for what is refused
+ *    send(path)    -> a promise of the service's answer; the field is empty once it is there
+ *    done(answer) */
+export function pathForm({ label, field, button: [name, more], problem, send, done, ...form }) {
+  const path = h("input", { type: "text", ...field });
+  const place = problemPlace(problem);
+  const submit = asking(place, async () => {
+    const answer = await send(path.value.trim());
+    path.value = "";
+    done(answer);
+  });
+  const element = h(
+    "form",
+    {
+      class: "path-form",
+      hidden: true,
+      ...form,
+      onsubmit: async (event) => {
+        event.preventDefault();
+        if (!path.value.trim()) return;
+        element.classList.add("waiting");
+        await submit();
+        element.classList.remove("waiting");
+      },
+    },
+    label,
+    h("div", { class: "row" }, path, h("button", more, name)),
+    place,
+  );
+  return element;
 }

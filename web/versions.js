@@ -2,11 +2,11 @@
 
 import * as api from "./api.js";
 import { asked, say } from "./dialogs.js";
-import { attrs, h, keyedList, showProblem, text } from "./dom.js";
+import { asking, attrs, h, keyedList, problemPlace, text } from "./dom.js";
 import { parentOf } from "./editor.js";
 import { bytes, count, gaussians, point, when } from "./format.js";
 import { warnings } from "./run.js";
-import { showUpload } from "./uploads.js";
+import { pathForm, showUpload } from "./uploads.js";
 
 export function buildVersions(editor) {
   const { store } = editor;
@@ -48,54 +48,28 @@ export function buildVersions(editor) {
     if (file) upload(file);
   });
 
-  const path = h("input", {
-    type: "text",
-    placeholder: "chair",
-    testid: "dataset-path",
-    "aria-label": "Dataset folder below the service's scene folder",
-  });
-  const pathProblem = h("p", { class: "problem", role: "alert", hidden: true, testid: "dataset-path-problem" });
-  const pathForm = h(
-    "form",
-    {
-      class: "path-form",
-      hidden: true,
-      onsubmit: async (event) => {
-        event.preventDefault();
-        if (!path.value.trim()) return;
-        pathForm.classList.add("waiting");
-        try {
-          showProblem(pathProblem, null);
-          editor.datasetChanged(await api.putDatasetPath(store.state.scene.id, path.value.trim()));
-          path.value = "";
-        } catch (error) {
-          showProblem(pathProblem, error);
-        }
-        pathForm.classList.remove("waiting");
-      },
+  const paths = pathForm({
+    label: h("span", { class: "muted" }, "or a folder of the service's scene folder"),
+    field: {
+      placeholder: "chair",
+      testid: "dataset-path",
+      "aria-label": "Dataset folder below the service's scene folder",
     },
-    h("span", { class: "muted" }, "or a folder of the service's scene folder"),
-    h("div", { class: "row" }, path, h("button", { class: "small", testid: "dataset-path-set" }, "Use")),
-    pathProblem,
-  );
-  store.watch(["info"], ({ info }) => (pathForm.hidden = !info?.scene_root));
+    button: ["Use", { class: "small", testid: "dataset-path-set" }],
+    problem: "dataset-path-problem",
+    send: (path) => api.putDatasetPath(store.state.scene.id, path),
+    done: (scene) => editor.datasetChanged(scene),
+  });
+  store.watch(["info"], ({ info }) => (paths.hidden = !info?.scene_root));
 
   const facts = h("dl", { class: "facts", testid: "scene-facts" });
-  const problem = h("p", { class: "problem", role: "alert", hidden: true, testid: "scene-tab-problem" });
-  const asking = (ask) => async () => {
-    try {
-      showProblem(problem, null);
-      await ask();
-    } catch (error) {
-      showProblem(problem, error);
-    }
-  };
+  const problem = problemPlace("scene-tab-problem");
   const button = (label, testid, onclick, extra) =>
     h("button", { type: "button", class: "small", testid, onclick, ...extra }, label);
   const rename = button(
     "Rename",
     "rename",
-    asking(async () => {
+    asking(problem, async () => {
       const name = await asked({ title: "Rename the scene", label: "Name", value: store.state.scene.name });
       if (name) await editor.rename(name);
     }),
@@ -103,7 +77,7 @@ export function buildVersions(editor) {
   const up = button(
     "Up is up on the screen",
     "set-up",
-    asking(() => editor.setUpFromView()),
+    asking(problem, () => editor.setUpFromView()),
     {
       title:
         "The scene's up direction becomes that of the present view; orbits turn about it. The scene's data stays as it is.",
@@ -112,7 +86,7 @@ export function buildVersions(editor) {
   const resetUp = button(
     "Forget",
     "reset-up",
-    asking(() => editor.setUp(null)),
+    asking(problem, () => editor.setUp(null)),
     { title: "Back to the default, -y" },
   );
 
@@ -155,7 +129,7 @@ export function buildVersions(editor) {
       ),
       zip,
       uploads,
-      pathForm,
+      paths,
     ),
     h("section", {}, h("h2", {}, "Scene"), facts, problem, h("div", { class: "row wrap" }, rename, up, resetUp)),
   );

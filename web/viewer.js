@@ -25,6 +25,7 @@ const STILL_AFTER_MS = 160;
 const CLICK_PX = 4;
 const ORBIT_PER_PX = 0.0055; // Radians.
 const KEPT_PICTURES = 6;
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }; // Right, down.
 const THUMBNAIL = { width: 320, height: 200 };
 
 /** How much a turn of the wheel multiplies by. */
@@ -396,7 +397,7 @@ export class Viewer {
 
   #key(event) {
     if (event.ctrlKey || event.metaKey || event.altKey || event.target !== this.#view || !this.camera) return;
-    const arrow = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
+    const arrow = ARROWS[event.key];
     if (arrow && event.shiftKey)
       this.#turn((pose) => panned({ ...pose, ...this.#size }, -30 * arrow[0], -30 * arrow[1]));
     else if (arrow) this.#turn((pose) => orbited(pose, 0.09 * arrow[0], 0.09 * arrow[1], this.#editor.worldUp));
@@ -411,7 +412,7 @@ export class Viewer {
 
   /** Arrow keys on a handle's dot move its target by some pixels, as a drag would. */
   #nudge(id, event) {
-    const arrow = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
+    const arrow = ARROWS[event.key];
     if (!arrow || event.ctrlKey || event.metaKey || !this.camera) return;
     event.preventDefault();
     event.stopPropagation();
