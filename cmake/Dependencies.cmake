@@ -8,6 +8,13 @@ find_package(OpenImageIO 2.4 REQUIRED)       # image files, resizing
 # need not be installed; CMake refuses a folder that does not exist.
 set_target_properties(OpenImageIO::OpenImageIO PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "${OpenImageIO_INCLUDE_DIR}"
                       INTERFACE_SYSTEM_INCLUDE_DIRECTORIES "")
+# FLANN's trees are templates: its headers are all we need, and lz4, which they name. (Debian's pkg-config file asks for
+# an MPI that nothing here uses.)
+find_path(FLANN_INCLUDE_DIR flann/algorithms/kdtree_single_index.h REQUIRED)
+find_library(LZ4_LIBRARY lz4 REQUIRED)
+add_library(FLANN::FLANN INTERFACE IMPORTED)
+set_target_properties(FLANN::FLANN PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "${FLANN_INCLUDE_DIR}"
+                      INTERFACE_LINK_LIBRARIES "${LZ4_LIBRARY}")
 find_package(ZLIB REQUIRED)                  # spz versions 1 to 3
 find_package(zstd REQUIRED)                  # spz version 4
 find_package(SQLite3 3.38 REQUIRED)          # job records

@@ -25,32 +25,34 @@ ProgressDisplay::~ProgressDisplay() {
   if (style_ == Style::bar && percent_ >= 0) out_ << "\r\x1b[K" << std::flush;
 }
 
-void ProgressDisplay::show(const engine::edit::Progress& progress) {
-  const int percent = int(std::floor(100 * std::clamp(progress.fraction, 0.0, 1.0)));
+void ProgressDisplay::show(double fraction, const std::string& doing) {
+  const int percent = int(std::floor(100 * std::clamp(fraction, 0.0, 1.0)));
+  const auto line = [&] { return std::to_string(percent) + " %  " + doing + time_left(fraction); };
   if (style_ == Style::bar) {
     if (clock_() - drawn_ < redraw_every && percent < 100) return;
     drawn_ = clock_();
     const int filled = bar_width * percent / 100;
     out_ << "\r\x1b[K[" << std::string(std::size_t(filled), '#') << std::string(std::size_t(bar_width - filled), '.')
-         << "] " << description(progress) << std::flush;
+         << "] " << line() << std::flush;
   } else {
     if (percent_ >= 0 && percent < percent_ + line_every && (percent < 100 || percent_ == 100)) return;
-    out_ << description(progress) << '\n' << std::flush;
+    out_ << line() << '\n' << std::flush;
   }
   percent_ = percent;
 }
 
-std::string ProgressDisplay::description(const engine::edit::Progress& progress) const {
-  std::string text = std::to_string(int(std::floor(100 * progress.fraction))) + " %";
+void ProgressDisplay::show(const engine::edit::Progress& progress) {
+  std::string doing;
   if (progress.interval > 0)
-    text += "  interval " + std::to_string(progress.interval) + " of " + std::to_string(progress.intervals);
-  text += "  " + progress.stage;
+    doing = "interval " + std::to_string(progress.interval) + " of " + std::to_string(progress.intervals) + "  ";
+  doing += progress.stage;
   if (progress.loss) {
-    std::array<char, 32> loss{};
-    std::snprintf(loss.data(), loss.size(), ", loss %.3g", *progress.loss);
-    text += loss.data();
+    std::array<char, 64> text{};
+    std::snprintf(text.data(), text.size(), ", iteration %d of %d, loss %.3g", progress.iteration, progress.iterations,
+                  *progress.loss);
+    doing += text.data();
   }
-  return text + time_left(progress.fraction);
+  show(progress.fraction, doing);
 }
 
 std::string ProgressDisplay::time_left(double fraction) const {

@@ -1,4 +1,4 @@
-// Shows a running edit to the person who waits for it.
+// Shows long work to the person who waits for it.
 #pragma once
 
 #include <chrono>
@@ -22,10 +22,11 @@ class ProgressDisplay {
   ProgressDisplay(const ProgressDisplay&) = delete;
   ProgressDisplay& operator=(const ProgressDisplay&) = delete;
 
+  /// How far it is, 0 to 1, and what is being done.
+  void show(double fraction, const std::string& doing);
   void show(const engine::edit::Progress& progress);
 
  private:
-  [[nodiscard]] std::string description(const engine::edit::Progress& progress) const;
   [[nodiscard]] std::string time_left(double fraction) const;
 
   std::ostream& out_;

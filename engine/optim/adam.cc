@@ -149,4 +149,22 @@ void Adam::append_rows(std::size_t count) {
   fit_buffers();
 }
 
+void Adam::write(ByteWriter& out) const {
+  out.write(std::uint64_t(rows_));
+  out.write(steps_);
+  for (const Moments& group : groups_) {
+    out.write_all(std::span<const float>(group.first));
+    out.write_all(std::span<const float>(group.second));
+  }
+}
+
+void Adam::read(ByteReader& in) {
+  if (in.read<std::uint64_t>() != rows_) in.fail();
+  steps_ = in.read<std::uint64_t>();
+  for (Moments& group : groups_) {
+    in.read_all(std::span(group.first));
+    in.read_all(std::span(group.second));
+  }
+}
+
 }  // namespace engine::optim

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "engine/core/byte_reader.h"
+#include "engine/core/byte_writer.h"
 #include "engine/core/result.h"
 
 namespace engine::optim {
@@ -55,6 +57,11 @@ class Adam {
   /// Adds `count` rows with moments 0. The number of steps stays that of the whole, as usual in the field: the first
   /// steps of a row that joins late are up to (1 - beta1) / sqrt(1 - beta2) = 3.2 times the rate.
   void append_rows(std::size_t count);
+
+  /// Moments and number of steps, for a checkpoint.
+  void write(ByteWriter& out) const;
+  /// What write() of one with the same layout and rows wrote. Other bytes leave `in` failed, and the moments anything.
+  void read(ByteReader& in);
 
   [[nodiscard]] std::size_t rows() const { return rows_; }
   [[nodiscard]] std::uint64_t steps() const { return steps_; }

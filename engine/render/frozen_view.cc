@@ -9,38 +9,11 @@
 
 #include "engine/core/parallel.h"
 #include "engine/render/backward_stages.h"
+#include "engine/render/color_tiles.h"
 #include "engine/render/splats.h"
 
 namespace engine::render {
 namespace {
-
-TileGrid grid_of(const scene::Camera& camera) {
-  return {.columns = tile_columns(camera.width),
-          .rows = tile_rows(camera.height),
-          .pixels = {0, 0, camera.width, camera.height},
-          .wanted = {}};
-}
-
-/// Copies the pixels of a tile to a picture of `region`.
-void store_tile(const TilePixels& tile, int x0, int y0, scene::Rect region, scene::Image& color) {
-  const int width = std::min(x0 + tile_size, region.x1) - x0, height = std::min(y0 + tile_size, region.y1) - y0;
-  int channel = 0;
-  for (const float* from : {tile.red, tile.green, tile.blue}) {
-    float* const plane = color.plane(channel++).data();
-    for (int y = 0; y < height; ++y)
-      std::copy_n(from + y * tile_size, width,
-                  plane + std::ptrdiff_t(y0 - region.y0 + y) * color.width + (x0 - region.x0));
-  }
-}
-
-/// Blends one tile of the listed splats and stores it.
-void render_tile(const Splat* splats, std::span<const std::uint32_t> list, std::uint32_t tile, int columns,
-                 Vec3 background, scene::Rect region, scene::Image& color) {
-  TilePixels pixels;
-  const int x0 = int(tile) % columns * tile_size, y0 = int(tile) / columns * tile_size;
-  composite_tile(splats, list, x0, y0, {.color = true}, background, pixels);
-  store_tile(pixels, x0, y0, region, color);
-}
 
 [[maybe_unused]] bool contains(scene::Rect outer, scene::Rect inner) {
   return inner.empty() ||
@@ -74,7 +47,7 @@ struct FrozenView::Impl {
 FrozenView::FrozenView(const Layers& frozen, const scene::Camera& camera, scene::Rect region, Vec3 background)
     : impl_(std::make_unique<Impl>()) {
   assert(scene::validate(camera) && !region.empty() && whole_tiles(region, camera) == region);
-  TileGrid grid = grid_of(camera);
+  TileGrid grid = whole_grid(camera);
   grid.wanted.assign(std::size_t(grid.columns) * std::size_t(grid.rows), 0);
   std::vector<std::uint32_t> tiles;
   for (int y = region.y0; y < region.y1; y += tile_size)
@@ -105,7 +78,7 @@ FrozenView::FrozenView(const Layers& frozen, const scene::Camera& camera, scene:
 
   view.color = scene::Image(region.width(), region.height(), 3);
   parallel_for(tiles.size(), 1, [&](std::size_t i, std::size_t) {
-    render_tile(view.splats.data(), view.list(tiles[i]), tiles[i], view.columns, background, region, view.color);
+    draw_tile(view.splats.data(), view.list(tiles[i]), tiles[i], view.columns, background, region, view.color);
   });
 }
 
@@ -141,7 +114,7 @@ LocalFrame& LocalFrame::operator=(LocalFrame&&) noexcept = default;
 
 scene::Rect LocalFrame::project(const scene::GaussianCloud& changeable, const scene::Camera& camera) {
   assert(scene::validate(camera));
-  const TileGrid grid = grid_of(camera);
+  const TileGrid grid = whole_grid(camera);
   ForwardBuffers& buffers = impl_->changeable;
   render::project(changeable, view_params<float>(camera), changeable.sh_degree, {}, Culling::exact, grid.pixels,
                   buffers);
@@ -239,7 +212,7 @@ void LocalFrame::forward(const FrozenView& frozen, scene::Image& color) {
   const ForwardBuffers& merged = impl_->merged;
   parallel_for(impl_->tiles.size(), 1, [&](std::size_t i, std::size_t) {
     const std::uint32_t tile = impl_->tiles[i], first = merged.tile_begin[tile], last = merged.tile_begin[tile + 1];
-    render_tile(merged.splats.data(), {merged.entries.data() + first, last - first}, tile, view.columns,
+    draw_tile(merged.splats.data(), {merged.entries.data() + first, last - first}, tile, view.columns,
                 view.background, view.region, color);
   });
 }
@@ -252,7 +225,7 @@ void LocalFrame::backward(const FrozenView& frozen, const scene::GaussianCloud& 
   std::vector<std::uint32_t>& rows = impl_->rows;
   rows.resize(changeable.size());
   std::iota(rows.begin(), rows.end(), 0u);
-  TileGrid grid = grid_of(view.camera);
+  TileGrid grid = whole_grid(view.camera);
   grid.pixels = view.region;
   const UpstreamPlanes upstream{.color = &v_color};
   clear_mean2d(out);

@@ -70,4 +70,12 @@ Camera look_at(DVec3 eye, DVec3 target, DVec3 up, double fov_y_rad, int width, i
   return camera;
 }
 
+double capture_extent(std::span<const Camera> cameras) {
+  DVec3 middle(0.0);
+  for (const Camera& camera : cameras) middle += camera.centre() / double(cameras.size());
+  double reach = 0;
+  for (const Camera& camera : cameras) reach = std::max(reach, glm::distance(camera.centre(), middle));
+  return 1.1 * reach;
+}
+
 }  // namespace engine::scene

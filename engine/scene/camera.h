@@ -1,6 +1,7 @@
 // Pinhole cameras. Axes as in OpenCV: x right, y down, z forward.
 #pragma once
 
+#include <span>
 #include <string>
 
 #include "engine/core/result.h"
@@ -38,5 +39,8 @@ struct Camera {
 /// A camera at `eye` that looks at `target`; `up` is the world direction that points up in the picture.
 /// Principal point in the middle, square pixels, vertical field of view `fov_y_rad`.
 [[nodiscard]] Camera look_at(DVec3 eye, DVec3 target, DVec3 up, double fov_y_rad, int width, int height);
+
+/// INRIA's extent of a capture: 1.1 times the largest distance of a camera from their centre, world units. 0 for none.
+[[nodiscard]] double capture_extent(std::span<const Camera> cameras);
 
 }  // namespace engine::scene

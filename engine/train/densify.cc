@@ -42,6 +42,14 @@ void PullStatistic::add(const render::Gradients& gradients, const scene::Camera&
   }
 }
 
+void PullStatistic::keep_rows(std::span<const std::uint8_t> keep) {
+  assert(keep.size() == sum.size());
+  std::size_t kept = 0;
+  for (std::size_t row = 0; row < keep.size(); ++row)
+    if (keep[row] != 0) sum[kept] = sum[row], views[kept] = views[row], ++kept;
+  sum.resize(kept), views.resize(kept);
+}
+
 std::vector<std::uint32_t> rows_to_densify(const PullStatistic& pull, double threshold, std::size_t most) {
   const auto mean = [&](std::uint32_t row) { return pull.sum[row] / std::max<double>(pull.views[row], 1); };
   std::vector<std::uint32_t> rows;

@@ -23,6 +23,8 @@ struct PullStatistic {
   void reset(std::size_t rows);
   /// Takes in one view.
   void add(const render::Gradients& gradients, const scene::Camera& camera);
+  /// Rows with keep[i] != 0 stay, in order. keep: [R].
+  void keep_rows(std::span<const std::uint8_t> keep);
 };
 
 /// Rows whose mean pull exceeds the threshold, ascending: at most `most`, the strongest (the lower row if two tie).

@@ -1,7 +1,6 @@
 #include "engine/train/trainer.h"
 
 #include <algorithm>
-#include <array>
 #include <cassert>
 #include <cmath>
 #include <numeric>
@@ -14,16 +13,6 @@ namespace engine::train {
 namespace {
 
 const Vec3 black(0.0f);
-
-/// The groups of parameters, in the order of adam_groups(). Named as in a .ply file where that has one name for them.
-std::vector<optim::AdamLayout> adam_layout(const scene::GaussianCloud& cloud) {
-  std::vector<optim::AdamLayout> layout;
-  for (const char* name :
-       {"x", "y", "z", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3", "opacity"})
-    layout.push_back({name, 1});
-  layout.push_back({"sh", cloud.sh_stride()});
-  return layout;
-}
 
 /// Largest distance of a mean from their centre.
 double radius_of(const scene::GaussianCloud& cloud) {
@@ -86,7 +75,7 @@ Trainer::Trainer(Frozen frozen, Changeable changeable, double scene_extent, cons
       radius_(radius_of(cloud_)),
       position_scale_(optim::position_scale(options.rates, scene_extent, radius_)),
       ancestor_(cloud_.size()),
-      adam_(adam_layout(cloud_), cloud_.size(), options.adam) {
+      adam_(cloud_.size(), cloud_.sh_degree, options.adam) {
   assert(validate(options) && cloud_.sh_degree == frozen.base->sh_degree);
   assert(name_.empty() || name_.size() == cloud_.size());
   std::iota(ancestor_.begin(), ancestor_.end(), 0u);
@@ -181,24 +170,13 @@ Result<double> Trainer::differentiate(View& view) {
 
 Result<void> Trainer::adam_step(double decay) {
   const optim::LearningRates& rates = options_.rates;
-  const std::array<double, 1> position{rates.position * position_scale_ * decay}, scale{rates.log_scale * decay},
-      rotation{rates.rotation * decay}, opacity{rates.opacity_logit * decay};
-  std::vector<double> sh(cloud_.sh_stride(), rates.sh_rest * decay);
-  for (std::size_t c = 0; c < 3; ++c) sh[c * scene::sh_coefficients(cloud_.sh_degree)] = rates.sh_dc * decay;
-  render::Gradients& g = gradients_;
-  const std::array<optim::AdamGroup, 12> groups{{{cloud_.mean.x, g.mean.x, position},
-                                                 {cloud_.mean.y, g.mean.y, position},
-                                                 {cloud_.mean.z, g.mean.z, position},
-                                                 {cloud_.log_scale.x, g.log_scale.x, scale},
-                                                 {cloud_.log_scale.y, g.log_scale.y, scale},
-                                                 {cloud_.log_scale.z, g.log_scale.z, scale},
-                                                 {cloud_.rotation.w, g.rotation.w, rotation},
-                                                 {cloud_.rotation.x, g.rotation.x, rotation},
-                                                 {cloud_.rotation.y, g.rotation.y, rotation},
-                                                 {cloud_.rotation.z, g.rotation.z, rotation},
-                                                 {cloud_.opacity_logit, g.opacity_logit, opacity},
-                                                 {cloud_.sh, g.sh, sh}}};
-  auto stepped = adam_.step(groups);
+  auto stepped = adam_.step(cloud_, gradients_,
+                            {.position = rates.position * position_scale_ * decay,
+                             .sh_dc = rates.sh_dc * decay,
+                             .sh_rest = rates.sh_rest * decay,
+                             .opacity_logit = rates.opacity_logit * decay,
+                             .log_scale = rates.log_scale * decay,
+                             .rotation = rates.rotation * decay});
   if (stepped) return {};
   // "[12].opacity" -> "gaussian[12].opacity", with the name of the row.
   Error error = std::move(stepped.error());
@@ -272,14 +250,11 @@ void Trainer::remove_floaters() {
   if (removed == 0) return;
   cloud_ = scene::select(cloud_, keep);
   adam_.keep_rows(keep);
+  pull_.keep_rows(keep);
   std::size_t kept = 0;
-  for (std::size_t row = 0; row < keep.size(); ++row) {
-    if (keep[row] == 0) continue;
-    ancestor_[kept] = ancestor_[row];
-    pull_.sum[kept] = pull_.sum[row], pull_.views[kept] = pull_.views[row];
-    ++kept;
-  }
-  ancestor_.resize(kept), pull_.sum.resize(kept), pull_.views.resize(kept);
+  for (std::size_t row = 0; row < keep.size(); ++row)
+    if (keep[row] != 0) ancestor_[kept++] = ancestor_[row];
+  ancestor_.resize(kept);
   floaters_ += removed;
 }
 

@@ -15,7 +15,6 @@
 #include <vector>
 
 #include "engine/core/result.h"
-#include "engine/optim/adam.h"
 #include "engine/optim/losses.h"
 #include "engine/optim/perceptual.h"
 #include "engine/render/backward.h"
@@ -24,6 +23,7 @@
 #include "engine/scene/gaussian_cloud.h"
 #include "engine/scene/image.h"
 #include "engine/train/chance.h"
+#include "engine/train/cloud_adam.h"
 #include "engine/train/densify.h"
 #include "engine/train/options.h"
 #include "engine/train/view.h"
@@ -119,7 +119,7 @@ class Trainer {
   std::size_t floaters_ = 0;
   IterationCost cost_;
 
-  optim::Adam adam_;
+  CloudAdam adam_;
   PullStatistic pull_;
   render::LocalFrame frame_;
   render::Gradients gradients_;

@@ -87,6 +87,71 @@ TEST_F(Cli, DemoSceneIsTheSameEveryTime) {
     EXPECT_EQ(support::read_file(at("again/" + std::string(name))), support::read_file(demo(name))) << name;
 }
 
+TEST_F(Cli, FitMakesASceneFromPhotos) {
+  const Finished run = splatdrag("fit --dataset " + at("demo") + " --out " + at("fit") +
+                                 " --iterations 150 --max-gaussians 6000 --hold-out 6");
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_NE(run.err.find("100 %  iteration 150 of 150, "), std::string::npos) << run.err;
+  const auto scene = io::read_scene(at("fit/scene.ply"));
+  ASSERT_TRUE(scene) << scene.error().message;
+  EXPECT_EQ(scene->cloud.sh_degree, 3);
+  const json said = report("fit");
+  EXPECT_EQ(said["gaussians"], scene->cloud.size());
+  EXPECT_LE(said["gaussians"], 6000);
+  EXPECT_EQ(said["views"], 5);
+  EXPECT_GT(said["training"]["psnr_db"], said["curve"][0]["psnr_db"].get<double>() + 5) << said;
+  EXPECT_GT(said["held_out"]["psnr_db"], said["curve"][0]["psnr_db"].get<double>()) << said;
+  EXPECT_EQ(said["curve"].back()["iteration"], 150);
+  EXPECT_EQ(files_in("fit"), 2u) << "and nothing else";
+  const Finished compared =
+      splatdrag("render --all --compare --scene " + at("fit/scene.ply") + " --dataset " + at("demo"));
+  EXPECT_EQ(compared.status, 0) << compared.err;
+}
+
+TEST_F(Cli, FitGoesOnAfterAKillToTheSameBytes) {
+  const std::string fit = "fit --dataset " + at("demo") + " --iterations 120 --max-gaussians 6000 ";
+  ASSERT_EQ(splatdrag(fit + "--out " + at("undisturbed")).status, 0);
+  const std::string killed = std::string(SPLATDRAG_PROGRAM) + " " + fit + "--checkpoint-every 0 --out " + at("killed") +
+                             " >/dev/null 2>&1 & pid=$!; while ! [ -e " + at("killed/fit.checkpoint") +
+                             " ]; do sleep 0.01; done; sleep 0.3; kill -9 $pid; wait $pid";
+  ASSERT_NE(std::system(("bash -c '" + killed + "'").c_str()), 0);
+  ASSERT_FALSE(fs::exists(at("killed/scene.ply"))) << "it was too late to kill it";
+
+  const Finished other = splatdrag(fit + "--seed 1 --out " + at("killed"));
+  EXPECT_EQ(other.status, 9);
+  EXPECT_NE(other.err.find("--restart"), std::string::npos) << other.err;
+  const Finished again = splatdrag(fit + "--out " + at("killed"));
+  ASSERT_EQ(again.status, 0) << again.err;
+  EXPECT_NE(again.err.find("going on after iteration "), std::string::npos) << again.err;
+  EXPECT_EQ(support::read_file(at("killed/scene.ply")), support::read_file(at("undisturbed/scene.ply")));
+  EXPECT_FALSE(fs::exists(at("killed/fit.checkpoint")));
+}
+
+TEST_F(Cli, FitSaysWhatIsMissing) {
+  const std::string out = " --iterations 1 --out " + at("fit");
+  fs::remove(at("demo/images/view_03.png"));
+  const Finished one = splatdrag("fit --dataset " + at("demo") + out);
+  EXPECT_EQ(one.status, 3);
+  EXPECT_NE(one.err.find("view_03.png"), std::string::npos) << one.err;
+  fs::remove_all(at("demo/images"));
+  const Finished all = splatdrag("fit --dataset " + at("demo") + out);
+  EXPECT_EQ(all.status, 3);
+  EXPECT_NE(all.err.find("has no photos"), std::string::npos) << all.err;
+}
+
+TEST_F(Cli, FitNeedsPointsOrASceneToStartFrom) {
+  fs::remove(at("demo/sparse/0/points3D.txt"));
+  const std::string fit = "fit --iterations 3 --out " + at("fit") + " --dataset " + at("demo");
+  const Finished without = splatdrag(fit);
+  EXPECT_EQ(without.status, 6);
+  EXPECT_NE(without.err.find("--scene"), std::string::npos) << without.err;
+  const Finished with = splatdrag(fit + " --scene " + demo("scene.ply"));
+  ASSERT_EQ(with.status, 0) << with.err;
+  EXPECT_EQ(report("fit")["start_gaussians"], io::read_scene(demo("scene.ply"))->cloud.size());
+  EXPECT_EQ(splatdrag("fit --dataset " + at("demo") + " --scene " + demo("scene.ply") + " --out " + at("demo")).status, 9)
+      << "scene.ply would replace its own input";
+}
+
 TEST_F(Cli, EditWritesSceneReportAndPictures) {
   const Finished run = splatdrag("edit --scene " + demo("scene.ply") + " --dataset " + at("demo") + " --request " +
                                  demo("drags/ball.json") + " --out " + at("out/deep"));

@@ -10,6 +10,7 @@
 #include "engine/core/rng.h"
 #include "engine/render/reference.h"
 #include "engine/render/reference_backward.h"
+#include "tests/engine/render/gradients.h"
 #include "tests/engine/render/test_scenes.h"
 #include "tests/support/gradient_matches.h"
 
@@ -17,62 +18,6 @@ namespace engine::render {
 namespace {
 
 using support::gradient_matches;
-
-constexpr float y0 = 0.28209479177387814f;  // the constant SH function
-
-std::vector<std::uint32_t> all_rows(const Layers& layers) {
-  std::vector<std::uint32_t> rows(layers.size());
-  std::iota(rows.begin(), rows.end(), 0u);
-  return rows;
-}
-
-Upstream random_upstream(int width, int height, std::uint64_t seed) {
-  Upstream upstream{scene::Image(width, height, 3), scene::Image(width, height, 1), scene::Image(width, height, 1)};
-  Rng rng(seed);
-  for (scene::Image* image : {&upstream.color, &upstream.depth, &upstream.alpha})
-    for (float& value : image->data) value = rng.normal();
-  return upstream;
-}
-
-BackwardOptions on(Backend backend, Semantics semantics = Semantics::dense_stop) {
-  return {.forward = {.background = {0.1f, 0.5f, 0.9f}, .backend = backend, .semantics = semantics}};
-}
-
-Gradients gradients_of(const Layers& layers, const scene::Camera& camera, const BackwardOptions& options,
-                       const Upstream& upstream, std::span<const std::uint32_t> rows) {
-  Gradients out;
-  out.reset(rows.size(), layers.base->sh_degree);
-  BackwardWorkspace workspace;
-  backward(layers, camera, options, upstream, rows, workspace, out);
-  return out;
-}
-
-Gradients gradients_of(const Layers& layers, const scene::Camera& camera, const BackwardOptions& options,
-                       const Upstream& upstream) {
-  return gradients_of(layers, camera, options, upstream, all_rows(layers));
-}
-
-struct Column {
-  const char* name;
-  std::vector<float> values;
-};
-
-std::vector<Column> columns_of(const Gradients& g) {
-  return {{"mean.x", g.mean.x},
-          {"mean.y", g.mean.y},
-          {"mean.z", g.mean.z},
-          {"log_scale.x", g.log_scale.x},
-          {"log_scale.y", g.log_scale.y},
-          {"log_scale.z", g.log_scale.z},
-          {"rotation.w", g.rotation.w},
-          {"rotation.x", g.rotation.x},
-          {"rotation.y", g.rotation.y},
-          {"rotation.z", g.rotation.z},
-          {"opacity_logit", g.opacity_logit},
-          {"sh", g.sh},
-          {"mean2d_x_px", g.mean2d_x_px},
-          {"mean2d_y_px", g.mean2d_y_px}};
-}
 
 void expect_same_bytes(const Gradients& seen, const Gradients& expected) {
   const auto a = columns_of(seen), b = columns_of(expected);
@@ -83,23 +28,6 @@ void expect_finite(const Gradients& seen) {
   for (const Column& column : columns_of(seen)) {
     const auto bad = first_not_finite(column.values);
     EXPECT_FALSE(bad) << column.name << '[' << bad.value_or(0) << ']';
-  }
-}
-
-double relative_l2(const std::vector<float>& seen, const std::vector<float>& expected) {
-  double difference = 0, norm = 0;
-  for (std::size_t i = 0; i < expected.size(); ++i) {
-    difference += std::pow(double(seen[i]) - double(expected[i]), 2);
-    norm += std::pow(double(expected[i]), 2);
-  }
-  return std::sqrt(difference) / std::max(std::sqrt(norm), 1e-30);
-}
-
-void expect_close(const Gradients& seen, const Gradients& expected, double tolerance) {
-  const auto a = columns_of(seen), b = columns_of(expected);
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    ASSERT_EQ(a[i].values.size(), b[i].values.size());
-    EXPECT_LE(relative_l2(a[i].values, b[i].values), tolerance) << a[i].name;
   }
 }
 
@@ -123,43 +51,6 @@ scene::GaussianCloud smooth_cloud() {
   return cloud;
 }
 
-std::vector<double> values_of(const scene::GaussianCloud& cloud) {
-  std::vector<double> x;
-  for (const auto* column :
-       {&cloud.mean.x, &cloud.mean.y, &cloud.mean.z, &cloud.log_scale.x, &cloud.log_scale.y, &cloud.log_scale.z,
-        &cloud.rotation.w, &cloud.rotation.x, &cloud.rotation.y, &cloud.rotation.z, &cloud.opacity_logit, &cloud.sh})
-    x.insert(x.end(), column->begin(), column->end());
-  return x;
-}
-
-scene::GaussianCloud with_values(scene::GaussianCloud cloud, const std::vector<double>& x) {
-  auto next = x.begin();
-  for (auto* column :
-       {&cloud.mean.x, &cloud.mean.y, &cloud.mean.z, &cloud.log_scale.x, &cloud.log_scale.y, &cloud.log_scale.z,
-        &cloud.rotation.w, &cloud.rotation.x, &cloud.rotation.y, &cloud.rotation.z, &cloud.opacity_logit, &cloud.sh})
-    for (float& value : *column) value = float(*next++);
-  return cloud;
-}
-
-ReferenceUpstream<double> planes_of(const Upstream& upstream) {
-  const auto plane = [](const scene::Image& image, int c) {
-    const auto from = image.plane(c);
-    return std::vector<double>(from.begin(), from.end());
-  };
-  return {{plane(upstream.color, 0), plane(upstream.color, 1), plane(upstream.color, 2)},
-          plane(upstream.depth, 0),
-          plane(upstream.alpha, 0)};
-}
-
-double loss(const ReferencePictures<double>& pictures, const ReferenceUpstream<double>& upstream) {
-  double sum = 0;
-  for (std::size_t i = 0; i < pictures.alpha.size(); ++i) {
-    for (std::size_t c = 0; c < 3; ++c) sum += pictures.color[c][i] * upstream.color[c][i];
-    sum += pictures.depth[i] * upstream.depth[i] + pictures.alpha[i] * upstream.alpha[i];
-  }
-  return sum;
-}
-
 TEST(BackwardReference, MatchesCentralDifferencesOfTheWholePassInEveryStoredValue) {
   auto camera = scene::look_at({0.1, -0.2, 0}, {0.2, 0.1, 4}, {0.1, -1, 0}, 0.7, 10, 7);
   camera.cx += 0.7;
@@ -170,19 +61,11 @@ TEST(BackwardReference, MatchesCentralDifferencesOfTheWholePassInEveryStoredValu
     ASSERT_EQ(count, 5) << "the scene is not clear of the cuts";
 
   const auto v = backward_reference<double>(cloud, camera, options, upstream, all_rows(cloud));
-  std::vector<double> gradient;
-  const auto append = [&](const auto& arrays) {  // component by component, as values_of()
-    for (std::size_t k = 0; k < arrays[0].size(); ++k)
-      for (const auto& array : arrays) gradient.push_back(array[k]);
-  };
-  append(v.mean), append(v.log_scale), append(v.rotation);
-  gradient.insert(gradient.end(), v.opacity_logit.begin(), v.opacity_logit.end());
-  gradient.insert(gradient.end(), v.sh.begin(), v.sh.end());
   EXPECT_TRUE(gradient_matches(
       [&](const std::vector<double>& x) {
         return loss(forward_reference<double>(with_values(cloud, x), camera, options.forward, {}), upstream);
       },
-      values_of(cloud), gradient, {.step = 1.0 / 512}));
+      values_of(cloud), values_of(v), {.step = 1.0 / 512}));
 }
 
 TEST(BackwardReference, TheGradientOfASplatsPlaceInThePictureIsThatOfShiftingThePrincipalPoint) {
@@ -372,130 +255,6 @@ TEST_P(BackwardTest, FarFromTheOriginTheGradientsAreThoseAtTheOrigin) {
                1e-3);
 }
 
-// Kinks --------------------------------------------------------------------------------------------------------------
-// Those of projection and colour (near plane, field of view, colour, log scale, logit, quaternion guard) are in
-// project_vjp_test.cc, that of alpha at 0.99 itself in blend_test.cc.
-
-/// Gradients of the sum of the three channels at the one pixel of one_pixel_camera(), before black.
-Gradients at_one_pixel(const scene::GaussianCloud& cloud, BackwardOptions options) {
-  options.forward.background = Vec3(0.0f);
-  return gradients_of(cloud, one_pixel_camera(), options, {.color = scene::Image(1, 1, 3, 1.0f)});
-}
-
-float sigmoid(float logit) { return 1 / (1 + std::exp(-logit)); }
-
-TEST_P(BackwardTest, From1Over255OnTheDerivativeIsThatOfTheBlendedSideAndBelowThereIsNone) {
-  const float cut = -std::log(254.0f);  // the logit whose opacity is 1/255
-  scene::GaussianCloud above, below;
-  add_on_axis(above, 2, cut + 1e-4f, 0.6f);
-  add_on_axis(below, 2, cut - 1e-4f, 0.6f);
-  const float slope = 3 * 0.6f * sigmoid(cut) * (1 - sigmoid(cut));
-  EXPECT_NEAR(at_one_pixel(above, on(GetParam())).opacity_logit[0], slope, 1e-3f * slope)
-      << "the jump itself is not differentiated";
-  EXPECT_EQ(at_one_pixel(below, on(GetParam())).opacity_logit[0], 0.0f);
-  EXPECT_EQ(at_one_pixel(below, on(GetParam())).sh[0], 0.0f);
-}
-
-TEST_P(BackwardTest, AlphaClampedAt99PercentStopsTheGradientOfOpacityAndShapeButNotOfColour) {
-  scene::GaussianCloud cloud;
-  add_on_axis(cloud, 2, 6, 0.6f);
-  const auto seen = at_one_pixel(cloud, on(GetParam()));
-  EXPECT_EQ(seen.opacity_logit[0], 0.0f);
-  EXPECT_EQ(seen.log_scale.get(0), Vec3(0.0f));
-  EXPECT_EQ(seen.mean.get(0), Vec3(0.0f));
-  EXPECT_NEAR(seen.sh[0], 0.99f * y0, 1e-6f);
-}
-
-TEST(BackwardReference, ToldToPassStraightThroughAClampedAlphaHasTheGradientOfTheRawOne) {
-  scene::GaussianCloud cloud;
-  add_on_axis(cloud, 2, 6, 0.6f);
-  BackwardOptions options = on(Backend::reference);
-  options.alpha_clamp = AlphaClamp::straight_through;
-  EXPECT_NEAR(at_one_pixel(cloud, options).opacity_logit[0], 3 * 0.6f * sigmoid(6) * sigmoid(-6), 1e-6f);
-}
-
-TEST_P(BackwardTest, TheSplatAtWhichARayEndsAndAllBehindItHaveNoGradientAndThoseBeforeDoNotSeeThem) {
-  scene::GaussianCloud before;
-  add_on_axis(before, 1, 6, 0.6f);                        // alpha 0.99
-  add_on_axis(before, 2, std::log(0.98f / 0.02f), 0.7f);  // leaves T = 2e-4
-  auto all = before;
-  add_on_axis(all, 3, std::log(0.9f / 0.1f), 0.8f);  // would leave 2e-5
-  add_on_axis(all, 4, std::log(0.3f / 0.7f), 0.9f);  // would leave 1.4e-4, had the ray not ended
-  const auto expected = at_one_pixel(before, on(GetParam())), seen = at_one_pixel(all, on(GetParam()));
-  for (const std::size_t i : {0u, 1u}) {
-    EXPECT_EQ(seen.opacity_logit[i], expected.opacity_logit[i]);
-    EXPECT_EQ(seen.mean.get(i), expected.mean.get(i));
-  }
-  EXPECT_NEAR(seen.opacity_logit[1], 0.01f * 3 * 0.7f * 0.98f * 0.02f, 1e-7f);
-  for (const std::size_t i : {2u, 3u}) {
-    EXPECT_EQ(seen.opacity_logit[i], 0.0f);
-    EXPECT_EQ(seen.sh[3 * i], 0.0f);
-    EXPECT_EQ(seen.mean.get(i), Vec3(0.0f));
-  }
-}
-
-TEST(BackwardReference, WithoutAnEndOfRaysEvenTheFarthestSplatHasAGradient) {
-  scene::GaussianCloud cloud;
-  for (int i = 0; i < 30; ++i) add_on_axis(cloud, 1.0f + float(i), 6, 0.6f);  // T = 1e-60 at last
-  add_on_axis(cloud, 40, 0, 0.8f);
-  const auto camera = one_pixel_camera();
-  const auto rows = all_rows(cloud);
-  const BackwardOptions options = on(Backend::reference, Semantics::dense_nostop);
-  const auto v = backward_reference<double>(cloud, camera, options, {.color = {{{1.0}, {1.0}, {1.0}}}}, rows);
-  EXPECT_NEAR(v.sh[3 * 30] / (1e-60 * 0.5 * y0), 1, 1e-6);
-  EXPECT_NEAR(v.sh[0], 0.99 * y0, 1e-7);
-  // In float the transmittance underflows on the way; the splats before that do not suffer.
-  const auto f = backward_reference<float>(cloud, camera, options, {.color = {{{1.0f}, {1.0f}, {1.0f}}}}, rows);
-  EXPECT_NEAR(f.sh[0], 0.99f * y0, 1e-6f);
-  EXPECT_NEAR(f.sh[3] / (0.0099f * y0), 1, 1e-5f);
-}
-
-TEST_P(BackwardTest, AtTheNearPlaneItselfThereIsNoGradientAndJustBehindItThereIs) {
-  scene::GaussianCloud at, behind;
-  add_on_axis(at, 0.2f, 0, 0.6f);
-  add_on_axis(behind, std::nextafter(0.2f, 1.0f), 0, 0.6f);
-  EXPECT_EQ(at_one_pixel(at, on(GetParam())).opacity_logit[0], 0.0f);
-  EXPECT_NEAR(at_one_pixel(behind, on(GetParam())).opacity_logit[0], 3 * 0.6f * 0.25f, 1e-5f);
-}
-
-TEST_P(BackwardTest, AtTheEdgeOfWhatStoredValuesSaturateAtTheDerivativeIsTheOneFromInsideAndBeyondThereIsNone) {
-  const auto camera = off_centre_camera();
-  const auto upstream = random_upstream(camera.width, camera.height, 10);
-  const auto gradients = [&](auto&& change) {
-    scene::GaussianCloud cloud;
-    add_on_axis(cloud, 2, 0.3f, 0.6f, -2.0f);
-    change(cloud);
-    return gradients_of(cloud, camera, on(GetParam()), upstream);
-  };
-  const auto scale = [&](float value) {
-    return gradients([&](auto& cloud) { cloud.log_scale.x[0] = value; }).log_scale.x[0];
-  };
-  for (const float sign : {-1.0f, 1.0f}) {
-    EXPECT_NE(scale(sign * 20), 0.0f);
-    EXPECT_EQ(scale(sign * std::nextafter(20.0f, 30.0f)), 0.0f);
-  }
-  const auto logit = [&](float value) {
-    return gradients([&](auto& cloud) { cloud.opacity_logit[0] = value; }).opacity_logit[0];
-  };
-  EXPECT_NE(logit(30), 0.0f) << "around the pixels that are clamped at 0.99";
-  EXPECT_EQ(logit(std::nextafter(30.0f, 40.0f)), 0.0f);
-
-  float black = -0.5f / y0;  // the coefficient whose colour is exactly zero in float
-  while (0.5f + black * y0 < 0) black = std::nextafter(black, 0.0f);
-  while (0.5f + black * y0 > 0) black = std::nextafter(black, -9.0f);
-  ASSERT_EQ(0.5f + black * y0, 0.0f);
-  const auto dc = [&](float value) { return gradients([&](auto& cloud) { cloud.sh[0] = value; }).sh[0]; };
-  EXPECT_NEAR(dc(black), dc(0), 1e-4f * std::abs(dc(0))) << "a black Gaussian can brighten";
-  EXPECT_EQ(dc(black - 1e-3f), 0.0f);
-
-  for (const float length : {0.0f, 1e-13f})
-    EXPECT_EQ(glm::length(gradients([&](auto& cloud) {
-                            cloud.log_scale.x[0] = -1;
-                            cloud.rotation.set(0, {length, 0, 0.5f * length, length});
-                          }).rotation.get(0)),
-              0.0f);
-}
-
 TEST_P(BackwardTest, BeyondTheFieldOfViewTheShapeOfASplatDoesNotFollowItsMean) {
   // So far outside that only the clamped place of the Jacobian matters: log scales must have gradients there, too.
   const auto camera = off_centre_camera();
@@ -508,42 +267,6 @@ TEST_P(BackwardTest, BeyondTheFieldOfViewTheShapeOfASplatDoesNotFollowItsMean) {
   EXPECT_NE(seen.log_scale.x[0], 0.0f);
   EXPECT_NEAR(seen.mean.x[0], expected.mean.x[0], 1e-4f * std::abs(expected.mean.x[0]));
   EXPECT_NEAR(seen.mean.z[0], expected.mean.z[0], 1e-4f * std::abs(expected.mean.z[0]));
-}
-
-TEST_P(BackwardTest, DepthOrderIsTakenAsItIs) {
-  const auto two = [](float depth_of_first, float depth_of_second) {
-    scene::GaussianCloud cloud;
-    add_on_axis(cloud, depth_of_first, 0, 0.9f);
-    add_on_axis(cloud, depth_of_second, 0, 0.2f);
-    return cloud;
-  };
-  const auto tie = at_one_pixel(two(2, 2), on(GetParam()));
-  const auto first_nearer = at_one_pixel(two(2, 2.00001f), on(GetParam()));
-  const auto second_nearer = at_one_pixel(two(2.00001f, 2), on(GetParam()));
-  EXPECT_NEAR(tie.opacity_logit[0], 3 * 0.25f * (0.9f - 0.5f * 0.2f), 1e-5f) << "ties blend in row order";
-  EXPECT_NEAR(tie.opacity_logit[0], first_nearer.opacity_logit[0], 1e-4f);
-  EXPECT_NEAR(second_nearer.opacity_logit[0], 3 * 0.25f * 0.5f * 0.9f, 1e-4f);
-  // That a step in depth would swap them, and brighten the pixel, no gradient says.
-  EXPECT_NEAR(tie.mean.z[0], first_nearer.mean.z[0], 1e-4f);
-}
-
-TEST(BackwardReference, TheTilesASplatReachesAreTakenAsTheyAre) {
-  // Sigma 7.9 px at x = 8.9: three sigmas, rounded up, end at tile 1, while alpha is above 1/255 up to column 35.
-  auto camera = scene::look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 1.0, 64, 16);
-  camera.fx = camera.fy = 10;
-  camera.cx = 8.9 + 0.5, camera.cy = 8;
-  scene::GaussianCloud cloud;
-  add_on_axis(cloud, 1, 4, 0.6f, std::log(0.79f));
-  Upstream beyond{.color = scene::Image(64, 16, 3)};
-  for (int c = 0; c < 3; ++c)
-    for (int y = 0; y < 16; ++y)
-      for (int x = 32; x < 64; ++x) beyond.color.at(x, y, c) = 1;
-  const auto with_tiles = gradients_of(cloud, camera, on(Backend::reference, Semantics::tile16_stop), beyond);
-  const auto dense = gradients_of(cloud, camera, on(Backend::reference), beyond);
-  EXPECT_EQ(with_tiles.opacity_logit[0], 0.0f);
-  EXPECT_EQ(with_tiles.mean.get(0), Vec3(0.0f)) << "that a step to the right would reach tile 2, no gradient says";
-  EXPECT_NE(dense.opacity_logit[0], 0.0f);
-  EXPECT_GT(std::abs(dense.mean.x[0]), 0.0f);
 }
 
 // Numbers that float finds hard --------------------------------------------------------------------------------------

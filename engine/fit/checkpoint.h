@@ -1,0 +1,46 @@
+// A fit under way, as bytes: what it takes to go on after an interruption.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/fit/fitter.h"
+#include "engine/fit/options.h"
+#include "engine/fit/photo.h"
+#include "engine/scene/gaussian_cloud.h"
+
+namespace engine::fit {
+
+/// How far a fit had come at some time.
+struct Milestone {
+  int iteration = 0;            ///< Done by then.
+  double seconds = 0;           ///< Of work, interruptions left out.
+  std::uint64_t gaussians = 0;
+  double psnr_db = 0;           ///< Mean over training views.
+  bool operator==(const Milestone&) const = default;
+};
+
+/// What there is to know of a fit beside its Gaussians.
+struct History {
+  double seconds = 0;  ///< Spent so far.
+  std::vector<Milestone> milestones;
+  bool operator==(const History&) const = default;
+};
+
+/// A number that another fit hardly has: one with other photos, another start or other options.
+[[nodiscard]] std::uint64_t identity_of(std::span<const Photo> photos, const scene::GaussianCloud& start,
+                                        const FitOptions& options);
+
+/// Magic, version, contents, checksum.
+[[nodiscard]] std::string encode(std::uint64_t identity, const History& history, const Fitter& fitter);
+
+/// What encode() made, put into a fitter that has just been made.
+///   errors  corrupt_data; unsupported: the version of another program; conflict: of another identity. `where` is
+///           "checkpoint". The fitter is of no use then.
+[[nodiscard]] Result<History> decode(std::string_view bytes, std::uint64_t identity, Fitter& fitter);
+
+}  // namespace engine::fit

@@ -1,0 +1,208 @@
+#include "engine/fit/fitter.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <utility>
+
+#include "engine/fit/start.h"
+#include "engine/optim/picture_view.h"
+#include "engine/scene/cloud_bytes.h"
+#include "engine/train/chance.h"
+
+namespace engine::fit {
+namespace {
+
+constexpr double identical_db = 100;  // infinity has no mean
+constexpr int least_side = 64;        // pixels: a smaller picture has nothing to fit to
+
+// Parts of the iterations after which photos are halved once less often, and after which bands are added.
+constexpr double finer_after[] = {0.1, 0.3};
+constexpr double bands_after = 0.1;
+
+train::Key key_of(const FitOptions& options) { return {.seed = options.seed, .interval = 0, .round = 0}; }
+
+std::vector<scene::Camera> cameras_of(std::span<const Photo> photos) {
+  std::vector<scene::Camera> cameras;
+  for (const Photo& photo : photos) cameras.push_back(photo.camera);
+  return cameras;
+}
+
+}  // namespace
+
+Result<void> validate(const FitOptions& options) {
+  const auto wrong = [](const char* what, const char* where) { return fail(ErrorCode::invalid_argument, what, where); };
+  if (options.iterations < 1) return wrong("A fit has 1 or more iterations.", "iterations");
+  if (options.sh_degree < 0 || options.sh_degree > scene::max_sh_degree)
+    return wrong("The SH degree is 0 to 3.", "sh_degree");
+  if (options.max_gaussians < 1) return wrong("A scene has 1 or more Gaussians.", "max_gaussians");
+  if (options.halvings < 0 || options.halvings > 8) return wrong("Photos are halved 0 to 8 times.", "halvings");
+  if (!(options.least_opacity >= 0 && options.least_opacity < 1))
+    return wrong("The least opacity is 0 to below 1.", "least_opacity");
+  if (auto valid = optim::validate(options.rates); !valid) return valid;
+  if (auto valid = optim::validate(options.adam); !valid) return valid;
+  if (auto valid = optim::validate(options.loss); !valid) return valid;
+  return train::validate(options.densify);
+}
+
+Stage stage_of(const FitOptions& options, int start_degree, int iteration) {
+  const double progress = double(iteration) / options.iterations;
+  Stage stage{options.halvings, std::max(start_degree, 0)};
+  for (const double after : finer_after)
+    if (progress >= after && stage.halvings > 0) --stage.halvings;
+  if (progress >= finer_after[1]) stage.halvings = 0;
+  stage.sh_degree = std::max(start_degree, std::min(options.sh_degree, int(progress / bands_after)));
+  return stage;
+}
+
+Fitter::Fitter(std::vector<Photo> photos, scene::GaussianCloud start, const FitOptions& options)
+    : options_(options),
+      photos_(std::move(photos)),
+      cloud_(std::move(start)),
+      start_degree_(cloud_.sh_degree),
+      start_rows_(cloud_.size()),
+      extent_(scene::capture_extent(cameras_of(photos_))),
+      adam_(cloud_.size(), cloud_.sh_degree, options.adam) {
+  assert(validate(options) && !photos_.empty() && cloud_.size() > 0 && cloud_.sh_degree <= options.sh_degree);
+  pull_.reset(cloud_.size());
+}
+
+void Fitter::enter(const Stage& stage) {
+  if (!stage_ || stage.halvings != stage_->halvings) {
+    halved_.clear();
+    if (stage.halvings > 0) halved_ = photos_;
+    for (Photo& photo : halved_)
+      for (int h = 0; h < stage.halvings && std::min(photo.camera.width, photo.camera.height) >= 2 * least_side; ++h)
+        photo = halved(photo);
+  }
+  if (stage.sh_degree != cloud_.sh_degree) {
+    cloud_ = with_sh_degree(cloud_, stage.sh_degree);
+    adam_ = train::CloudAdam(cloud_.size(), stage.sh_degree, options_.adam);
+  }
+  stage_ = stage;
+}
+
+Result<double> Fitter::step() {
+  assert(!done());
+  if (const Stage stage = stage_of(options_, start_degree_, iteration_); stage_ != stage) enter(stage);
+  const std::vector<Photo>& photos = halved_.empty() ? photos_ : halved_;
+  const std::size_t in_epoch = std::size_t(iteration_) % photos.size();
+  if (in_epoch == 0 || order_.empty())
+    order_ = train::shuffled(photos.size(), key_of(options_), std::size_t(iteration_) - in_epoch);
+  const Photo& photo = photos[order_[in_epoch]];
+  const scene::Camera& camera = photo.camera;
+
+  to_image(photo, photo_);
+  if (rendered_.width != camera.width || rendered_.height != camera.height)
+    rendered_ = scene::Image(camera.width, camera.height, 3);
+  frame_.forward(cloud_, camera, options_.background, rendered_);
+  v_rendered_.width = camera.width, v_rendered_.height = camera.height, v_rendered_.channels = 3;
+  v_rendered_.data.assign(rendered_.data.size(), 0.0f);
+  const double loss = optim::background_loss(optim::view(rendered_), optim::view(photo_), {}, photo_.pixels(),
+                                             options_.loss, loss_workspace_, optim::view(v_rendered_))
+                          .total;
+  gradients_.reset(cloud_.size(), cloud_.sh_degree);
+  frame_.backward(cloud_, v_rendered_, gradients_);
+
+  const optim::LearningRates& rates = options_.rates;
+  const double progress = double(iteration_) / options_.iterations;
+  auto stepped = adam_.step(
+      cloud_, gradients_,
+      {.position = extent_ * optim::exponential_decay(rates.position, rates.position * rates.last, progress),
+       .sh_dc = rates.sh_dc,
+       .sh_rest = rates.sh_rest,
+       .opacity_logit = rates.opacity_logit,
+       .log_scale = rates.log_scale,
+       .rotation = rates.rotation});
+  if (!stepped) {
+    stepped.error().where = "gaussian" + stepped.error().where;
+    return propagate(stepped);
+  }
+  if (!std::isfinite(loss))
+    return fail(ErrorCode::internal, "The loss is not a finite number at iteration " + std::to_string(iteration_) + ".",
+                "view[" + camera.name + "].loss");
+  ++iteration_;
+
+  const train::DensifyOptions& densify_options = options_.densify;
+  if (densify_options.every > 0 && iteration_ <= densify_options.until * options_.iterations) {
+    pull_.add(gradients_, camera);
+    if (iteration_ % densify_options.every == 0) densify();
+  }
+  return loss;
+}
+
+/// Grows evenly until densification ends: what is fitted longest has had the most time to find its place.
+std::size_t Fitter::most_gaussians() const {
+  const double part = std::min(1.0, iteration_ / std::max(1.0, options_.densify.until * options_.iterations));
+  const double from = double(start_rows_), to = double(options_.max_gaussians);
+  return to <= from ? start_rows_ : std::size_t(from + (to - from) * part);
+}
+
+void Fitter::densify() {
+  prune();
+  const std::size_t most = most_gaussians();
+  const double loss_weight = options_.loss.l1_weight + options_.loss.ssim_weight;
+  const auto rows = train::rows_to_densify(pull_, options_.densify.gradient * loss_weight,
+                                           most - std::min(most, cloud_.size()));
+  Rng rng = train::stream(key_of(options_), train::Purpose::split, std::size_t(iteration_));
+  train::add_children(cloud_, rows, options_.densify.dense * extent_, rng);
+  adam_.append_rows(rows.size());
+  pull_.reset(cloud_.size());
+}
+
+void Fitter::prune() {
+  const auto faintest = float(std::log(options_.least_opacity / (1 - options_.least_opacity)));  // -inf for 0
+  std::vector<std::uint8_t> keep(cloud_.size());
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < keep.size(); ++i) kept += keep[i] = cloud_.opacity_logit[i] >= faintest;
+  if (kept == keep.size() || kept == 0) return;
+  cloud_ = scene::select(cloud_, keep);
+  adam_.keep_rows(keep);
+  pull_.keep_rows(keep);
+}
+
+void Fitter::write(ByteWriter& out) const {
+  out.write(std::int32_t(iteration_));
+  scene::write_cloud(out, cloud_);
+  adam_.write(out);
+  out.write_all(std::span<const double>(pull_.sum));
+  out.write_all(std::span<const std::uint32_t>(pull_.views));
+}
+
+void Fitter::read(ByteReader& in) {
+  iteration_ = in.read<std::int32_t>();
+  cloud_ = scene::read_cloud(in);
+  if (!in.ok() || iteration_ < 0 || iteration_ > options_.iterations || cloud_.size() == 0) return in.fail();
+  order_.clear();
+  stage_.reset();
+  adam_ = train::CloudAdam(cloud_.size(), cloud_.sh_degree, options_.adam);
+  adam_.read(in);
+  pull_.reset(cloud_.size());
+  in.read_all(std::span(pull_.sum));
+  in.read_all(std::span(pull_.views));
+}
+
+Closeness closeness(const scene::GaussianCloud& cloud, std::span<const Photo> photos, Vec3 background) {
+  assert(!photos.empty());
+  Closeness mean;
+  render::Workspace workspace;
+  render::Rendering rendering;
+  optim::LossWorkspace loss_workspace;
+  scene::Image photo, ignored;
+  mean.worst_psnr_db = identical_db;
+  for (const Photo& wanted : photos) {
+    render::forward(cloud, wanted.camera, {.background = background}, {}, workspace, rendering);
+    for (float& value : rendering.color.data) value = std::clamp(value, 0.0f, 1.0f);
+    to_image(wanted, photo);
+    const double db = std::min(scene::psnr(rendering.color, photo), identical_db);
+    ignored = scene::Image(photo.width, photo.height, 3);
+    const double dissimilarity = optim::ssim_loss(optim::view(rendering.color), optim::view(photo), {}, photo.pixels(),
+                                                  0.0, loss_workspace, optim::view(ignored));
+    mean.psnr_db += db / double(photos.size());
+    mean.ssim += (1 - dissimilarity) / double(photos.size());
+    if (db <= mean.worst_psnr_db) mean.worst_psnr_db = db, mean.worst_view = wanted.camera.name;
+  }
+  return mean;
+}
+
+}  // namespace engine::fit

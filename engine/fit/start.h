@@ -1,0 +1,30 @@
+// The Gaussians that a fit begins with.
+// Source: Kerbl et al. 2023, section 5.1 and the program published with it: isotropic Gaussians as large as the points
+// around are near.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "engine/core/vec.h"
+#include "engine/scene/gaussian_cloud.h"
+
+namespace engine::fit {
+
+/// A point of a sparse reconstruction.
+struct ColoredPoint {
+  DVec3 position{0.0};                ///< World units.
+  std::array<std::uint8_t, 3> rgb{};  ///< Display-referred.
+};
+
+/// One Gaussian per point, in their order: opacity 0.1, the point's colour from everywhere, sigma the root mean square
+/// distance to the three nearest other points. That is kept from 0 (points that coincide) and from what would cover
+/// everything (points far from all others): within a factor of 1e4 below, and of 30 above, the median sigma.
+///   sh_degree  of the result; bands beyond 0 are zero
+[[nodiscard]] scene::GaussianCloud gaussians_at(std::span<const ColoredPoint> points, int sh_degree);
+
+/// The same Gaussians with room for more bands (zero), or without those beyond `sh_degree`.
+[[nodiscard]] scene::GaussianCloud with_sh_degree(const scene::GaussianCloud& cloud, int sh_degree);
+
+}  // namespace engine::fit

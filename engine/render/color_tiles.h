@@ -1,0 +1,38 @@
+// Tiles of pictures that hold nothing but colour: what passes that are differentiated have in common.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "engine/render/splats.h"
+
+namespace engine::render {
+
+/// All tiles of the camera's picture.
+inline TileGrid whole_grid(const scene::Camera& camera) {
+  return {.columns = tile_columns(camera.width),
+          .rows = tile_rows(camera.height),
+          .pixels = {0, 0, camera.width, camera.height},
+          .wanted = {}};
+}
+
+/// Blends a tile of the listed splats and copies it to a picture of `region`, which begins at a tile's edge and holds
+/// the tile as far as the whole picture does.
+inline void draw_tile(const Splat* splats, std::span<const std::uint32_t> list, std::uint32_t tile, int columns,
+                      Vec3 background, scene::Rect region, scene::Image& color) {
+  TilePixels pixels;
+  const int x0 = int(tile) % columns * tile_size, y0 = int(tile) / columns * tile_size;
+  composite_tile(splats, list, x0, y0, {.color = true}, background, pixels);
+  const int width = std::min(x0 + tile_size, region.x1) - x0, height = std::min(y0 + tile_size, region.y1) - y0;
+  int channel = 0;
+  for (const float* from : {pixels.red, pixels.green, pixels.blue}) {
+    float* const plane = color.plane(channel++).data();
+    for (int y = 0; y < height; ++y)
+      std::copy_n(from + y * tile_size, width,
+                  plane + std::ptrdiff_t(y0 - region.y0 + y) * color.width + (x0 - region.x0));
+  }
+}
+
+}  // namespace engine::render

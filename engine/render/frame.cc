@@ -1,0 +1,62 @@
+#include "engine/render/frame.h"
+
+#include <algorithm>
+#include <cassert>
+#include <numeric>
+#include <vector>
+
+#include "engine/core/parallel.h"
+#include "engine/render/backward_stages.h"
+#include "engine/render/color_tiles.h"
+
+namespace engine::render {
+
+struct Frame::Impl {
+  scene::Camera camera;
+  Vec3 background{0.0f};
+  TileGrid grid;
+  ForwardBuffers buffers;
+  WalkBuffers walk;
+  std::vector<std::uint32_t> rows;  ///< 0, 1, 2, ...
+};
+
+Frame::Frame() : impl_(std::make_unique<Impl>()) {}
+Frame::~Frame() = default;
+Frame::Frame(Frame&&) noexcept = default;
+Frame& Frame::operator=(Frame&&) noexcept = default;
+
+void Frame::forward(const scene::GaussianCloud& cloud, const scene::Camera& camera, Vec3 background,
+                    scene::Image& color) {
+  assert(scene::validate(camera));
+  assert(color.width == camera.width && color.height == camera.height && color.channels == 3);
+  Impl& frame = *impl_;
+  frame.camera = camera, frame.background = background;
+  frame.grid = whole_grid(camera);
+  ForwardBuffers& buffers = frame.buffers;
+  project(cloud, view_params<float>(camera), cloud.sh_degree, {}, Culling::exact, frame.grid.pixels, buffers);
+  sort_by_depth(buffers);
+  bin(frame.grid, buffers);
+  parallel_for(buffers.tile_begin.size() - 1, 1, [&](std::size_t tile, std::size_t) {
+    const std::uint32_t first = buffers.tile_begin[tile], last = buffers.tile_begin[tile + 1];
+    draw_tile(buffers.splats.data(), {buffers.entries.data() + first, last - first}, std::uint32_t(tile),
+              frame.grid.columns, background, frame.grid.pixels, color);
+  });
+}
+
+void Frame::backward(const scene::GaussianCloud& cloud, const scene::Image& v_color, Gradients& out) {
+  Impl& frame = *impl_;
+  assert(v_color.width == frame.camera.width && v_color.height == frame.camera.height && v_color.channels == 3);
+  assert(out.size() == cloud.size() && out.sh_degree == cloud.sh_degree);
+  std::int32_t* const slots = frame.walk.slot_of_splat.reserve(frame.buffers.count);
+  for (std::size_t i = 0; i < frame.buffers.count; ++i) slots[i] = std::int32_t(frame.buffers.splats[i].row);
+  frame.rows.resize(cloud.size());
+  std::iota(frame.rows.begin(), frame.rows.end(), 0u);
+  const auto params = view_params<float>(frame.camera);
+  clear_mean2d(out);
+  walk_tiles(frame.buffers, frame.grid, {.color = &v_color}, frame.background, cloud.size(), frame.walk);
+  parallel_for(cloud.size(), project_vjp_block, [&](std::size_t begin, std::size_t end) {
+    project_rows_vjp(cloud, 0, params, cloud.sh_degree, frame.rows, frame.walk.rows, begin, end, out);
+  });
+}
+
+}  // namespace engine::render
