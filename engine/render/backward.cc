@@ -1,5 +1,7 @@
 #include "engine/render/backward.h"
 
+#include <hwy/cache_control.h>
+
 #include <algorithm>
 #include <cassert>
 
@@ -83,6 +85,7 @@ void Gradients::reset(std::size_t rows, int degree) {
 namespace {
 
 constexpr std::size_t sum_block = 2048;  // splats per unit of parallel work
+constexpr std::size_t sum_tiles = 16;    // tiles whose entries are fetched ahead
 
 /// Reads dL/d(pictures) of the tile whose first pixel is (x0, y0), and what they make of the ray's end. False if all is
 /// zero.
@@ -111,32 +114,52 @@ bool load_tile(const UpstreamPlanes& upstream, scene::Rect area, Vec3 background
 /// of each tile's list to itself, since lists are in the order of splats: no two threads add to the same sum.
 void sum_over_tiles(const ForwardBuffers& forward, std::size_t rows, WalkBuffers& work) {
   work.rows.seen.assign(rows, 0);
-  std::array<float*, TileGradient::sums> sums;
-  for (std::size_t k = 0; k < sums.size(); ++k) sums[k] = work.rows.sums[k].reserve(rows);
+  TileGradient* const sums = work.rows.sums.reserve(rows);
   parallel_for(forward.count, sum_block, [&](std::size_t begin, std::size_t end) {
     const std::int32_t* const slots = work.slot_of_splat.data();
     if (std::all_of(slots + begin, slots + end, [](std::int32_t slot) { return slot < 0; })) return;
     std::vector<std::array<double, TileGradient::sums>> totals(end - begin);
     std::vector<std::uint8_t> seen(end - begin, 0);
     const std::uint32_t* const list = forward.entries.data();
-    for (std::size_t tile = 0; tile < work.walked.size(); ++tile) {
-      if (work.walked[tile] == 0) continue;
-      const std::uint32_t* const last = list + forward.tile_begin[tile + 1];
-      for (const std::uint32_t* entry = std::lower_bound(list + forward.tile_begin[tile], last, begin);
-           entry != last && *entry < end; ++entry) {
-        if (slots[*entry] < 0) continue;
-        const TileGradient& v = work.entries[std::size_t(entry - list)];
-        const std::array<float, TileGradient::sums> values{
-            v.g, v.along, v.across, v.along_along, v.along_across, v.across_across, v.red, v.green, v.blue, v.depth};
-        auto& total = totals[*entry - begin];
-        for (std::size_t k = 0; k < values.size(); ++k) total[k] += double(values[k]);
-        seen[*entry - begin] = 1;
+    std::array<const std::uint32_t*, sum_tiles> first;
+    for (std::size_t tiles = 0; tiles < work.walked.size(); tiles += sum_tiles) {
+      const std::size_t tiles_end = std::min(tiles + sum_tiles, work.walked.size());
+      for (std::size_t tile = tiles; tile < tiles_end; ++tile) {
+        if (work.walked[tile] == 0) continue;
+        const std::uint32_t* const from = std::lower_bound(list + forward.tile_begin[tile],
+                                                           list + forward.tile_begin[tile + 1], std::uint32_t(begin));
+        first[tile - tiles] = from;
+        const auto* const line = reinterpret_cast<const char*>(work.entries.data() + (from - list));
+        for (std::size_t i = 0; i < 4; ++i) hwy::Prefetch(line + 64 * i);
+      }
+      for (std::size_t tile = tiles; tile < tiles_end; ++tile) {
+        if (work.walked[tile] == 0) continue;
+        const std::uint32_t* const last = list + forward.tile_begin[tile + 1];
+        for (const std::uint32_t* entry = first[tile - tiles]; entry != last && *entry < end; ++entry) {
+          if (slots[*entry] < 0) continue;
+          const TileGradient& v = work.entries[std::size_t(entry - list)];
+          const std::array<float, TileGradient::sums> values{
+              v.g, v.along, v.across, v.along_along, v.along_across, v.across_across, v.red, v.green, v.blue, v.depth};
+          auto& total = totals[*entry - begin];
+          for (std::size_t k = 0; k < values.size(); ++k) total[k] += double(values[k]);
+          seen[*entry - begin] = 1;
+        }
       }
     }
     for (std::size_t i = begin; i < end; ++i) {
       if (seen[i - begin] == 0) continue;
       const auto slot = std::size_t(slots[i]);
-      for (std::size_t k = 0; k < sums.size(); ++k) sums[k][slot] = float(totals[i - begin][k]);
+      const auto& total = totals[i - begin];
+      sums[slot] = {.g = float(total[0]),
+                    .along = float(total[1]),
+                    .across = float(total[2]),
+                    .along_along = float(total[3]),
+                    .along_across = float(total[4]),
+                    .across_across = float(total[5]),
+                    .red = float(total[6]),
+                    .green = float(total[7]),
+                    .blue = float(total[8]),
+                    .depth = float(total[9])};
       work.rows.seen[slot] = 1;
     }
   });

@@ -33,24 +33,24 @@ struct alignas(64) TileUpstream {
 };
 
 /// Memory for what a tile's walk keeps from the way to the last blended splat to the way back: per batch of 64 splats a
-/// part, and an alpha per splat and pixel of the blocks it reaches. Kept from tile to tile.
+/// part, and an alpha and a weight per splat and pixel of the blocks it reaches. Kept from tile to tile.
 class TileTrace {
  public:
   struct alignas(64) Part {
     std::byte bytes[8 * 1024];
   };
-  /// Forgets all alphas; their memory is used again.
+  /// Forgets all alphas and weights; their memory is used again.
   void clear() { slab_ = used_ = 0; }
   /// The i-th part; parts are asked for in order, and stay where they are.
   Part& part(std::size_t i) {
     if (parts_.size() <= i) parts_.push_back(std::make_unique_for_overwrite<Part>());
     return *parts_[i];
   }
-  /// Room for n alphas, at most slab_size; aligned for vectors where n always is a multiple of their lanes.
-  float* alphas(std::size_t n) {
+  /// Room for n floats, at most slab_size; aligned for vectors where n always is a multiple of their lanes.
+  float* floats(std::size_t n) {
     if (used_ + n > slab_size) ++slab_, used_ = 0;
     if (slabs_.size() <= slab_) slabs_.push_back(std::make_unique_for_overwrite<Slab>());
-    float* const room = slabs_[slab_]->alphas + used_;
+    float* const room = slabs_[slab_]->floats + used_;
     used_ += n;
     return room;
   }
@@ -58,7 +58,7 @@ class TileTrace {
 
  private:
   struct alignas(64) Slab {
-    float alphas[slab_size];
+    float floats[slab_size];
   };
   std::vector<std::unique_ptr<Part>> parts_;
   std::vector<std::unique_ptr<Slab>> slabs_;
@@ -73,9 +73,9 @@ class TileTrace {
 void composite_tile_vjp(const Splat* splats, std::span<const std::uint32_t> list, const std::int32_t* row_slot, int x0,
                         int y0, const TileUpstream& upstream, bool with_depth, TileTrace& trace, TileGradient* out);
 
-/// Sums over tiles, for the rows [R] that may change; one array per member of TileGradient.
+/// Sums over tiles, for the rows [R] that may change. Side by side: they are written in the order of depth.
 struct RowGradients {
-  Buffer<float> sums[TileGradient::sums];
+  Buffer<TileGradient> sums;       ///< [R]
   std::vector<std::uint8_t> seen;  ///< [R] 0: no tile has the row, and its sums are undefined.
 };
 

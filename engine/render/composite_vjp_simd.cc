@@ -20,34 +20,37 @@ namespace HWY_NAMESPACE {
 struct TracedBatch {
   Batch batch;                       ///< reach: only of blocks that still had a ray.
   std::uint64_t changeable;          ///< Bit k: splat k's row may change.
-  std::uint32_t end[Blocks::count];  ///< Where a block's alphas end.
-  float* alpha;                      ///< One vector per set bit of reach, block by block: zero where not blended.
+  std::uint32_t end[Blocks::count];  ///< Where a block's steps end.
+  float* steps;  ///< Per set bit of reach, block by block: a vector of alphas and one of weights, zero where not
+                 ///< blended.
 };
+constexpr std::size_t step_size = 2 * Blocks::lanes;
 static_assert(sizeof(TracedBatch) <= sizeof(TileTrace::Part));
-static_assert(Batch::size * TilePixels::count <= TileTrace::slab_size);
+static_assert(Batch::size * 2 * TilePixels::count <= TileTrace::slab_size);
 
 /// The rays of a tile, block by block.
 struct alignas(64) Rays {
-  float transmittance[TilePixels::count];  ///< On the way there as TilePixels has it; on the way back as RayBackward.
-  float behind[TilePixels::count];
+  float transmittance[TilePixels::count];  ///< On the way there, as TilePixels has it.
+  float beyond[TilePixels::count];  ///< On the way back: dL/dT of all that lies farther back, T being what reaches it.
 };
 
-/// Where the pixels of a tile's blocks are.
-struct Lanes {
-  V x, y;
+/// Where the pixels of a tile are, block by block.
+struct alignas(64) Places {
+  float x[TilePixels::count], y[TilePixels::count];
+
+  Places() {
+    for (std::size_t i = 0; i < TilePixels::count; ++i) {
+      const std::size_t block = i / Blocks::lanes, lane = i % Blocks::lanes;
+      x[i] = float(block % Blocks::columns * Blocks::width + lane % Blocks::width);
+      y[i] = float(block / Blocks::columns * Blocks::height + lane / Blocks::width);
+    }
+  }
 };
 
-HWY_INLINE V PixelX(D d, const Lanes& lanes, std::size_t block) {
-  return hn::Add(lanes.x, hn::Set(d, float(block % Blocks::columns * Blocks::width)));
-}
-HWY_INLINE V PixelY(D d, const Lanes& lanes, std::size_t block) {
-  return hn::Add(lanes.y, hn::Set(d, float(block / Blocks::columns * Blocks::height)));
-}
-
-/// Blend() of composite_simd.cc, of which only alphas and transmittance are kept. False if all rays of the block had
-/// ended before.
-///   next  where the block's alphas start; set to where they end
-HWY_INLINE bool Trace(D d, const Lanes& lanes, std::size_t block, float*& next, TracedBatch& traced,
+/// Blend() of composite_simd.cc, of which alphas, weights and transmittance are kept. False if all rays of the block
+/// had ended before.
+///   next  where the block's steps start; set to where they end
+HWY_INLINE bool Trace(D d, const Places& places, std::size_t block, float*& next, TracedBatch& traced,
                       float* transmittances) {
   const Batch& batch = traced.batch;
   const V threshold = hn::Set(d, -log2_255), ceiling = hn::Set(d, float(max_alpha)),
@@ -57,8 +60,8 @@ HWY_INLINE bool Trace(D d, const Lanes& lanes, std::size_t block, float*& next, 
     traced.batch.reach[block] = 0;
     return false;
   }
-  const V px = PixelX(d, lanes, block), py = PixelY(d, lanes, block);
-  float* alphas = next;
+  const V px = hn::Load(d, places.x + block * Blocks::lanes), py = hn::Load(d, places.y + block * Blocks::lanes);
+  float* step = next;
   for (std::uint64_t rest = batch.reach[block]; rest != 0; rest &= rest - 1) {
     const std::size_t k = hwy::Num0BitsBelowLS1Bit_Nonzero64(rest);
     const V u =
@@ -68,70 +71,120 @@ HWY_INLINE bool Trace(D d, const Lanes& lanes, std::size_t block, float*& next, 
     const V alpha = hn::IfThenElseZero(hn::Ge(power, threshold), hn::Min(Exp2(d, power), ceiling));
     const V after = hn::NegMulAdd(transmittance, alpha, transmittance);
     const auto going_on = hn::Ge(after, floor);
-    hn::Store(hn::IfThenElseZero(going_on, alpha), d, alphas);
-    alphas += Blocks::lanes;
+    hn::Store(hn::IfThenElseZero(going_on, alpha), d, step);
+    hn::Store(hn::IfThenElseZero(going_on, hn::Mul(transmittance, alpha)), d, step + Blocks::lanes);
+    step += step_size;
     transmittance = hn::IfThenElse(going_on, after, hn::Or(transmittance, sign));
   }
-  next = alphas;
-  traced.end[block] = std::uint32_t(alphas - traced.alpha);
+  next = step;
+  traced.end[block] = std::uint32_t(step - traced.steps);
   hn::Store(transmittance, d, transmittances + block * Blocks::lanes);
   return true;
 }
 
-/// Sums of a batch, lane by lane: [splat][member of TileGradient][lane].
-struct BatchSums {
-  alignas(64) float lanes[Batch::size][TileGradient::sums][Blocks::lanes];
+/// Sums over the lanes of four vectors.
+HWY_INLINE void StoreSums(D d, V a, V b, V c, V e, float* to) {
+#if HWY_TARGET == HWY_SCALAR
+  for (const V sum : {a, b, c, e}) *to++ = hn::GetLane(sum);
+  (void)d;
+#else
+  static_assert(Blocks::lanes >= 4);
+  // Per four lanes: (a0 + a2, b0 + b2, a1 + a3, b1 + b3), then the sums of all four, then those of the next four.
+  const hn::Repartition<double, D> d64;
+  const auto ab = hn::BitCast(d64, hn::Add(hn::InterleaveLower(d, a, b), hn::InterleaveUpper(d, a, b)));
+  const auto ce = hn::BitCast(d64, hn::Add(hn::InterleaveLower(d, c, e), hn::InterleaveUpper(d, c, e)));
+  alignas(64) float sums[Blocks::lanes];
+  hn::Store(hn::Add(hn::BitCast(d, hn::InterleaveLower(d64, ab, ce)), hn::BitCast(d, hn::InterleaveUpper(d64, ab, ce))),
+            d, sums);
+  const hn::FixedTag<float, 4> d4;
+  auto sum = hn::Load(d4, sums);
+  for (std::size_t i = 4; i < Blocks::lanes; i += 4) sum = hn::Add(sum, hn::Load(d4, sums + i));
+  hn::StoreU(sum, d4, to);
+#endif
+}
+
+/// A set of blocks.
+struct BlockSet {
+  static constexpr std::size_t words = (Blocks::count + 63) / 64;
+  std::uint64_t bits[words];
 };
 
-/// Walks one block's rays back through a batch. The pullbacks are blend_vjp() and falloff_vjp() of blend.h.
+/// Walks all rays back through a batch, splat by splat: a splat's sums stay in registers. The pullbacks are blend_vjp()
+/// and falloff_vjp() of blend.h in another form: with X = dL/dT of what lies beyond, per unit of transmittance,
+///   dL/dalpha = T (v_weight - X),   X <- X + alpha (v_weight - X),
+/// which needs no division, and T alpha is the weight.
+///   first  of the splats that are asked for: in front of it nothing may change
+///   out    [splats of the batch] written for those that may change
 template <bool kDepth>
-HWY_INLINE void WalkBack(D d, const Lanes& lanes, std::size_t block, const TracedBatch& traced,
-                         const TileUpstream& upstream, Rays& rays, BatchSums& sums) {
+HWY_INLINE void WalkBack(D d, const Places& places, std::size_t first, const TracedBatch& traced,
+                         const TileUpstream& upstream, Rays& rays, TileGradient* out) {
   const Batch& batch = traced.batch;
-  if (batch.reach[block] == 0) return;
-  const std::size_t at = block * Blocks::lanes;
-  const V one = hn::Set(d, 1.0f), ceiling = hn::Set(d, float(max_alpha));
-  const V px = PixelX(d, lanes, block), py = PixelY(d, lanes, block);
-  const V v_red = hn::Load(d, upstream.red + at), v_green = hn::Load(d, upstream.green + at),
-          v_blue = hn::Load(d, upstream.blue + at), v_depth = hn::Load(d, upstream.depth + at);
-  V transmittance = hn::Load(d, rays.transmittance + at), behind = hn::Load(d, rays.behind + at);
-  const float* alphas = traced.alpha + traced.end[block];
-  for (std::uint64_t rest = batch.reach[block]; rest != 0;) {
+  BlockSet blocks[Batch::size] = {};
+  const float* ends[Blocks::count];
+  std::uint64_t met = 0;
+  for (std::size_t block = 0; block < Blocks::count; ++block) {
+    ends[block] = traced.steps + traced.end[block];
+    met |= batch.reach[block];
+    for (std::uint64_t rest = batch.reach[block]; rest != 0; rest &= rest - 1)
+      blocks[hwy::Num0BitsBelowLS1Bit_Nonzero64(rest)].bits[block / 64] |= std::uint64_t{1} << block % 64;
+  }
+  const V zero = hn::Zero(d), ceiling = hn::Set(d, float(max_alpha));
+  for (std::uint64_t rest = (met | traced.changeable) >> first << first; rest != 0;) {
     const std::size_t k = hwy::Num0BitsAboveMS1Bit_Nonzero64(rest) ^ 63;
     const std::uint64_t bit = std::uint64_t{1} << k;
     rest ^= bit;
-    alphas -= Blocks::lanes;
-    const V alpha = hn::Load(d, alphas);
-    V v_weight =
-        hn::MulAdd(hn::Set(d, batch.red[k]), v_red,
-                   hn::MulAdd(hn::Set(d, batch.green[k]), v_green, hn::Mul(hn::Set(d, batch.blue[k]), v_blue)));
-    if constexpr (kDepth) v_weight = hn::MulAdd(hn::Set(d, batch.depth[k]), v_depth, v_weight);
-    const V inverse_keep = hn::Div(one, hn::Sub(one, alpha));
-    transmittance = hn::Mul(transmittance, inverse_keep);
-    const V weight = hn::Mul(transmittance, alpha);
-    const V v_alpha = hn::NegMulAdd(behind, inverse_keep, hn::Mul(transmittance, v_weight));
-    behind = hn::MulAdd(weight, v_weight, behind);
-    if ((traced.changeable & bit) == 0) continue;
-
-    const V u =
-        hn::MulAdd(hn::Set(d, batch.l1[k]), px, hn::MulAdd(hn::Set(d, batch.l2[k]), py, hn::Set(d, batch.u0[k])));
-    const V v = hn::MulAdd(hn::Set(d, batch.l3[k]), py, hn::Set(d, batch.v0[k]));
-    const V g = hn::IfThenElseZero(hn::Lt(alpha, ceiling), hn::Mul(alpha, v_alpha));
-    const V gu = hn::Mul(g, u), gv = hn::Mul(g, v);
-    float* to = sums.lanes[k][0];
-    const auto add = [&](std::size_t sum, V value) {
-      hn::Store(hn::Add(hn::Load(d, to + sum * Blocks::lanes), value), d, to + sum * Blocks::lanes);
+    const V red = hn::Set(d, batch.red[k]), green = hn::Set(d, batch.green[k]), blue = hn::Set(d, batch.blue[k]),
+            depth = hn::Set(d, batch.depth[k]);
+    const auto each_block = [&](auto&& use) {
+      for (std::size_t word = 0; word < BlockSet::words; ++word)
+        for (std::uint64_t left = blocks[k].bits[word]; left != 0; left &= left - 1)
+          use(64 * word + hwy::Num0BitsBelowLS1Bit_Nonzero64(left));
     };
-    const auto add_product = [&](std::size_t sum, V a, V b) {
-      hn::Store(hn::MulAdd(a, b, hn::Load(d, to + sum * Blocks::lanes)), d, to + sum * Blocks::lanes);
+    /// v_weight - X.
+    const auto gain = [&](std::size_t at, V v_red, V v_green, V v_blue, V beyond) {
+      V sum = hn::MulAdd(red, v_red, hn::MulAdd(green, v_green, hn::MulSub(blue, v_blue, beyond)));
+      if constexpr (kDepth) sum = hn::MulAdd(depth, hn::Load(d, upstream.depth + at), sum);
+      return sum;
     };
-    add(0, g), add(1, gu), add(2, gv);
-    add_product(3, gu, u), add_product(4, gu, v), add_product(5, gv, v);
-    add_product(6, weight, v_red), add_product(7, weight, v_green), add_product(8, weight, v_blue);
-    if constexpr (kDepth) add_product(9, weight, v_depth);
+    if ((traced.changeable & bit) == 0) {
+      each_block([&](std::size_t block) {
+        const std::size_t at = block * Blocks::lanes;
+        const V alpha = hn::Load(d, ends[block] -= step_size), beyond = hn::Load(d, rays.beyond + at);
+        const V v = gain(at, hn::Load(d, upstream.red + at), hn::Load(d, upstream.green + at),
+                         hn::Load(d, upstream.blue + at), beyond);
+        hn::Store(hn::MulAdd(alpha, v, beyond), d, rays.beyond + at);
+      });
+      continue;
+    }
+    const V l1 = hn::Set(d, batch.l1[k]), l2 = hn::Set(d, batch.l2[k]), l3 = hn::Set(d, batch.l3[k]),
+            u0 = hn::Set(d, batch.u0[k]), v0 = hn::Set(d, batch.v0[k]);
+    V sum_g = zero, sum_u = zero, sum_v = zero, sum_uu = zero, sum_uv = zero, sum_vv = zero;
+    V sum_red = zero, sum_green = zero, sum_blue = zero, sum_depth = zero;
+    each_block([&](std::size_t block) {
+      const std::size_t at = block * Blocks::lanes;
+      const float* const step = ends[block] -= step_size;
+      const V alpha = hn::Load(d, step), weight = hn::Load(d, step + Blocks::lanes);
+      const V beyond = hn::Load(d, rays.beyond + at);
+      const V v_red = hn::Load(d, upstream.red + at), v_green = hn::Load(d, upstream.green + at),
+              v_blue = hn::Load(d, upstream.blue + at);
+      const V v_gain = gain(at, v_red, v_green, v_blue, beyond);
+      hn::Store(hn::MulAdd(alpha, v_gain, beyond), d, rays.beyond + at);
+      const V px = hn::Load(d, places.x + at), py = hn::Load(d, places.y + at);
+      const V u = hn::MulAdd(l1, px, hn::MulAdd(l2, py, u0)), v = hn::MulAdd(l3, py, v0);
+      const V g = hn::IfThenElseZero(hn::Lt(alpha, ceiling), hn::Mul(weight, v_gain));
+      const V gu = hn::Mul(g, u), gv = hn::Mul(g, v);
+      sum_g = hn::Add(sum_g, g), sum_u = hn::Add(sum_u, gu), sum_v = hn::Add(sum_v, gv);
+      sum_uu = hn::MulAdd(gu, u, sum_uu), sum_uv = hn::MulAdd(gu, v, sum_uv), sum_vv = hn::MulAdd(gv, v, sum_vv);
+      sum_red = hn::MulAdd(weight, v_red, sum_red), sum_green = hn::MulAdd(weight, v_green, sum_green);
+      sum_blue = hn::MulAdd(weight, v_blue, sum_blue);
+      if constexpr (kDepth) sum_depth = hn::MulAdd(weight, hn::Load(d, upstream.depth + at), sum_depth);
+    });
+    // The members of TileGradient, in order; two are written twice, as they fill up the last four.
+    auto* const to = reinterpret_cast<float*>(out + k);
+    StoreSums(d, sum_g, sum_u, sum_v, sum_uu, to);
+    StoreSums(d, sum_uv, sum_vv, sum_red, sum_green, to + 4);
+    StoreSums(d, sum_red, sum_green, sum_blue, sum_depth, to + 6);
   }
-  hn::Store(transmittance, d, rays.transmittance + at);
-  hn::Store(behind, d, rays.behind + at);
 }
 
 /// From rows to block order.
@@ -149,12 +202,7 @@ void WalkTile(const Splat* splats, const std::uint32_t* list, std::size_t count,
   const D d;
   const auto part = [&](std::size_t i) -> TracedBatch& { return *reinterpret_cast<TracedBatch*>(trace.part(i).bytes); };
   const std::size_t batches = (count + Batch::size - 1) / Batch::size;
-  alignas(64) float lanes_x[Blocks::lanes], lanes_y[Blocks::lanes];
-  for (std::size_t i = 0; i < Blocks::lanes; ++i) {
-    lanes_x[i] = float(i % Blocks::width);
-    lanes_y[i] = float(i / Blocks::width);
-  }
-  const Lanes lanes{hn::Load(d, lanes_x), hn::Load(d, lanes_y)};
+  const Places places;
 
   trace.clear();
   Rays rays;
@@ -171,10 +219,10 @@ void WalkTile(const Splat* splats, const std::uint32_t* list, std::size_t count,
     if (traced.changeable != 0) first_changeable = HWY_MIN(first_changeable, traced_batches);
     std::size_t vectors = 0;
     for (const std::uint64_t reach : traced.batch.reach) vectors += std::size_t(std::popcount(reach));
-    float* next = traced.alpha = trace.alphas(vectors * Blocks::lanes);
+    float* next = traced.steps = trace.floats(vectors * step_size);
     live = false;
     for (std::size_t block = 0; block < Blocks::count; ++block)
-      live |= Trace(d, lanes, block, next, traced, rays.transmittance);
+      live |= Trace(d, places, block, next, traced, rays.transmittance);
   }
   // What no ray got to.
   for (std::size_t k = traced_batches * Batch::size; k < count; ++k)
@@ -186,33 +234,13 @@ void WalkTile(const Splat* splats, const std::uint32_t* list, std::size_t count,
   ToBlocks(rows_upstream.blue, upstream.blue);
   ToBlocks(rows_upstream.depth, upstream.depth);
   ToBlocks(rows_upstream.transmittance, upstream.transmittance);
-  for (std::size_t i = 0; i < TilePixels::count; i += Blocks::lanes) {
-    const V left = hn::Abs(hn::Load(d, rays.transmittance + i));
-    hn::Store(left, d, rays.transmittance + i);
-    hn::Store(hn::Mul(left, hn::Load(d, upstream.transmittance + i)), d, rays.behind + i);
-  }
-  BatchSums sums;
+  std::copy_n(upstream.transmittance, TilePixels::count, rays.beyond);
   // In front of the nearest splat that may change nothing is asked for.
   for (std::size_t b = traced_batches; b-- > first_changeable;) {
     const TracedBatch& traced = part(b);
-    for (std::uint64_t rest = traced.changeable; rest != 0; rest &= rest - 1)
-      std::fill_n(sums.lanes[hwy::Num0BitsBelowLS1Bit_Nonzero64(rest)][0], TileGradient::sums * Blocks::lanes, 0.0f);
-    for (std::size_t block = 0; block < Blocks::count; ++block)
-      WalkBack<kDepth>(d, lanes, block, traced, upstream, rays, sums);
-    for (std::uint64_t rest = traced.changeable; rest != 0; rest &= rest - 1) {
-      const std::size_t k = hwy::Num0BitsBelowLS1Bit_Nonzero64(rest);
-      const auto sum = [&](std::size_t i) { return hn::GetLane(hn::SumOfLanes(d, hn::Load(d, sums.lanes[k][i]))); };
-      out[b * Batch::size + k] = {.g = sum(0),
-                                  .along = sum(1),
-                                  .across = sum(2),
-                                  .along_along = sum(3),
-                                  .along_across = sum(4),
-                                  .across_across = sum(5),
-                                  .red = sum(6),
-                                  .green = sum(7),
-                                  .blue = sum(8),
-                                  .depth = kDepth ? sum(9) : 0.0f};
-    }
+    const std::size_t first_asked =
+        b == first_changeable ? hwy::Num0BitsBelowLS1Bit_Nonzero64(traced.changeable) : std::size_t{0};
+    WalkBack<kDepth>(d, places, first_asked, traced, upstream, rays, out + b * Batch::size);
   }
 }
 

@@ -239,7 +239,11 @@ void ProjectRowsVjp(const scene::GaussianCloud& cloud, std::size_t first_row, co
     seen.rotation[0][i] = cloud.rotation.w[row], seen.rotation[1][i] = cloud.rotation.x[row];
     seen.rotation[2][i] = cloud.rotation.y[row], seen.rotation[3][i] = cloud.rotation.z[row];
     seen.logit[i] = cloud.opacity_logit[row];
-    for (std::size_t k = 0; k < TileGradient::sums; ++k) seen.sums[k][i] = v_rows.sums[k][r];
+    const TileGradient& sums = v_rows.sums[r];
+    seen.sums[0][i] = sums.g, seen.sums[1][i] = sums.along, seen.sums[2][i] = sums.across;
+    seen.sums[3][i] = sums.along_along, seen.sums[4][i] = sums.along_across, seen.sums[5][i] = sums.across_across;
+    seen.sums[6][i] = sums.red, seen.sums[7][i] = sums.green, seen.sums[8][i] = sums.blue;
+    seen.sums[9][i] = sums.depth;
   }
   if (seen.count == 0) return;
   // What fills up the last vector: the last row once more.
