@@ -55,6 +55,8 @@ EditRecord decode(const ordered_json& object) {
   record.eta_seconds = optional_at<double>(object, "eta_seconds");
   record.interval = object.at("interval").get<int>();
   record.intervals = object.at("intervals").get<int>();
+  record.iteration = object.at("iteration").get<int>();
+  record.loss = optional_at<double>(object, "loss");
   for (const ordered_json& finished : object.at("finished_intervals"))
     record.finished_intervals.push_back(decode_interval(finished));
   for (const ordered_json& count : object.at("handles")) record.handles.push_back({count.get<std::size_t>()});
@@ -82,6 +84,8 @@ std::string to_json(const EditRecord& record) {
                    {"eta_seconds", or_null(record.eta_seconds)},
                    {"interval", record.interval},
                    {"intervals", record.intervals},
+                   {"iteration", record.iteration},
+                   {"loss", or_null(record.loss)},
                    {"finished_intervals", std::move(finished)},
                    {"handles", std::move(handles)},
                    {"request", nullptr},

@@ -17,6 +17,8 @@ struct EditRecord {
   double progress = 0;
   std::optional<double> eta_seconds;
   int interval = 0, intervals = 0;
+  int iteration = 0;
+  std::optional<double> loss;
   std::vector<FinishedInterval> finished_intervals;
   std::vector<HandleCount> handles;
   std::optional<EditRequest> request;

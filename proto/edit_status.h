@@ -52,6 +52,9 @@ struct EditStatus {
   double progress = 0;                ///< 0 to 1, never falls.
   std::optional<double> eta_seconds;  ///< Of the running edit, as of its last news.
   int interval = 0, intervals = 0;    ///< In work, of T; 0 before they are known.
+  int iteration = 0;           ///< Done of the optimisation of the interval in work; 0 while it does not optimise.
+  int iterations = 0;          ///< Of each interval, all corrections together; 0: nothing is optimised.
+  std::optional<double> loss;  ///< Of the last iteration, as of its last news, while it optimises.
   std::vector<FinishedInterval> finished_intervals;
   std::vector<HandleCount> handles;
   EditRequest request;  ///< As asked; with every parameter filled in once the edit has started.

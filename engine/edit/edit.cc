@@ -93,7 +93,9 @@ class Run {
  public:
   Run(const scene::GaussianCloud& scene, const Request& request, const Observer& observer,
       optim::PerceptualLoss& perceptual)
-      : scene_(scene), request_(request), observer_(observer), perceptual_(perceptual) {}
+      : scene_(scene), request_(request), observer_(observer), perceptual_(perceptual) {
+    stages_.set_lengths(resolved_intervals(request), iterations_of_interval(request.params));
+  }
 
   Result<void> start(std::span<const scene::Camera> cameras);
   Result<void> go_on(const Checkpoint& from);
@@ -141,7 +143,6 @@ Result<void> Run::start(std::span<const scene::Camera> cameras) {
   report_.resolved.intervals = resolved_intervals(request_);
   report_.input_gaussians = scene_.size();
   for (const std::size_t count : assignment->count) report_.handles.push_back({count, {}});
-  stages_.set_intervals(intervals());
 
   if (auto going = stages_.enter("views", 0, views_from); !going) return going;
   auto views = choose_views(scene_, cameras, request_, assignment->handle, working_, stages_, report_);
@@ -155,7 +156,6 @@ Result<void> Run::start(std::span<const scene::Camera> cameras) {
 Result<void> Run::go_on(const Checkpoint& from) {
   if (auto fits = check_resume(from, request_); !fits) return fits;
   report_ = from.report;
-  stages_.set_intervals(intervals());
   if (auto going = stages_.enter("assign", from.interval, fraction(from.interval, 1)); !going) return going;
   working_ = begin(scene_, request_, deform::HandleColumn(scene_.size(), 0));
   if (auto restored = restore(from.members, working_); !restored) return restored;
@@ -176,8 +176,9 @@ Result<void> Run::optimise(int u) {
   if (auto going = stages_.enter("optimise", u, fraction(u, early(0.95))); !going) return going;
   std::vector<scene::Mask> dilated = masks_;
   dilate_masks(dilated);
-  const auto advance = [&](double done, double loss) {
-    return stages_.advance(fraction(u, early(0.95) + (0.95 - early(0.95)) * done), loss);
+  const auto advance = [&](const OptimiseProgress& at) {
+    const double done = double(at.iteration) / at.iterations;
+    return stages_.advance(fraction(u, early(0.95) + (0.95 - early(0.95)) * done), at.iteration, at.loss);
   };
   const auto outcome = edit::optimise(working_, scene_, views_, dilated, request_.params, u, perceptual_, advance);
   if (!outcome) return propagate(outcome);

@@ -28,6 +28,8 @@ struct Progress {
   std::string stage;    ///< "assign", "views", "deform", "mask", "optimise", "relocate", "finish"; for an Observer that
                         ///< wants them, "renders" (Observer::moment) and "checkpoint" (Observer::interval_done)
   double fraction = 0;  ///< Of the whole edit, 0..1, never falls.
+  int iteration = 0;    ///< Done of the interval's optimisation; 0 outside it.
+  int iterations = 0;   ///< Of each interval, all corrections together; 0: nothing is optimised.
   std::optional<double> loss = {};  ///< Of the last iteration, while it optimises.
 };
 

@@ -38,7 +38,8 @@ void take_over(const train::Trainer& trainer, std::span<const std::uint32_t> mem
 Result<OptimiseOutcome> optimise(WorkingScene& working, const scene::GaussianCloud& input,
                                  std::span<const scene::Camera> views, std::span<const scene::Mask> masks,
                                  const Params& params, int u, optim::PerceptualLoss& perceptual,
-                                 const std::function<Result<void>(double, double)>& advance) {
+                                 const std::function<Result<void>(const OptimiseProgress&)>& advance) {
+  const int iterations = iterations_of_interval(params);
   const std::vector<std::uint32_t> members = member_rows(working);
   train::Changeable changeable;
   changeable.cloud.sh_degree = working.cloud.sh_degree;
@@ -49,13 +50,12 @@ Result<OptimiseOutcome> optimise(WorkingScene& working, const scene::GaussianClo
   train::Trainer trainer({&working.cloud, members}, std::move(changeable), scene_extent(views), {}, perceptual);
   for (std::size_t v = 0; v < views.size(); ++v) {
     trainer.add_view(in_frame_of(working, views[v]), masks[v], originals);
-    if (auto going = advance(0, 0); !going) return propagate(going);
+    if (auto going = advance({.iterations = iterations}); !going) return propagate(going);
   }
   OptimiseOutcome outcome;
   if (trainer.views() == 0) return outcome;
 
   std::vector<double> losses(trainer.views(), 0.0);
-  const double all = double(params.annealing_steps) * params.iterations;
   for (int a = 1; a <= params.annealing_steps; ++a) {
     if (a > 1)
       for (std::size_t v = 0; v < trainer.views(); ++v) trainer.set_edited(v, trainer.render(v));
@@ -64,11 +64,11 @@ Result<OptimiseOutcome> optimise(WorkingScene& working, const scene::GaussianClo
       const auto done = trainer.step();
       if (!done) return propagate(done);
       losses[done->view] = done->loss;
-      const double part = (double(a - 1) * params.iterations + i + 1) / all;
-      if (auto going = advance(part, done->loss); !going) return propagate(going);
+      const int iteration = (a - 1) * params.iterations + i + 1;
+      if (auto going = advance({iteration, iterations, done->loss}); !going) return propagate(going);
     }
   }
-  const auto seen = std::min(trainer.views(), std::size_t(all));
+  const auto seen = std::min(trainer.views(), std::size_t(iterations));
   outcome.loss = std::accumulate(losses.begin(), losses.end(), 0.0) / double(seen);
   outcome.children = trainer.cloud().size() - members.size();
   take_over(trainer, members, working);

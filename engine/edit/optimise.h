@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -16,6 +17,13 @@
 
 namespace engine::edit {
 
+/// How far the optimisation of an interval is.
+struct OptimiseProgress {
+  int iteration = 0;                ///< Done, of `iterations`; 0 while the views are set up.
+  int iterations = 0;               ///< Of all corrections together.
+  std::optional<double> loss = {};  ///< Of the last iteration.
+};
+
 struct OptimiseOutcome {
   double loss = 0;           ///< Mean over the views of the last epoch of the last correction.
   std::size_t children = 0;  ///< Rows that densification added and the guard against floaters left.
@@ -26,13 +34,17 @@ struct OptimiseOutcome {
 /// bits; I_o is the render of the input. Only rows of M change. Children are appended: they inherit handle, parent and
 /// mean_at_deform; those of members of P_h are copies, others a trail.
 ///   masks    per view, dilated; views without a set pixel are left out. If none is left, nothing happens.
-///   advance  called as the work goes on, with the part of it that is done and the loss of the last iteration; its
-///            error ends the optimisation
+///   advance  called after every view that is set up and every iteration; its error ends the optimisation
 ///   errors   internal: a value is not finite; `where` names it by the input's row ("gaussian[12].opacity")
 /// On an error the working scene is as it was.
 [[nodiscard]] Result<OptimiseOutcome> optimise(WorkingScene& working, const scene::GaussianCloud& input,
                                                std::span<const scene::Camera> views, std::span<const scene::Mask> masks,
                                                const Params& params, int u, optim::PerceptualLoss& perceptual,
-                                               const std::function<Result<void>(double, double)>& advance);
+                                               const std::function<Result<void>(const OptimiseProgress&)>& advance);
+
+/// Of each interval: all corrections together.
+[[nodiscard]] inline int iterations_of_interval(const Params& params) {
+  return params.annealing_steps * params.iterations;
+}
 
 }  // namespace engine::edit

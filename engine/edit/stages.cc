@@ -8,12 +8,14 @@ Result<void> Stages::enter(const std::string& stage, int interval, double fracti
   end_stage();
   progress_.stage = stage;
   progress_.interval = interval;
+  progress_.iteration = 0;
   progress_.loss.reset();
   since_ = std::chrono::steady_clock::now();
   return report(fraction);
 }
 
-Result<void> Stages::advance(double fraction, std::optional<double> loss) {
+Result<void> Stages::advance(double fraction, int iteration, std::optional<double> loss) {
+  progress_.iteration = iteration;
   progress_.loss = loss;
   return report(fraction);
 }
@@ -21,6 +23,7 @@ Result<void> Stages::advance(double fraction, std::optional<double> loss) {
 void Stages::finish() {
   end_stage();
   progress_.fraction = 1;
+  progress_.iteration = 0;
   progress_.loss.reset();
   if (observer_.progress) observer_.progress(progress_);
 }

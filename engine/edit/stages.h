@@ -16,13 +16,18 @@ class Stages {
  public:
   Stages(const Observer& observer, std::vector<StageTime>& times) : observer_(observer), times_(times) {}
 
-  void set_intervals(int intervals) { progress_.intervals = intervals; }
+  ///   iterations  of each interval
+  void set_lengths(int intervals, int iterations) {
+    progress_.intervals = intervals;
+    progress_.iterations = iterations;
+  }
   /// The stage before ends here.
   ///   fraction  of the whole edit; never reported as less than before
   ///   errors    cancelled: a stop was requested
   [[nodiscard]] Result<void> enter(const std::string& stage, int interval, double fraction);
   /// Still in the same stage.
-  [[nodiscard]] Result<void> advance(double fraction, std::optional<double> loss = std::nullopt);
+  ///   iteration, loss  as in Progress
+  [[nodiscard]] Result<void> advance(double fraction, int iteration = 0, std::optional<double> loss = std::nullopt);
   /// The last stage ends; all is done.
   void finish();
 

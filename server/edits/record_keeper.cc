@@ -24,13 +24,20 @@ RecordKeeper::RecordKeeper(proto::EditRecord record, Publish publish, Clock cloc
       since_(clock_()),
       published_(since_ - publish_every),
       base_time_(since_) {
-  record_.stage.clear();
   record_.eta_seconds.reset();
+  leave_stage();
+}
+
+void RecordKeeper::leave_stage() {
+  record_.stage.clear();
+  record_.iteration = 0;
+  record_.loss.reset();
 }
 
 void RecordKeeper::enter(const std::string& stage) {
   if (stage == record_.stage) return;
   count_time();
+  leave_stage();
   record_.stage = stage;
   publish();
 }
@@ -39,6 +46,8 @@ void RecordKeeper::advance(const engine::edit::Progress& progress) {
   const bool another_interval = progress.interval != record_.interval;
   record_.interval = progress.interval;
   record_.intervals = progress.intervals > 0 ? progress.intervals : record_.intervals;
+  record_.iteration = progress.iteration;
+  record_.loss = progress.loss;
   record_.progress = std::max(record_.progress, std::min(rounded(progress.fraction, 1e-4), most_before_the_end));
   // A run that goes on with an interval jumps there: only from then on does its pace mean anything.
   if (base_interval_ == 0 && progress.interval > 0) {
@@ -86,7 +95,7 @@ void RecordKeeper::publish() {
 
 void RecordKeeper::finish() {
   count_time();
-  record_.stage.clear();
+  leave_stage();
   record_.eta_seconds.reset();
   record_.progress = 1;
   publish();

@@ -36,6 +36,7 @@ class RecordKeeper {
   using TimePoint = std::chrono::steady_clock::time_point;
 
   void count_time();  ///< For the present stage, up to now.
+  void leave_stage();
   void guess_time_left(double fraction);
 
   proto::EditRecord record_;

@@ -29,6 +29,10 @@ void fill_in(proto::EditStatus& status, proto::EditRecord record, const jobs::Jo
     status.stage = std::move(record.stage);
     status.eta_seconds = record.eta_seconds;
   }
+  if (!ended && job.state != jobs::State::queued) {  // one that waits to go on begins its interval again
+    status.iteration = record.iteration;
+    status.loss = record.loss;
+  }
   status.interval = record.interval;
   if (record.intervals > 0) status.intervals = record.intervals;
   // The pictures and the checkpoint of an interval are there once the job says so, and go with a cancelled job.
@@ -62,6 +66,8 @@ proto::EditStatus status_of(const jobs::Job& job) {
     status.warnings = warnings_about(*asked);
   }
   if (auto record = proto::parse_edit_record(job.progress)) fill_in(status, std::move(*record), job);
+  const proto::Params& params = status.request.params;
+  status.iterations = params.annealing_steps.value_or(1) * params.iterations.value_or(0);
   status.error = job.error;
   status.created = proto::rfc3339(job.created);
   if (job.started) status.started = proto::rfc3339(*job.started);

@@ -14,6 +14,8 @@ EditRecord full_record() {
   record.eta_seconds = 12.5;
   record.interval = 2;
   record.intervals = 3;
+  record.iteration = 17;
+  record.loss = 1.0 / 7;
   record.finished_intervals = {{.interval = 1,
                                 .seconds = 0.25,
                                 .positions = {{1.0 / 3, 2, -3e-7}, {4, 5, 6}},

@@ -61,7 +61,10 @@ TEST(EditStatus, OfAWaitingEditHasEveryFieldAndNullsWhereNothingIsKnown) {
   EXPECT_EQ(edit.at("state"), "queued");
   EXPECT_EQ(edit.at("stopped_early"), false);
   EXPECT_EQ(edit.at("queue_position"), 2);
-  for (const char* name : {"stage", "eta_seconds", "gaussians", "result_version", "error", "started", "ended", "simd"})
+  EXPECT_EQ(edit.at("iteration"), 0);
+  EXPECT_EQ(edit.at("iterations"), 0);
+  for (const char* name :
+       {"stage", "eta_seconds", "loss", "gaussians", "result_version", "error", "started", "ended", "simd"})
     EXPECT_TRUE(edit.at(name).is_null()) << name;
   for (const char* name : {"finished_intervals", "handles", "timings", "warnings"})
     EXPECT_EQ(edit.at(name), json::array()) << name;
@@ -94,6 +97,18 @@ TEST(EditStatus, OfASuccessLinksItsResultAndItsPictures) {
             json::parse(R"({"input": 10, "output": 12, "removed": 1, "copies": 3, "changeable": 4})"));
   EXPECT_EQ(edit.at("simd"), "AVX2");
   EXPECT_EQ(edit.at("stopped_early"), true);
+}
+
+TEST(EditStatus, OfAnOptimisationSaysHowFarItIsAndWhatItsLossIs) {
+  EditStatus status = queued();
+  status.state = "running";
+  status.iteration = 17;
+  status.iterations = 200;
+  status.loss = 0.25;
+  const json edit = json::parse(to_json(status));
+  EXPECT_EQ(edit.at("iteration"), 17);
+  EXPECT_EQ(edit.at("iterations"), 200);
+  EXPECT_EQ(edit.at("loss"), 0.25);
 }
 
 TEST(EditStatus, OfAFailureSaysWhatAndWhere) {

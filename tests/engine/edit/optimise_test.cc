@@ -97,14 +97,18 @@ TEST(Optimise, BringsTheBackgroundBack) {
 TEST(Optimise, ReportsTheLossOfEveryIterationAndInterval) {
   const Case c;
   std::vector<double> of_intervals;
-  std::size_t iterations = 0;
+  std::map<int, std::vector<double>> losses;
   double last = -1;
   Observer observer;
   observer.progress = [&](const Progress& progress) {
     EXPECT_GE(progress.fraction, last);
     last = progress.fraction;
-    EXPECT_EQ(progress.loss.has_value(), progress.stage == "optimise" && progress.loss.has_value());
-    if (progress.loss) ++iterations;
+    EXPECT_EQ(progress.iterations, 24) << "two corrections of twelve";
+    EXPECT_EQ(progress.loss.has_value(), progress.iteration > 0);
+    if (!progress.loss) return;
+    EXPECT_EQ(progress.stage, "optimise");
+    losses[progress.interval].push_back(*progress.loss);
+    EXPECT_EQ(progress.iteration, int(losses[progress.interval].size()));
   };
   std::vector<std::string> stages;
   observer.moment = [&](const Moment& moment) {
@@ -117,7 +121,12 @@ TEST(Optimise, ReportsTheLossOfEveryIterationAndInterval) {
   };
   const auto outcome = run(c.scene, c.cameras, c.request, observer);
   ASSERT_TRUE(outcome);
-  EXPECT_GE(iterations, 2u * 2 * 12);
+  ASSERT_EQ(losses.size(), 2u);
+  for (const auto& [interval, of_iterations] : losses) {
+    ASSERT_EQ(of_iterations.size(), 24u) << interval;
+    const double last_epoch = (of_iterations[21] + of_iterations[22] + of_iterations[23]) / 3;
+    EXPECT_NEAR(of_intervals.at(std::size_t(interval) - 1), last_epoch, 1e-9) << "three views";
+  }
   EXPECT_EQ(stages, (std::vector<std::string>{"before", "deformed", "optimised", "before", "deformed", "optimised"}));
   EXPECT_EQ(of_intervals, outcome->report.losses);
   for (const double loss : of_intervals) EXPECT_GT(loss, 0);

@@ -102,6 +102,31 @@ TEST_F(RecordKeeperTest, GuessesFromWhereAResumedRunBeganToWork) {
   EXPECT_NEAR(*published().eta_seconds, 4, 0.11);
 }
 
+TEST_F(RecordKeeperTest, TellsIterationAndLossAsLongAsItOptimises) {
+  proto::EditRecord earlier;
+  earlier.iteration = 9;
+  earlier.loss = 3;
+  auto keeper = keeper_of(earlier);
+  keeper.enter("load");
+  EXPECT_EQ(published().iteration, 0) << "what it was at when it was interrupted";
+  EXPECT_EQ(published().loss, std::nullopt);
+  for (int i = 1; i <= 3; ++i) {
+    now += 101ms;
+    keeper.advance({.interval = 1,
+                    .intervals = 2,
+                    .stage = "optimise",
+                    .fraction = 0.1 * i,
+                    .iteration = i,
+                    .iterations = 3,
+                    .loss = 1.0 / i});
+    EXPECT_EQ(published().iteration, i);
+    EXPECT_EQ(published().loss, 1.0 / i);
+  }
+  keeper.advance({.interval = 1, .intervals = 2, .stage = "relocate", .fraction = 0.4, .iterations = 3});
+  EXPECT_EQ(published().iteration, 0);
+  EXPECT_EQ(published().loss, std::nullopt);
+}
+
 TEST_F(RecordKeeperTest, OnlyTheEndIsOne) {
   auto keeper = keeper_of();
   keeper.advance({.interval = 1, .stage = "finish", .fraction = 1});
