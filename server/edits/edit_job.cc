@@ -133,12 +133,12 @@ class Run {
     observer.stop = context_.cancel_token();
     if (const auto checkpoint = last_checkpoint()) {
       last_interval_ = checkpoint->interval;
-      auto outcome = edit::run(*input_, cameras_, request_, observer, &*checkpoint);
+      auto outcome = edit::run(*input_, cameras_, request_, observer, &*checkpoint, workshop_.perceptual);
       if (outcome || outcome.error().where != "checkpoint") return outcome;
       begin_again(outcome.error());
     }
     last_interval_ = 0;
-    return edit::run(*input_, cameras_, request_, observer);
+    return edit::run(*input_, cameras_, request_, observer, nullptr, workshop_.perceptual);
   }
 
   std::optional<edit::Checkpoint> last_checkpoint() {

@@ -5,6 +5,7 @@
 
 #include "engine/core/parallel.h"
 #include "engine/jobs/worker.h"
+#include "engine/optim/perceptual.h"
 #include "server/edits/gate.h"
 #include "server/scenes/scene_store.h"
 
@@ -17,6 +18,7 @@ struct Workshop {
   Gate& results;                     ///< An edit owns its id while it publishes its result: who cancels it shares it.
   spdlog::logger* logger = nullptr;  ///< May be null.
   int pictured_views = 4;            ///< Of each interval.
+  engine::optim::PerceptualLoss* perceptual = nullptr;  ///< As in engine::edit::run().
 };
 
 /// The version of a scene that an edit has made; nothing if it has not made one.

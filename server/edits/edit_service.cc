@@ -163,8 +163,10 @@ struct EditService::Impl {
         *records, {.folder = jobs_folder(), .max_queued = options.max_queued, .retention = options.retention});
     if (!made) return propagate(made);
     queue = std::move(*made);
-    worker.emplace(*queue, [workshop = Workshop{scenes, arena, results, options.logger, options.pictured_views}](
-                               jobs::JobContext& context) { return carry_out(context, workshop); });
+    worker.emplace(*queue, [workshop = Workshop{scenes, arena, results, options.logger, options.pictured_views,
+                                                options.perceptual}](jobs::JobContext& context) {
+      return carry_out(context, workshop);
+    });
     return {};
   }
 

@@ -17,6 +17,7 @@
 #include "engine/core/parallel.h"
 #include "engine/core/result.h"
 #include "engine/jobs/queue.h"
+#include "engine/optim/perceptual.h"
 #include "proto/edit_request.h"
 #include "proto/edit_status.h"
 #include "server/scenes/scene_store.h"
@@ -32,6 +33,8 @@ struct ServiceOptions {
   int pictured_views = 4;            ///< Of each interval, for its intermediate renders.
   int threads = 0;                   ///< 0: as many as the machine has cores.
   spdlog::logger* logger = nullptr;  ///< Is told what becomes of edits; outlives the service. Null: nobody is.
+  /// The loss inside masks; outlives the service. Null: the engine's own.
+  engine::optim::PerceptualLoss* perceptual = nullptr;
 };
 
 /// Safe to call from any thread.

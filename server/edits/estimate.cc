@@ -16,7 +16,7 @@ constexpr double jpeg_pixel_seconds = 1.5e-8;
 constexpr double write_seconds = 1e-3;  // until a picture is on disk
 constexpr double least_seconds = 0.05;  // records, checkpoints, the version file
 
-constexpr std::size_t frame_row_bytes = 200, frame_pixel_bytes = 32, trained_pixel_bytes = 36;
+constexpr std::size_t frame_row_bytes = 200, frame_pixel_bytes = 32, trained_pixel_bytes = 36, frozen_row_bytes = 24;
 
 }  // namespace
 
@@ -37,15 +37,16 @@ double estimated_seconds(const Workload& work) {
                           2 * intervals * pictured * write_seconds;
   const double rows = row_seconds * n * (work.layered ? 3 : 2) + (work.virtual_views ? dome_seconds * n : 0) +
                       drag_seconds * double(work.dragged) * intervals;
-  const double iterations = intervals * double(work.iterations) * view_frame;
+  const double iterations = work.iterations > 0 ? intervals * (views + double(work.iterations)) * view_frame : 0.0;
   return least_seconds + masks + pictures + iterations + rows;
 }
 
 std::uint64_t estimated_bytes(const Workload& work) {
   const std::uint64_t n = work.gaussians;
   const std::uint64_t rows = (work.layered ? n : 0) + n + std::uint64_t(work.intervals) * work.copies + n + work.copies;
-  const std::uint64_t trained = work.iterations > 0 ? work.views * trained_pixel_bytes : 0;
-  return rows * work.row_bytes + n * frame_row_bytes + (work.views + frame_pixel_bytes + trained) * work.view_pixels;
+  const std::uint64_t trained =
+      work.iterations > 0 ? work.views * (trained_pixel_bytes * work.view_pixels + frozen_row_bytes * n) : 0;
+  return rows * work.row_bytes + n * frame_row_bytes + (work.views + frame_pixel_bytes) * work.view_pixels + trained;
 }
 
 }  // namespace server::edits

@@ -38,7 +38,8 @@ constexpr std::size_t comparison_pixels = 192 * 144;
 ///                                         only the part that moves is rendered: a tenth of the time of a frame, a
 ///                                         quarter through virtual views, which are close to it
 ///     pictures    (T + 1) (K (frame(view) + jpeg view) + row N) + 2 T K write
-///     iterations  T iterations frame(view)  an iteration renders and differentiates a part of a view
+///     iterations  T (V + iterations) frame(view) [iterations]
+///                                         each view is set up; an iteration renders and differentiates a part of one
 ///     rows        row N (2 + [layered]) + dome N [virtual] + drag |P_h| T
 /// It says nothing of the time an edit waits for others.
 [[nodiscard]] double estimated_seconds(const Workload& work);
@@ -49,7 +50,9 @@ constexpr std::size_t comparison_pixels = 192 * 144;
 ///                + N + copies)                  the scene of a picture, as long as it is rendered
 ///   + 200 N                                     splats of a frame, columns of the working scene
 ///   + V pixels + 32 pixels                      masks; one frame
-///   + 36 V pixels [iterations]                  three pictures of each view, at most, while it optimises
+///   + V (36 pixels + 24 N) [iterations]         of each view, while it optimises: three pictures, at most, and the
+///                                               frozen splats of its region, of 48 bytes, which are half of them where
+///                                               the edit is large
 [[nodiscard]] std::uint64_t estimated_bytes(const Workload& work);
 
 }  // namespace server::edits

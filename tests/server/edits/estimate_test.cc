@@ -41,6 +41,7 @@ TEST(Estimate, GrowsWithEverythingThatCosts) {
                                        {"virtual views", [](Workload& w) { w.virtual_views = true; }, true, false},
                                        {"views", [](Workload& w) { ++w.views; }, true, true},
                                        {"pictures", [](Workload& w) { ++w.pictured; }, true, false},
+                                       {"iterations", [](Workload& w) { w.iterations = 100; }, true, true},
                                        {"picture size", [](Workload& w) { w.view_pixels *= 2; }, true, true},
                                        {"a slower machine", [](Workload& w) { w.probe_seconds *= 2; }, true, false}};
   for (const Growth& growth : growths) {
@@ -68,6 +69,19 @@ TEST(Estimate, MemoryHoldsTheWorkingCopyAndAPicturesScene) {
   const auto flat = estimated_bytes(work);
   work.layered = true;
   EXPECT_EQ(estimated_bytes(work) - flat, work.gaussians * work.row_bytes);
+}
+
+TEST(Estimate, AnOptimisationHoldsEveryViewItSetsUp) {
+  Workload work = typical();
+  const auto plain = estimated_bytes(work);
+  work.iterations = 1;
+  const auto one = estimated_bytes(work);
+  const double seconds = estimated_seconds(work);
+  EXPECT_GE(one - plain, work.views * (36 * work.view_pixels + 24 * work.gaussians));
+  EXPECT_GE(seconds, work.intervals * double(work.views) * frame_seconds(work, work.view_pixels));
+  work.iterations = 1000;
+  EXPECT_EQ(estimated_bytes(work), one) << "more iterations take more time, not more memory";
+  EXPECT_GT(estimated_seconds(work), seconds);
 }
 
 }  // namespace
