@@ -66,6 +66,38 @@ test('killed at twenty moments, an edit goes on each time and ends with the same
   assert.ok(resumed >= 3, `only ${resumed} of ${kills} kills hit an edit with a finished interval`);
 });
 
+test('killed in the middle of optimising, with other numbers of threads, an edit ends with the same bytes', async () => {
+  const params = { intervals: 3, iterations: 75, annealing_steps: 2, views: 8, max_image_side: 320 };
+  const optimised = { ...request, params };
+  const undisturbed = await service.client.succeeded((await service.client.submit(optimised)).id);
+  for (const finished of undisturbed.finished_intervals) assert.ok(finished.loss > 0);
+  const expected = await service.client.file(scene.id, undisturbed.result_version);
+  assert.notDeepEqual(expected, truth, 'it makes a difference');
+
+  const { id } = await service.client.submit(optimised);
+  const args = service.args;
+  try {
+    for (const [interval, threads] of [[1, 1], [2, 4], [2, 2], [3, 4], [3, 1]]) {
+      const from = 1 + Math.floor(random() * 90);  // of 150: news come ten times a second
+      const hit = await service.client.until(id, (edit) => edit.interval === interval && edit.iteration >= from, { every: 5 });
+      assert.equal(hit.stage, 'optimise');
+      assert.equal(hit.iterations, 150);
+      assert.ok(hit.loss > 0, 'the loss of a running iteration is told');
+      service.args = [...args, '--threads', threads];
+      await again();
+      const edit = await service.client.edit(id);
+      assert.equal(edit.finished_intervals.length, interval - 1, 'it goes on with the interval that was cut');
+    }
+  } finally {
+    service.args = args;
+  }
+  const edit = await service.client.succeeded(id);
+  assert.equal(edit.loss, null);
+  assert.deepEqual(edit.finished_intervals.map(({ loss }) => loss), undisturbed.finished_intervals.map(({ loss }) => loss));
+  assert.deepEqual(await service.client.file(scene.id, edit.result_version), expected);
+  await again();  // with the usual threads
+});
+
 test('killed right after 202, an edit is carried out, and the key still finds it', async () => {
   const key = { 'idempotency-key': 'sent before the power cut' };
   const { id } = await service.client.submit(request, key);
