@@ -6,39 +6,17 @@
 // is timed next to a run of it, so that whatever else the machine does hits both.
 #include <benchmark/benchmark.h>
 
-#include <algorithm>
-#include <chrono>
-#include <cstdlib>
-#include <filesystem>
 #include <numeric>
+#include <vector>
 
 #include "bench/calibrator.h"
-#include "engine/io/dataset.h"
-#include "engine/io/scene_file.h"
+#include "bench/fox.h"
+#include "bench/measure.h"
 #include "engine/procedural/demo_scene.h"
 #include "engine/render/forward.h"
 #include "engine/render/reference.h"
 
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-// OpenSplat's rasteriser on fox, view 0001, 359x640, two threads, and what the calibrator's arithmetic ran at on that
-// machine's two cores (measured once, elsewhere; see README).
-constexpr double peer_forward_s = 0.590;
-constexpr double peer_calibrator_pairs_per_s = 2 * 2.6e9;
-
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + std::ptrdiff_t(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
-
-std::filesystem::path fox() {
-  const char* data = std::getenv("SPLATDRAG_DATA");
-  return (data ? std::filesystem::path(data) : std::filesystem::path(SPLATDRAG_SOURCE_DIR) / "../shared/data") / "fox";
-}
 
 /// Pairs that this view blends, as the reference counts them.
 double blended_pairs(const engine::scene::GaussianCloud& cloud, const engine::scene::Camera& camera) {
@@ -54,26 +32,24 @@ void time_frames(benchmark::State& state, const engine::scene::GaussianCloud& cl
   engine::render::Rendering frame;
   std::vector<double> frame_s, calibrator_rate, share, speedup;
   for (auto _ : state) {
-    auto start = Clock::now();
-    const auto calibrated = double(bench::blend_in_registers(300'000));
-    const double rate = calibrated / seconds_since(start);
-    start = Clock::now();
+    const double rate = bench::calibrator_pairs_per_s();
+    const auto start = bench::Clock::now();
     engine::render::forward(cloud, camera, {}, {}, workspace, frame);
-    const double s = seconds_since(start);
+    const double s = bench::seconds_since(start);
     benchmark::DoNotOptimize(frame.color.data.data());
     state.SetIterationTime(s);
     frame_s.push_back(s);
     calibrator_rate.push_back(rate);
     share.push_back(pairs / s / rate);
-    speedup.push_back(peer_forward_s * peer_calibrator_pairs_per_s / rate / s);
+    speedup.push_back(bench::times_faster(bench::peer_forward_s, s, rate));
   }
-  state.counters["frame_ms"] = 1e3 * median(frame_s);
-  state.counters["frames_per_s"] = 1 / median(frame_s);
+  state.counters["frame_ms"] = 1e3 * bench::median(frame_s);
+  state.counters["frames_per_s"] = 1 / bench::median(frame_s);
   state.counters["blended_Mpairs"] = pairs * 1e-6;
-  state.counters["blended_Gpairs_per_s"] = pairs / median(frame_s) * 1e-9;
-  state.counters["calibrator_Gpairs_per_s"] = median(calibrator_rate) * 1e-9;
-  state.counters["share_of_calibrator"] = median(share);
-  if (against_peer) state.counters["times_faster_than_peer"] = median(speedup);
+  state.counters["blended_Gpairs_per_s"] = pairs / bench::median(frame_s) * 1e-9;
+  state.counters["calibrator_Gpairs_per_s"] = bench::median(calibrator_rate) * 1e-9;
+  state.counters["share_of_calibrator"] = bench::median(share);
+  if (against_peer) state.counters["times_faster_than_peer"] = bench::median(speedup);
 }
 
 void calibrator(benchmark::State& state) {
@@ -84,13 +60,9 @@ void calibrator(benchmark::State& state) {
 BENCHMARK(calibrator)->UseRealTime()->Unit(benchmark::kMillisecond);
 
 void fox_view_0001_359x640(benchmark::State& state) {
-  const auto scene = engine::io::read_scene(fox() / "point_cloud.ply");
-  const auto dataset = engine::io::read_dataset(fox());
-  if (!scene || !dataset) return state.SkipWithError("the fox capture is not on this machine (SPLATDRAG_DATA)");
-  const auto view = std::find_if(dataset->views.begin(), dataset->views.end(),
-                                 [](const auto& v) { return v.camera.name == "0001.jpg"; });
-  if (view == dataset->views.end()) return state.SkipWithError("view 0001.jpg is missing");
-  time_frames(state, scene->cloud, view->camera, true);
+  const auto fox = bench::fox("0001.jpg");
+  if (!fox) return state.SkipWithError(bench::no_fox);
+  time_frames(state, fox->cloud, fox->camera, true);
 }
 BENCHMARK(fox_view_0001_359x640)->UseManualTime()->Unit(benchmark::kMillisecond)->Iterations(60);
 

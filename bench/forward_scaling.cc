@@ -3,17 +3,14 @@
 //   build/release/bench/forward_scaling docs
 //
 // writes docs/forward-scaling.md and docs/forward-scaling.svg.
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <stdexcept>
 #include <thread>
 
+#include "bench/measure.h"
+#include "bench/process.h"
 #include "bench/svg_plot.h"
 #include "engine/procedural/demo_scene.h"
 #include "engine/render/forward.h"
@@ -26,21 +23,6 @@ struct Measured {
   double pass_mb = 0;   // peak of the process during rendering, beyond what it held before
 };
 
-double now_ms() {
-  return 1e-6 * double(std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1));
-}
-
-/// A field of /proc/self/status, MB.
-double memory_mb(const std::string& field) {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);)
-    if (line.starts_with(field + ":")) return std::stod(line.substr(field.size() + 1)) / 1024;
-  throw std::runtime_error("no " + field + " in /proc/self/status");
-}
-
-/// Starts the peak (VmHWM) anew.
-void reset_peak() { std::ofstream("/proc/self/clear_refs") << "5"; }
-
 Measured measure(std::size_t gaussians, int width, int height) {
   auto scene = engine::procedural::make_demo_scene(
       {.gaussians = gaussians, .seed = 0, .views = 40, .width = width, .height = height});
@@ -48,39 +30,24 @@ Measured measure(std::size_t gaussians, int width, int height) {
   Measured out;
   const auto& cloud = scene.cloud;
   out.scene_mb = double(cloud.size() * (11 + cloud.sh_stride()) * sizeof(float)) / (1 << 20);
-  reset_peak();
-  const double before = memory_mb("VmRSS");
+  bench::reset_peak();
+  const double before = bench::memory_mb("VmRSS");
   engine::render::Workspace workspace;
   engine::render::Rendering frame;
   std::vector<double> times;
   for (int i = 0; i < 15; ++i) {
-    const double start = now_ms();
+    const auto start = bench::Clock::now();
     engine::render::forward(cloud, scene.cameras.front(), {}, {}, workspace, frame);
-    times.push_back(now_ms() - start);
+    times.push_back(1e3 * bench::seconds_since(start));
   }
-  std::nth_element(times.begin(), times.begin() + 7, times.end());
-  out.frame_ms = times[7];
-  out.pass_mb = std::max(0.0, memory_mb("VmHWM") - before);
+  out.frame_ms = bench::median(times);
+  out.pass_mb = std::max(0.0, bench::memory_mb("VmHWM") - before);
   return out;
 }
 
 /// In a process of its own, so that peaks do not add up.
 Measured measured_apart(std::size_t gaussians, int width, int height) {
-  int channel[2];
-  if (pipe(channel) != 0) throw std::runtime_error("pipe failed");
-  const pid_t child = fork();
-  if (child == 0) {
-    const Measured result = measure(gaussians, width, height);
-    _exit(write(channel[1], &result, sizeof result) == sizeof result ? 0 : 1);
-  }
-  Measured result;
-  const bool good = read(channel[0], &result, sizeof result) == sizeof result;
-  int status = 0;
-  waitpid(child, &status, 0);
-  close(channel[0]);
-  close(channel[1]);
-  if (!good || status != 0) throw std::runtime_error("a measurement failed");
-  return result;
+  return bench::in_own_process<Measured>([&] { return measure(gaussians, width, height); });
 }
 
 std::string row(const std::string& what, const Measured& m) {
