@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <memory>
 #include <numeric>
 #include <stdexcept>
 #include <thread>
@@ -36,6 +37,44 @@ TEST(ParallelFor, MakesTheSameChunksForAnyNumberOfThreads) {
   const float one = sums_with(1);
   EXPECT_EQ(one, sums_with(2));
   EXPECT_EQ(one, sums_with(4));
+}
+
+// These two say more under ThreadSanitizer, which has to be told in which order work is handed over.
+TEST(ParallelFor, HandsMemoryToItsWorkAndBack) {
+  WorkArena arena(4);
+  for (int round = 0; round < 20; ++round) {
+    SCOPED_TRACE(round);
+    auto input = std::make_unique<std::vector<int>>(1000, round);
+    std::vector<std::vector<int>> output(32);
+    arena.run([&] {
+      parallel_for(output.size(), 1, [&](std::size_t chunk, std::size_t) {
+        output[chunk].resize(input->size());
+        parallel_for(input->size(), 100, [&](std::size_t begin, std::size_t end) {
+          for (std::size_t i = begin; i < end; ++i) output[chunk][i] = (*input)[i] + int(chunk);
+        });
+      });
+    });
+    input.reset();
+    for (std::size_t chunk = 0; chunk < output.size(); ++chunk)
+      EXPECT_EQ(output[chunk], std::vector<int>(1000, round + int(chunk)));
+  }
+}
+
+TEST(WorkArena, ServesMoreCallersThanItHasThreads) {
+  WorkArena arena(2);
+  std::vector<std::thread> callers;
+  std::vector<std::size_t> sums(5);
+  for (std::size_t caller = 0; caller < sums.size(); ++caller)
+    callers.emplace_back([&arena, &sum = sums[caller], caller] {
+      for (int round = 0; round < 20; ++round) {
+        std::vector<std::size_t> partial(100);
+        arena.run(
+            [&] { parallel_for(partial.size(), 1, [&](std::size_t i, std::size_t) { partial[i] = i * caller; }); });
+        sum += std::accumulate(partial.begin(), partial.end(), std::size_t{0});
+      }
+    });
+  for (std::thread& caller : callers) caller.join();
+  for (std::size_t caller = 0; caller < sums.size(); ++caller) EXPECT_EQ(sums[caller], 20 * 4950 * caller);
 }
 
 TEST(ParallelFor, DoesNothingForNoItems) {

@@ -297,7 +297,9 @@ TEST_F(ServiceTest, ACancelledEditsFilesAreGone) {
   EXPECT_TRUE(fs::exists(dir.path() / "edits/jobs" / id));
   value(service->cancel(id));
   wait_for_end(*service, id);
-  for (int i = 0; i < 100 && fs::exists(dir.path() / "edits/jobs" / id); ++i) std::this_thread::sleep_for(10ms);
+  const auto deadline = std::chrono::steady_clock::now() + patience;
+  while (fs::exists(dir.path() / "edits/jobs" / id) && std::chrono::steady_clock::now() < deadline)
+    std::this_thread::sleep_for(10ms);
   EXPECT_FALSE(fs::exists(dir.path() / "edits/jobs" / id));
   EXPECT_EQ(code_of(service->interval_picture(id, 1, 0, "before")), ErrorCode::not_found);
 }
@@ -478,7 +480,7 @@ TEST_F(ServiceTest, SpeaksOfItsTroubleWithoutNamingItsFolder) {
   std::optional<engine::Error> trouble;
   {
     const engine::jobs::FullDisk full(std::filesystem::file_size(dir.path() / "edits" / "jobs.db-wal"));
-    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    const auto deadline = std::chrono::steady_clock::now() + patience;
     while (!(trouble = service->trouble()) && std::chrono::steady_clock::now() < deadline)
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }

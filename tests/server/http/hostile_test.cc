@@ -233,7 +233,8 @@ TEST(HostileCrowd, MoreConnectionsThanItTakesAreTurnedAway) {
   EXPECT_NE(server.metrics.text().find("splatdrag_http_connections_refused_total 1"), std::string::npos);
   holders.clear();
   const auto left = Clock::now();  // once it has noticed
-  while (ask(server.port(), "GET", "/json").status != 200 && Clock::now() - left < 10s) std::this_thread::sleep_for(20ms);
+  while (ask(server.port(), "GET", "/json").status != 200 && Clock::now() - left < 10s)
+    std::this_thread::sleep_for(20ms);
   EXPECT_EQ(ask(server.port(), "GET", "/json").status, 200) << "and then it serves again";
 }
 
