@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 #include "engine/core/parallel.h"
@@ -40,7 +41,7 @@ struct Place {
   std::uint32_t ground = 0;
   float u = 0, v = 0, step_u = 0, step_v = 0;
   float sigma_u = 0, sigma_v = 0;
-  bool seen = false;
+  bool wanted = false;
 };
 
 struct Eye {
@@ -168,8 +169,11 @@ bool is_seen(const Ground& ground, const Place& place, std::span<const Eye> eyes
   return false;
 }
 
-std::vector<Place> place_all(const std::vector<Ground>& grounds, float spacing, std::span<const Eye> eyes,
-                             const Occluders& occluders, std::uint64_t seed) {
+/// Is a place to be covered? Asked place by place along each row; `first` is a memory of the row's.
+using Wanted = std::function<bool(const Ground&, const Place&, Rng&, std::size_t& first)>;
+
+std::vector<Place> place_all(const std::vector<Ground>& grounds, float spacing, std::uint64_t seed,
+                             const Wanted& wanted) {
   const std::vector<Row> rows = lay_rows(grounds, spacing);
   std::vector<Place> places(rows.empty() ? 0 : rows.back().begin + rows.back().count);
   parallel_for(rows.size(), 8, [&](std::size_t begin, std::size_t end) {
@@ -190,11 +194,11 @@ std::vector<Place> place_all(const std::vector<Ground>& grounds, float spacing, 
         const bool end_u = !ground.patch->closed_u && (k == 0 || k + 1 == row.count);
         place.sigma_u = spacing_u * (end_u ? edge_overlap : overlap);
         place.sigma_v = row.spacing_v * (row.first || row.last ? edge_overlap : overlap);
-        place.seen = is_seen(ground, place, eyes, occluders, rng, first_eye);
+        place.wanted = wanted(ground, place, rng, first_eye);
       }
     }
   });
-  std::erase_if(places, [](const Place& place) { return !place.seen; });
+  std::erase_if(places, [](const Place& place) { return !place.wanted; });
   return places;
 }
 
@@ -202,15 +206,15 @@ std::vector<Place> place_all(const std::vector<Ground>& grounds, float spacing, 
 ///
 /// At spacing s there are about a / s^2 + b / s of them: a the area that is seen, b the length of the rims around it,
 /// where Gaussians that are half hidden stay. Two smaller tries tell a and b, so that the first large one mostly fits.
-std::vector<Place> place_count(const std::vector<Ground>& grounds, std::span<const Eye> eyes,
-                               const Occluders& occluders, std::size_t count, std::uint64_t seed) {
+std::vector<Place> place_count(const std::vector<Ground>& grounds, std::size_t count, std::uint64_t seed,
+                               const Wanted& wanted_place) {
   const double tolerance = 0.008 * double(count);
   double last_density = 0, last_found = 0;           // density = 1 / spacing
   double density = 0.05 * std::sqrt(double(count));  // about a tenth of the Gaussians, if objects are of unit size
   std::vector<Place> best, above;                    // the nearest to count; the fewest that are no fewer than count
   auto miss = [&](const std::vector<Place>& p) { return std::abs(double(p.size()) - double(count)); };
   for (int attempt = 0; attempt < 12; ++attempt) {
-    std::vector<Place> places = place_all(grounds, float(1 / density), eyes, occluders, seed);
+    std::vector<Place> places = place_all(grounds, float(1 / density), seed, wanted_place);
     if (places.empty()) return places;
     const double found = double(places.size());
     if (places.size() >= count && (above.empty() || places.size() < above.size())) above = places;
@@ -290,18 +294,18 @@ void paint(const Place& place, const Ground& ground, const LightMap& map, const 
   }
 }
 
-}  // namespace
-
-Surfels make_surfels(std::span<const Object> objects, const Light& light, std::span<const scene::Camera> cameras,
-                     std::size_t count, std::uint64_t seed) {
+std::vector<Eye> eyes_of(std::span<const scene::Camera> cameras) {
   std::vector<Eye> eyes;
   for (const scene::Camera& c : cameras)
     eyes.push_back({Vec3(c.centre()), Mat3(c.rotation), float(c.fx), float(c.fy), float(c.cx), float(c.cy),
                     float(c.width), float(c.height)});
-  const Occluders occluders(objects);
-  const std::vector<Ground> grounds = lay_ground(objects);
-  const std::vector<Place> places = place_count(grounds, eyes, occluders, count, seed);
+  return eyes;
+}
 
+/// Puts a Gaussian at every place, in the colour that it has there.
+Surfels paint_places(std::span<const Object> objects, const Light& light, std::span<const Eye> eyes,
+                     const Occluders& occluders, const std::vector<Ground>& grounds, const std::vector<Place>& places,
+                     std::size_t count, std::uint64_t seed) {
   Surfels surfels;
   scene::GaussianCloud& cloud = surfels.cloud;
   cloud.sh_degree = 1;
@@ -336,6 +340,28 @@ Surfels make_surfels(std::span<const Object> objects, const Light& light, std::s
     }
   });
   return surfels;
+}
+
+}  // namespace
+
+Surfels make_surfels(std::span<const Object> objects, const Light& light, std::span<const scene::Camera> cameras,
+                     std::size_t count, std::uint64_t seed) {
+  const std::vector<Eye> eyes = eyes_of(cameras);
+  const Occluders occluders(objects);
+  const std::vector<Ground> grounds = lay_ground(objects);
+  const auto places =
+      place_count(grounds, count, seed, [&](const Ground& ground, const Place& place, Rng& rng, std::size_t& first) {
+        return is_seen(ground, place, eyes, occluders, rng, first);
+      });
+  return paint_places(objects, light, eyes, occluders, grounds, places, count, seed);
+}
+
+Surfels cover_all(std::span<const Object> objects, const Light& light, std::span<const scene::Camera> cameras,
+                  float spacing, std::uint64_t seed) {
+  const std::vector<Ground> grounds = lay_ground(objects);
+  const auto places =
+      place_all(grounds, spacing, seed, [](const Ground&, const Place&, Rng&, std::size_t&) { return true; });
+  return paint_places(objects, light, eyes_of(cameras), Occluders(objects), grounds, places, places.size(), seed);
 }
 
 }  // namespace engine::procedural

@@ -28,4 +28,11 @@ struct Surfels {
 [[nodiscard]] Surfels make_surfels(std::span<const Object> objects, const Light& light,
                                    std::span<const scene::Camera> cameras, std::size_t count, std::uint64_t seed);
 
+/// Covers the objects all over, inside and behind too, whether any camera sees it or not.
+///   spacing  of Gaussians where a patch's density is 1, world units
+///   cameras  for which glazed things are painted
+///   returns  Gaussians by object and patch, in order; the same bytes for the same arguments, for any number of threads
+[[nodiscard]] Surfels cover_all(std::span<const Object> objects, const Light& light,
+                                std::span<const scene::Camera> cameras, float spacing, std::uint64_t seed);
+
 }  // namespace engine::procedural

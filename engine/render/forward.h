@@ -83,6 +83,7 @@ class Workspace {
  private:
   friend void forward(const Layers&, const scene::Camera&, const ForwardOptions&, std::span<const float>, Workspace&,
                       Rendering&);
+  friend void raise_to_largest_weights(const Layers&, const scene::Camera&, Workspace&, std::span<float>);
   friend std::optional<PixelHit> pick(const Layers&, const scene::Camera&, DVec2, Workspace&);
   struct Impl;
   std::unique_ptr<Impl> impl_;

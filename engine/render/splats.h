@@ -137,6 +137,12 @@ struct alignas(64) TilePixels {
 void composite_tile(const Splat* splats, std::span<const std::uint32_t> list, int x0, int y0, Channels channels,
                     Vec3 background, TilePixels& tile);
 
+/// The largest blending weight of each listed splat over the pixels of a tile; see composite_tile().
+///   width, height  pixels of the picture from (x0, y0) on: those beyond count for nothing
+///   out            [list.size()]
+void largest_tile_weights(const Splat* splats, std::span<const std::uint32_t> list, int x0, int y0, int width,
+                          int height, float* out);
+
 /// Projects all layers into the buffers.
 ///   weight  [layers.size()] or empty
 void project(const Layers& layers, const ViewParams<float>& view, int sh_degree, std::span<const float> weight,

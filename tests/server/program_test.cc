@@ -37,7 +37,7 @@ void expect_error(const std::vector<std::string>& arguments, int status, const s
 TEST(Program, ListsExactlyTheSubcommandsThereAre) {
   const Finished run = splatdrag({"--help"});
   EXPECT_EQ(run.status, 0);
-  for (const char* name : {"  edit ", "  fit ", "  render ", "  info ", "  convert ", "  demo-scene ", "  serve "})
+  for (const char* name : {"  edit ", "  fit ", "  render ", "  info ", "  convert ", "  demo-scene ", "  serve ", "  bench-edit "})
     EXPECT_NE(run.out.find(name), std::string::npos) << name;
   for (const char* name : {"  bench-edit "}) EXPECT_EQ(run.out.find(name), std::string::npos) << name;
   EXPECT_NE(run.out.find("Exit status"), std::string::npos);
@@ -57,7 +57,7 @@ TEST(Program, SaysItsVersion) {
 }
 
 TEST(Program, RefusesAWrongCommandLineInOneLine) {
-  expect_error({}, 2, "a subcommand is required: serve edit fit render info convert demo-scene");
+  expect_error({}, 2, "a subcommand is required: serve edit fit render info convert demo-scene bench-edit");
   expect_error({"bake"}, 2, "\"bake\" is no subcommand");
   expect_error({"serve"}, 2, "--data-dir is required");
   expect_error({"edit"}, 2, "--scene is required");

@@ -1,0 +1,333 @@
+#include "engine/evaluate/cases.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <numeric>
+#include <utility>
+
+#include "engine/deform/rotate_sh.h"
+#include "engine/procedural/demo_scene.h"
+#include "engine/procedural/light.h"
+#include "engine/procedural/materials.h"
+#include "engine/procedural/objects.h"
+#include "engine/procedural/surfels.h"
+#include "engine/render/largest_weight.h"
+
+namespace engine::evaluate {
+namespace {
+
+namespace made = procedural;
+
+constexpr double pi = std::numbers::pi;
+constexpr std::uint64_t seed = 7;
+// A Gaussian that no camera of the capture blends with more than this is not in the scene: nothing would have trained it.
+constexpr float least_weight = 0.02f;
+constexpr int held_out_every = 5;
+
+/// How a point of the part moves: turned about the pivot, drawn away from the vertical through it, shifted.
+struct Motion {
+  DQuat turn{1, 0, 0, 0};
+  DVec3 pivot{0.0};    ///< World units.
+  DVec3 shift{0.0};    ///< World units.
+  double widen = 0;    ///< Horizontal distances from the pivot grow by this part of themselves per unit of height.
+
+  [[nodiscard]] DVec3 operator()(DVec3 point) const {
+    const DVec3 arm = turn * (point - pivot);
+    const double stretch = 1 + widen * std::max(-arm.y, 0.0);  // height is -y
+    return pivot + DVec3(stretch * arm.x, arm.y, stretch * arm.z) + shift;
+  }
+};
+
+/// A thing that is moved, or that only the edited scene has (what a drawn-out part grows).
+struct Part {
+  made::Object object;
+  Motion motion = {};
+  bool only_after = false;
+};
+
+/// What a case is made from.
+struct Plan {
+  std::string what;
+  std::vector<made::Object> surroundings = {};
+  std::vector<Part> parts = {};
+  edit::Request request = {};
+  float spacing = 0.018f;         ///< Of Gaussians, world units.
+  int views = 30, width = 480, height = 360;
+  double zoom = 1;                ///< Of the cameras; below 1 everything is smaller in the picture.
+  bool small = false, textured = true;
+};
+
+Vec3 at(float x, float height, float z) { return {x, -height, z}; }
+DVec3 dat(double x, double height, double z) { return {x, -height, z}; }
+
+/// Even light: what is moved looks the same elsewhere.
+made::Light studio() {
+  made::Light light;
+  light.to_sun = glm::normalize(Vec3(-0.5f, -0.8f, -0.6f));
+  light.sun = 1.6f * Vec3(1.0f, 0.95f, 0.88f);
+  light.sky_up = 0.9f * Vec3(0.95f, 0.98f, 1.0f);
+  light.sky_level = 0.75f * Vec3(1.0f, 1.0f, 1.0f);
+  light.sky_down = 0.45f * Vec3(1.0f, 0.95f, 0.9f);
+  light.window = {.middle = {0, 0, 0}, .columns = 1, .rows = 1, .pane_width = 200, .pane_height = 200, .bar = 0, .softness = 0.1f};
+  return light;
+}
+
+std::vector<made::Object> furnished_room() {
+  return {made::make_room(-1.5f), made::make_table({}, {3.7f, 1.5f, 2.1f}),
+          made::make_framed_print({at(-0.95f, 0.85f, 1.40f), 0}, 1.5f, 1.1f),
+          made::make_framed_print({at(0.95f, 0.85f, 1.40f), 0}, 1.5f, 1.1f)};
+}
+
+made::Object crate(made::Placement placement, float side, float height) {
+  return {"crate", placement, made::box({0, 0, 0}, {side, height, side}, made::cloth_cover(made::srgb(60, 92, 150)), 2)};
+}
+
+edit::Handle handle(DVec3 source, std::optional<DVec3> target, double radius, int group = 0) {
+  return {source, target, radius, group};
+}
+
+edit::Request drag(std::vector<edit::Handle> handles, std::optional<edit::Region> region = {}) {
+  edit::Request request;
+  request.handles = std::move(handles);
+  request.region = region;
+  return request;
+}
+
+/// Everything above the table top within a square around `middle`.
+edit::Region above_table(DVec3 middle, double side, double height) {
+  return {{middle.x, -0.004 - height / 2, middle.z}, {side, height, side}};
+}
+
+Plan slide() {
+  const DVec3 shift = dat(0.85, 0, 0.05), foot = dat(-0.45, 0, -0.35);
+  Plan plan{.what = "A blue crate moved across a wooden table."};
+  plan.surroundings = furnished_room();
+  plan.parts = {{crate({Vec3(foot), 0.3f}, 0.42f, 0.36f), {.shift = shift}}};
+  const DVec3 middle = foot + dat(0, 0.18, 0);
+  plan.request = drag({handle(middle, middle + shift, 0.42)}, above_table(foot, 0.8, 0.5));
+  plan.spacing = 0.03f, plan.width = 240, plan.height = 180, plan.small = true;
+  return plan;
+}
+
+Plan lift() {
+  const DVec3 shift = dat(0.1, 0.55, 0), foot = dat(-0.75, 0.25, 0.95);
+  Plan plan{.what = "A hanging ball lifted before a wall with prints."};
+  plan.surroundings = furnished_room();
+  plan.parts = {{made::make_ball({Vec3(foot), 0}, 0.26f, made::srgb(240, 232, 214), made::srgb(150, 40, 30)),
+                 {.shift = shift}}};
+  const DVec3 middle = foot + dat(0, 0.26, 0);
+  plan.request = drag({handle(middle, middle + shift, 0.28)});
+  return plan;
+}
+
+/// A pole of `blocks` rings in two colours; each is a thing of its own, so that a longer pole has the same Gaussians.
+made::Object ring(Vec3 foot, float radius, float height, bool red) {
+  const Vec3 colour = red ? made::srgb(190, 40, 30) : made::srgb(236, 230, 220);
+  return {"ring", {foot, 0}, {made::lathe({{radius, 0}, {radius, height}}, made::plain(colour, 0.1f), 2.0f, 40),
+                              made::lathe({{radius, height}, {0, height}}, made::plain(colour, 0.1f), 2.0f, 40)}};
+}
+
+Plan pole() {
+  constexpr int rings = 8, more = 4, dragged = 4;
+  constexpr float height = 0.09f, radius = 0.10f;
+  Plan plan{.what = "A striped pole drawn out to one and a half of its length."};
+  plan.surroundings = furnished_room();
+  const auto foot = [&](int k) { return at(0.1f, float(k) * height, -0.1f); };
+  for (int k = 0; k < rings - dragged; ++k) plan.surroundings.push_back(ring(foot(k), radius, height, k % 2 == 0));
+  const double rise = double(more) * double(height);
+  for (int k = rings - dragged; k < rings; ++k)
+    plan.parts.push_back({ring(foot(k), radius, height, k % 2 == 0), {.shift = dat(0, rise, 0)}});
+  for (int k = rings - dragged; k < rings - dragged + more; ++k)
+    plan.parts.push_back({ring(foot(k), radius, height, k % 2 == 0), {}, true});
+  const DVec3 middle = DVec3(foot(rings - dragged)) + dat(0, 0.5 * dragged * double(height), 0);
+  plan.request = drag({handle(middle, middle + dat(0, rise, 0), 0.26)},
+                      edit::Region{middle, {0.3, dragged * double(height) + 0.004, 0.3}});
+  plan.request.mode = edit::Mode::extend;
+  return plan;
+}
+
+Plan arm() {
+  constexpr float length = 0.5f, thick = 0.11f;
+  Plan plan{.what = "A jointed arm raised at the shoulder and bent at the elbow."};
+  plan.surroundings = furnished_room();
+  const Vec3 shoulder = at(-0.75f, 0.45f, -0.15f);
+  plan.surroundings.push_back({"stand", {at(-0.75f, 0, -0.15f), 0},
+                               made::box({0, 0, 0}, {0.16f, 0.45f, 0.16f}, made::plain(made::srgb(90, 90, 96), 0.1f), 2)});
+  const auto segment = [&](float along, const made::Material& material) {
+    return made::Object{"segment", {shoulder + Vec3(along + 0.5f * length, 0.5f * thick, 0), 0},
+                        made::box({0, 0, 0}, {length, thick, thick}, material, 2.2f)};
+  };
+  const DVec3 from(shoulder), elbow = from + DVec3(double(length), 0, 0);
+  const DQuat raise = glm::angleAxis(-35 * pi / 180, DVec3(0, 0, 1)), bend = glm::angleAxis(-20 * pi / 180, DVec3(0, 0, 1));
+  const Motion upper{.turn = raise, .pivot = from};
+  const DVec3 moved_elbow = upper(elbow);
+  const Motion lower{.turn = bend * raise, .pivot = elbow, .shift = moved_elbow - elbow};
+  plan.parts = {{segment(0, made::cloth_cover(made::srgb(170, 120, 40))), upper},
+                {segment(length, made::cloth_cover(made::srgb(60, 110, 70))), lower}};
+  std::vector<edit::Handle> handles;
+  for (const double along : {0.0, 0.17, 0.34}) {
+    const DVec3 point = from + DVec3(along + 0.08, 0, 0);
+    handles.push_back(handle(point, upper(point), 0.125));
+  }
+  for (const double along : {0.5, 0.67, 0.84}) {
+    const DVec3 point = from + DVec3(along + 0.08, 0, 0);
+    handles.push_back(handle(point, lower(point), 0.125));
+  }
+  plan.request = drag(std::move(handles), edit::Region{from + DVec3(0.5, 0, 0), {1.002, 0.118, 0.118}});
+  plan.request.params.interpolation = edit::Interpolation::rigid;
+  return plan;
+}
+
+Plan bush() {
+  const made::Placement pot{{0.0f, 0, -0.1f}, 0.3f};
+  Plan plan{.what = "A leafy bush widened to both sides.", .textured = false};
+  plan.surroundings = {made::make_room(-1.5f), made::make_table({}, {3.7f, 1.5f, 2.1f}), made::make_pot(pot)};
+  const made::Plant plant = made::make_plant(pot, 40, seed);
+  const DVec3 soil = DVec3(pot.position) + dat(0, double(made::soil_height), 0);
+  const Motion motion{.pivot = soil, .widen = 0.7};
+  plan.parts = {{plant.object, motion}};
+  std::vector<edit::Handle> handles{handle(soil + dat(0, 0.1, 0), std::nullopt, 0.16)};
+  for (int k = 0; k < 6; ++k) {
+    const double angle = 2 * pi * k / 6;
+    for (const double height : {0.35, 0.7}) {
+      const DVec3 point = soil + dat(0.34 * std::cos(angle), height, 0.34 * std::sin(angle));
+      handles.push_back(handle(point, motion(point), 0.30));
+    }
+  }
+  plan.request = drag(std::move(handles), edit::Region{soil + dat(0, 0.85, 0), {2.2, 1.66, 2.2}});
+  plan.request.params.interpolation = edit::Interpolation::smooth;
+  return plan;
+}
+
+Plan apart() {
+  const DVec3 left = dat(-0.22, 0, -0.45), right = dat(0.24, 0, -0.40);
+  const DVec3 to_left = dat(-0.5, 0, 0.05), to_right = dat(0.5, 0, -0.1);
+  Plan plan{.what = "A mug and an apple moved apart, each by a group of its own."};
+  plan.surroundings = furnished_room();
+  plan.parts = {{made::make_mug({Vec3(left), 2.4f}), {.shift = to_left}},
+                {made::make_apple({Vec3(right), 0.4f}, 0.18f), {.shift = to_right}}};
+  const DVec3 mug = left + dat(0, 0.2, 0), apple = right + dat(0, 0.17, 0);
+  plan.request = drag({handle(mug, mug + to_left, 0.36, 1), handle(apple, apple + to_right, 0.27, 2)},
+                      edit::Region{dat(0, 0.304, -0.4), {1.4, 0.6, 0.9}});
+  return plan;
+}
+
+Plan distance() {
+  const DVec3 foot = dat(-1.35, 0, -0.55), shift = dat(2.6, 0, 0.35);
+  Plan plan{.what = "An apple moved over the whole table, many radii far."};
+  plan.surroundings = furnished_room();
+  plan.parts = {{made::make_apple({Vec3(foot), 0.4f}, 0.16f), {.shift = shift}}};
+  const DVec3 middle = foot + dat(0, 0.16, 0);
+  plan.request = drag({handle(middle, middle + shift, 0.24)}, above_table(foot, 0.5, 0.5));
+  return plan;
+}
+
+Plan speck() {
+  const DVec3 foot = dat(0.1, 0, -0.3), shift = dat(0.28, 0, 0.1);
+  Plan plan{.what = "An apple moved on a table far from the cameras."};
+  plan.surroundings = furnished_room();
+  plan.parts = {{made::make_apple({Vec3(foot), 0.4f}, 0.12f), {.shift = shift}}};
+  const DVec3 middle = foot + dat(0, 0.12, 0);
+  plan.request = drag({handle(middle, middle + shift, 0.19)}, above_table(foot, 0.4, 0.4));
+  plan.spacing = 0.03f, plan.width = 240, plan.height = 180, plan.zoom = 0.6, plan.small = true;
+  return plan;
+}
+
+const std::vector<std::pair<std::string, Plan (*)()>>& plans() {
+  static const std::vector<std::pair<std::string, Plan (*)()>> all{
+      {"slide", slide}, {"lift", lift},   {"pole", pole},         {"arm", arm},
+      {"bush", bush},   {"apart", apart}, {"distance", distance}, {"speck", speck}};
+  return all;
+}
+
+/// Row i of the cloud, carried along by the motion.
+void move_row(scene::GaussianCloud& cloud, std::size_t i, const Motion& motion, const deform::ShRotation& sh) {
+  cloud.mean.set(i, Vec3(motion(DVec3(cloud.mean.get(i)))));
+  if (motion.turn == DQuat(1, 0, 0, 0)) return;
+  cloud.rotation.set(i, Quat(motion.turn * DQuat(cloud.rotation.get(i))));
+  const std::size_t coefficients = scene::sh_coefficients(cloud.sh_degree);
+  for (std::size_t c = 0; c < 3; ++c)
+    deform::rotate_sh(sh, cloud.sh_row(i).subspan(c * coefficients, coefficients));
+}
+
+std::vector<std::uint32_t> range(std::size_t first, std::size_t last) {
+  std::vector<std::uint32_t> rows(last - first);
+  std::iota(rows.begin(), rows.end(), std::uint32_t(first));
+  return rows;
+}
+
+void place_cameras(const Plan& plan, Case& out) {
+  auto cameras = made::make_arc_cameras(plan.views, plan.width, plan.height);
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    cameras[i].fx *= plan.zoom, cameras[i].fy *= plan.zoom;
+    (i % held_out_every == held_out_every - 1 ? out.held_out : out.cameras).push_back(cameras[i]);
+  }
+}
+
+Case carry_out(const std::string& name, const Plan& plan) {
+  Case out;
+  out.name = name, out.what = plan.what, out.small = plan.small, out.textured = plan.textured;
+  out.request = plan.request;
+  place_cameras(plan, out);
+
+  const made::Light light = studio();
+  const made::Surfels around = made::cover_all(plan.surroundings, light, out.cameras, plan.spacing, seed);
+  std::vector<made::Object> things;
+  for (const Part& part : plan.parts) things.push_back(part.object);
+  const made::Surfels moved = made::cover_all(things, light, out.cameras, plan.spacing, seed + 1);
+
+  const std::size_t rows_around = around.cloud.size(), rows_moved = moved.cloud.size();
+  out.truth = around.cloud;
+  scene::append_rows(out.truth, moved.cloud, range(0, rows_moved));
+  out.part = range(rows_around, rows_around + rows_moved);
+  std::vector<std::uint32_t> there_before;
+  for (std::size_t i = 0; i < rows_moved; ++i)
+    if (!plan.parts[moved.object[i]].only_after) there_before.push_back(std::uint32_t(i));
+  scene::GaussianCloud whole = around.cloud;
+  scene::append_rows(whole, moved.cloud, there_before);
+  std::vector<deform::ShRotation> sh;
+  for (const Part& part : plan.parts) sh.push_back(deform::sh_rotation(part.motion.turn));
+  for (std::size_t i = 0; i < rows_moved; ++i)
+    move_row(out.truth, rows_around + i, plan.parts[moved.object[i]].motion, sh[moved.object[i]]);
+
+  std::vector<float> weight(whole.size(), 0.0f);
+  render::Workspace workspace;
+  for (const scene::Camera& camera : out.cameras) render::raise_to_largest_weights(whole, camera, workspace, weight);
+  std::vector<std::uint8_t> seen(whole.size());
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    seen[i] = weight[i] >= least_weight;
+    if (seen[i] && i >= rows_around) {
+      out.part_before.push_back(std::uint32_t(kept));
+      out.part_after.push_back(std::uint32_t(rows_around + there_before[i - rows_around]));
+    }
+    kept += seen[i];
+  }
+  out.before = scene::select(whole, seen);
+  return out;
+}
+
+}  // namespace
+
+const std::vector<std::string>& case_names() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> out;
+    for (const auto& [name, plan] : plans()) out.push_back(name);
+    return out;
+  }();
+  return names;
+}
+
+Result<Case> make_case(const std::string& name) {
+  std::string known;
+  for (const auto& [called, plan] : plans()) {
+    if (called == name) return carry_out(name, plan());
+    known += (known.empty() ? "" : ", ") + called;
+  }
+  return fail(ErrorCode::not_found, "there is no case \"" + name + "\"; there are " + known, "case");
+}
+
+}  // namespace engine::evaluate

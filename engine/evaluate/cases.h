@@ -1,0 +1,44 @@
+// Edits whose right result is known: made-up scenes in which a part can be put elsewhere.
+//
+// A case consists of surroundings and a part, both covered with Gaussians all over, also where nobody looks. The truth
+// is both with the part moved. What is edited is both with the part at its first place, without the Gaussians that no
+// camera of the capture shows: under an object there is no floor, as in a scene that was trained on photos. Light is
+// baked into each of the two alone, so that no shadow of the part stays behind or is missing.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/edit/request.h"
+#include "engine/scene/camera.h"
+#include "engine/scene/gaussian_cloud.h"
+
+namespace engine::evaluate {
+
+struct Case {
+  std::string name;     ///< "slide"
+  std::string what;     ///< One sentence for people.
+  bool small = false;   ///< Quick enough for sweeps and for every change of the code.
+  bool textured = true;  ///< What the part uncovers has a pattern, so that a smooth filling is a wrong one.
+
+  scene::GaussianCloud before;           ///< What is edited.
+  scene::GaussianCloud truth;            ///< What it should become.
+  std::vector<std::uint32_t> part;         ///< Rows of `truth` that the edit is about: those moved, those it grew.
+  std::vector<std::uint32_t> part_before;  ///< Rows of `before` that should move,
+  std::vector<std::uint32_t> part_after;   ///< and the row of `truth` that each should become.
+  std::vector<scene::Camera> cameras;    ///< Of the capture.
+  std::vector<scene::Camera> held_out;   ///< Between them; the edit never sees these.
+  edit::Request request;                 ///< Handles and mode; parameters are those of a preset or a sweep.
+};
+
+/// Names of all cases, in order.
+[[nodiscard]] const std::vector<std::string>& case_names();
+
+/// Makes one. The same bytes every time, for any number of threads.
+///   errors  not_found: no case of that name; the message lists them
+[[nodiscard]] Result<Case> make_case(const std::string& name);
+
+}  // namespace engine::evaluate

@@ -1,0 +1,45 @@
+// How near an edited scene comes to the truth, at cameras that the edit has not seen.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "engine/evaluate/cases.h"
+#include "engine/scene/camera.h"
+#include "engine/scene/gaussian_cloud.h"
+#include "engine/scene/image.h"
+
+namespace engine::evaluate {
+
+/// Likeness over the pixels of a kind, of all held-out views together.
+struct Likeness {
+  double psnr_db = 0;      ///< Of the mean square error over all of them; 100 where nothing differs.
+  double ssim = 0;         ///< Mean of SSIM's map; windows reach beyond the pixels that count.
+  std::size_t pixels = 0;  ///< That count. 0: the rest says nothing.
+};
+
+struct Quality {
+  Likeness edited;   ///< What the part dominates before or after, and 4 pixels (at 360 of height) around it.
+  Likeness vacated;  ///< What it dominates before, and not after.
+  Likeness arrived;  ///< What it dominates after.
+  Likeness outside;  ///< All that is not `edited`.
+  /// Mean distance from where a Gaussian of the part should be to the nearest one there, world units: of those that the
+  /// capture shows before the move.
+  double miss = 0;
+};
+
+/// The pixels of one held-out view, by kind.
+struct Kinds {
+  scene::Mask edited, vacated, arrived;
+};
+[[nodiscard]] Kinds kinds_of(const Case& the_case, const scene::Camera& camera);
+
+/// Judges `result`, which came of the_case.before.
+[[nodiscard]] Quality judge(const Case& the_case, const scene::GaussianCloud& result);
+
+/// A case at one view, side by side: before, deformed, result, truth, and four times the difference of the last two.
+[[nodiscard]] scene::Image comparison(const Case& the_case, const scene::GaussianCloud& deformed,
+                                      const scene::GaussianCloud& result, const scene::Camera& camera);
+
+}  // namespace engine::evaluate

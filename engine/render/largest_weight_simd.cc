@@ -1,0 +1,94 @@
+// The largest blending weight of each splat in one tile: the walk of composite_simd.cc with another result.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "engine/render/largest_weight_simd.cc"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+// After highway.h: compiled once per instruction set.
+#include "engine/render/tile_blocks.inc"
+
+#include <algorithm>
+
+#include "engine/render/splats.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace engine::render {
+namespace HWY_NAMESPACE {
+
+/// Walks the batch through one block. False if all of the block's rays have ended.
+///   largest  [batch][lanes] raised
+HWY_INLINE bool WalkBlock(D d, const Batch& batch, std::size_t block, V lane_x, V lane_y, float* transmittances,
+                          float* largest) {
+  const V zero = hn::Zero(d), threshold = hn::Set(d, -log2_255), ceiling = hn::Set(d, float(max_alpha)),
+          floor = hn::Set(d, float(min_transmittance)), sign = hn::Set(d, -0.0f);
+  V transmittance = hn::Load(d, transmittances + block * Blocks::lanes);
+  if (hn::AllTrue(d, hn::Lt(transmittance, zero))) return false;
+  const V px = hn::Add(lane_x, hn::Set(d, float(block % Blocks::columns * Blocks::width)));
+  const V py = hn::Add(lane_y, hn::Set(d, float(block / Blocks::columns * Blocks::height)));
+  for (std::uint64_t rest = batch.reach[block]; rest != 0; rest &= rest - 1) {
+    const std::size_t k = hwy::Num0BitsBelowLS1Bit_Nonzero64(rest);
+    const V u =
+        hn::MulAdd(hn::Set(d, batch.l1[k]), px, hn::MulAdd(hn::Set(d, batch.l2[k]), py, hn::Set(d, batch.u0[k])));
+    const V v = hn::MulAdd(hn::Set(d, batch.l3[k]), py, hn::Set(d, batch.v0[k]));
+    const V power = hn::NegMulAdd(u, u, hn::NegMulAdd(v, v, hn::Set(d, batch.log2_opacity[k])));
+    const V alpha = hn::IfThenElseZero(hn::Ge(power, threshold), hn::Min(Exp2(d, power), ceiling));
+    const V after = hn::NegMulAdd(transmittance, alpha, transmittance);
+    const auto going_on = hn::Ge(after, floor);
+    const V w = hn::IfThenElseZero(going_on, hn::Mul(transmittance, alpha));
+    float* const so_far = largest + k * Blocks::lanes;
+    hn::Store(hn::Max(w, hn::Load(d, so_far)), d, so_far);
+    transmittance = hn::IfThenElse(going_on, after, hn::Or(transmittance, sign));
+  }
+  hn::Store(transmittance, d, transmittances + block * Blocks::lanes);
+  return true;
+}
+
+void LargestWeights(const Splat* splats, const std::uint32_t* list, std::size_t count, int x0, int y0, int width,
+                    int height, float* out) {
+  const D d;
+  alignas(64) float lanes_x[Blocks::lanes], lanes_y[Blocks::lanes];
+  for (std::size_t i = 0; i < Blocks::lanes; ++i) {
+    lanes_x[i] = float(i % Blocks::width);
+    lanes_y[i] = float(i / Blocks::width);
+  }
+  const V lane_x = hn::Load(d, lanes_x), lane_y = hn::Load(d, lanes_y);
+  // Beyond the picture's edge nothing is shown: those rays have ended before they begin.
+  alignas(64) float transmittances[TilePixels::count];
+  for (std::size_t i = 0; i < TilePixels::count; ++i) {
+    const std::size_t block = i / Blocks::lanes, lane = i % Blocks::lanes;
+    const float x = lanes_x[lane] + float(block % Blocks::columns * Blocks::width),
+                y = lanes_y[lane] + float(block / Blocks::columns * Blocks::height);
+    transmittances[i] = x < float(width) && y < float(height) ? 1.0f : -1.0f;
+  }
+  Batch batch;
+  alignas(64) float largest[Batch::size * Blocks::lanes];
+  std::fill_n(out, count, 0.0f);
+  for (std::size_t first = 0; first < count; first += Batch::size) {
+    const std::size_t n = HWY_MIN(Batch::size, count - first);
+    Fill(splats, list + first, n, x0, y0, batch);
+    FindReach(d, n, batch);
+    std::fill_n(largest, n * Blocks::lanes, 0.0f);
+    bool live = false;
+    for (std::size_t block = 0; block < Blocks::count; ++block)
+      live |= WalkBlock(d, batch, block, lane_x, lane_y, transmittances, largest);
+    for (std::size_t k = 0; k < n; ++k)
+      out[first + k] = *std::max_element(largest + k * Blocks::lanes, largest + (k + 1) * Blocks::lanes);
+    if (!live) return;
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace engine::render
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace engine::render {
+
+HWY_EXPORT(LargestWeights);
+
+void largest_tile_weights(const Splat* splats, std::span<const std::uint32_t> list, int x0, int y0, int width,
+                          int height, float* out) {
+  HWY_DYNAMIC_DISPATCH(LargestWeights)(splats, list.data(), list.size(), x0, y0, width, height, out);
+}
+
+}  // namespace engine::render
+#endif
