@@ -44,43 +44,65 @@ struct FrozenView::Impl {
   }
 };
 
-FrozenView::FrozenView(const Layers& frozen, const scene::Camera& camera, scene::Rect region, Vec3 background)
-    : impl_(std::make_unique<Impl>()) {
-  assert(scene::validate(camera) && !region.empty() && whole_tiles(region, camera) == region);
-  TileGrid grid = whole_grid(camera);
-  grid.wanted.assign(std::size_t(grid.columns) * std::size_t(grid.rows), 0);
+namespace {
+
+/// The tiles of a region of whole tiles, ascending.
+std::vector<std::uint32_t> tiles_of(scene::Rect region, int columns) {
   std::vector<std::uint32_t> tiles;
   for (int y = region.y0; y < region.y1; y += tile_size)
     for (int x = region.x0; x < region.x1; x += tile_size)
-      tiles.push_back(std::uint32_t(y / tile_size * grid.columns + x / tile_size));
-  for (const std::uint32_t tile : tiles) grid.wanted[tile] = 1;
+      tiles.push_back(std::uint32_t(y / tile_size * columns + x / tile_size));
+  return tiles;
+}
+
+}  // namespace
+
+FrozenView::FrozenView(const Layers& frozen, const scene::Camera& camera, scene::Rect region, Vec3 background)
+    : impl_(std::make_unique<Impl>()) {
+  assert(scene::validate(camera) && !region.empty() && whole_tiles(region, camera) == region);
+  Impl& view = *impl_;
+  view.camera = camera, view.region = region, view.background = background, view.columns = tile_columns(camera.width);
+  restore(frozen);
+  view.color = scene::Image(region.width(), region.height(), 3);
+  const std::vector<std::uint32_t> tiles = tiles_of(region, view.columns);
+  parallel_for(tiles.size(), 1, [&](std::size_t i, std::size_t) {
+    draw_tile(view.splats.data(), view.list(tiles[i]), tiles[i], view.columns, background, region, view.color);
+  });
+}
+
+void FrozenView::restore(const Layers& frozen) {
+  Impl& view = *impl_;
+  TileGrid grid = whole_grid(view.camera);
+  grid.wanted.assign(std::size_t(grid.columns) * std::size_t(grid.rows), 0);
+  for (const std::uint32_t tile : tiles_of(view.region, grid.columns)) grid.wanted[tile] = 1;
   ForwardBuffers buffers;
   // Within all of the picture: what a splat's box is cut to decides which tiles it is listed in, and the lists are to
   // be those of a picture that was not cut.
-  project(frozen, view_params<float>(camera), frozen.base->sh_degree, {}, Culling::exact, grid.pixels, buffers);
+  project(frozen, view_params<float>(view.camera), frozen.base->sh_degree, {}, Culling::exact, grid.pixels, buffers);
   sort_by_depth(buffers);
   bin(grid, buffers);
 
-  Impl& view = *impl_;
-  view.camera = camera, view.region = region, view.background = background, view.columns = grid.columns;
   const std::span<const std::uint32_t> entries(buffers.entries.data(), buffers.tile_begin.back());
   std::vector<std::uint32_t> number(buffers.count, 0);  // of a splat among those kept, plus one
   for (const std::uint32_t splat : entries) number[splat] = 1;
   std::uint32_t kept = 0;
   for (std::uint32_t& n : number)
     if (n != 0) n = ++kept;
-  view.splats.reserve(kept);
+  view.splats.clear(), view.splats.reserve(kept);
   for (std::size_t i = 0; i < number.size(); ++i)
     if (number[i] != 0) view.splats.push_back(buffers.splats[i]);
-  view.entries.reserve(entries.size());
+  view.entries.clear(), view.entries.reserve(entries.size());
   for (const std::uint32_t splat : entries) view.entries.push_back(number[splat] - 1);
   view.tile_begin = buffers.tile_begin;
-
-  view.color = scene::Image(region.width(), region.height(), 3);
-  parallel_for(tiles.size(), 1, [&](std::size_t i, std::size_t) {
-    draw_tile(view.splats.data(), view.list(tiles[i]), tiles[i], view.columns, background, region, view.color);
-  });
 }
+
+void FrozenView::let_go() {
+  // Not `= {}`, which keeps the memory.
+  impl_->splats = std::vector<Splat>();
+  impl_->entries = std::vector<std::uint32_t>();
+  impl_->tile_begin = std::vector<std::uint32_t>();
+}
+bool FrozenView::is_let_go() const { return impl_->tile_begin.empty(); }
 
 FrozenView::~FrozenView() = default;
 FrozenView::FrozenView(FrozenView&&) noexcept = default;
@@ -138,6 +160,7 @@ void LocalFrame::merge(const FrozenView& frozen) {
   const FrozenView::Impl& view = *frozen.impl_;
   const ForwardBuffers& top = frame.changeable;
   ForwardBuffers& merged = frame.merged;
+  assert(!frozen.is_let_go());
   assert(top.tile_begin.size() == view.tile_begin.size() && contains(view.region, frame.reach));
 
   // By depth; a frozen splat comes before a changeable one of the same depth, as rows of a base do.

@@ -39,8 +39,15 @@ class FrozenView {
   [[nodiscard]] scene::Rect region() const;
   /// The region of the picture with nothing changeable in it.
   [[nodiscard]] const scene::Image& color() const;
-  [[nodiscard]] std::size_t splats() const;  ///< That reach the region.
+  [[nodiscard]] std::size_t splats() const;  ///< That reach the region; 0 while they are let go.
   [[nodiscard]] std::size_t memory_bytes() const;
+
+  /// Lets splats and lists go, most of the memory. The picture stays; LocalFrame needs them back first.
+  void let_go();
+  [[nodiscard]] bool is_let_go() const;
+  /// Makes them anew, as they were, at the cost of the scene.
+  ///   frozen  as given at first
+  void restore(const Layers& frozen);
 
  private:
   friend class LocalFrame;

@@ -1,6 +1,8 @@
 // How changeable Gaussians are trained.
 #pragma once
 
+#include <cstddef>
+
 #include "engine/core/result.h"
 #include "engine/optim/adam.h"
 #include "engine/optim/losses.h"
@@ -26,6 +28,9 @@ struct TrainOptions {
   double dead_zone = 0.501 / 255.0;  ///< Colour units, 0 or more: see optim::edit_loss().
   DensifyOptions densify = {};
   double floater_distance = 0.1;  ///< Of the radius of the changeable part: see Trainer::step().
+  /// Bytes. What views keep of the frozen Gaussians beyond this is let go, of those longest unused first, and made anew
+  /// when it is needed: slower by a pass over the scene, the same bytes.
+  std::size_t frozen_memory = std::size_t{2} << 30;
 };
 [[nodiscard]] Result<void> validate(const TrainOptions& options);
 

@@ -93,8 +93,10 @@ bool Trainer::add_view(const scene::Camera& camera, const scene::Mask& mask, con
                     .background = {},
                     .edited = {},
                     .near_by_tile = {},
-                    .nearest = 0});
+                    .nearest = 0,
+                    .used = 0});
   View& view = views_.back();
+  make_room_for(view);
   frame_.merge(view.frozen);  // of `original`, as projected last
   view.background = view.frozen.color();
   frame_.forward(view.frozen, view.background);
@@ -104,8 +106,31 @@ bool Trainer::add_view(const scene::Camera& camera, const scene::Mask& mask, con
 
 void Trainer::lay_over(View& view) {
   const scene::Rect reach = frame_.project(cloud_, view.frozen.camera());
-  if (!has_room(view.frozen.region(), reach, view.frozen.camera())) widen(view, reach, frozen_, black);
+  if (!has_room(view.frozen.region(), reach, view.frozen.camera()))
+    widen(view, reach, frozen_, black);
+  else if (view.frozen.is_let_go())
+    view.frozen.restore(frozen_.layers());
+  make_room_for(view);
   frame_.merge(view.frozen);
+}
+
+void Trainer::make_room_for(View& view) {
+  view.used = ++drawings_;
+  std::size_t bytes = 0;
+  std::vector<View*> kept;
+  for (View& other : views_) {
+    if (other.frozen.is_let_go()) continue;
+    bytes += other.frozen.memory_bytes();
+    if (&other != &view) kept.push_back(&other);
+  }
+  if (bytes <= options_.frozen_memory) return;
+  std::sort(kept.begin(), kept.end(), [](const View* a, const View* b) { return a->used < b->used; });
+  for (View* const other : kept) {
+    if (bytes <= options_.frozen_memory) return;
+    const std::size_t held = other->frozen.memory_bytes();
+    other->frozen.let_go();
+    bytes -= held - other->frozen.memory_bytes();
+  }
 }
 
 scene::Image Trainer::render(std::size_t v) {

@@ -97,6 +97,8 @@ class Trainer {
  private:
   /// Puts the changeable Gaussians as they are now into the view; widens it if they have left it.
   void lay_over(View& view);
+  /// Lets go of what other views keep, until all of them stay within TrainOptions::frozen_memory.
+  void make_room_for(View& view);
   Result<double> differentiate(View& view);
   Result<void> adam_step(double decay);
   void densify();
@@ -112,6 +114,7 @@ class Trainer {
   double radius_, position_scale_;
   std::vector<std::uint32_t> ancestor_;
   std::vector<View> views_;
+  std::uint64_t drawings_ = 0;
 
   Key key_;
   int iteration_ = 0, iterations_ = 0;

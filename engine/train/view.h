@@ -35,6 +35,7 @@ struct View {
   std::vector<float> near_by_tile;  ///< [tiles of the picture] Depth of the nearest changeable Gaussian when the
                                     ///< correction began; 0: none in this tile.
   float nearest = 0;                ///< Of all of them.
+  std::uint64_t used = 0;           ///< When it was last drawn, counted in drawings.
 };
 
 [[nodiscard]] inline scene::Rect united(scene::Rect a, scene::Rect b) {

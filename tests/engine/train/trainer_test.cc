@@ -56,6 +56,7 @@ struct Setting {
     changeable = before;
     for (const scene::Camera& camera : cameras) out.add_view(camera, mask, before);
     for (std::size_t v = 0; v < out.views(); ++v) {
+      static_cast<void>(out.render(v));  // so that what it keeps is at hand
       render::LocalFrame frame;
       frame.project(before, cameras[v]);
       frame.merge(out.view(v).frozen);
@@ -85,6 +86,18 @@ TEST(Trainer, TheLossFalls) {
   Trainer trainer = setting.pushed();
   const auto losses = train(trainer, 120);
   EXPECT_LT(mean(losses, 116, 4), 0.5 * mean(losses, 0, 4)) << losses.front() << " to " << losses.back();
+}
+
+TEST(Trainer, KeepsToItsMemoryAndGivesTheSameBytes) {
+  Setting one, other;
+  Trainer free = one.pushed();
+  Trainer bound = other.pushed({.frozen_memory = 1});
+  EXPECT_LT(bound.memory_bytes(), free.memory_bytes());
+  std::size_t let_go = 0;
+  for (std::size_t v = 0; v < bound.views(); ++v) let_go += bound.view(v).frozen.is_let_go();
+  EXPECT_EQ(let_go, bound.views() - 1) << "all but the one in use";
+  EXPECT_EQ(train(free, 30), train(bound, 30));
+  EXPECT_EQ(free.cloud(), bound.cloud());
 }
 
 TEST(Trainer, NothingMovesWhereThePicturesAreAsTheyShouldBe) {

@@ -1,6 +1,5 @@
 #include "server/scenes/scene_store.h"
 
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -8,13 +7,13 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
-#include <csignal>
 #include <cstring>
 #include <limits>
 #include <set>
 #include <thread>
 
 #include "tests/server/scenes/store_support.h"
+#include "tests/support/full_disk.h"
 
 namespace {
 std::atomic<bool> folders_cannot_be_synced = false;
@@ -578,27 +577,6 @@ TEST_F(SceneStoreTest, TakesADatasetBelowTheSceneRoot) {
   EXPECT_EQ(store->put_dataset_path(id, "..").error().where, "path");
 }
 
-/// No file can grow beyond so many bytes: to those who write, a full disk.
-class FullDisk {
- public:
-  explicit FullDisk(rlim_t bytes) {
-    getrlimit(RLIMIT_FSIZE, &before_);
-    handler_ = std::signal(SIGXFSZ, SIG_IGN);
-    const rlimit limit{bytes, before_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FullDisk() {
-    setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-  FullDisk(const FullDisk&) = delete;
-  FullDisk& operator=(const FullDisk&) = delete;
-
- private:
-  rlimit before_{};
-  void (*handler_)(int) = nullptr;
-};
-
 TEST_F(SceneStoreTest, SaysThatTheDiskIsFullAndHarmsNothing) {
   const std::string id = add(200);
   const auto base = cloud_of(id, "0");
@@ -610,14 +588,14 @@ TEST_F(SceneStoreTest, SaysThatTheDiskIsFullAndHarmsNothing) {
   const auto before = entries(options.folder / id);
   const auto code = [](const auto& result) { return result ? ErrorCode::internal : result.error().code; };
   {
-    const FullDisk full(6000);
+    const support::FullDisk full(6000);
     EXPECT_EQ(code(store->add_version(id, 0, "e1", large)), ErrorCode::no_space);
     EXPECT_EQ(code(store->add_path("table.ply", "")), ErrorCode::no_space);
     EXPECT_EQ(code(store->put_dataset_zip(id, temp.path() / "data.zip", "data.zip")), ErrorCode::no_space);
     EXPECT_EQ(code(store->file(id, "0", FileFormat::splat)), ErrorCode::no_space);
   }
   {
-    const FullDisk full(10);
+    const support::FullDisk full(10);
     EXPECT_EQ(code(store->patch(id, {"table", {}})), ErrorCode::no_space);
   }
   EXPECT_TRUE(entries(options.folder / ".scratch").empty());
