@@ -2,7 +2,7 @@
 
 import { confirmed, say, showPictures } from "./dialogs.js";
 import { attrs, h, keyedList, problemPlace, showProblem, text } from "./dom.js";
-import { count, counted, duration, gaussians, when } from "./format.js";
+import { count, counted, duration, gaussians, loss, when } from "./format.js";
 import { warnings } from "./run.js";
 import { hasEnded } from "./watch.js";
 
@@ -40,8 +40,10 @@ export function statusLine(edit) {
   if (!hasEnded(edit)) {
     const stage = edit.stage ? (STAGES[edit.stage] ?? edit.stage) : "Starting";
     const interval = edit.intervals > 0 && edit.interval > 0 ? ` · interval ${edit.interval} of ${edit.intervals}` : "";
+    const done = `iteration ${count(edit.iteration ?? 0)} of ${count(edit.iterations ?? 0)}, loss ${loss(edit.loss)}`;
+    const iteration = edit.iteration > 0 ? ` · ${done}` : "";
     const eta = typeof edit.eta_seconds === "number" ? ` · about ${duration(edit.eta_seconds)} left` : "";
-    return `${stage}${interval}${eta}`;
+    return `${stage}${interval}${iteration}${eta}`;
   }
   if (edit.state === "succeeded") {
     const kept = edit.stopped_early
@@ -176,7 +178,8 @@ function card(editor, id) {
 }
 
 /** The pictures of a finished interval, as it found the scene and as it left it. */
-function intervalRow(id, { interval, seconds, renders }) {
+function intervalRow(id, { interval, seconds, loss: reached, renders }) {
+  const took = duration(seconds) + (typeof reached === "number" ? `, loss ${loss(reached)}` : "");
   const pictures = renders.slice(0, 4).map(({ view, stages }, k) => {
     const shown = Object.entries(stages);
     const [, last] = shown.at(-1);
@@ -204,7 +207,7 @@ function intervalRow(id, { interval, seconds, renders }) {
     element: h(
       "div",
       { class: "interval", testid: `interval-${interval}` },
-      h("span", { class: "interval-name" }, `Interval ${interval}`, h("small", {}, duration(seconds))),
+      h("span", { class: "interval-name" }, `Interval ${interval}`, h("small", {}, took)),
       h("div", { class: "thumbs" }, pictures),
     ),
   };

@@ -17,6 +17,9 @@ export function bytes(n) {
   return `${value.toFixed(value < 99.95 ? 1 : 0)} ${units[power - 1]}`;
 }
 
+/** A loss: its first digits are what one compares. */
+export const loss = (x) => (typeof x === "number" ? Number(x.toPrecision(3)).toString() : "unknown");
+
 /** "12 ms", "0.4 s", "12 s", "3 min 20 s", "2 h 5 min". */
 export function duration(seconds) {
   if (typeof seconds !== "number" || !(seconds >= 0)) return "";

@@ -25,6 +25,17 @@ test("a running edit says stage, interval and how long it will take, as far as t
   assert.equal(statusLine(edit({ stage: "something new", eta_seconds: null })), "something new · interval 2 of 5");
 });
 
+test("an edit that optimises says how far it is and what it has reached", () => {
+  assert.equal(
+    statusLine(edit({ stage: "optimise", iteration: 1200, iterations: 2000, loss: 0.012345, eta_seconds: null })),
+    "Optimising · interval 2 of 5 · iteration 1,200 of 2,000, loss 0.0123",
+  );
+  assert.equal(
+    statusLine(edit({ iteration: 0, iterations: 2000, loss: null, eta_seconds: null })),
+    "Deforming · interval 2 of 5",
+  );
+});
+
 test("an edit that is done names its version, and whether it was stopped early", () => {
   assert.equal(statusLine(edit({ state: "succeeded", result_version: 3 })), "Version 3");
   const stopped = edit({ state: "succeeded", result_version: 3, stopped_early: true, finished_intervals: [{}, {}] });

@@ -1,7 +1,18 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { bytes, coordinate, coordinates, count, counted, duration, gaussians, nameOfFile, when } from "../../../web/format.js";
+import {
+  bytes,
+  coordinate,
+  coordinates,
+  count,
+  counted,
+  duration,
+  gaussians,
+  loss,
+  nameOfFile,
+  when,
+} from "../../../web/format.js";
 
 test("sizes, times and counts read as people write them", () => {
   assert.equal(bytes(999), "999 B");
@@ -12,6 +23,9 @@ test("sizes, times and counts read as people write them", () => {
   assert.equal(count(62000), "62,000");
   assert.equal(gaussians(1), "1 Gaussian");
   assert.equal(counted(2000, "handle"), "2,000 handles");
+  assert.equal(loss(0.0123456), "0.0123");
+  assert.equal(loss(2), "2");
+  assert.equal(loss(null), "unknown");
   assert.equal(duration(0.0123), "12 ms");
   assert.equal(duration(0), "0.0 s");
   assert.equal(duration(0.44), "0.4 s");
