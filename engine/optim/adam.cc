@@ -1,6 +1,7 @@
 #include "engine/optim/adam.h"
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
 #include <cmath>
 #include <limits>
@@ -22,29 +23,42 @@ struct StepFactors {
   float epsilon;
 };
 
-/// One element; written so that the compiler can take several at once.
-inline float moved(float value, float gradient, float& first, float& second, float rate, const StepFactors& f) {
-  first = f.keep_first * first + f.add_first * gradient;
-  second = f.keep_second * second + f.add_second * (gradient * gradient);
-  return value - rate * first / (std::sqrt(second * f.second_correction) + f.epsilon);
+/// All ones in the exponent: NaN or infinity.
+inline std::uint32_t is_bad(float x) {
+  constexpr std::uint32_t exponent = 0x7f800000u;
+  return (std::bit_cast<std::uint32_t>(x) & exponent) == exponent ? 1u : 0u;
 }
 
-/// Steps rows [begin, end) of a group.
-void step_rows(const AdamGroup& group, std::span<const float> rate, std::size_t begin, std::size_t end,
+/// One element; written so that the compiler can take several at once, as are the loops over it.
+///   bad  set if the element or a moment of it is not finite any more
+inline float moved(float value, float gradient, float& first, float& second, float rate, const StepFactors& f,
+                   std::uint32_t& bad) {
+  const float m = f.keep_first * first + f.add_first * gradient;
+  const float v = f.keep_second * second + f.add_second * (gradient * gradient);
+  const float result = value - rate * m / (std::sqrt(v * f.second_correction) + f.epsilon);
+  first = m, second = v;
+  bad |= is_bad(m) | is_bad(v) | is_bad(result);
+  return result;
+}
+
+/// Steps rows [begin, end) of a group. False if something in them is not finite any more.
+bool step_rows(const AdamGroup& group, std::span<const float> rate, std::size_t begin, std::size_t end,
                const StepFactors& factors, float* first, float* second) {
   float* value = group.value.data();
   const float* gradient = group.gradient.data();
+  std::uint32_t bad = 0;
   if (group.rate.size() == 1) {
     const std::size_t columns = rate.size();
     for (std::size_t i = begin * columns; i < end * columns; ++i)
-      value[i] = moved(value[i], gradient[i], first[i], second[i], rate[0], factors);
-    return;
+      value[i] = moved(value[i], gradient[i], first[i], second[i], rate[0], factors, bad);
+    return bad == 0;
   }
   for (std::size_t row = begin; row < end; ++row)
     for (std::size_t k = 0; k < rate.size(); ++k) {
       const std::size_t i = row * rate.size() + k;
-      value[i] = moved(value[i], gradient[i], first[i], second[i], rate[k], factors);
+      value[i] = moved(value[i], gradient[i], first[i], second[i], rate[k], factors, bad);
     }
+  return bad == 0;
 }
 
 std::size_t rows_per_chunk(std::size_t columns) { return std::max<std::size_t>(values_per_chunk / columns, 1); }
@@ -98,8 +112,10 @@ Result<void> Adam::step(std::span<const AdamGroup> groups) {
     for (std::size_t k = 0; k < columns; ++k)
       rate_[k] = float(group.rate[group.rate.size() == 1 ? 0 : k] * correction1);
     parallel_for(rows_, grain, [&](std::size_t begin, std::size_t end) {
-      step_rows(group, std::span(rate_).first(columns), begin, end, factors, moments.first.data(),
-                moments.second.data());
+      bad_[begin / grain] = none;
+      if (step_rows(group, std::span(rate_).first(columns), begin, end, factors, moments.first.data(),
+                    moments.second.data()))
+        return;
       const std::size_t first = begin * columns, n = (end - begin) * columns;
       std::size_t bad = none;
       for (const std::span<const float> values :
