@@ -1,15 +1,21 @@
 // splatdrag bench-edit: edits whose right result is known, carried out and judged.
 #include <algorithm>
+#include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <iomanip>
+#include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <ostream>
+#include <span>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "engine/core/atomic_file.h"
+#include "engine/core/checksum.h"
 #include "engine/edit/edit.h"
 #include "engine/evaluate/cases.h"
 #include "engine/evaluate/measure.h"
@@ -39,13 +45,6 @@ struct BenchOptions {
   ComputeOptions compute;
 };
 
-/// What a case came to.
-struct Judged {
-  evaluate::Quality untouched, result;
-  double seconds = 0;
-  ordered_json json;
-};
-
 ordered_json encode(const evaluate::Likeness& likeness) {
   return {{"psnr_db", likeness.psnr_db}, {"ssim", likeness.ssim}, {"pixels", likeness.pixels}};
 }
@@ -67,33 +66,64 @@ edit::Request request_of(const evaluate::Case& the_case, const BenchOptions& opt
   return request;
 }
 
-Result<Judged> judge(const evaluate::Case& the_case, const BenchOptions& options) {
-  const edit::Request request = request_of(the_case, options);
+/// A field of /proc/self/status in bytes, 0 where there is no such file.
+std::uint64_t status_bytes(const std::string& field) {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);)
+    if (line.starts_with(field + ":")) return 1024 * std::stoull(line.substr(field.size() + 1));
+  return 0;
+}
+
+/// Starts the peak of memory anew, where the system lets us.
+void forget_peak() { std::ofstream("/proc/self/clear_refs") << "5"; }
+
+/// Names a result by all that it depends on: the case, the request, the instruction set, and this very program.
+std::string key_of(const evaluate::Case& the_case, const BenchOptions& options, const Machine& machine) {
+  static const std::uint64_t program = [] {
+    std::ifstream file("/proc/self/exe", std::ios::binary);
+    const std::string bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+    return engine::fnv1a(std::as_bytes(std::span(bytes)));
+  }();
+  const ordered_json all{the_case.name, options.intervals, options.iterations, options.annealing_steps,
+                         options.views, machine.simd,      program};
+  const std::string text = all.dump();
+  std::ostringstream key;
+  key << std::hex << std::setfill('0') << std::setw(16) << engine::fnv1a(std::as_bytes(std::span(text)));
+  return the_case.name + "-" + key.str();
+}
+
+/// What an edit came to, and how long it took.
+Result<ordered_json> judge(const evaluate::Case& the_case, const edit::Request& request,
+                           scene::GaussianCloud& edited) {
+  forget_peak();
+  const std::uint64_t before = status_bytes("VmRSS");
   const auto outcome = edit::run(the_case.before, the_case.cameras, request);
   if (!outcome) return propagate(outcome);
-  const scene::GaussianCloud result = scene::flatten(the_case.before, outcome->overlay);
-
-  Judged judged;
-  judged.untouched = evaluate::judge(the_case, the_case.before);
-  judged.result = evaluate::judge(the_case, result);
+  const std::uint64_t peak = status_bytes("VmHWM");
+  edited = scene::flatten(the_case.before, outcome->overlay);
+  double seconds = 0;
   ordered_json stages = ordered_json::object();
   for (const edit::StageTime& time : outcome->report.times) {
     stages[time.stage] = time.seconds;
-    judged.seconds += time.seconds;
+    seconds += time.seconds;
   }
-  judged.json = {{"case", the_case.name},
-                 {"what", the_case.what},
-                 {"gaussians", the_case.before.size()},
-                 {"part", the_case.part_before.size()},
-                 {"intervals", outcome->report.resolved.intervals},
-                 {"untouched", encode(judged.untouched)},
-                 {"result", encode(judged.result)},
-                 {"seconds", judged.seconds},
-                 {"stages", std::move(stages)},
-                 {"warnings", outcome->report.warnings}};
+  return ordered_json{{"case", the_case.name},
+                      {"what", the_case.what},
+                      {"gaussians", the_case.before.size()},
+                      {"part", the_case.part_before.size()},
+                      {"intervals", outcome->report.resolved.intervals},
+                      {"untouched", encode(evaluate::judge(the_case, the_case.before))},
+                      {"result", encode(evaluate::judge(the_case, edited))},
+                      {"seconds", seconds},
+                      {"stages", std::move(stages)},
+                      {"peak_memory_bytes", peak > before ? peak - before : 0},
+                      {"warnings", outcome->report.warnings}};
+}
 
-  if (options.pictures == 0) return judged;
-  scene::GaussianCloud deformed = result;
+Result<void> write_pictures(const evaluate::Case& the_case, const edit::Request& request,
+                            const scene::GaussianCloud& edited, const BenchOptions& options) {
+  if (options.pictures == 0) return {};
+  scene::GaussianCloud deformed = edited;
   if (request.params.iterations > 0) {
     edit::Request deform_only = request;
     deform_only.params.iterations = 0;
@@ -101,25 +131,45 @@ Result<Judged> judge(const evaluate::Case& the_case, const BenchOptions& options
     if (!dry) return propagate(dry);
     deformed = scene::flatten(the_case.before, dry->overlay);
   }
-  for (std::size_t v = 0; v < std::min<std::size_t>(std::size_t(options.pictures), the_case.held_out.size()); ++v) {
+  for (std::size_t v = 0; v < std::min(std::size_t(options.pictures), the_case.held_out.size()); ++v) {
     const scene::Camera& camera = the_case.held_out[v];
     const path file = path(options.out) / (the_case.name + "_" + camera.name + ".png");
-    if (auto saved = io::write_image(file, evaluate::comparison(the_case, deformed, result, camera)); !saved)
-      return propagate(saved);
+    if (auto saved = io::write_image(file, evaluate::comparison(the_case, deformed, edited, camera)); !saved)
+      return saved;
   }
-  return judged;
+  return {};
 }
 
-std::string row(const std::string& name, const Judged& judged) {
+/// A result of an earlier run, if it is there and whole.
+std::optional<ordered_json> kept_result(const path& file) {
+  std::ifstream in(file);
+  ordered_json kept = ordered_json::parse(in, nullptr, /*allow_exceptions=*/false);
+  if (kept.is_discarded() || !kept.contains("result")) return std::nullopt;
+  return kept;
+}
+
+/// The result of a case: kept from an earlier run, or new and then kept.
+Result<ordered_json> result_of(const evaluate::Case& the_case, const BenchOptions& options, const Machine& machine) {
+  const path file = path(options.out) / "results" / (key_of(the_case, options, machine) + ".json");
+  if (auto kept = kept_result(file)) return std::move(*kept);
+  const edit::Request request = request_of(the_case, options);
+  scene::GaussianCloud edited;
+  auto found = judge(the_case, request, edited);
+  if (!found) return found;
+  if (auto written = write_pictures(the_case, request, edited, options); !written) return propagate(written);
+  const std::string text = proto::pretty(*found) + "\n";
+  if (auto kept = engine::write_file(file, std::as_bytes(std::span(text))); !kept) return propagate(kept);
+  return found;
+}
+
+std::string row(const ordered_json& found) {
   std::ostringstream out;
-  const auto cell = [&](const evaluate::Likeness& likeness) {
-    out << " | " << std::fixed << std::setprecision(2) << likeness.psnr_db << " | " << std::setprecision(4)
-        << likeness.ssim;
-  };
-  out << "| " << name;
-  cell(judged.result.edited), cell(judged.result.vacated), cell(judged.result.arrived), cell(judged.result.outside);
-  out << " | " << std::setprecision(4) << judged.result.miss << " | " << std::setprecision(1) << judged.seconds
-      << " |\n";
+  out << "| " << found["case"].get<std::string>() << std::fixed;
+  for (const char* kind : {"edited", "vacated", "arrived", "outside"})
+    out << " | " << std::setprecision(2) << found["result"][kind]["psnr_db"].get<double>() << " | "
+        << std::setprecision(4) << found["result"][kind]["ssim"].get<double>();
+  out << " | " << std::setprecision(4) << found["result"]["miss"].get<double>() << " | " << std::setprecision(1)
+      << found["seconds"].get<double>() << " |\n";
   return out.str();
 }
 
@@ -128,7 +178,7 @@ constexpr const char* table_head =
     "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n";
 
 Result<void> run(const BenchOptions& options, Terminal& terminal) {
-  if (auto made = make_folder(options.out); !made) return made;
+  if (auto made = make_folder(path(options.out) / "results"); !made) return made;
   return compute(options.compute, [&](const Machine& machine) -> Result<void> {
     std::string table = table_head;
     ordered_json all = ordered_json::array();
@@ -137,11 +187,11 @@ Result<void> run(const BenchOptions& options, Terminal& terminal) {
       const auto made = evaluate::make_case(name);
       if (!made) return propagate(made);
       if (options.small && !made->small) continue;
-      const auto judged = judge(*made, options);
-      if (!judged) return propagate(judged);
-      table += row(name, *judged);
-      terminal.out << row(name, *judged) << std::flush;
-      all.push_back(judged->json);
+      auto found = result_of(*made, options, machine);
+      if (!found) return propagate(found);
+      table += row(*found);
+      terminal.out << row(*found) << std::flush;
+      all.push_back(std::move(*found));
     }
     const ordered_json report{{"splatdrag", SPLATDRAG_VERSION},
                               {"threads", machine.threads},
@@ -171,7 +221,7 @@ void add_bench_edit_command(CLI::App& program, Action& action) {
       ->default_str("")
       ->type_name("NAME");
   command->add_flag("--small", options->small, "Only those that are quick");
-  command->add_option("--out", options->out, "Folder for bench.json, bench.md and pictures")
+  command->add_option("--out", options->out, "Folder for bench.json, bench.md, pictures, and results by request: those that are there are not worked out again")
       ->required()
       ->type_name("DIR");
   command->add_option("--intervals", options->intervals, "Of each edit; 0: by the length of the drag")

@@ -152,6 +152,35 @@ TEST_F(Cli, FitNeedsPointsOrASceneToStartFrom) {
       << "scene.ply would replace its own input";
 }
 
+TEST_F(Cli, BenchEditJudgesEditsWhoseRightResultIsKnown) {
+  const std::string bench = "bench-edit --case slide --out " + at("bench");
+  const Finished run = splatdrag(bench);
+  ASSERT_EQ(run.status, 0) << run.err;
+  const json said = json::parse(support::read_file(at("bench/bench.json")));
+  ASSERT_EQ(said["cases"].size(), 1u);
+  const json& found = said["cases"][0];
+  // The crate arrives as it was; where it stood, there is nothing.
+  EXPECT_GT(found["result"]["arrived"]["psnr_db"], 45) << found;
+  EXPECT_GT(found["result"]["outside"]["psnr_db"], 36) << found;
+  EXPECT_GT(found["result"]["edited"]["psnr_db"], found["untouched"]["edited"]["psnr_db"].get<double>() + 5) << found;
+  EXPECT_LT(found["result"]["miss"], 0.01) << found;
+  EXPECT_NE(run.out.find("| slide | "), std::string::npos) << run.out;
+  EXPECT_TRUE(io::read_image(at("bench/slide_view_04.png"))) << "a held-out view";
+
+  // What is there is not worked out again; what is damaged is.
+  std::string kept;
+  for (const auto& entry : fs::directory_iterator(at("bench/results"))) kept = entry.path().string();
+  std::string bytes = support::read_file(kept);
+  const std::size_t at_seconds = bytes.find("\"seconds\": ") + 11;
+  bytes.insert(at_seconds, "77");
+  support::write_file(kept, bytes);
+  ASSERT_EQ(splatdrag(bench).status, 0);
+  EXPECT_GT(json::parse(support::read_file(at("bench/bench.json")))["cases"][0]["seconds"], 70);
+  support::write_file(kept, bytes.substr(0, bytes.size() / 2));
+  ASSERT_EQ(splatdrag(bench).status, 0);
+  EXPECT_LT(json::parse(support::read_file(at("bench/bench.json")))["cases"][0]["seconds"], 70);
+}
+
 TEST_F(Cli, EditWritesSceneReportAndPictures) {
   const Finished run = splatdrag("edit --scene " + demo("scene.ply") + " --dataset " + at("demo") + " --request " +
                                  demo("drags/ball.json") + " --out " + at("out/deep"));
