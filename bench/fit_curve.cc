@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -44,7 +45,8 @@ std::string summary(const Fit& fit) {
 }
 
 std::string curve(const Fit& fit) {
-  std::string rows = "\n" + fit.name + ":\n\n| iteration | seconds | Gaussians | PSNR, dB |\n| ---: | ---: | ---: | ---: |\n";
+  std::string rows =
+      "\n" + fit.name + ":\n\n| iteration | seconds | Gaussians | PSNR, dB |\n| ---: | ---: | ---: | ---: |\n";
   for (const json& point : fit.report.at("curve"))
     rows += format("| %d | %.0f | %d | %.2f |\n", point.at("iteration").get<int>(), point.at("seconds").get<double>(),
                    point.at("gaussians").get<int>(), point.at("psnr_db").get<double>());
@@ -82,6 +84,11 @@ std::string page(const std::vector<Fit>& fits) {
   return out;
 }
 
+void write(const std::filesystem::path& file, const std::string& text) {
+  std::ofstream out(file);
+  if (!(out << text << std::flush)) throw std::runtime_error("cannot write " + file.string());
+}
+
 Fit load(const std::string& argument) {
   const std::size_t equals = argument.find('=');
   if (equals == std::string::npos) throw std::runtime_error("not NAME=REPORT: " + argument);
@@ -97,8 +104,8 @@ int main(int count, char** arguments) try {
   std::vector<Fit> fits;
   for (int i = 2; i < count; ++i) fits.push_back(load(arguments[i]));
   const std::filesystem::path folder = arguments[1];
-  std::ofstream(folder / "fit-curve.svg") << bench::to_svg({chart(fits)});
-  std::ofstream(folder / "fit.md") << page(fits);
+  write(folder / "fit-curve.svg", bench::to_svg({chart(fits)}));
+  write(folder / "fit.md", page(fits));
 } catch (const std::exception& error) {
   std::fprintf(stderr, "error: %s\n", error.what());
   return 2;

@@ -36,9 +36,7 @@ struct Axis {
   double step;       ///< Between lines, in positions.
   double from, to;   ///< Pixels.
 
-  [[nodiscard]] double position(double value) const {
-    return scale == Scale::logarithmic ? std::log10(value) : value;
-  }
+  [[nodiscard]] double position(double value) const { return scale == Scale::logarithmic ? std::log10(value) : value; }
   [[nodiscard]] double pixel(double place) const { return from + (place - low) / (high - low) * (to - from); }
   [[nodiscard]] double at(double value) const { return pixel(position(value)); }
   [[nodiscard]] int lines() const { return int(std::lround((high - low) / step)) + 1; }
@@ -57,7 +55,8 @@ double round_step(double least) {
 }
 
 Axis axis_over(const Chart& chart, bool x_axis, double from, double to) {
-  Axis axis{.scale = x_axis ? chart.x_scale : chart.y_scale, .low = 1e9, .high = -1e9, .step = 1, .from = from, .to = to};
+  Axis axis{
+      .scale = x_axis ? chart.x_scale : chart.y_scale, .low = 1e9, .high = -1e9, .step = 1, .from = from, .to = to};
   for (const Series& series : chart.series)
     for (const auto& [x, y] : series.points) {
       const double position = axis.position(x_axis ? x : y);

@@ -77,15 +77,16 @@ std::uint64_t status_bytes(const std::string& field) {
 /// Starts the peak of memory anew, where the system lets us.
 void forget_peak() { std::ofstream("/proc/self/clear_refs") << "5"; }
 
-/// Names a result by all that it depends on: the case, the request, the instruction set, and this very program.
+/// Names a result by all that it and its times depend on: the case, the request, the machine, and this very program.
 std::string key_of(const evaluate::Case& the_case, const BenchOptions& options, const Machine& machine) {
   static const std::uint64_t program = [] {
     std::ifstream file("/proc/self/exe", std::ios::binary);
     const std::string bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
     return engine::fnv1a(std::as_bytes(std::span(bytes)));
   }();
-  const ordered_json all{the_case.name, options.intervals, options.iterations, options.annealing_steps,
-                         options.views, machine.simd,      program};
+  const ordered_json all{the_case.name,           options.intervals, options.iterations,
+                         options.annealing_steps, options.views,     options.pictures,
+                         machine.threads,         machine.simd,      program};
   const std::string text = all.dump();
   std::ostringstream key;
   key << std::hex << std::setfill('0') << std::setw(16) << engine::fnv1a(std::as_bytes(std::span(text)));
@@ -93,8 +94,7 @@ std::string key_of(const evaluate::Case& the_case, const BenchOptions& options, 
 }
 
 /// What an edit came to, and how long it took.
-Result<ordered_json> judge(const evaluate::Case& the_case, const edit::Request& request,
-                           scene::GaussianCloud& edited) {
+Result<ordered_json> judge(const evaluate::Case& the_case, const edit::Request& request, scene::GaussianCloud& edited) {
   forget_peak();
   const std::uint64_t before = status_bytes("VmRSS");
   const auto outcome = edit::run(the_case.before, the_case.cameras, request);
@@ -140,11 +140,27 @@ Result<void> write_pictures(const evaluate::Case& the_case, const edit::Request&
   return {};
 }
 
+std::string row(const ordered_json& found) {
+  std::ostringstream out;
+  out << "| " << found.at("case").get<std::string>() << std::fixed;
+  for (const char* kind : {"edited", "vacated", "arrived", "outside"})
+    out << " | " << std::setprecision(2) << found.at("result").at(kind).at("psnr_db").get<double>() << " | "
+        << std::setprecision(4) << found.at("result").at(kind).at("ssim").get<double>();
+  out << " | " << std::setprecision(4) << found.at("result").at("miss").get<double>() << " | " << std::setprecision(1)
+      << found.at("seconds").get<double>() << " |\n";
+  return out.str();
+}
+
 /// A result of an earlier run, if it is there and whole.
 std::optional<ordered_json> kept_result(const path& file) {
   std::ifstream in(file);
   ordered_json kept = ordered_json::parse(in, nullptr, /*allow_exceptions=*/false);
-  if (kept.is_discarded() || !kept.contains("result")) return std::nullopt;
+  if (kept.is_discarded()) return std::nullopt;
+  try {
+    static_cast<void>(row(kept));
+  } catch (const nlohmann::json::exception&) {
+    return std::nullopt;  // not what we wrote
+  }
   return kept;
 }
 
@@ -162,31 +178,34 @@ Result<ordered_json> result_of(const evaluate::Case& the_case, const BenchOption
   return found;
 }
 
-std::string row(const ordered_json& found) {
-  std::ostringstream out;
-  out << "| " << found["case"].get<std::string>() << std::fixed;
-  for (const char* kind : {"edited", "vacated", "arrived", "outside"})
-    out << " | " << std::setprecision(2) << found["result"][kind]["psnr_db"].get<double>() << " | "
-        << std::setprecision(4) << found["result"][kind]["ssim"].get<double>();
-  out << " | " << std::setprecision(4) << found["result"]["miss"].get<double>() << " | " << std::setprecision(1)
-      << found["seconds"].get<double>() << " |\n";
-  return out.str();
-}
-
 constexpr const char* table_head =
     "| case | edited, dB | SSIM | vacated, dB | SSIM | arrived, dB | SSIM | outside, dB | SSIM | miss | s |\n"
     "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n";
 
+/// The cases asked for, by name.
+Result<std::vector<std::string>> chosen_cases(const BenchOptions& options) {
+  const std::vector<std::string>& all = evaluate::case_names();
+  for (const std::string& name : options.cases)
+    if (std::find(all.begin(), all.end(), name) == all.end()) return propagate(evaluate::make_case(name));
+  std::vector<std::string> chosen;
+  for (const std::string& name : options.cases.empty() ? all : options.cases)
+    if (!options.small || evaluate::is_small(name)) chosen.push_back(name);
+  if (chosen.empty())
+    return engine::fail(engine::ErrorCode::invalid_argument, "none of these cases is small", "--case, --small");
+  return chosen;
+}
+
 Result<void> run(const BenchOptions& options, Terminal& terminal) {
+  const auto chosen = chosen_cases(options);
+  if (!chosen) return propagate(chosen);
   if (auto made = make_folder(path(options.out) / "results"); !made) return made;
   return compute(options.compute, [&](const Machine& machine) -> Result<void> {
     std::string table = table_head;
     ordered_json all = ordered_json::array();
     terminal.out << table_head << std::flush;
-    for (const std::string& name : options.cases.empty() ? evaluate::case_names() : options.cases) {
+    for (const std::string& name : *chosen) {
       const auto made = evaluate::make_case(name);
       if (!made) return propagate(made);
-      if (options.small && !made->small) continue;
       auto found = result_of(*made, options, machine);
       if (!found) return propagate(found);
       table += row(*found);
@@ -221,7 +240,10 @@ void add_bench_edit_command(CLI::App& program, Action& action) {
       ->default_str("")
       ->type_name("NAME");
   command->add_flag("--small", options->small, "Only those that are quick");
-  command->add_option("--out", options->out, "Folder for bench.json, bench.md, pictures, and results by request: those that are there are not worked out again")
+  command
+      ->add_option("--out", options->out,
+                   "Folder for bench.json, bench.md, pictures, and results by request: those that are there are not "
+                   "worked out again")
       ->required()
       ->type_name("DIR");
   command->add_option("--intervals", options->intervals, "Of each edit; 0: by the length of the drag")

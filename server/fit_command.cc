@@ -1,6 +1,7 @@
 // splatdrag fit: photos with known cameras in, a scene out.
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <iomanip>
@@ -42,6 +43,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int milestones = 20;
 constexpr std::size_t photos_per_milestone = 50;
+constexpr double least_seen = 0.1;  // of the start: with less, poses or units are hardly those of the points
 constexpr const char* checkpoint_name = "fit.checkpoint";
 
 struct FitCommandOptions {
@@ -101,25 +103,46 @@ Result<scene::GaussianCloud> load_start(const io::Dataset& dataset, const FitCom
     return std::move(start->cloud);
   }
   if (dataset.points.empty())
-    return fail(ErrorCode::unprocessable,
-                "this dataset has no sparse points to start from: give a scene with --scene", options.dataset);
+    return fail(ErrorCode::unprocessable, "this dataset has no sparse points to start from: give a scene with --scene",
+                options.dataset);
   std::vector<fit::ColoredPoint> points;
-  for (const io::Point& point : dataset.points) points.push_back({point.position, point.rgb});
+  for (const io::Point& point : dataset.points) {
+    for (int axis = 0; axis < 3; ++axis)
+      if (std::abs(point.position[axis]) > fit::max_coordinate)
+        return fail(ErrorCode::corrupt_data, "this sparse point lies beyond all measure; remove it",
+                    "points3D[" + std::to_string(points.size()) + "]." + "xyz"[axis]);
+    points.push_back({point.position, point.rgb});
+  }
   return fit::gaussians_at(points, 0);
+}
+
+/// A start that the cameras do not see leads nowhere, whatever the photos show.
+Result<void> check_seen(const scene::GaussianCloud& start, const std::vector<fit::Photo>& photos, Terminal& terminal) {
+  const std::size_t seen = fit::seen(start, photos);
+  if (seen == 0)
+    return fail(ErrorCode::unprocessable,
+                "no camera sees any of the " + std::to_string(start.size()) +
+                    " Gaussians to start from: poses must lead from world to camera, be of the points' own frame, and "
+                    "leave more than 0.2 units between camera and subject");
+  if (double(seen) < least_seen * double(start.size()))
+    terminal.err << "warning: the cameras see only " << seen << " of the " << start.size()
+                 << " Gaussians to start from: are poses and points of one reconstruction?\n";
+  return {};
 }
 
 /// A fit under way, with its place on disk.
 class RunningFit {
  public:
-  RunningFit(const Photos& photos, const scene::GaussianCloud& start, const FitCommandOptions& options)
-      : photos_(photos),
-        options_(options),
+  RunningFit(std::vector<fit::Photo> photos, const scene::GaussianCloud& start, const FitCommandOptions& options,
+             const Machine& machine, Terminal& terminal)
+      : options_(options),
+        terminal_(terminal),
         file_(path(options.out) / checkpoint_name),
-        identity_(fit::identity_of(photos.training, start, options.fit)),
-        fitter_(photos.training, start, options.fit) {}
+        identity_(fit::identity_of(photos, start, options.fit, SPLATDRAG_VERSION " " + machine.simd)),
+        fitter_(std::move(photos), start, options.fit) {}
 
   /// Goes on from the checkpoint, if there is one.
-  Result<void> resume(Terminal& terminal) {
+  Result<void> resume() {
     std::error_code none;
     if (options_.restart || !std::filesystem::exists(file_, none)) return {};
     const auto input = io::InputFile::open(file_.string());
@@ -133,7 +156,7 @@ class RunningFit {
       return propagate(history);
     }
     history_ = std::move(*history);
-    terminal.err << "going on after iteration " << fitter_.iteration() << ", from " << file_.string() << '\n';
+    terminal_.err << "going on after iteration " << fitter_.iteration() << ", from " << file_.string() << '\n';
     return {};
   }
 
@@ -152,7 +175,7 @@ class RunningFit {
       if (iteration * std::int64_t(milestones) / all != (iteration - 1) * std::int64_t(milestones) / all)
         add_milestone(iteration);
       if (spent() - saved < options_.checkpoint_every || fitter_.done()) continue;
-      if (auto kept = keep(); !kept) return kept;
+      keep();
       saved = spent();
     }
     history_.seconds = spent();
@@ -165,12 +188,19 @@ class RunningFit {
   }
 
   [[nodiscard]] const scene::GaussianCloud& cloud() const { return fitter_.cloud(); }
+  [[nodiscard]] const std::vector<fit::Photo>& photos() const { return fitter_.photos(); }
   [[nodiscard]] const fit::History& history() const { return history_; }
 
  private:
-  Result<void> keep() const {
+  /// A fit does not end because a checkpoint cannot be written: the one before is still there, and the scene is
+  /// smaller.
+  void keep() {
     const std::string bytes = fit::encode(identity_, history_, fitter_);
-    return engine::write_file(file_, std::as_bytes(std::span(bytes)));
+    const auto kept = engine::write_file(file_, std::as_bytes(std::span(bytes)));
+    if (!kept && !warned_)
+      terminal_.err << "warning: no checkpoint after iteration " << fitter_.iteration() << ": " << kept.error().message
+                    << '\n';
+    warned_ = !kept;
   }
 
   [[nodiscard]] std::string describe(double loss) const {
@@ -181,17 +211,17 @@ class RunningFit {
   }
 
   void add_milestone(int iteration) {
-    const std::size_t count = std::min(photos_.training.size(), photos_per_milestone);
-    const auto near = fit::closeness(cloud(), std::span(photos_.training).first(count), options_.fit.background);
+    const auto near = fit::closeness(cloud(), photos(), options_.fit.background, photos_per_milestone);
     history_.milestones.push_back({iteration, history_.seconds, cloud().size(), near.psnr_db});
   }
 
-  const Photos& photos_;
   const FitCommandOptions& options_;
+  Terminal& terminal_;
   path file_;
   std::uint64_t identity_;
   fit::Fitter fitter_;
   fit::History history_;
+  bool warned_ = false;  ///< Of the last checkpoint.
 };
 
 void summarise(std::ostream& out, const path& file, const FitReport& report) {
@@ -212,34 +242,41 @@ Result<void> run(const FitCommandOptions& options, Terminal& terminal) {
   if (!options.scene.empty())
     if (auto safe = keep_input_safe(options.scene, folder / "scene.ply"); !safe) return safe;
   if (auto made = make_folder(folder); !made) return made;
+  // Better now than after minutes of work.
+  if (const auto writable = engine::AtomicFile::create(folder / "scene.ply"); !writable) return propagate(writable);
+  std::error_code unreachable;  // then they are not the same
+  if (std::filesystem::equivalent(folder, options.dataset, unreachable))
+    return fail(ErrorCode::conflict, "files of the dataset would be replaced: choose another folder", "--out");
 
   return compute(options.compute, [&](const Machine& machine) -> Result<void> {
     const auto dataset = io::read_dataset(options.dataset, {.points = options.scene.empty()});
     if (!dataset) return propagate(dataset);
-    const auto photos = load_photos(*dataset, options);
+    auto photos = load_photos(*dataset, options);
     if (!photos) return propagate(photos);
     const auto start = load_start(*dataset, options);
     if (!start) return propagate(start);
 
-    RunningFit fitting(*photos, *start, options);
-    if (auto resumed = fitting.resume(terminal); !resumed) return resumed;
+    if (auto seen = check_seen(*start, photos->training, terminal); !seen) return seen;
+    RunningFit fitting(std::move(photos->training), *start, options, machine, terminal);
+    if (auto resumed = fitting.resume(); !resumed) return resumed;
     {
       ProgressDisplay display(terminal.err,
                               terminal.err_is_terminal ? ProgressDisplay::Style::bar : ProgressDisplay::Style::lines);
       if (auto ran = fitting.run(display); !ran) return ran;
     }
 
-    const io::SceneFile fitted{fitting.cloud(), io::inria_layout(fitting.cloud().sh_degree)};
+    const io::SceneFile fitted{fit::with_sh_degree(fitting.cloud(), options.fit.sh_degree),
+                               io::inria_layout(options.fit.sh_degree)};
     if (auto saved = io::write_scene(folder / "scene.ply", fitted, io::SceneFormat::ply); !saved) return saved;
     FitReport report{.machine = machine,
                      .options = options.fit,
                      .max_side = options.max_side,
                      .hold_out = options.hold_out,
-                     .views = photos->training.size(),
+                     .views = fitting.photos().size(),
                      .start_gaussians = start->size(),
                      .gaussians = fitted.cloud.size(),
                      .history = fitting.history(),
-                     .training = fit::closeness(fitted.cloud, photos->training, options.fit.background),
+                     .training = fit::closeness(fitted.cloud, fitting.photos(), options.fit.background),
                      .held_out = std::nullopt};
     if (!photos->held_out.empty())
       report.held_out = fit::closeness(fitted.cloud, photos->held_out, options.fit.background);
@@ -273,7 +310,7 @@ void add_fit_command(CLI::App& program, Action& action) {
       ->check(CLI::Range(1, 10'000'000))
       ->type_name("N");
   command->add_option("--max-gaussians", fit.max_gaussians, "Where growth ends")
-      ->check(CLI::Range(std::size_t{1}, std::size_t{100'000'000}))
+      ->check(CLI::Range(std::size_t{1}, std::size_t(io::ReadOptions{}.max_gaussians)))
       ->type_name("N");
   command->add_option("--sh-degree", fit.sh_degree, "How colours may depend on the direction of view, 0 to 3")
       ->check(CLI::Range(0, scene::max_sh_degree))

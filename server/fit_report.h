@@ -15,9 +15,9 @@ namespace server {
 struct FitReport {
   Machine machine;
   engine::fit::FitOptions options;
-  int max_side = 0;      ///< Pixels.
-  int hold_out = 0;      ///< Every so many views; 0: none.
-  std::size_t views = 0; ///< Trained on.
+  int max_side = 0;       ///< Pixels.
+  int hold_out = 0;       ///< Every so many views; 0: none.
+  std::size_t views = 0;  ///< Trained on.
   std::size_t start_gaussians = 0, gaussians = 0;
   engine::fit::History history;
   engine::fit::Closeness training;

@@ -27,13 +27,15 @@ ProgressDisplay::~ProgressDisplay() {
 
 void ProgressDisplay::show(double fraction, const std::string& doing) {
   const int percent = int(std::floor(100 * std::clamp(fraction, 0.0, 1.0)));
+  if (!begun_at_) begun_at_ = fraction;
   const auto line = [&] { return std::to_string(percent) + " %  " + doing + time_left(fraction); };
   if (style_ == Style::bar) {
     if (clock_() - drawn_ < redraw_every && percent < 100) return;
     drawn_ = clock_();
     const int filled = bar_width * percent / 100;
-    out_ << "\r\x1b[K[" << std::string(std::size_t(filled), '#') << std::string(std::size_t(bar_width - filled), '.')
-         << "] " << line() << std::flush;
+    // Without wrapping (?7l): of a line that is wider than the terminal only the last part would be redrawn.
+    out_ << "\r\x1b[K\x1b[?7l[" << std::string(std::size_t(filled), '#')
+         << std::string(std::size_t(bar_width - filled), '.') << "] " << line() << "\x1b[?7h" << std::flush;
   } else {
     if (percent_ >= 0 && percent < percent_ + line_every && (percent < 100 || percent_ == 100)) return;
     out_ << line() << '\n' << std::flush;
@@ -57,9 +59,10 @@ void ProgressDisplay::show(const engine::edit::Progress& progress) {
 
 std::string ProgressDisplay::time_left(double fraction) const {
   const double elapsed = Seconds(clock_() - start_).count();
+  const double done = fraction - begun_at_.value_or(0);  // since we look: work that goes on begins in its middle
   // A guess from less than this would be noise.
-  if (fraction < 0.05 || fraction >= 1 || elapsed < 1) return {};
-  const auto seconds = std::int64_t(std::ceil(elapsed * (1 - fraction) / fraction));
+  if (done < 0.05 || fraction >= 1 || elapsed < 1) return {};
+  const auto seconds = std::int64_t(std::ceil(elapsed * (1 - fraction) / done));
   if (seconds < 90) return "  about " + std::to_string(seconds) + " s left";
   return "  about " + std::to_string((seconds + 59) / 60) + " min left";
 }

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <functional>
+#include <optional>
 #include <ostream>
 #include <string>
 
@@ -33,7 +34,8 @@ class ProgressDisplay {
   Style style_;
   Clock clock_;
   std::chrono::steady_clock::time_point start_, drawn_;
-  int percent_ = -1;  ///< As last shown.
+  std::optional<double> begun_at_;  ///< The first fraction shown.
+  int percent_ = -1;                ///< As last shown.
 };
 
 }  // namespace server

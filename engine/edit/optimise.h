@@ -2,6 +2,7 @@
 // Source: 3DGS-Drag (ICLR 2025), section 3.4.
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <optional>
 #include <span>
@@ -14,8 +15,12 @@
 #include "engine/scene/camera.h"
 #include "engine/scene/gaussian_cloud.h"
 #include "engine/scene/image.h"
+#include "engine/train/options.h"
 
 namespace engine::edit {
+
+/// Bytes: the most that an optimisation keeps of the frozen Gaussians of all views (but one view is always kept).
+constexpr std::size_t frozen_memory = train::TrainOptions{}.frozen_memory;
 
 /// How far the optimisation of an interval is.
 struct OptimiseProgress {

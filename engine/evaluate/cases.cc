@@ -23,16 +23,17 @@ namespace made = procedural;
 
 constexpr double pi = std::numbers::pi;
 constexpr std::uint64_t seed = 7;
-// A Gaussian that no camera of the capture blends with more than this is not in the scene: nothing would have trained it.
+// A Gaussian that no camera of the capture blends with more than this is not in the scene: nothing would have trained
+// it.
 constexpr float least_weight = 0.02f;
 constexpr int held_out_every = 5;
 
 /// How a point of the part moves: turned about the pivot, drawn away from the vertical through it, shifted.
 struct Motion {
   DQuat turn{1, 0, 0, 0};
-  DVec3 pivot{0.0};    ///< World units.
-  DVec3 shift{0.0};    ///< World units.
-  double widen = 0;    ///< Horizontal distances from the pivot grow by this part of themselves per unit of height.
+  DVec3 pivot{0.0};  ///< World units.
+  DVec3 shift{0.0};  ///< World units.
+  double widen = 0;  ///< Horizontal distances from the pivot grow by this part of themselves per unit of height.
 
   [[nodiscard]] DVec3 operator()(DVec3 point) const {
     const DVec3 arm = turn * (point - pivot);
@@ -54,10 +55,10 @@ struct Plan {
   std::vector<made::Object> surroundings = {};
   std::vector<Part> parts = {};
   edit::Request request = {};
-  float spacing = 0.018f;         ///< Of Gaussians, world units.
+  float spacing = 0.018f;  ///< Of Gaussians, world units.
   int views = 30, width = 480, height = 360;
-  double zoom = 1;                ///< Of the cameras; below 1 everything is smaller in the picture.
-  bool small = false, textured = true;
+  double zoom = 1;  ///< Of the cameras; below 1 everything is smaller in the picture.
+  bool textured = true;
 };
 
 Vec3 at(float x, float height, float z) { return {x, -height, z}; }
@@ -71,7 +72,8 @@ made::Light studio() {
   light.sky_up = 0.9f * Vec3(0.95f, 0.98f, 1.0f);
   light.sky_level = 0.75f * Vec3(1.0f, 1.0f, 1.0f);
   light.sky_down = 0.45f * Vec3(1.0f, 0.95f, 0.9f);
-  light.window = {.middle = {0, 0, 0}, .columns = 1, .rows = 1, .pane_width = 200, .pane_height = 200, .bar = 0, .softness = 0.1f};
+  light.window = {
+      .middle = {0, 0, 0}, .columns = 1, .rows = 1, .pane_width = 200, .pane_height = 200, .bar = 0, .softness = 0.1f};
   return light;
 }
 
@@ -82,7 +84,8 @@ std::vector<made::Object> furnished_room() {
 }
 
 made::Object crate(made::Placement placement, float side, float height) {
-  return {"crate", placement, made::box({0, 0, 0}, {side, height, side}, made::cloth_cover(made::srgb(60, 92, 150)), 2)};
+  return {"crate", placement,
+          made::box({0, 0, 0}, {side, height, side}, made::cloth_cover(made::srgb(60, 92, 150)), 2)};
 }
 
 edit::Handle handle(DVec3 source, std::optional<DVec3> target, double radius, int group = 0) {
@@ -108,7 +111,7 @@ Plan slide() {
   plan.parts = {{crate({Vec3(foot), 0.3f}, 0.42f, 0.36f), {.shift = shift}}};
   const DVec3 middle = foot + dat(0, 0.18, 0);
   plan.request = drag({handle(middle, middle + shift, 0.42)}, above_table(foot, 0.8, 0.5));
-  plan.spacing = 0.03f, plan.width = 240, plan.height = 180, plan.small = true;
+  plan.spacing = 0.03f, plan.width = 240, plan.height = 180;
   return plan;
 }
 
@@ -116,8 +119,8 @@ Plan lift() {
   const DVec3 shift = dat(0.1, 0.55, 0), foot = dat(-0.75, 0.25, 0.95);
   Plan plan{.what = "A hanging ball lifted before a wall with prints."};
   plan.surroundings = furnished_room();
-  plan.parts = {{made::make_ball({Vec3(foot), 0}, 0.26f, made::srgb(240, 232, 214), made::srgb(150, 40, 30)),
-                 {.shift = shift}}};
+  plan.parts = {
+      {made::make_ball({Vec3(foot), 0}, 0.26f, made::srgb(240, 232, 214), made::srgb(150, 40, 30)), {.shift = shift}}};
   const DVec3 middle = foot + dat(0, 0.26, 0);
   plan.request = drag({handle(middle, middle + shift, 0.28)});
   return plan;
@@ -126,8 +129,10 @@ Plan lift() {
 /// A pole of `blocks` rings in two colours; each is a thing of its own, so that a longer pole has the same Gaussians.
 made::Object ring(Vec3 foot, float radius, float height, bool red) {
   const Vec3 colour = red ? made::srgb(190, 40, 30) : made::srgb(236, 230, 220);
-  return {"ring", {foot, 0}, {made::lathe({{radius, 0}, {radius, height}}, made::plain(colour, 0.1f), 2.0f, 40),
-                              made::lathe({{radius, height}, {0, height}}, made::plain(colour, 0.1f), 2.0f, 40)}};
+  return {"ring",
+          {foot, 0},
+          {made::lathe({{radius, 0}, {radius, height}}, made::plain(colour, 0.1f), 2.0f, 40),
+           made::lathe({{radius, height}, {0, height}}, made::plain(colour, 0.1f), 2.0f, 40)}};
 }
 
 Plan pole() {
@@ -154,14 +159,18 @@ Plan arm() {
   Plan plan{.what = "A jointed arm raised at the shoulder and bent at the elbow."};
   plan.surroundings = furnished_room();
   const Vec3 shoulder = at(-0.75f, 0.45f, -0.15f);
-  plan.surroundings.push_back({"stand", {at(-0.75f, 0, -0.15f), 0},
-                               made::box({0, 0, 0}, {0.16f, 0.45f, 0.16f}, made::plain(made::srgb(90, 90, 96), 0.1f), 2)});
+  plan.surroundings.push_back(
+      {"stand",
+       {at(-0.75f, 0, -0.15f), 0},
+       made::box({0, 0, 0}, {0.16f, 0.45f, 0.16f}, made::plain(made::srgb(90, 90, 96), 0.1f), 2)});
   const auto segment = [&](float along, const made::Material& material) {
-    return made::Object{"segment", {shoulder + Vec3(along + 0.5f * length, 0.5f * thick, 0), 0},
+    return made::Object{"segment",
+                        {shoulder + Vec3(along + 0.5f * length, 0.5f * thick, 0), 0},
                         made::box({0, 0, 0}, {length, thick, thick}, material, 2.2f)};
   };
   const DVec3 from(shoulder), elbow = from + DVec3(double(length), 0, 0);
-  const DQuat raise = glm::angleAxis(-35 * pi / 180, DVec3(0, 0, 1)), bend = glm::angleAxis(-20 * pi / 180, DVec3(0, 0, 1));
+  const DQuat raise = glm::angleAxis(-35 * pi / 180, DVec3(0, 0, 1)),
+              bend = glm::angleAxis(-20 * pi / 180, DVec3(0, 0, 1));
   const Motion upper{.turn = raise, .pivot = from};
   const DVec3 moved_elbow = upper(elbow);
   const Motion lower{.turn = bend * raise, .pivot = elbow, .shift = moved_elbow - elbow};
@@ -232,14 +241,20 @@ Plan speck() {
   plan.parts = {{made::make_apple({Vec3(foot), 0.4f}, 0.12f), {.shift = shift}}};
   const DVec3 middle = foot + dat(0, 0.12, 0);
   plan.request = drag({handle(middle, middle + shift, 0.19)}, above_table(foot, 0.4, 0.4));
-  plan.spacing = 0.03f, plan.width = 240, plan.height = 180, plan.zoom = 0.6, plan.small = true;
+  plan.spacing = 0.03f, plan.width = 240, plan.height = 180, plan.zoom = 0.6;
   return plan;
 }
 
-const std::vector<std::pair<std::string, Plan (*)()>>& plans() {
-  static const std::vector<std::pair<std::string, Plan (*)()>> all{
-      {"slide", slide}, {"lift", lift},   {"pole", pole},         {"arm", arm},
-      {"bush", bush},   {"apart", apart}, {"distance", distance}, {"speck", speck}};
+struct Known {
+  std::string name;
+  Plan (*plan)();
+  bool small = false;
+};
+
+const std::vector<Known>& known_cases() {
+  static const std::vector<Known> all{{"slide", slide, true}, {"lift", lift},        {"pole", pole},
+                                      {"arm", arm},           {"bush", bush},        {"apart", apart},
+                                      {"distance", distance}, {"speck", speck, true}};
   return all;
 }
 
@@ -249,8 +264,7 @@ void move_row(scene::GaussianCloud& cloud, std::size_t i, const Motion& motion, 
   if (motion.turn == DQuat(1, 0, 0, 0)) return;
   cloud.rotation.set(i, Quat(motion.turn * DQuat(cloud.rotation.get(i))));
   const std::size_t coefficients = scene::sh_coefficients(cloud.sh_degree);
-  for (std::size_t c = 0; c < 3; ++c)
-    deform::rotate_sh(sh, cloud.sh_row(i).subspan(c * coefficients, coefficients));
+  for (std::size_t c = 0; c < 3; ++c) deform::rotate_sh(sh, cloud.sh_row(i).subspan(c * coefficients, coefficients));
 }
 
 std::vector<std::uint32_t> range(std::size_t first, std::size_t last) {
@@ -269,7 +283,7 @@ void place_cameras(const Plan& plan, Case& out) {
 
 Case carry_out(const std::string& name, const Plan& plan) {
   Case out;
-  out.name = name, out.what = plan.what, out.small = plan.small, out.textured = plan.textured;
+  out.name = name, out.what = plan.what, out.textured = plan.textured;
   out.request = plan.request;
   place_cameras(plan, out);
 
@@ -312,22 +326,27 @@ Case carry_out(const std::string& name, const Plan& plan) {
 
 }  // namespace
 
+bool is_small(const std::string& name) {
+  return std::any_of(known_cases().begin(), known_cases().end(),
+                     [&](const Known& known) { return known.small && known.name == name; });
+}
+
 const std::vector<std::string>& case_names() {
   static const std::vector<std::string> names = [] {
     std::vector<std::string> out;
-    for (const auto& [name, plan] : plans()) out.push_back(name);
+    for (const Known& known : known_cases()) out.push_back(known.name);
     return out;
   }();
   return names;
 }
 
 Result<Case> make_case(const std::string& name) {
-  std::string known;
-  for (const auto& [called, plan] : plans()) {
-    if (called == name) return carry_out(name, plan());
-    known += (known.empty() ? "" : ", ") + called;
+  std::string names;
+  for (const Known& known : known_cases()) {
+    if (known.name == name) return carry_out(name, known.plan());
+    names += (names.empty() ? "" : ", ") + known.name;
   }
-  return fail(ErrorCode::not_found, "there is no case \"" + name + "\"; there are " + known, "case");
+  return fail(ErrorCode::not_found, "there is no case \"" + name + "\"; there are " + names, "case");
 }
 
 }  // namespace engine::evaluate

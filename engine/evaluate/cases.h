@@ -19,23 +19,25 @@
 namespace engine::evaluate {
 
 struct Case {
-  std::string name;     ///< "slide"
-  std::string what;     ///< One sentence for people.
-  bool small = false;   ///< Quick enough for sweeps and for every change of the code.
+  std::string name;      ///< "slide"
+  std::string what;      ///< One sentence for people.
   bool textured = true;  ///< What the part uncovers has a pattern, so that a smooth filling is a wrong one.
 
-  scene::GaussianCloud before;           ///< What is edited.
-  scene::GaussianCloud truth;            ///< What it should become.
+  scene::GaussianCloud before;             ///< What is edited.
+  scene::GaussianCloud truth;              ///< What it should become.
   std::vector<std::uint32_t> part;         ///< Rows of `truth` that the edit is about: those moved, those it grew.
   std::vector<std::uint32_t> part_before;  ///< Rows of `before` that should move,
   std::vector<std::uint32_t> part_after;   ///< and the row of `truth` that each should become.
-  std::vector<scene::Camera> cameras;    ///< Of the capture.
-  std::vector<scene::Camera> held_out;   ///< Between them; the edit never sees these.
-  edit::Request request;                 ///< Handles and mode; parameters are those of a preset or a sweep.
+  std::vector<scene::Camera> cameras;      ///< Of the capture.
+  std::vector<scene::Camera> held_out;     ///< Between them; the edit never sees these.
+  edit::Request request;                   ///< Handles and mode; parameters are those of a preset or a sweep.
 };
 
 /// Names of all cases, in order.
 [[nodiscard]] const std::vector<std::string>& case_names();
+
+/// Is it quick enough for sweeps and for every change of the code? False if there is none of that name.
+[[nodiscard]] bool is_small(const std::string& name);
 
 /// Makes one. The same bytes every time, for any number of threads.
 ///   errors  not_found: no case of that name; the message lists them

@@ -32,11 +32,11 @@ void write(ByteWriter& out, const FitOptions& options) {
   out.write(options.seed);
   for (int c = 0; c < 3; ++c) out.write(options.background[c]);
   const optim::LearningRates& rates = options.rates;
-  for (const double number : {rates.position, rates.sh_dc, rates.sh_rest, rates.opacity_logit, rates.log_scale,
-                              rates.rotation, rates.last, options.adam.beta1, options.adam.beta2, options.adam.epsilon,
-                              options.loss.l1_weight, options.loss.ssim_weight, options.loss.l1.scale,
-                              options.densify.until, options.densify.gradient, options.densify.dense,
-                              options.least_opacity})
+  for (const double number :
+       {rates.position, rates.sh_dc, rates.sh_rest, rates.opacity_logit, rates.log_scale, rates.rotation, rates.last,
+        options.adam.beta1, options.adam.beta2, options.adam.epsilon, options.loss.l1_weight, options.loss.ssim_weight,
+        options.loss.l1.scale, options.densify.until, options.densify.gradient, options.densify.dense,
+        options.least_opacity})
     out.write(number);
   out.write(std::int32_t(options.loss.l1.kind));
   out.write(std::int32_t(options.densify.every));
@@ -44,8 +44,10 @@ void write(ByteWriter& out, const FitOptions& options) {
 
 }  // namespace
 
-std::uint64_t identity_of(std::span<const Photo> photos, const scene::GaussianCloud& start, const FitOptions& options) {
+std::uint64_t identity_of(std::span<const Photo> photos, const scene::GaussianCloud& start, const FitOptions& options,
+                          std::string_view computes) {
   ByteWriter all;
+  all.write_string(computes);
   write(all, options);
   scene::write_cloud(all, start);
   for (const Photo& photo : photos) {
@@ -86,7 +88,9 @@ Result<History> decode(std::string_view text, std::uint64_t identity, Fitter& fi
     return wrong(ErrorCode::unsupported, "The checkpoint is that of another version of this program.");
   if (checksum != fnv1a(bytes.first(contents))) return wrong(ErrorCode::corrupt_data, "The checkpoint is damaged.");
   if (in.read<std::uint64_t>() != identity)
-    return wrong(ErrorCode::conflict, "The checkpoint is that of a fit with other photos, another start or other options.");
+    return wrong(ErrorCode::conflict,
+                 "The checkpoint is that of a fit with other photos, another start, other options, or on another kind "
+                 "of machine.");
   History history{in.read<double>(), {}};
   const auto count = in.read<std::uint32_t>();
   for (std::uint32_t i = 0; i < count && in.ok(); ++i) {

@@ -17,10 +17,10 @@ namespace engine::fit {
 
 /// How far a fit had come at some time.
 struct Milestone {
-  int iteration = 0;            ///< Done by then.
-  double seconds = 0;           ///< Of work, interruptions left out.
+  int iteration = 0;   ///< Done by then.
+  double seconds = 0;  ///< Of work, interruptions left out.
   std::uint64_t gaussians = 0;
-  double psnr_db = 0;           ///< Mean over training views.
+  double psnr_db = 0;  ///< Mean over training views, or over some of them that are evenly spread.
   bool operator==(const Milestone&) const = default;
 };
 
@@ -32,8 +32,9 @@ struct History {
 };
 
 /// A number that another fit hardly has: one with other photos, another start or other options.
+///   computes  what else bytes depend on: the program's version, the instruction set
 [[nodiscard]] std::uint64_t identity_of(std::span<const Photo> photos, const scene::GaussianCloud& start,
-                                        const FitOptions& options);
+                                        const FitOptions& options, std::string_view computes);
 
 /// Magic, version, contents, checksum.
 [[nodiscard]] std::string encode(std::uint64_t identity, const History& history, const Fitter& fitter);

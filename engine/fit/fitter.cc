@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <cstdint>
 #include <utility>
 
 #include "engine/fit/start.h"
 #include "engine/optim/picture_view.h"
+#include "engine/render/largest_weight.h"
 #include "engine/scene/cloud_bytes.h"
 #include "engine/train/chance.h"
 
@@ -18,7 +20,11 @@ constexpr int least_side = 64;        // pixels: a smaller picture has nothing t
 
 // Parts of the iterations after which photos are halved once less often, and after which bands are added.
 constexpr double finer_after[] = {0.1, 0.3};
-constexpr double bands_after = 0.1;
+constexpr int bands_in = 10;  // one more with every tenth
+
+// Of the distance at which the scene lies, where the cameras hardly differ in place: a single photo, a panorama. The
+// extent is what positions go by, and at 0 nothing would move.
+constexpr double least_extent = 0.1;
 
 train::Key key_of(const FitOptions& options) { return {.seed = options.seed, .interval = 0, .round = 0}; }
 
@@ -26,6 +32,16 @@ std::vector<scene::Camera> cameras_of(std::span<const Photo> photos) {
   std::vector<scene::Camera> cameras;
   for (const Photo& photo : photos) cameras.push_back(photo.camera);
   return cameras;
+}
+
+/// Median distance of the means from the first camera, world units.
+double distance_of(const scene::GaussianCloud& cloud, const scene::Camera& camera) {
+  const DVec3 centre = camera.centre();
+  std::vector<double> distance(cloud.size());
+  for (std::size_t i = 0; i < distance.size(); ++i) distance[i] = glm::distance(centre, DVec3(cloud.mean.get(i)));
+  const auto middle = distance.begin() + std::ptrdiff_t(distance.size() / 2);
+  std::nth_element(distance.begin(), middle, distance.end());
+  return *middle;
 }
 
 }  // namespace
@@ -40,6 +56,7 @@ Result<void> validate(const FitOptions& options) {
   if (!(options.least_opacity >= 0 && options.least_opacity < 1))
     return wrong("The least opacity is 0 to below 1.", "least_opacity");
   if (auto valid = optim::validate(options.rates); !valid) return valid;
+  if (!(options.rates.position > 0)) return wrong("Its decay needs a rate of positions above 0.", "rates.position");
   if (auto valid = optim::validate(options.adam); !valid) return valid;
   if (auto valid = optim::validate(options.loss); !valid) return valid;
   return train::validate(options.densify);
@@ -51,7 +68,8 @@ Stage stage_of(const FitOptions& options, int start_degree, int iteration) {
   for (const double after : finer_after)
     if (progress >= after && stage.halvings > 0) --stage.halvings;
   if (progress >= finer_after[1]) stage.halvings = 0;
-  stage.sh_degree = std::max(start_degree, std::min(options.sh_degree, int(progress / bands_after)));
+  const auto tenths = int(std::int64_t{bands_in} * iteration / options.iterations);
+  stage.sh_degree = std::max(start_degree, std::min(options.sh_degree, tenths));
   return stage;
 }
 
@@ -61,7 +79,8 @@ Fitter::Fitter(std::vector<Photo> photos, scene::GaussianCloud start, const FitO
       cloud_(std::move(start)),
       start_degree_(cloud_.sh_degree),
       start_rows_(cloud_.size()),
-      extent_(scene::capture_extent(cameras_of(photos_))),
+      extent_(std::max(scene::capture_extent(cameras_of(photos_)),
+                       least_extent * distance_of(cloud_, photos_.front().camera))),
       adam_(cloud_.size(), cloud_.sh_degree, options.adam) {
   assert(validate(options) && !photos_.empty() && cloud_.size() > 0 && cloud_.sh_degree <= options.sh_degree);
   pull_.reset(cloud_.size());
@@ -70,10 +89,19 @@ Fitter::Fitter(std::vector<Photo> photos, scene::GaussianCloud start, const FitO
 void Fitter::enter(const Stage& stage) {
   if (!stage_ || stage.halvings != stage_->halvings) {
     halved_.clear();
-    if (stage.halvings > 0) halved_ = photos_;
-    for (Photo& photo : halved_)
-      for (int h = 0; h < stage.halvings && std::min(photo.camera.width, photo.camera.height) >= 2 * least_side; ++h)
-        photo = halved(photo);
+    if (stage.halvings > 0) halved_.reserve(photos_.size());
+    for (std::size_t p = 0; stage.halvings > 0 && p < photos_.size(); ++p) {
+      const auto large = [](const Photo& photo) {
+        return std::min(photo.camera.width, photo.camera.height) >= 2 * least_side;
+      };
+      if (!large(photos_[p])) {
+        halved_.push_back(photos_[p]);
+        continue;
+      }
+      Photo photo = halved(photos_[p]);
+      for (int h = 1; h < stage.halvings && large(photo); ++h) photo = halved(photo);
+      halved_.push_back(std::move(photo));
+    }
   }
   if (stage.sh_degree != cloud_.sh_degree) {
     cloud_ = with_sh_degree(cloud_, stage.sh_degree);
@@ -106,14 +134,14 @@ Result<double> Fitter::step() {
 
   const optim::LearningRates& rates = options_.rates;
   const double progress = double(iteration_) / options_.iterations;
-  auto stepped = adam_.step(
-      cloud_, gradients_,
-      {.position = extent_ * optim::exponential_decay(rates.position, rates.position * rates.last, progress),
-       .sh_dc = rates.sh_dc,
-       .sh_rest = rates.sh_rest,
-       .opacity_logit = rates.opacity_logit,
-       .log_scale = rates.log_scale,
-       .rotation = rates.rotation});
+  auto stepped =
+      adam_.step(cloud_, gradients_,
+                 {.position = extent_ * optim::exponential_decay(rates.position, rates.position * rates.last, progress),
+                  .sh_dc = rates.sh_dc,
+                  .sh_rest = rates.sh_rest,
+                  .opacity_logit = rates.opacity_logit,
+                  .log_scale = rates.log_scale,
+                  .rotation = rates.rotation});
   if (!stepped) {
     stepped.error().where = "gaussian" + stepped.error().where;
     return propagate(stepped);
@@ -142,8 +170,8 @@ void Fitter::densify() {
   prune();
   const std::size_t most = most_gaussians();
   const double loss_weight = options_.loss.l1_weight + options_.loss.ssim_weight;
-  const auto rows = train::rows_to_densify(pull_, options_.densify.gradient * loss_weight,
-                                           most - std::min(most, cloud_.size()));
+  const auto rows =
+      train::rows_to_densify(pull_, options_.densify.gradient * loss_weight, most - std::min(most, cloud_.size()));
   Rng rng = train::stream(key_of(options_), train::Purpose::split, std::size_t(iteration_));
   train::add_children(cloud_, rows, options_.densify.dense * extent_, rng);
   adam_.append_rows(rows.size());
@@ -182,15 +210,18 @@ void Fitter::read(ByteReader& in) {
   in.read_all(std::span(pull_.views));
 }
 
-Closeness closeness(const scene::GaussianCloud& cloud, std::span<const Photo> photos, Vec3 background) {
-  assert(!photos.empty());
+Closeness closeness(const scene::GaussianCloud& cloud, std::span<const Photo> photos, Vec3 background,
+                    std::size_t most) {
+  assert(!photos.empty() && most >= 1);
+  const std::size_t count = std::min(photos.size(), most);
   Closeness mean;
   render::Workspace workspace;
   render::Rendering rendering;
   optim::LossWorkspace loss_workspace;
   scene::Image photo, ignored;
   mean.worst_psnr_db = identical_db;
-  for (const Photo& wanted : photos) {
+  for (std::size_t k = 0; k < count; ++k) {
+    const Photo& wanted = photos[k * photos.size() / count];
     render::forward(cloud, wanted.camera, {.background = background}, {}, workspace, rendering);
     for (float& value : rendering.color.data) value = std::clamp(value, 0.0f, 1.0f);
     to_image(wanted, photo);
@@ -198,11 +229,18 @@ Closeness closeness(const scene::GaussianCloud& cloud, std::span<const Photo> ph
     ignored = scene::Image(photo.width, photo.height, 3);
     const double dissimilarity = optim::ssim_loss(optim::view(rendering.color), optim::view(photo), {}, photo.pixels(),
                                                   0.0, loss_workspace, optim::view(ignored));
-    mean.psnr_db += db / double(photos.size());
-    mean.ssim += (1 - dissimilarity) / double(photos.size());
+    mean.psnr_db += db / double(count);
+    mean.ssim += (1 - dissimilarity) / double(count);
     if (db <= mean.worst_psnr_db) mean.worst_psnr_db = db, mean.worst_view = wanted.camera.name;
   }
   return mean;
+}
+
+std::size_t seen(const scene::GaussianCloud& cloud, std::span<const Photo> photos) {
+  std::vector<float> weight(cloud.size(), 0.0f);
+  render::Workspace workspace;
+  for (const Photo& photo : photos) render::raise_to_largest_weights(cloud, photo.camera, workspace, weight);
+  return std::size_t(std::count_if(weight.begin(), weight.end(), [](float w) { return w > 0; }));
 }
 
 }  // namespace engine::fit

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -43,13 +44,16 @@ class Fitter {
   /// Precondition: validate(options); photos and start are not empty; start.sh_degree <= options.sh_degree.
   Fitter(std::vector<Photo> photos, scene::GaussianCloud start, const FitOptions& options);
 
+  [[nodiscard]] const std::vector<Photo>& photos() const { return photos_; }
+
   [[nodiscard]] int iteration() const { return iteration_; }  ///< Iterations done.
   [[nodiscard]] bool done() const { return iteration_ == options_.iterations; }
 
   /// The next iteration.
   ///   returns  the loss of its view, before the step
   ///   errors   internal: a parameter, gradient or loss is not finite. `where` names the first
-  ///            ("gaussian[12].opacity", "view[0001.jpg].loss"). The fitter is of no use any more.
+  ///            ("gaussian[12].opacity", by its row in cloud() at that time; "view[0001.jpg].loss"). The fitter is of
+  ///            no use any more.
   /// Precondition: !done()
   [[nodiscard]] Result<double> step();
 
@@ -72,11 +76,11 @@ class Fitter {
   scene::GaussianCloud cloud_;
   int start_degree_;
   std::size_t start_rows_;
-  double extent_;  ///< World units.
+  double extent_;  ///< World units: how far apart things are that the capture tells apart.
 
   int iteration_ = 0;
-  std::optional<Stage> stage_;   ///< None before the first iteration.
-  std::vector<Photo> halved_;    ///< Of the stage; empty if its photos are those given.
+  std::optional<Stage> stage_;  ///< None before the first iteration.
+  std::vector<Photo> halved_;   ///< Of the stage; empty if its photos are those given.
   std::vector<std::uint32_t> order_;
   train::CloudAdam adam_;
   train::PullStatistic pull_;
@@ -94,8 +98,12 @@ struct Closeness {
   std::string worst_view;
 };
 
-/// Renders every view. PSNR of equal pictures counts as 100 dB.
-/// Precondition: there are photos.
-[[nodiscard]] Closeness closeness(const scene::GaussianCloud& cloud, std::span<const Photo> photos, Vec3 background);
+/// Renders every view, or `most` of them that are evenly spread. PSNR of equal pictures counts as 100 dB.
+/// Precondition: there are photos; most >= 1.
+[[nodiscard]] Closeness closeness(const scene::GaussianCloud& cloud, std::span<const Photo> photos, Vec3 background,
+                                  std::size_t most = std::numeric_limits<std::size_t>::max());
+
+/// How many of the Gaussians show in any of the photos' views, were they alone but for one another.
+[[nodiscard]] std::size_t seen(const scene::GaussianCloud& cloud, std::span<const Photo> photos);
 
 }  // namespace engine::fit

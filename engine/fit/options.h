@@ -15,12 +15,12 @@
 namespace engine::fit {
 
 struct FitOptions {
-  int iterations = 7000;          ///< 1 or more, one view each.
-  int sh_degree = scene::max_sh_degree;  ///< Of the result, 0 to 3. Reached in steps: see Fitter.
+  int iterations = 7000;                 ///< 1 or more, one view each.
+  int sh_degree = scene::max_sh_degree;  ///< 0 to 3. Reached band by band, if there are iterations enough: stage_of().
   std::size_t max_gaussians = 100'000;   ///< 1 or more. Limits growth; a start that is larger stays as large.
-  int halvings = 2;               ///< 0 to 8: photos are first halved so often, then less and less.
+  int halvings = 2;                      ///< 0 to 8: photos are first halved so often, then less and less.
   std::uint64_t seed = 0;
-  Vec3 background{0.0f};          ///< Colour behind the scene, display-referred.
+  Vec3 background{0.0f};  ///< Colour behind the scene, display-referred.
 
   optim::LearningRates rates = {};  ///< mask_radii is of no use here: positions go by the capture's extent.
   optim::AdamOptions adam = {};

@@ -38,6 +38,18 @@ float median(std::vector<float> values) {
   return *middle;
 }
 
+DVec3 median_position(std::span<const ColoredPoint> points) {
+  DVec3 middle(0.0);
+  std::vector<double> along(points.size());
+  for (int axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = 0; i < points.size(); ++i) along[i] = points[i].position[axis];
+    const auto half = along.begin() + std::ptrdiff_t(along.size() / 2);
+    std::nth_element(along.begin(), half, along.end());
+    middle[axis] = *half;
+  }
+  return middle;
+}
+
 }  // namespace
 
 scene::GaussianCloud gaussians_at(std::span<const ColoredPoint> points, int sh_degree) {
@@ -45,9 +57,9 @@ scene::GaussianCloud gaussians_at(std::span<const ColoredPoint> points, int sh_d
   cloud.sh_degree = sh_degree;
   cloud.resize(points.size());
   if (points.empty()) return cloud;
-  // Relative to the middle: float would not keep small distances apart far from the origin.
-  DVec3 middle(0.0);
-  for (const ColoredPoint& point : points) middle += point.position / double(points.size());
+  // Relative to the middle: float would not keep small distances apart far from the origin. A median, which a point
+  // that lies lost far away does not carry off.
+  const DVec3 middle = median_position(points);
   std::vector<float> positions;
   for (const ColoredPoint& point : points)
     for (int axis = 0; axis < 3; ++axis) positions.push_back(float(point.position[axis] - middle[axis]));

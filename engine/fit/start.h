@@ -12,6 +12,9 @@
 
 namespace engine::fit {
 
+/// World units; squares of what lies farther out are no floats any more.
+constexpr double max_coordinate = 1e15;
+
 /// A point of a sparse reconstruction.
 struct ColoredPoint {
   DVec3 position{0.0};                ///< World units.
@@ -21,6 +24,7 @@ struct ColoredPoint {
 /// One Gaussian per point, in their order: opacity 0.1, the point's colour from everywhere, sigma the root mean square
 /// distance to the three nearest other points. That is kept from 0 (points that coincide) and from what would cover
 /// everything (points far from all others): within a factor of 1e4 below, and of 30 above, the median sigma.
+///   points     finite, no coordinate beyond max_coordinate
 ///   sh_degree  of the result; bands beyond 0 are zero
 [[nodiscard]] scene::GaussianCloud gaussians_at(std::span<const ColoredPoint> points, int sh_degree);
 

@@ -1,7 +1,10 @@
 #include "engine/jobs/durable_file.h"
 
-#include <fstream>
-#include <iterator>
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
 #include <span>
 #include <system_error>
 
@@ -37,11 +40,17 @@ Result<void> write_durably(const fs::path& file, std::string_view bytes) {
 }
 
 Result<std::string> read_bytes(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) return fail(ErrorCode::not_found, "the file cannot be opened", file);
-  std::string bytes{std::istreambuf_iterator<char>(in), {}};
-  if (in.bad()) return fail(ErrorCode::unavailable, "the file cannot be read to its end", file);
-  return bytes;
+  const FileDescriptor in(::open(file.c_str(), O_RDONLY | O_CLOEXEC));
+  if (in.get() < 0 && errno == ENOENT) return fail(ErrorCode::not_found, "the file cannot be opened", file);
+  if (in.get() < 0) return tl::make_unexpected(trouble(errno, "open", file));
+  std::string bytes;
+  for (std::array<char, 65536> block{};;) {
+    const ssize_t got = ::read(in.get(), block.data(), block.size());
+    if (got == 0) return bytes;
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) return tl::make_unexpected(trouble(errno, "read", file));
+    bytes.append(block.data(), std::size_t(got));
+  }
 }
 
 }  // namespace engine::jobs

@@ -235,8 +235,8 @@ void LocalFrame::forward(const FrozenView& frozen, scene::Image& color) {
   const ForwardBuffers& merged = impl_->merged;
   parallel_for(impl_->tiles.size(), 1, [&](std::size_t i, std::size_t) {
     const std::uint32_t tile = impl_->tiles[i], first = merged.tile_begin[tile], last = merged.tile_begin[tile + 1];
-    draw_tile(merged.splats.data(), {merged.entries.data() + first, last - first}, tile, view.columns,
-                view.background, view.region, color);
+    draw_tile(merged.splats.data(), {merged.entries.data() + first, last - first}, tile, view.columns, view.background,
+              view.region, color);
   });
 }
 

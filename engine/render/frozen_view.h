@@ -23,7 +23,7 @@ namespace engine::render {
 /// The rectangle grown to whole tiles, cut to the picture. An empty one stays empty.
 [[nodiscard]] scene::Rect whole_tiles(scene::Rect rect, const scene::Camera& camera);
 
-/// What frozen Gaussians put into a part of one camera's picture. Never changes once made.
+/// What frozen Gaussians put into a part of one camera's picture. Never changes once made, but for being let go.
 class FrozenView {
  public:
   /// Projects, sorts, lists and renders: the one step that costs the size of the scene.

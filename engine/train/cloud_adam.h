@@ -32,7 +32,8 @@ class CloudAdam {
 
   /// One step of all rows.
   ///   cloud, gradients  of rows() rows and the degree
-  ///   errors  internal: a gradient, parameter or moment is not finite; `where` is the first, with the property names of
+  ///   errors  internal: a gradient, parameter or moment is not finite; `where` is the first, with the property names
+  ///   of
   ///           a .ply file where it has one: "[12].opacity", "[3].sh[17]". Parameters are spoilt then.
   [[nodiscard]] Result<void> step(scene::GaussianCloud& cloud, const render::Gradients& gradients,
                                   const StepRates& rates);

@@ -28,7 +28,7 @@ struct TrainOptions {
   double dead_zone = 0.501 / 255.0;  ///< Colour units, 0 or more: see optim::edit_loss().
   DensifyOptions densify = {};
   double floater_distance = 0.1;  ///< Of the radius of the changeable part: see Trainer::step().
-  /// Bytes. What views keep of the frozen Gaussians beyond this is let go, of those longest unused first, and made anew
+  /// Bytes. What views keep of the frozen Gaussians beyond this is let go, of those used last, and made anew
   /// when it is needed: slower by a pass over the scene, the same bytes.
   std::size_t frozen_memory = std::size_t{2} << 30;
 };

@@ -124,7 +124,8 @@ void Trainer::make_room_for(View& view) {
     if (&other != &view) kept.push_back(&other);
   }
   if (bytes <= options_.frozen_memory) return;
-  std::sort(kept.begin(), kept.end(), [](const View* a, const View* b) { return a->used < b->used; });
+  // Each is used once an epoch: the one just used is the one whose turn is farthest off.
+  std::sort(kept.begin(), kept.end(), [](const View* a, const View* b) { return a->used > b->used; });
   for (View* const other : kept) {
     if (bytes <= options_.frozen_memory) return;
     const std::size_t held = other->frozen.memory_bytes();

@@ -5,7 +5,8 @@
 //   L = background_loss(I_r, I_o) outside the mask + perceptual_weight * edit_loss(I_r, I_e) inside it,
 // means over all pixels of the full view. Rendered and differentiated are the tiles that changeable Gaussians reach;
 // all else of a view is kept (render::FrozenView). An iteration costs what they reach and how many they are, never the
-// size of the scene. Same bytes for any number of threads.
+// size of the scene, as long as what is kept has room in TrainOptions::frozen_memory. Same bytes for any number of
+// threads.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,9 @@
 #include "server/edits/estimate.h"
 
+#include <algorithm>
+
+#include "engine/edit/optimise.h"
+
 namespace server::edits {
 namespace {
 
@@ -45,7 +49,9 @@ std::uint64_t estimated_bytes(const Workload& work) {
   const std::uint64_t n = work.gaussians;
   const std::uint64_t rows = (work.layered ? n : 0) + n + std::uint64_t(work.intervals) * work.copies + n + work.copies;
   const std::uint64_t trained =
-      work.iterations > 0 ? work.views * (trained_pixel_bytes * work.view_pixels + frozen_row_bytes * n) : 0;
+      work.iterations > 0 ? work.views * trained_pixel_bytes * work.view_pixels +
+                                std::min<std::uint64_t>(work.views * frozen_row_bytes * n, engine::edit::frozen_memory)
+                          : 0;
   return rows * work.row_bytes + n * frame_row_bytes + (work.views + frame_pixel_bytes) * work.view_pixels + trained;
 }
 

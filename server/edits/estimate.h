@@ -50,9 +50,9 @@ constexpr std::size_t comparison_pixels = 192 * 144;
 ///                + N + copies)                  the scene of a picture, as long as it is rendered
 ///   + 200 N                                     splats of a frame, columns of the working scene
 ///   + V pixels + 32 pixels                      masks; one frame
-///   + V (36 pixels + 24 N) [iterations]         of each view, while it optimises: three pictures, at most, and the
-///                                               frozen splats of its region, of 48 bytes, which are half of them where
-///                                               the edit is large
+///   + V 36 pixels [iterations]                  of each view, while it optimises: three pictures, at most
+///   + min(V 24 N, frozen_memory) [iterations]   frozen splats of the views' regions, of 48 bytes, which are half of
+///                                               them where the edit is large
 [[nodiscard]] std::uint64_t estimated_bytes(const Workload& work);
 
 }  // namespace server::edits

@@ -112,8 +112,8 @@ TEST_F(Cli, FitGoesOnAfterAKillToTheSameBytes) {
   const std::string fit = "fit --dataset " + at("demo") + " --iterations 120 --max-gaussians 6000 ";
   ASSERT_EQ(splatdrag(fit + "--out " + at("undisturbed")).status, 0);
   const std::string killed = std::string(SPLATDRAG_PROGRAM) + " " + fit + "--checkpoint-every 0 --out " + at("killed") +
-                             " >/dev/null 2>&1 & pid=$!; while ! [ -e " + at("killed/fit.checkpoint") +
-                             " ]; do sleep 0.01; done; sleep 0.3; kill -9 $pid; wait $pid";
+                             " >/dev/null 2>&1 & pid=$!; while kill -0 $pid && ! [ -e " + at("killed/fit.checkpoint") +
+                             " ]; do sleep 0.01; done; kill -9 $pid; wait $pid";
   ASSERT_NE(std::system(("bash -c '" + killed + "'").c_str()), 0);
   ASSERT_FALSE(fs::exists(at("killed/scene.ply"))) << "it was too late to kill it";
 
@@ -139,6 +139,29 @@ TEST_F(Cli, FitSaysWhatIsMissing) {
   EXPECT_NE(all.err.find("has no photos"), std::string::npos) << all.err;
 }
 
+TEST_F(Cli, FitSaysThatNoCameraSeesThePoints) {
+  const std::string file = at("demo/sparse/0/points3D.txt");
+  support::write_file(file, "1 0 0 -900 10 20 30 0.5\n2 1 0 -900 10 20 30 0.5\n3 0 1 -900 10 20 30 0.5\n");
+  const std::string fit = "fit --dataset " + at("demo") + " --iterations 1 --out " + at("fit");
+  const Finished lost = splatdrag(fit);
+  EXPECT_EQ(lost.status, 6);
+  EXPECT_NE(lost.err.find("no camera sees any of the 3 Gaussians"), std::string::npos) << lost.err;
+  support::write_file(file, "1 0 0 0 10 20 30 0.5\n2 1e300 0 0 10 20 30 0.5\n");
+  const Finished beyond = splatdrag(fit);
+  EXPECT_EQ(beyond.status, 4);
+  EXPECT_NE(beyond.err.find("points3D[1].x"), std::string::npos) << beyond.err;
+}
+
+TEST_F(Cli, FitDoesNotEndBecauseACheckpointCannotBeWritten) {
+  fs::create_directories(at("fit/fit.checkpoint/in the way"));
+  const Finished run =
+      splatdrag("fit --restart --checkpoint-every 0 --iterations 20 --dataset " + at("demo") + " --out " + at("fit"));
+  EXPECT_EQ(run.status, 0) << run.err;
+  EXPECT_EQ(run.err.find("warning: no checkpoint after iteration 1:"), run.err.rfind("warning: no checkpoint"))
+      << run.err;
+  EXPECT_TRUE(io::read_scene(at("fit/scene.ply")));
+}
+
 TEST_F(Cli, FitNeedsPointsOrASceneToStartFrom) {
   fs::remove(at("demo/sparse/0/points3D.txt"));
   const std::string fit = "fit --iterations 3 --out " + at("fit") + " --dataset " + at("demo");
@@ -148,8 +171,11 @@ TEST_F(Cli, FitNeedsPointsOrASceneToStartFrom) {
   const Finished with = splatdrag(fit + " --scene " + demo("scene.ply"));
   ASSERT_EQ(with.status, 0) << with.err;
   EXPECT_EQ(report("fit")["start_gaussians"], io::read_scene(demo("scene.ply"))->cloud.size());
-  EXPECT_EQ(splatdrag("fit --dataset " + at("demo") + " --scene " + demo("scene.ply") + " --out " + at("demo")).status, 9)
+  EXPECT_EQ(splatdrag("fit --dataset " + at("demo") + " --scene " + demo("scene.ply") + " --out " + at("demo")).status,
+            9)
       << "scene.ply would replace its own input";
+  EXPECT_EQ(splatdrag("fit --dataset " + at("demo") + " --out " + at("demo")).status, 9)
+      << "files of the dataset would be replaced";
 }
 
 TEST_F(Cli, BenchEditJudgesEditsWhoseRightResultIsKnown) {

@@ -23,7 +23,7 @@ struct Capture {
   std::vector<Photo> photos;
   std::vector<ColoredPoint> points;
 
-  explicit Capture(int views = 6) {
+  explicit Capture(int views = 6, int width = 120, int height = 90) {
     truth.sh_degree = 0;
     truth.resize(400);
     Rng rng(1);
@@ -37,8 +37,8 @@ struct Capture {
     }
     for (int v = 0; v < views; ++v) {
       const double angle = 0.9 * v / views;
-      scene::Camera camera =
-          scene::look_at({4 * std::sin(angle), 0.4 * v, -4 * std::cos(angle)}, {0, 0, 0}, {0, -1, 0}, 0.8, 120, 90);
+      scene::Camera camera = scene::look_at({4 * std::sin(angle), 0.4 * v, -4 * std::cos(angle)}, {0, 0, 0}, {0, -1, 0},
+                                            0.8, width, height);
       camera.name = "view_" + std::to_string(v);
       photos.push_back(to_photo(camera, render::forward(truth, camera).color));
     }
@@ -93,6 +93,18 @@ TEST(Fitter, GrowsUpToTheLimitAndGainsBands) {
   EXPECT_EQ(fitter.cloud().sh_degree, 1);
 }
 
+TEST(Fitter, MovesPositionsWithASinglePhoto) {
+  const Capture capture(1);
+  FitOptions options = short_fit(60);
+  options.densify.every = 0;
+  Fitter fitter(capture.photos, capture.start(), options);
+  run(fitter, 60);
+  double moved = 0;
+  for (std::size_t i = 0; i < capture.points.size(); ++i)
+    moved = std::max(moved, glm::distance(DVec3(fitter.cloud().mean.get(i)), capture.points[i].position));
+  EXPECT_GT(moved, 1e-3);
+}
+
 TEST(Fitter, RemovesWhatNobodySees) {
   const Capture capture;
   scene::GaussianCloud start = capture.start();
@@ -131,13 +143,13 @@ TEST(Fitter, GivesTheSameBytesForAnyNumberOfThreads) {
 }
 
 TEST(Fitter, GoesOnFromACheckpointToTheSameBytes) {
-  const Capture capture;
+  const Capture capture(6, 160, 140);
   FitOptions options = short_fit(100);
-  options.halvings = 1;  // 120 x 90: too small to be halved, but for stages it counts
+  options.halvings = 1;
   Fitter undisturbed(capture.photos, capture.start(), options);
   run(undisturbed, 100);
-  // In the middle of an epoch; right before children come, and before a band does.
-  for (const int at : {1, 19, 20, 33, 99}) {
+  // In the middle of an epoch; around children (20), a band (10) and finer photos (30).
+  for (const int at : {1, 9, 10, 19, 20, 29, 30, 33, 99}) {
     Fitter first(capture.photos, capture.start(), options);
     run(first, at);
     const History history{12.5, {{at, 3.25, 99, 21.5}}};
@@ -182,20 +194,48 @@ TEST(FitCheckpoint, RefusesWhatIsNotItsOwn) {
 TEST(FitIdentity, TellsFitsApart) {
   const Capture capture(2);
   const FitOptions options = short_fit(10);
-  const std::uint64_t identity = identity_of(capture.photos, capture.start(), options);
-  EXPECT_EQ(identity, identity_of(capture.photos, capture.start(), options));
+  const std::uint64_t identity = identity_of(capture.photos, capture.start(), options, "AVX2");
+  EXPECT_EQ(identity, identity_of(capture.photos, capture.start(), options, "AVX2"));
   auto photos = capture.photos;
   photos[1].rgb[100] ^= 1;
-  EXPECT_NE(identity, identity_of(photos, capture.start(), options));
+  EXPECT_NE(identity, identity_of(photos, capture.start(), options, "AVX2"));
   photos = capture.photos;
   photos[0].camera.cx += 0.5;
-  EXPECT_NE(identity, identity_of(photos, capture.start(), options));
+  EXPECT_NE(identity, identity_of(photos, capture.start(), options, "AVX2"));
   auto start = capture.start();
   start.mean.x[0] += 0.5f;
-  EXPECT_NE(identity, identity_of(capture.photos, start, options));
-  FitOptions other = options;
-  other.seed = 1;
-  EXPECT_NE(identity, identity_of(capture.photos, capture.start(), other));
+  EXPECT_NE(identity, identity_of(capture.photos, start, options, "AVX2"));
+  EXPECT_NE(identity, identity_of(capture.photos, capture.start(), options, "SSE4"));
+  const std::vector<void (*)(FitOptions&)> changes{[](FitOptions& o) { ++o.iterations; },
+                                                   [](FitOptions& o) { --o.sh_degree; },
+                                                   [](FitOptions& o) { ++o.max_gaussians; },
+                                                   [](FitOptions& o) { ++o.halvings; },
+                                                   [](FitOptions& o) { ++o.seed; },
+                                                   [](FitOptions& o) { o.background.y = 1; },
+                                                   [](FitOptions& o) { o.rates.position *= 2; },
+                                                   [](FitOptions& o) { o.rates.sh_dc *= 2; },
+                                                   [](FitOptions& o) { o.rates.sh_rest *= 2; },
+                                                   [](FitOptions& o) { o.rates.opacity_logit *= 2; },
+                                                   [](FitOptions& o) { o.rates.log_scale *= 2; },
+                                                   [](FitOptions& o) { o.rates.rotation *= 2; },
+                                                   [](FitOptions& o) { o.rates.last *= 2; },
+                                                   [](FitOptions& o) { o.adam.beta1 /= 2; },
+                                                   [](FitOptions& o) { o.adam.beta2 /= 2; },
+                                                   [](FitOptions& o) { o.adam.epsilon *= 2; },
+                                                   [](FitOptions& o) { o.loss.l1_weight *= 2; },
+                                                   [](FitOptions& o) { o.loss.ssim_weight *= 2; },
+                                                   [](FitOptions& o) { o.loss.l1.scale *= 2; },
+                                                   [](FitOptions& o) { o.loss.l1.kind = optim::SmoothL1::charbonnier; },
+                                                   [](FitOptions& o) { ++o.densify.every; },
+                                                   [](FitOptions& o) { o.densify.until /= 2; },
+                                                   [](FitOptions& o) { o.densify.gradient *= 2; },
+                                                   [](FitOptions& o) { o.densify.dense *= 2; },
+                                                   [](FitOptions& o) { o.least_opacity *= 2; }};
+  for (std::size_t i = 0; i < changes.size(); ++i) {
+    FitOptions other = options;
+    changes[i](other);
+    EXPECT_NE(identity, identity_of(capture.photos, capture.start(), other, "AVX2")) << "change " << i;
+  }
 }
 
 TEST(Fitter, NamesAParameterThatIsNotFinite) {
@@ -239,6 +279,7 @@ TEST(ValidateFitOptions, NamesTheWrongOne) {
   EXPECT_EQ(where([](FitOptions& o) { o.max_gaussians = 0; }), "max_gaussians");
   EXPECT_EQ(where([](FitOptions& o) { o.halvings = 9; }), "halvings");
   EXPECT_EQ(where([](FitOptions& o) { o.least_opacity = 1; }), "least_opacity");
+  EXPECT_EQ(where([](FitOptions& o) { o.rates.position = 0; }), "rates.position");
 }
 
 }  // namespace

@@ -49,8 +49,7 @@ TEST(GaussiansAt, HaveTheColourOfTheirPointFromEverywhere) {
 
 TEST(GaussiansAt, AreOfTheSameSizeFarFromTheOrigin) {
   const scene::GaussianCloud near = gaussians_at(lattice(0.01), 0), far = gaussians_at(lattice(0.01, DVec3(1e6)), 0);
-  for (std::size_t i = 0; i < near.size(); ++i)
-    EXPECT_NEAR(far.log_scale.x[i], near.log_scale.x[i], 1e-3f);
+  for (std::size_t i = 0; i < near.size(); ++i) EXPECT_NEAR(far.log_scale.x[i], near.log_scale.x[i], 1e-3f);
 }
 
 TEST(GaussiansAt, TakePointsThatCoincideAndPointsThatAreLost) {

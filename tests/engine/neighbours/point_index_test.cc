@@ -44,7 +44,8 @@ void expect_as_by_scan(const std::vector<float>& points, std::size_t dimensions,
   ASSERT_EQ(found.size(), count * kept);
   for (std::size_t q = 0; q < count; ++q) {
     const auto expected = nearest_by_scan(points, dimensions, queries.data() + q * dimensions, k);
-    EXPECT_TRUE(std::equal(expected.begin(), expected.end(), found.begin() + std::ptrdiff_t(q * kept))) << "query " << q;
+    EXPECT_TRUE(std::equal(expected.begin(), expected.end(), found.begin() + std::ptrdiff_t(q * kept)))
+        << "query " << q;
   }
 }
 
