@@ -34,8 +34,10 @@ struct Sums {
     for (std::uint8_t& flag : ignored.data) flag = flag == 0;
     optim::LossWorkspace workspace;
     scene::Image gradient(result.width, result.height, 3);
-    dissimilarity += double(area) * optim::ssim_loss(optim::view(result), optim::view(truth), optim::view(ignored),
-                                                     area, 0, workspace, optim::view(gradient));
+    // A mean over the whole picture, in which pixels that do not count are alike.
+    const std::size_t all = counts.data.size();
+    dissimilarity += double(all) * optim::ssim_loss(optim::view(result), optim::view(truth), optim::view(ignored), all,
+                                                    0, workspace, optim::view(gradient));
     pixels += area;
   }
   [[nodiscard]] Likeness likeness() const {
