@@ -18,8 +18,8 @@ namespace HWY_NAMESPACE {
 /// Blends the batch into one block. False if all of the block's rays have ended.
 template <bool kColor, bool kDepth, bool kWeight>
 HWY_INLINE bool Blend(D d, const Batch& batch, std::size_t block, V lane_x, V lane_y, TilePixels& pixels) {
-  const V zero = hn::Zero(d), threshold = hn::Set(d, -log2_255), ceiling = hn::Set(d, float(max_alpha)),
-          floor = hn::Set(d, float(min_transmittance)), half = hn::Set(d, 0.5f), sign = hn::Set(d, -0.0f);
+  const V zero = hn::Zero(d), floor = hn::Set(d, float(min_transmittance)), half = hn::Set(d, 0.5f),
+          sign = hn::Set(d, -0.0f);
   const std::size_t at = block * Blocks::lanes;
   V transmittance = hn::Load(d, pixels.transmittance + at);
   if (hn::AllTrue(d, hn::Lt(transmittance, zero))) return false;
@@ -36,11 +36,7 @@ HWY_INLINE bool Blend(D d, const Batch& batch, std::size_t block, V lane_x, V la
 
   for (std::uint64_t rest = batch.reach[block]; rest != 0; rest &= rest - 1) {
     const std::size_t k = hwy::Num0BitsBelowLS1Bit_Nonzero64(rest);
-    const V u =
-        hn::MulAdd(hn::Set(d, batch.l1[k]), px, hn::MulAdd(hn::Set(d, batch.l2[k]), py, hn::Set(d, batch.u0[k])));
-    const V v = hn::MulAdd(hn::Set(d, batch.l3[k]), py, hn::Set(d, batch.v0[k]));
-    const V power = hn::NegMulAdd(u, u, hn::NegMulAdd(v, v, hn::Set(d, batch.log2_opacity[k])));
-    const V alpha = hn::IfThenElseZero(hn::Ge(power, threshold), hn::Min(Exp2(d, power), ceiling));  // from 1/255 on
+    const V alpha = AlphaAt(d, batch, k, px, py);
     const V after = hn::NegMulAdd(transmittance, alpha, transmittance);
     const auto going_on = hn::Ge(after, floor);  // never true of a ray that has ended: its transmittance is negative
     const V w = hn::IfThenElseZero(going_on, hn::Mul(transmittance, alpha));

@@ -53,8 +53,7 @@ struct alignas(64) Places {
 HWY_INLINE bool Trace(D d, const Places& places, std::size_t block, float*& next, TracedBatch& traced,
                       float* transmittances) {
   const Batch& batch = traced.batch;
-  const V threshold = hn::Set(d, -log2_255), ceiling = hn::Set(d, float(max_alpha)),
-          floor = hn::Set(d, float(min_transmittance)), sign = hn::Set(d, -0.0f);
+  const V floor = hn::Set(d, float(min_transmittance)), sign = hn::Set(d, -0.0f);
   V transmittance = hn::Load(d, transmittances + block * Blocks::lanes);
   if (hn::AllTrue(d, hn::Lt(transmittance, hn::Zero(d)))) {
     traced.batch.reach[block] = 0;
@@ -64,11 +63,7 @@ HWY_INLINE bool Trace(D d, const Places& places, std::size_t block, float*& next
   float* step = next;
   for (std::uint64_t rest = batch.reach[block]; rest != 0; rest &= rest - 1) {
     const std::size_t k = hwy::Num0BitsBelowLS1Bit_Nonzero64(rest);
-    const V u =
-        hn::MulAdd(hn::Set(d, batch.l1[k]), px, hn::MulAdd(hn::Set(d, batch.l2[k]), py, hn::Set(d, batch.u0[k])));
-    const V v = hn::MulAdd(hn::Set(d, batch.l3[k]), py, hn::Set(d, batch.v0[k]));
-    const V power = hn::NegMulAdd(u, u, hn::NegMulAdd(v, v, hn::Set(d, batch.log2_opacity[k])));
-    const V alpha = hn::IfThenElseZero(hn::Ge(power, threshold), hn::Min(Exp2(d, power), ceiling));
+    const V alpha = AlphaAt(d, batch, k, px, py);
     const V after = hn::NegMulAdd(transmittance, alpha, transmittance);
     const auto going_on = hn::Ge(after, floor);
     hn::Store(hn::IfThenElseZero(going_on, alpha), d, step);

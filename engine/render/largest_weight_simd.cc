@@ -18,19 +18,14 @@ namespace HWY_NAMESPACE {
 ///   largest  [batch][lanes] raised
 HWY_INLINE bool WalkBlock(D d, const Batch& batch, std::size_t block, V lane_x, V lane_y, float* transmittances,
                           float* largest) {
-  const V zero = hn::Zero(d), threshold = hn::Set(d, -log2_255), ceiling = hn::Set(d, float(max_alpha)),
-          floor = hn::Set(d, float(min_transmittance)), sign = hn::Set(d, -0.0f);
+  const V zero = hn::Zero(d), floor = hn::Set(d, float(min_transmittance)), sign = hn::Set(d, -0.0f);
   V transmittance = hn::Load(d, transmittances + block * Blocks::lanes);
   if (hn::AllTrue(d, hn::Lt(transmittance, zero))) return false;
   const V px = hn::Add(lane_x, hn::Set(d, float(block % Blocks::columns * Blocks::width)));
   const V py = hn::Add(lane_y, hn::Set(d, float(block / Blocks::columns * Blocks::height)));
   for (std::uint64_t rest = batch.reach[block]; rest != 0; rest &= rest - 1) {
     const std::size_t k = hwy::Num0BitsBelowLS1Bit_Nonzero64(rest);
-    const V u =
-        hn::MulAdd(hn::Set(d, batch.l1[k]), px, hn::MulAdd(hn::Set(d, batch.l2[k]), py, hn::Set(d, batch.u0[k])));
-    const V v = hn::MulAdd(hn::Set(d, batch.l3[k]), py, hn::Set(d, batch.v0[k]));
-    const V power = hn::NegMulAdd(u, u, hn::NegMulAdd(v, v, hn::Set(d, batch.log2_opacity[k])));
-    const V alpha = hn::IfThenElseZero(hn::Ge(power, threshold), hn::Min(Exp2(d, power), ceiling));
+    const V alpha = AlphaAt(d, batch, k, px, py);
     const V after = hn::NegMulAdd(transmittance, alpha, transmittance);
     const auto going_on = hn::Ge(after, floor);
     const V w = hn::IfThenElseZero(going_on, hn::Mul(transmittance, alpha));

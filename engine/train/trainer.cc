@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "engine/mask/mask.h"
 #include "engine/optim/picture_view.h"
 
 namespace engine::train {
@@ -23,14 +24,6 @@ double radius_of(const scene::GaussianCloud& cloud) {
   for (std::size_t i = 0; i < cloud.size(); ++i)
     radius = std::max(radius, glm::distance(centre, DVec3(cloud.mean.get(i))));
   return radius;
-}
-
-scene::Rect bounding_box(const scene::Mask& mask) {
-  scene::Rect box;
-  for (int y = 0; y < mask.height; ++y)
-    for (int x = 0; x < mask.width; ++x)
-      if (mask.at(x, y) != 0) box = united(box, {x, y, x + 1, y + 1});
-  return box;
 }
 
 void shape_like(const scene::Image& image, scene::Image& out) {
@@ -83,7 +76,7 @@ Trainer::Trainer(Frozen frozen, Changeable changeable, double scene_extent, cons
 
 bool Trainer::add_view(const scene::Camera& camera, const scene::Mask& mask, const scene::GaussianCloud& original) {
   assert(mask.width == camera.width && mask.height == camera.height);
-  const scene::Rect box = bounding_box(mask);
+  const scene::Rect box = mask::bounding_box(mask);
   if (box.empty()) return false;
   scene::Rect reach = united(box, frame_.project(cloud_, camera));
   reach = united(reach, frame_.project(original, camera));

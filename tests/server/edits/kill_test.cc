@@ -198,24 +198,31 @@ engine::scene::GaussianCloud kept_after(scenes::SceneStore& store, int kept) {
   return engine::scene::flatten(input, outcome.overlay);
 }
 
+/// A process begins the long edit, asks something of it once `intervals` of it are finished, and is killed `delay` later.
+template <class Ask>
+void kill_after(const fs::path& data, int intervals, Ask ask, std::chrono::microseconds delay) {
+  const Child child([&](const Child& self) {
+    const Opened opened(data);
+    const auto id = value(opened.service->submit(long_edit(), "")).status.id;
+    (void)wait_for_interval(*opened.service, id, intervals);
+    ask(*opened.service, id);
+    self.say('a');
+    std::this_thread::sleep_for(1min);
+  });
+  ASSERT_EQ(child.hear(), 'a');
+  std::this_thread::sleep_for(delay);
+  child.kill();
+  (void)child.ended_well();
+}
+
 TEST(EditKill, DuringAStopKeepsAWholeInterval) {
   engine::Rng rng(7);
   for (int round = 0; round < 4; ++round) {
     SCOPED_TRACE(round);
     const support::TempDir dir;
     make_scene(dir.path());
-    const Child child([&](const Child& self) {
-      const Opened opened(dir.path());
-      const auto id = value(opened.service->submit(long_edit(), "")).status.id;
-      (void)wait_for_interval(*opened.service, id, 2);
-      (void)value(opened.service->stop(id));
-      self.say('s');
-      std::this_thread::sleep_for(1min);
-    });
-    ASSERT_EQ(child.hear(), 's');
-    std::this_thread::sleep_for(std::chrono::microseconds(rng.below(150'000)));
-    child.kill();
-    (void)child.ended_well();
+    const auto stop = [](EditService& service, const std::string& id) { (void)value(service.stop(id)); };
+    ASSERT_NO_FATAL_FAILURE(kill_after(dir.path(), 2, stop, std::chrono::microseconds(rng.below(150'000))));
     const Child next([&](const Child&) {
       const Opened opened(dir.path());
       const auto done = wait_for_end(*opened.service, first_edit);
@@ -235,18 +242,8 @@ TEST(EditKill, DuringACancelLeavesNoVersion) {
     SCOPED_TRACE(round);
     const support::TempDir dir;
     make_scene(dir.path());
-    const Child child([&](const Child& self) {
-      const Opened opened(dir.path());
-      const auto id = value(opened.service->submit(long_edit(), "")).status.id;
-      (void)wait_for_interval(*opened.service, id, 1);
-      (void)value(opened.service->cancel(id));
-      self.say('c');
-      std::this_thread::sleep_for(1min);
-    });
-    ASSERT_EQ(child.hear(), 'c');
-    std::this_thread::sleep_for(std::chrono::microseconds(rng.below(30'000)));
-    child.kill();
-    (void)child.ended_well();
+    const auto cancel = [](EditService& service, const std::string& id) { (void)value(service.cancel(id)); };
+    ASSERT_NO_FATAL_FAILURE(kill_after(dir.path(), 1, cancel, std::chrono::microseconds(rng.below(30'000))));
     const Child next([&](const Child&) {
       const Opened opened(dir.path());
       opened.expect(value(opened.service->find(first_edit)).state == "cancelled", "it goes on");
