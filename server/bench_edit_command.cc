@@ -16,8 +16,10 @@
 
 #include "engine/core/atomic_file.h"
 #include "engine/core/checksum.h"
+#include "engine/correct/scene_corrector.h"
 #include "engine/edit/edit.h"
 #include "engine/evaluate/cases.h"
+#include "engine/evaluate/harmonic_corrector.h"
 #include "engine/evaluate/measure.h"
 #include "engine/io/image_file.h"
 #include "engine/scene/overlay.h"
@@ -41,6 +43,7 @@ struct BenchOptions {
   std::vector<std::string> cases;
   std::string out;
   bool small = false;
+  std::string corrector = "none";
   int intervals = 0, iterations = 0, annealing_steps = 1, views = 50, pictures = 1;
   ComputeOptions compute;
 };
@@ -66,6 +69,13 @@ edit::Request request_of(const evaluate::Case& the_case, const BenchOptions& opt
   return request;
 }
 
+/// The corrector of that name; null: none.
+std::unique_ptr<engine::correct::Corrector> make_corrector(const std::string& name) {
+  if (name == "scene") return std::make_unique<engine::correct::SceneCorrector>();
+  if (name == "harmonic") return std::make_unique<evaluate::HarmonicCorrector>();
+  return nullptr;
+}
+
 /// A field of /proc/self/status in bytes, 0 where there is no such file.
 std::uint64_t status_bytes(const std::string& field) {
   std::ifstream status("/proc/self/status");
@@ -84,9 +94,9 @@ std::string key_of(const evaluate::Case& the_case, const BenchOptions& options, 
     const std::string bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
     return engine::fnv1a(std::as_bytes(std::span(bytes)));
   }();
-  const ordered_json all{the_case.name,           options.intervals, options.iterations,
-                         options.annealing_steps, options.views,     options.pictures,
-                         machine.threads,         machine.simd,      program};
+  const ordered_json all{
+      options.corrector, the_case.name,    options.intervals, options.iterations, options.annealing_steps,
+      options.views,     options.pictures, machine.threads,   machine.simd,       program};
   const std::string text = all.dump();
   std::ostringstream key;
   key << std::hex << std::setfill('0') << std::setw(16) << engine::fnv1a(std::as_bytes(std::span(text)));
@@ -94,10 +104,12 @@ std::string key_of(const evaluate::Case& the_case, const BenchOptions& options, 
 }
 
 /// What an edit came to, and how long it took.
-Result<ordered_json> judge(const evaluate::Case& the_case, const edit::Request& request, scene::GaussianCloud& edited) {
+Result<ordered_json> judge(const evaluate::Case& the_case, const edit::Request& request,
+                           const std::string& corrector_name, scene::GaussianCloud& edited) {
   forget_peak();
   const std::uint64_t before = status_bytes("VmRSS");
-  const auto outcome = edit::run(the_case.before, the_case.cameras, request);
+  const auto corrector = make_corrector(corrector_name);
+  const auto outcome = edit::run(the_case.before, the_case.cameras, request, {}, nullptr, nullptr, corrector.get());
   if (!outcome) return propagate(outcome);
   const std::uint64_t peak = status_bytes("VmHWM");
   edited = scene::flatten(the_case.before, outcome->overlay);
@@ -111,6 +123,7 @@ Result<ordered_json> judge(const evaluate::Case& the_case, const edit::Request& 
                       {"what", the_case.what},
                       {"gaussians", the_case.before.size()},
                       {"part", the_case.part_before.size()},
+                      {"seeds", outcome->report.seeds},
                       {"intervals", outcome->report.resolved.intervals},
                       {"untouched", encode(evaluate::judge(the_case, the_case.before))},
                       {"result", encode(evaluate::judge(the_case, edited))},
@@ -170,7 +183,7 @@ Result<ordered_json> result_of(const evaluate::Case& the_case, const BenchOption
   if (auto kept = kept_result(file)) return std::move(*kept);
   const edit::Request request = request_of(the_case, options);
   scene::GaussianCloud edited;
-  auto found = judge(the_case, request, edited);
+  auto found = judge(the_case, request, options.corrector, edited);
   if (!found) return found;
   if (auto written = write_pictures(the_case, request, edited, options); !written) return propagate(written);
   const std::string text = proto::pretty(*found) + "\n";
@@ -246,6 +259,9 @@ void add_bench_edit_command(CLI::App& program, Action& action) {
                    "worked out again")
       ->required()
       ->type_name("DIR");
+  command->add_option("--corrector", options->corrector, "Which")
+      ->check(CLI::IsMember({"none", "harmonic", "scene"}))
+      ->type_name("NAME");
   command->add_option("--intervals", options->intervals, "Of each edit; 0: by the length of the drag")
       ->check(CLI::Range(0, 20))
       ->type_name("N");

@@ -14,7 +14,7 @@ namespace engine::edit {
 namespace {
 
 constexpr std::string_view magic = "SDCHKPNT";
-constexpr std::uint32_t version = 2;
+constexpr std::uint32_t version = 3;
 
 // Each part is written and read by a pair of functions that name the same fields in the same order.
 
@@ -92,7 +92,7 @@ void read(ByteReader& in, MemberRows& members) {
   members.cloud = scene::read_cloud(in);
   if (!in.has(members.cloud.size())) return in.fail();
   members.role.resize(members.cloud.size());
-  for (Role& role : members.role) read(in, role, Role::trail);
+  for (Role& role : members.role) read(in, role, Role::seed);
   read(in, members.handle);
   read(in, members.parent);
   read(in, members.mean_at_deform);
@@ -140,6 +140,8 @@ void write(ByteWriter& out, const Params& params) {
   out.write(std::int32_t(params.views));
   write_list(out, params.exclude_views);
   out.write(std::int32_t(params.iterations)), out.write(std::int32_t(params.annealing_steps));
+  out.write(params.strength_initial), out.write(params.strength_final);
+  out.write(std::uint8_t(params.annealing));
   out.write(std::int32_t(params.max_image_side));
   out.write(params.seed);
   out.write(std::uint8_t(params.optimise_unmoved));
@@ -152,6 +154,8 @@ void read(ByteReader& in, Params& params) {
   params.views = in.read<std::int32_t>();
   read_list(in, params.exclude_views);
   params.iterations = in.read<std::int32_t>(), params.annealing_steps = in.read<std::int32_t>();
+  params.strength_initial = in.read<double>(), params.strength_final = in.read<double>();
+  read(in, params.annealing, Annealing::paper);
   params.max_image_side = in.read<std::int32_t>();
   params.seed = in.read<std::uint64_t>();
   params.optimise_unmoved = in.read<std::uint8_t>() != 0;
@@ -177,8 +181,8 @@ void write(ByteWriter& out, const Report& report) {
   write(out, report.resolved);
   write_list(out, report.handles);
   write_list(out, report.views);
-  for (const std::size_t count :
-       {report.input_gaussians, report.output_gaussians, report.changeable, report.copies, report.removed})
+  for (const std::size_t count : {report.input_gaussians, report.output_gaussians, report.changeable, report.copies,
+                                  report.seeds, report.removed})
     out.write(std::uint64_t(count));
   write(out, report.losses);
   write_list(out, report.warnings);
@@ -189,8 +193,8 @@ void read(ByteReader& in, Report& report) {
   read(in, report.resolved);
   read_list(in, report.handles);
   read_list(in, report.views);
-  for (std::size_t* count :
-       {&report.input_gaussians, &report.output_gaussians, &report.changeable, &report.copies, &report.removed})
+  for (std::size_t* count : {&report.input_gaussians, &report.output_gaussians, &report.changeable, &report.copies,
+                             &report.seeds, &report.removed})
     *count = std::size_t(in.read<std::uint64_t>());
   read(in, report.losses);
   read_list(in, report.warnings);

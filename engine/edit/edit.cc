@@ -11,6 +11,7 @@
 #include "engine/edit/messages.h"
 #include "engine/edit/optimise.h"
 #include "engine/edit/paste.h"
+#include "engine/edit/repair.h"
 #include "engine/edit/stages.h"
 #include "engine/edit/working_scene.h"
 
@@ -92,13 +93,13 @@ Result<void> check_resume(const Checkpoint& from, const Request& request) {
 class Run {
  public:
   Run(const scene::GaussianCloud& scene, const Request& request, const Observer& observer,
-      optim::PerceptualLoss& perceptual)
-      : scene_(scene), request_(request), observer_(observer), perceptual_(perceptual) {
+      optim::PerceptualLoss& perceptual, correct::Corrector* corrector)
+      : scene_(scene), request_(request), observer_(observer), perceptual_(perceptual), corrector_(corrector) {
     stages_.set_lengths(resolved_intervals(request), iterations_of_interval(request.params));
   }
 
   Result<void> start(std::span<const scene::Camera> cameras);
-  Result<void> go_on(const Checkpoint& from);
+  Result<void> go_on(const Checkpoint& from, std::span<const scene::Camera> cameras);
   [[nodiscard]] int finished() const { return finished_; }
   [[nodiscard]] int intervals() const { return report_.resolved.intervals; }
   Result<void> next_interval();
@@ -112,8 +113,22 @@ class Run {
   }
   /// Of an interval: what comes before the optimisation, which takes most of the time of an edit that has one.
   [[nodiscard]] double early(double part) const { return request_.params.iterations > 0 ? 0.1 * part : part; }
+  /// A part of the a-th correction of interval u is done, its optimisation included.
+  [[nodiscard]] double in_correction(int u, int a, double part) const {
+    const double done = (a - 1 + part) / request_.params.annealing_steps;
+    return fraction(u, early(0.95) + (0.95 - early(0.95)) * done);
+  }
+  [[nodiscard]] double corrected_to(int u, int a, double part) const {
+    return in_correction(u, a, correcting() * part);
+  }
+  [[nodiscard]] double optimised_to(int u, int a, double part) const {
+    return in_correction(u, a, correcting() + (1 - correcting()) * part);
+  }
+  [[nodiscard]] double correcting() const { return corrector_ != nullptr ? 0.3 : 0; }
   Result<void> mask(int u, std::span<const std::uint32_t> rows, double from, double to);
-  Result<void> optimise(int u);
+  Result<void> repair(int u);
+  Result<Corrected> correct(int u, int a, std::span<const scene::Mask> dilated);
+  Result<void> optimise(int u, int a, std::span<const scene::Mask> dilated, const Corrected& corrected);
   Result<void> show(const char* stage, int u, double part);
   Result<void> hand_out_checkpoint(int u, Clock::time_point start);
 
@@ -121,12 +136,16 @@ class Run {
   const Request& request_;
   const Observer& observer_;
   optim::PerceptualLoss& perceptual_;
+  correct::Corrector* corrector_;
+  std::vector<scene::Camera> observers_;  ///< That have seen the scene, if a corrector asks.
   Report report_;
   Stages stages_{observer_, report_.times};
   WorkingScene working_;
   std::vector<scene::Camera> views_;
   std::vector<scene::Mask> masks_;  ///< Undilated.
   std::vector<DVec3> positions_;
+  std::optional<WorkingScene> original_;  ///< As the edit found it, for `repair_`.
+  std::optional<Repair> repair_;
   std::vector<std::uint32_t> shown_;  ///< The rows of the last mask rendering, as long as they are as they were then.
   int finished_ = 0;
 };
@@ -137,6 +156,8 @@ Result<void> Run::start(std::span<const scene::Camera> cameras) {
   const auto assignment = assign(scene_.mean, request_);
   if (!assignment) return propagate(assignment);
   working_ = begin(scene_, request_, assignment->handle);
+
+  if (corrector_ != nullptr) observers_ = candidate_cameras(scene_, cameras, request_);
 
   // 2. Intervals.
   report_.resolved = request_.params;
@@ -153,8 +174,9 @@ Result<void> Run::start(std::span<const scene::Camera> cameras) {
   return {};
 }
 
-Result<void> Run::go_on(const Checkpoint& from) {
+Result<void> Run::go_on(const Checkpoint& from, std::span<const scene::Camera> cameras) {
   if (auto fits = check_resume(from, request_); !fits) return fits;
+  if (corrector_ != nullptr) observers_ = candidate_cameras(scene_, cameras, request_);
   report_ = from.report;
   if (auto going = stages_.enter("assign", from.interval, fraction(from.interval, 1)); !going) return going;
   working_ = begin(scene_, request_, deform::HandleColumn(scene_.size(), 0));
@@ -172,19 +194,52 @@ Result<void> Run::mask(int u, std::span<const std::uint32_t> rows, double from, 
                      [&](double done) { return stages_.advance(fraction(u, from + (to - from) * done)); });
 }
 
-Result<void> Run::optimise(int u) {
-  if (auto going = stages_.enter("optimise", u, fraction(u, early(0.95))); !going) return going;
+Result<void> Run::repair(int u) {
   std::vector<scene::Mask> dilated = masks_;
   dilate_masks(dilated);
-  const auto advance = [&](const OptimiseProgress& at) {
-    const double done = double(at.iteration) / at.iterations;
-    return stages_.advance(fraction(u, early(0.95) + (0.95 - early(0.95)) * done), at.iteration, at.loss);
-  };
-  const auto outcome = edit::optimise(working_, scene_, views_, dilated, request_.params, u, perceptual_, advance);
-  if (!outcome) return propagate(outcome);
-  report_.losses.push_back(outcome->loss);
+  for (int a = 1; a <= request_.params.annealing_steps; ++a) {
+    Corrected corrected;
+    if (corrector_ != nullptr) {
+      auto pictures = correct(u, a, dilated);
+      if (!pictures) return propagate(pictures);
+      corrected = std::move(*pictures);
+    }
+    if (auto optimised = optimise(u, a, dilated, corrected); !optimised) return optimised;
+  }
   shown_.clear();
   return show("optimised", u, 0.95);
+}
+
+Result<Corrected> Run::correct(int u, int a, std::span<const scene::Mask> dilated) {
+  if (auto going = stages_.enter("correct", u, corrected_to(u, a, 0)); !going) return propagate(going);
+  if (!repair_) {
+    original_ = begin(scene_, request_, deform::HandleColumn(scene_.size(), 0));
+    const auto in_frame = [&](std::span<const scene::Camera> cameras) {
+      std::vector<scene::Camera> out;
+      for (const scene::Camera& camera : cameras) out.push_back(in_frame_of(working_, camera));
+      return out;
+    };
+    repair_.emplace(original_->cloud, in_frame(observers_), in_frame(views_), request_.params, request_.mode,
+                    *corrector_);
+  }
+  auto outcome =
+      repair_->correct(working_, dilated, u, a, [&](double done) { return stages_.advance(corrected_to(u, a, done)); });
+  if (!outcome) return propagate(outcome);
+  report_.seeds += outcome->seeds;
+  return std::move(outcome->corrected);
+}
+
+Result<void> Run::optimise(int u, int a, std::span<const scene::Mask> dilated, const Corrected& corrected) {
+  if (auto going = stages_.enter("optimise", u, optimised_to(u, a, 0)); !going) return going;
+  const int before = (a - 1) * request_.params.iterations;
+  const auto advance = [&](const OptimiseProgress& at) {
+    return stages_.advance(optimised_to(u, a, double(at.iteration) / at.iterations), before + at.iteration, at.loss);
+  };
+  const auto outcome =
+      edit::optimise(working_, scene_, views_, dilated, corrected, request_.params, u, a, perceptual_, advance);
+  if (!outcome) return propagate(outcome);
+  if (a == request_.params.annealing_steps) report_.losses.push_back(outcome->loss);
+  return {};
 }
 
 Result<void> Run::show(const char* stage, int u, double part) {
@@ -230,9 +285,9 @@ Result<void> Run::next_interval() {
   // 6. ... and after it.
   if (auto masked = mask(u, shown_, early(0.5), early(0.95)); !masked) return masked;
 
-  // 7. and 8. Correct (nothing does yet) and optimise.
+  // 7. and 8. Correct and optimise, as often as annealing asks.
   if (request_.params.iterations > 0 && !shown_.empty())
-    if (auto optimised = optimise(u); !optimised) return optimised;
+    if (auto repaired = repair(u); !repaired) return repaired;
 
   // 9. Relocate.
   if (auto going = stages_.enter("relocate", u, fraction(u, 0.95)); !going) return going;
@@ -265,12 +320,13 @@ Result<Outcome> Run::finish() {
 }  // namespace
 
 Result<Outcome> run(const scene::GaussianCloud& scene, std::span<const scene::Camera> cameras, const Request& request,
-                    const Observer& observer, const Checkpoint* resume, optim::PerceptualLoss* perceptual) {
+                    const Observer& observer, const Checkpoint* resume, optim::PerceptualLoss* perceptual,
+                    correct::Corrector* corrector) {
   if (const auto valid = validate(request); !valid) return propagate(valid);
   if (const auto valid = validate_cameras(cameras); !valid) return propagate(valid);
   optim::MsSsimLoss ms_ssim;
-  Run run(scene, request, observer, perceptual != nullptr ? *perceptual : ms_ssim);
-  if (const auto ready = resume ? run.go_on(*resume) : run.start(cameras); !ready) return propagate(ready);
+  Run run(scene, request, observer, perceptual != nullptr ? *perceptual : ms_ssim, corrector);
+  if (const auto ready = resume ? run.go_on(*resume, cameras) : run.start(cameras); !ready) return propagate(ready);
   const auto is_enough = [&] { return run.finished() > 0 && observer.keep && observer.keep(); };
   while (run.finished() < run.intervals() && !is_enough())
     if (const auto done = run.next_interval(); !done) return propagate(done);

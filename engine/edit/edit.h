@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/correct/corrector.h"
 #include "engine/edit/checkpoint.h"
 #include "engine/edit/report.h"
 #include "engine/edit/request.h"
@@ -25,11 +26,12 @@ namespace engine::edit {
 struct Progress {
   int interval = 0;  ///< 1..intervals; 0 before the first.
   int intervals = 0;
-  std::string stage;    ///< "assign", "views", "deform", "mask", "optimise", "relocate", "finish"; for an Observer that
-                        ///< wants them, "renders" (Observer::moment) and "checkpoint" (Observer::interval_done)
-  double fraction = 0;  ///< Of the whole edit, 0..1, never falls.
-  int iteration = 0;    ///< Done of the interval's optimisation; 0 outside it.
-  int iterations = 0;   ///< Of each interval, all corrections together; 0: nothing is optimised.
+  std::string
+      stage;  ///< "assign", "views", "deform", "mask", "correct", "optimise", "relocate", "finish"; for an Observer
+              ///< that wants them, "renders" (Observer::moment) and "checkpoint" (Observer::interval_done)
+  double fraction = 0;              ///< Of the whole edit, 0..1, never falls.
+  int iteration = 0;                ///< Done of the interval's optimisation; 0 outside it.
+  int iterations = 0;               ///< Of each interval, all corrections together; 0: nothing is optimised.
   std::optional<double> loss = {};  ///< Of the last iteration, while it optimises.
 };
 
@@ -81,8 +83,10 @@ struct Outcome {
 ///   resume   state after an interval of the same edit: it goes on with the next one; null: from the start. With
 ///            Observer::keep answering yes at once, it ends with that interval as its result.
 ///   perceptual  the loss inside masks; null: optim::MsSsimLoss
+///   corrector   null: `none`, the optimisation keeps what the deformation shows
 [[nodiscard]] Result<Outcome> run(const scene::GaussianCloud& scene, std::span<const scene::Camera> cameras,
                                   const Request& request, const Observer& observer = {},
-                                  const Checkpoint* resume = nullptr, optim::PerceptualLoss* perceptual = nullptr);
+                                  const Checkpoint* resume = nullptr, optim::PerceptualLoss* perceptual = nullptr,
+                                  correct::Corrector* corrector = nullptr);
 
 }  // namespace engine::edit

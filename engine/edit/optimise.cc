@@ -9,6 +9,10 @@
 namespace engine::edit {
 namespace {
 
+// A trusted row moves at a hundredth of the usual rates. Adam takes no notice of how small a gradient is, so that
+// the little that a hole nearby leaves in its windows of SSIM would carry it off at full speed.
+constexpr float held_by_trust = 0.99f;
+
 /// INRIA's extent of a capture: 1.1 times the largest distance of a camera from their centre.
 double scene_extent(std::span<const scene::Camera> cameras) {
   DVec3 middle(0.0);
@@ -27,7 +31,8 @@ void take_over(const train::Trainer& trainer, std::span<const std::uint32_t> mem
   for (const std::uint32_t child : children) {
     const std::uint32_t ancestor = members[trainer.ancestors()[child]];
     working.handle.push_back(working.handle[ancestor]);
-    working.role.push_back(working.handle[ancestor] != 0 ? Role::copy : Role::trail);
+    const bool is_of_seed = working.role[ancestor] == Role::seed;
+    working.role.push_back(is_of_seed ? Role::seed : working.handle[ancestor] != 0 ? Role::copy : Role::trail);
     working.parent.push_back(working.parent[ancestor]);
     working.mean_at_deform.push_back(working.mean_at_deform.get(ancestor));
   }
@@ -37,38 +42,40 @@ void take_over(const train::Trainer& trainer, std::span<const std::uint32_t> mem
 
 Result<OptimiseOutcome> optimise(WorkingScene& working, const scene::GaussianCloud& input,
                                  std::span<const scene::Camera> views, std::span<const scene::Mask> masks,
-                                 const Params& params, int u, optim::PerceptualLoss& perceptual,
+                                 const Corrected& corrected, const Params& params, int u, int a,
+                                 optim::PerceptualLoss& perceptual,
                                  const std::function<Result<void>(const OptimiseProgress&)>& advance) {
-  const int iterations = iterations_of_interval(params);
   const std::vector<std::uint32_t> members = member_rows(working);
   train::Changeable changeable;
   changeable.cloud.sh_degree = working.cloud.sh_degree;
   changeable.cloud.extra_stride = working.cloud.extra_stride;
   scene::append_rows(changeable.cloud, working.cloud, members);
-  for (const std::uint32_t row : members) changeable.name.push_back(working.parent[row]);
+  for (const std::uint32_t row : members) {
+    changeable.name.push_back(working.parent[row]);
+    if (!corrected.trust.empty()) changeable.mobility.push_back(1 - held_by_trust * corrected.trust[row]);
+  }
   const scene::GaussianCloud originals = as_begun(working, input, members);
   train::Trainer trainer({&working.cloud, members}, std::move(changeable), scene_extent(views), {}, perceptual);
   for (std::size_t v = 0; v < views.size(); ++v) {
-    trainer.add_view(in_frame_of(working, views[v]), masks[v], originals);
-    if (auto going = advance({.iterations = iterations}); !going) return propagate(going);
+    const bool added = trainer.add_view(in_frame_of(working, views[v]), masks[v], originals);
+    if (added && !corrected.pictures.empty()) {
+      const std::size_t last = trainer.views() - 1;
+      trainer.set_edited(last, scene::cut_out(corrected.pictures[v], trainer.view(last).frozen.region()));
+    }
+    if (auto going = advance({.iterations = params.iterations}); !going) return propagate(going);
   }
   OptimiseOutcome outcome;
   if (trainer.views() == 0) return outcome;
 
   std::vector<double> losses(trainer.views(), 0.0);
-  for (int a = 1; a <= params.annealing_steps; ++a) {
-    if (a > 1)
-      for (std::size_t v = 0; v < trainer.views(); ++v) trainer.set_edited(v, trainer.render(v));
-    trainer.begin_correction({params.seed, u, a}, params.iterations);
-    for (int i = 0; i < params.iterations; ++i) {
-      const auto done = trainer.step();
-      if (!done) return propagate(done);
-      losses[done->view] = done->loss;
-      const int iteration = (a - 1) * params.iterations + i + 1;
-      if (auto going = advance({iteration, iterations, done->loss}); !going) return propagate(going);
-    }
+  trainer.begin_correction({params.seed, u, a}, params.iterations);
+  for (int i = 0; i < params.iterations; ++i) {
+    const auto done = trainer.step();
+    if (!done) return propagate(done);
+    losses[done->view] = done->loss;
+    if (auto going = advance({i + 1, params.iterations, done->loss}); !going) return propagate(going);
   }
-  const auto seen = std::min(trainer.views(), std::size_t(iterations));
+  const auto seen = std::min(trainer.views(), std::size_t(params.iterations));
   outcome.loss = std::accumulate(losses.begin(), losses.end(), 0.0) / double(seen);
   outcome.children = trainer.cloud().size() - members.size();
   take_over(trainer, members, working);

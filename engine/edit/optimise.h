@@ -25,26 +25,33 @@ constexpr std::size_t frozen_memory = train::TrainOptions{}.frozen_memory;
 /// How far the optimisation of an interval is.
 struct OptimiseProgress {
   int iteration = 0;                ///< Done, of `iterations`; 0 while the views are set up.
-  int iterations = 0;               ///< Of all corrections together.
+  int iterations = 0;               ///< Of this correction.
   std::optional<double> loss = {};  ///< Of the last iteration.
 };
 
+/// What a correction asks for.
+struct Corrected {
+  std::vector<scene::Image> pictures;  ///< I_e of each view, in its size.
+  std::vector<float> trust;            ///< [rows of the working scene] 0 to 1: the more, the slower a row may change.
+};
+
 struct OptimiseOutcome {
-  double loss = 0;           ///< Mean over the views of the last epoch of the last correction.
+  double loss = 0;           ///< Mean over the views of the last epoch.
   std::size_t children = 0;  ///< Rows that densification added and the guard against floaters left.
 };
 
-/// The optimisation of interval u: params.annealing_steps corrections of params.iterations iterations each.
-/// Nothing corrects pictures yet (`corrector: "none"`): I_e is what a view shows when a correction begins, rounded to 8
-/// bits; I_o is the render of the input. Only rows of M change. Children are appended: they inherit handle, parent and
-/// mean_at_deform; those of members of P_h are copies, others a trail.
-///   masks    per view, dilated; views without a set pixel are left out. If none is left, nothing happens.
+/// The optimisation after the a-th correction of interval u: params.iterations iterations.
+/// I_o is the render of the input. Only rows of M change. Children are appended: they inherit handle, parent and
+/// mean_at_deform; those of members of P_h are copies, those of seeds seeds, others a trail.
+///   masks      per view, dilated; views without a set pixel are left out. If none is left, nothing happens.
+///   corrected  empty (`corrector: "none"`): I_e is what a view shows now. Rounded to 8 bits.
 ///   advance  called after every view that is set up and every iteration; its error ends the optimisation
 ///   errors   internal: a value is not finite; `where` names it by the input's row ("gaussian[12].opacity")
 /// On an error the working scene is as it was.
 [[nodiscard]] Result<OptimiseOutcome> optimise(WorkingScene& working, const scene::GaussianCloud& input,
                                                std::span<const scene::Camera> views, std::span<const scene::Mask> masks,
-                                               const Params& params, int u, optim::PerceptualLoss& perceptual,
+                                               const Corrected& corrected, const Params& params, int u, int a,
+                                               optim::PerceptualLoss& perceptual,
                                                const std::function<Result<void>(const OptimiseProgress&)>& advance);
 
 /// Of each interval: all corrections together.

@@ -37,6 +37,7 @@ struct Report {
   std::size_t output_gaussians = 0;
   std::size_t changeable = 0;  ///< Size of the 3D mask M at the end.
   std::size_t copies = 0;      ///< New rows in the output: deformed copies, and children that the optimisation added.
+  std::size_t seeds = 0;       ///< Of those, as they were made: placed where a surface goes on that nobody has seen.
   std::size_t removed = 0;     ///< Input rows that are not in the output.
   std::vector<double> losses;  ///< Per interval: mean over the views of the last epoch. Empty without optimisation.
   std::vector<std::string> warnings;

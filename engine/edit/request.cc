@@ -54,6 +54,9 @@ Result<void> validate(const Params& params) {
   if (outside(params.annealing_steps, 1, 100))
     return invalid(range(params.annealing_steps, "the number of corrections per interval", "1 to 100"),
                    "params.annealing_steps");
+  for (const auto& [strength, where] : {std::pair{params.strength_initial, "params.strength_initial"},
+                                        {params.strength_final, "params.strength_final"}})
+    if (!(strength >= 0 && strength <= 1)) return invalid("a strength is a number from 0 to 1", where);
   return {};
 }
 

@@ -13,6 +13,12 @@
 
 namespace engine::edit {
 
+/// How the strength of a correction falls from the first of an interval to the last, number A.
+enum class Annealing {
+  linear,  ///< It reaches the final value: S_init - (a - 1) / (A - 1) (S_init - S_final).
+  paper,   ///< As printed: (a - 1) / A in its place, so that the final value is never reached.
+};
+
 enum class Mode {
   move,    ///< The dragged part leaves its place.
   extend,  ///< It is drawn out: the original and the trail stay.
@@ -47,6 +53,9 @@ struct Params {
   std::vector<std::string> exclude_views;  ///< Names held back from the choice.
   int iterations = 0;                      ///< Of the optimisation per correction, 0 to 1,000,000; 0: none.
   int annealing_steps = 1;                 ///< A: corrections per interval, 1 to 100.
+  double strength_initial = 0.5;           ///< S of an interval's first correction, 0 to 1.
+  double strength_final = 0.3;             ///< S of its last one, 0 to 1.
+  Annealing annealing = Annealing::linear;
   int max_image_side = 512;                ///< Pixels, of the pictures an edit works on, 16 to 16384.
   std::uint64_t seed = 0;
   bool optimise_unmoved = false;  ///< For tests: masks and optimises also what no handle moves. Not on the wire.

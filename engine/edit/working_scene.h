@@ -23,6 +23,7 @@ enum class Role : std::uint8_t {
   copy,      ///< A deformed copy at its latest place, in P_h.
   trail,     ///< Not the input's and not in P_h: a copy that was copied in turn, in an extend, its opacity lowered; or
              ///< a child that the optimisation gave an original.
+  seed,      ///< New, of the repair: a surface that nobody has seen goes on there. So are its children.
 };
 
 /// Rows [0, input_rows) are the input's, in its order; the rest are copies in the order they were made.

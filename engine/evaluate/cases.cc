@@ -8,6 +8,7 @@
 #include <numeric>
 #include <utility>
 
+#include "engine/core/rng.h"
 #include "engine/deform/rotate_sh.h"
 #include "engine/procedural/demo_scene.h"
 #include "engine/procedural/light.h"
@@ -15,6 +16,7 @@
 #include "engine/procedural/objects.h"
 #include "engine/procedural/surfels.h"
 #include "engine/render/largest_weight.h"
+#include "engine/scene/sh.h"
 
 namespace engine::evaluate {
 namespace {
@@ -26,19 +28,22 @@ constexpr std::uint64_t seed = 7;
 // A Gaussian that no camera of the capture blends with more than this is not in the scene: nothing would have trained
 // it.
 constexpr float least_weight = 0.02f;
+// One that they blend with less than this was hardly trained: its colour is off by up to so much, the less it is seen
+// the more.
+constexpr float fair_weight = 0.05f, worst_colour_error = 0.5f;
 constexpr int held_out_every = 5;
 
-/// How a point of the part moves: turned about the pivot, drawn away from the vertical through it, shifted.
+/// How a point of the part moves: turned about the pivot, drawn to both sides of it, shifted.
 struct Motion {
   DQuat turn{1, 0, 0, 0};
   DVec3 pivot{0.0};  ///< World units.
   DVec3 shift{0.0};  ///< World units.
-  double widen = 0;  ///< Horizontal distances from the pivot grow by this part of themselves per unit of height.
+  double widen = 0;  ///< What is `reach` or more to the left or right of the pivot moves away by this, world units;
+  double reach = 1;  ///< what is nearer by its part of it.
 
   [[nodiscard]] DVec3 operator()(DVec3 point) const {
     const DVec3 arm = turn * (point - pivot);
-    const double stretch = 1 + widen * std::max(-arm.y, 0.0);  // height is -y
-    return pivot + DVec3(stretch * arm.x, arm.y, stretch * arm.z) + shift;
+    return pivot + arm + DVec3(widen * std::clamp(arm.x / reach, -1.0, 1.0), 0, 0) + shift;
   }
 };
 
@@ -156,13 +161,13 @@ Plan pole() {
 
 Plan arm() {
   constexpr float length = 0.5f, thick = 0.11f;
-  Plan plan{.what = "A jointed arm raised at the shoulder and bent at the elbow."};
+  Plan plan{.what = "A jointed arm that lies on a table, raised at the shoulder and bent at the elbow."};
   plan.surroundings = furnished_room();
-  const Vec3 shoulder = at(-0.75f, 0.45f, -0.15f);
+  const Vec3 shoulder = at(-0.75f, 0.5f * thick, -0.15f);
   plan.surroundings.push_back(
       {"stand",
-       {at(-0.75f, 0, -0.15f), 0},
-       made::box({0, 0, 0}, {0.16f, 0.45f, 0.16f}, made::plain(made::srgb(90, 90, 96), 0.1f), 2)});
+       {at(-0.85f, 0, -0.15f), 0},
+       made::box({0, 0, 0}, {0.16f, 0.3f, 0.16f}, made::plain(made::srgb(90, 90, 96), 0.1f), 2)});
   const auto segment = [&](float along, const made::Material& material) {
     return made::Object{"segment",
                         {shoulder + Vec3(along + 0.5f * length, 0.5f * thick, 0), 0},
@@ -179,13 +184,13 @@ Plan arm() {
   std::vector<edit::Handle> handles;
   for (const double along : {0.0, 0.17, 0.34}) {
     const DVec3 point = from + DVec3(along + 0.08, 0, 0);
-    handles.push_back(handle(point, upper(point), 0.125));
+    handles.push_back(handle(point, upper(point), 0.125, 1));
   }
   for (const double along : {0.5, 0.67, 0.84}) {
     const DVec3 point = from + DVec3(along + 0.08, 0, 0);
-    handles.push_back(handle(point, lower(point), 0.125));
+    handles.push_back(handle(point, lower(point), 0.125, 2));
   }
-  plan.request = drag(std::move(handles), edit::Region{from + DVec3(0.5, 0, 0), {1.002, 0.118, 0.118}});
+  plan.request = drag(std::move(handles), edit::Region{from + dat(0.5, 0.004, 0), {1.002, double(thick), 0.118}});
   plan.request.params.interpolation = edit::Interpolation::rigid;
   return plan;
 }
@@ -196,17 +201,20 @@ Plan bush() {
   plan.surroundings = {made::make_room(-1.5f), made::make_table({}, {3.7f, 1.5f, 2.1f}), made::make_pot(pot)};
   const made::Plant plant = made::make_plant(pot, 40, seed);
   const DVec3 soil = DVec3(pot.position) + dat(0, double(made::soil_height), 0);
-  const Motion motion{.pivot = soil, .widen = 0.7};
+  const Motion motion{.pivot = soil, .widen = 0.22, .reach = 0.35};
   plan.parts = {{plant.object, motion}};
-  std::vector<edit::Handle> handles{handle(soil + dat(0, 0.1, 0), std::nullopt, 0.16)};
-  for (int k = 0; k < 6; ++k) {
-    const double angle = 2 * pi * k / 6;
-    for (const double height : {0.35, 0.7}) {
-      const DVec3 point = soil + dat(0.34 * std::cos(angle), height, 0.34 * std::sin(angle));
-      handles.push_back(handle(point, motion(point), 0.30));
-    }
+  std::vector<edit::Handle> handles;
+  for (const double height : {0.15, 0.4, 0.65})
+    for (const double depth : {-0.25, 0.25})
+      for (const double side : {-0.5, -0.25, 0.0, 0.25, 0.5}) {
+        const DVec3 point = soil + dat(side, height, depth);
+        handles.push_back(handle(point, motion(point), 0.4));
+      }
+  for (int k = 0; k < 10; ++k) {  // the pot stays
+    const double angle = 2 * pi * k / 10;
+    handles.push_back(handle(soil + dat(0.32 * std::cos(angle), 0, 0.32 * std::sin(angle)), std::nullopt, 0.25));
   }
-  plan.request = drag(std::move(handles), edit::Region{soil + dat(0, 0.85, 0), {2.2, 1.66, 2.2}});
+  plan.request = drag(std::move(handles), edit::Region{soil + dat(0, 0.6, 0), {2.6, 1.9, 2.2}});
   plan.request.params.interpolation = edit::Interpolation::smooth;
   return plan;
 }
@@ -273,6 +281,18 @@ std::vector<std::uint32_t> range(std::size_t first, std::size_t last) {
   return rows;
 }
 
+/// What a training does to Gaussians that no picture shows well.
+///   weight  [rows] largest blending weight over the cameras of the capture
+void spoil_colours(std::span<const float> weight, scene::GaussianCloud& cloud) {
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    if (weight[i] >= fair_weight) continue;
+    const float error = worst_colour_error * (fair_weight - weight[i]) / (fair_weight - least_weight);
+    Rng rng(seed, i);
+    for (std::size_t c = 0; c < 3; ++c)
+      cloud.sh_row(i)[c * scene::sh_coefficients(cloud.sh_degree)] += rng.uniform(-error, error) / float(scene::sh_c0);
+  }
+}
+
 void place_cameras(const Plan& plan, Case& out) {
   auto cameras = made::make_arc_cameras(plan.views, plan.width, plan.height);
   for (std::size_t i = 0; i < cameras.size(); ++i) {
@@ -320,6 +340,7 @@ Case carry_out(const std::string& name, const Plan& plan) {
     }
     kept += seen[i];
   }
+  spoil_colours(weight, whole);
   out.before = scene::select(whole, seen);
   return out;
 }

@@ -66,8 +66,6 @@ scene::GaussianCloud gaussians_at(std::span<const ColoredPoint> points, int sh_d
   const std::vector<float> distance = spacing(positions);
   const float typical = std::max(median(distance), 1e-7f);  // all points in one place: some size that is not 0
 
-  std::array<double, 1> basis{};
-  scene::sh_basis(0, 0.0, 0.0, 1.0, basis.data());
   const std::size_t coefficients = scene::sh_coefficients(sh_degree);
   for (std::size_t i = 0; i < points.size(); ++i) {
     cloud.mean.set(i, Vec3(points[i].position));
@@ -75,7 +73,7 @@ scene::GaussianCloud gaussians_at(std::span<const ColoredPoint> points, int sh_d
     cloud.rotation.set(i, Quat(1, 0, 0, 0));
     cloud.opacity_logit[i] = float(std::log(first_opacity / (1 - first_opacity)));
     for (std::size_t c = 0; c < 3; ++c)
-      cloud.sh_row(i)[c * coefficients] = float((double(points[i].rgb[c]) / 255.0 - 0.5) / basis[0]);
+      cloud.sh_row(i)[c * coefficients] = float((double(points[i].rgb[c]) / 255.0 - 0.5) / scene::sh_c0);
   }
   return cloud;
 }

@@ -5,9 +5,11 @@
 #include <cmath>
 #include <cstdint>
 
+#include "engine/scene/sh.h"
+
 namespace engine::io {
 
-constexpr double sh_c0 = 0.28209479177387814;  ///< 1 / (2 sqrt(pi)): colour = 0.5 + sh_c0 * f_dc
+using scene::sh_c0;
 
 /// Nearest byte, saturating.
 inline std::uint8_t nearest_byte(double value) { return std::uint8_t(std::clamp(std::round(value), 0.0, 255.0)); }

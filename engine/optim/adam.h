@@ -47,10 +47,11 @@ class Adam {
   Adam(std::vector<AdamLayout> layout, std::size_t rows, const AdamOptions& options = {});
 
   /// One step over all groups, in the order of the layout (sizes asserted).
+  ///   mobility  [rows] what each row's rates are multiplied by, 0 or more; empty: 1
   ///   errors  internal: a gradient, a value or a moment is not finite. `where` names the first by group, then row
   ///           ("[1204].mean.x", "[3].sh[17]"); groups up to it have been stepped: parameters and moments are spoilt
   /// Allocates nothing. Costs a pass over four arrays: bound by memory from some ten thousand rows on.
-  [[nodiscard]] Result<void> step(std::span<const AdamGroup> groups);
+  [[nodiscard]] Result<void> step(std::span<const AdamGroup> groups, std::span<const float> mobility = {});
 
   /// Rows with keep[i] != 0 stay, in order. keep: [rows()].
   void keep_rows(std::span<const std::uint8_t> keep);

@@ -1,7 +1,9 @@
 #include "engine/scene/image.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <numeric>
 
@@ -9,6 +11,34 @@ namespace engine::scene {
 
 std::size_t Mask::area() const {
   return std::accumulate(data.begin(), data.end(), std::size_t{0});
+}
+
+Image cut_out(const Image& image, Rect part) {
+  assert(part.x0 >= 0 && part.y0 >= 0 && part.x1 <= image.width && part.y1 <= image.height);
+  Image out(part.width(), part.height(), image.channels);
+  for (int c = 0; c < image.channels; ++c)
+    for (int y = 0; y < out.height; ++y)
+      std::copy_n(image.plane(c).data() + std::ptrdiff_t(part.y0 + y) * image.width + part.x0, out.width,
+                  out.plane(c).data() + std::ptrdiff_t(y) * out.width);
+  return out;
+}
+
+void paste(const Image& image, Rect part, Image& to) {
+  assert(part.x0 >= 0 && part.y0 >= 0 && part.x1 <= to.width && part.y1 <= to.height);
+  assert(image.width == part.width() && image.height == part.height() && image.channels == to.channels);
+  for (int c = 0; c < image.channels; ++c)
+    for (int y = 0; y < image.height; ++y)
+      std::copy_n(image.plane(c).data() + std::ptrdiff_t(y) * image.width, image.width,
+                  to.plane(c).data() + std::ptrdiff_t(part.y0 + y) * to.width + part.x0);
+}
+
+Mask cut_out(const Mask& mask, Rect part) {
+  assert(part.x0 >= 0 && part.y0 >= 0 && part.x1 <= mask.width && part.y1 <= mask.height);
+  Mask out(part.width(), part.height());
+  for (int y = 0; y < out.height; ++y)
+    std::copy_n(mask.data.begin() + std::ptrdiff_t(part.y0 + y) * mask.width + part.x0, out.width,
+                out.data.begin() + std::ptrdiff_t(y) * out.width);
+  return out;
 }
 
 double psnr(const Image& a, const Image& b) {

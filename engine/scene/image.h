@@ -54,6 +54,12 @@ struct Rect {
   bool operator==(const Rect&) const = default;
 };
 
+/// A part of a picture. Precondition: it lies inside.
+[[nodiscard]] Image cut_out(const Image& image, Rect part);
+[[nodiscard]] Mask cut_out(const Mask& mask, Rect part);
+/// Puts a picture of part.width() x part.height() there. Precondition: `part` lies inside `to`; same channels.
+void paste(const Image& image, Rect part, Image& to);
+
 /// Peak signal-to-noise ratio in dB for pictures of the same shape with peak 1; infinity if they are equal.
 /// Summed in double.
 [[nodiscard]] double psnr(const Image& a, const Image& b);

@@ -7,6 +7,9 @@
 
 namespace engine::scene {
 
+/// Y_0 = 1 / (2 sqrt(pi)): a Gaussian of degree 0 has the colour 0.5 + sh_c0 * sh[c][0].
+constexpr double sh_c0 = 0.28209479177387814;
+
 /// The (degree + 1)^2 basis values Y_k(d), coefficient order of the files.
 ///   degree   0..3
 ///   x, y, z  the direction d, of unit length: from the camera centre to the Gaussian's mean, world axes
@@ -14,7 +17,7 @@ namespace engine::scene {
 /// The colour of a Gaussian in channel c is max(0, 0.5 + sum_k sh[c][k] Y_k(d)).
 template <std::floating_point Real>
 constexpr void sh_basis(int degree, Real x, Real y, Real z, Real* out) noexcept {
-  out[0] = Real(0.28209479177387814);
+  out[0] = Real(sh_c0);
   if (degree < 1) return;
   constexpr Real c1 = Real(0.4886025119029199);
   out[1] = -c1 * y;

@@ -21,7 +21,8 @@ std::vector<optim::AdamLayout> layout(int sh_degree) {
 CloudAdam::CloudAdam(std::size_t rows, int sh_degree, const optim::AdamOptions& options)
     : adam_(layout(sh_degree), rows, options) {}
 
-Result<void> CloudAdam::step(scene::GaussianCloud& cloud, const render::Gradients& g, const StepRates& rates) {
+Result<void> CloudAdam::step(scene::GaussianCloud& cloud, const render::Gradients& g, const StepRates& rates,
+                             std::span<const float> mobility) {
   const std::array<double, 1> position{rates.position}, scale{rates.log_scale}, rotation{rates.rotation},
       opacity{rates.opacity_logit};
   std::vector<double> sh(cloud.sh_stride(), rates.sh_rest);
@@ -38,7 +39,7 @@ Result<void> CloudAdam::step(scene::GaussianCloud& cloud, const render::Gradient
                                                  {cloud.rotation.z, g.rotation.z, rotation},
                                                  {cloud.opacity_logit, g.opacity_logit, opacity},
                                                  {cloud.sh, g.sh, sh}}};
-  return adam_.step(groups);
+  return adam_.step(groups, mobility);
 }
 
 }  // namespace engine::train

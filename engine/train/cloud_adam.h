@@ -32,11 +32,12 @@ class CloudAdam {
 
   /// One step of all rows.
   ///   cloud, gradients  of rows() rows and the degree
+  ///   mobility          as in optim::Adam::step()
   ///   errors  internal: a gradient, parameter or moment is not finite; `where` is the first, with the property names
   ///   of
   ///           a .ply file where it has one: "[12].opacity", "[3].sh[17]". Parameters are spoilt then.
   [[nodiscard]] Result<void> step(scene::GaussianCloud& cloud, const render::Gradients& gradients,
-                                  const StepRates& rates);
+                                  const StepRates& rates, std::span<const float> mobility = {});
 
   /// Rows with keep[i] != 0 stay, in order. keep: [rows()].
   void keep_rows(std::span<const std::uint8_t> keep) { adam_.keep_rows(keep); }

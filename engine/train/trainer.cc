@@ -14,6 +14,7 @@ namespace engine::train {
 namespace {
 
 const Vec3 black(0.0f);
+constexpr float free_to_split = 0.5f;  // least mobility of a row that densification may touch
 
 /// Largest distance of a mean from their centre.
 double radius_of(const scene::GaussianCloud& cloud) {
@@ -62,6 +63,7 @@ Trainer::Trainer(Frozen frozen, Changeable changeable, double scene_extent, cons
     : frozen_(frozen),
       cloud_(std::move(changeable.cloud)),
       name_(std::move(changeable.name)),
+      mobility_(std::move(changeable.mobility)),
       options_(options),
       loss_(loss),
       initial_rows_(cloud_.size()),
@@ -174,9 +176,20 @@ Result<double> Trainer::differentiate(View& view) {
   const scene::Rect region = view.frozen.region(), box = within(view.box, region);
   const std::size_t view_pixels = std::size_t(camera.width) * std::size_t(camera.height);
   shape_like(rendered_, v_rendered_);
+  // What is edited is no part of the background, not even of a window of SSIM that reaches into it: a part that has
+  // just arrived would be pulled back towards what was there.
+  comparable_ = rendered_;
+  const auto in_mask = [&](auto&& each) {
+    for (int c = 0; c < comparable_.channels; ++c)
+      for (int y = box.y0; y < box.y1; ++y)
+        for (int x = box.x0; x < box.x1; ++x)
+          if (view.mask.at(region.x0 + x, region.y0 + y) != 0) each(x, y, c);
+  };
+  in_mask([&](int x, int y, int c) { comparable_.at(x, y, c) = view.background.at(x, y, c); });
   const auto background =
-      optim::background_loss(optim::view(rendered_), optim::view(view.background), optim::crop(view.mask, region),
+      optim::background_loss(optim::view(comparable_), optim::view(view.background), optim::crop(view.mask, region),
                              view_pixels, options_.background, loss_workspace_, optim::view(v_rendered_));
+  in_mask([&](int x, int y, int c) { v_rendered_.at(x, y, c) = 0; });
   const auto edit =
       optim::edit_loss(loss_, optim::crop(std::as_const(rendered_), box), optim::crop(std::as_const(view.edited), box),
                        optim::crop(view.mask, view.box), view_pixels, options_.perceptual_weight, edit_workspace_,
@@ -195,7 +208,8 @@ Result<void> Trainer::adam_step(double decay) {
                              .sh_rest = rates.sh_rest * decay,
                              .opacity_logit = rates.opacity_logit * decay,
                              .log_scale = rates.log_scale * decay,
-                             .rotation = rates.rotation * decay});
+                             .rotation = rates.rotation * decay},
+                            mobility_);
   if (stepped) return {};
   // "[12].opacity" -> "gaussian[12].opacity", with the name of the row.
   Error error = std::move(stepped.error());
@@ -240,10 +254,16 @@ void Trainer::densify() {
                     there = cloud_.size() - initial_rows_;
   const double loss_weight =
       options_.background.l1_weight + options_.background.ssim_weight + options_.perceptual_weight;
+  // A split moves a row at once, whatever its learning rates are: what should hardly change has no children.
+  for (std::size_t row = 0; row < mobility_.size(); ++row)
+    if (mobility_[row] < free_to_split) pull_.sum[row] = 0;
   const auto rows = rows_to_densify(pull_, options.gradient * loss_weight, most - std::min(most, there));
   Rng rng = stream(key_, Purpose::split, std::size_t(iteration_));
   add_children(cloud_, rows, options.dense * position_scale_, rng);
-  for (const std::uint32_t row : rows) ancestor_.push_back(ancestor_[row]);
+  for (const std::uint32_t row : rows) {
+    ancestor_.push_back(ancestor_[row]);
+    if (!mobility_.empty()) mobility_.push_back(mobility_[row]);
+  }
   adam_.append_rows(rows.size());
   pull_.reset(cloud_.size());
 }
@@ -272,8 +292,13 @@ void Trainer::remove_floaters() {
   pull_.keep_rows(keep);
   std::size_t kept = 0;
   for (std::size_t row = 0; row < keep.size(); ++row)
-    if (keep[row] != 0) ancestor_[kept++] = ancestor_[row];
+    if (keep[row] != 0) {
+      ancestor_[kept] = ancestor_[row];
+      if (!mobility_.empty()) mobility_[kept] = mobility_[row];
+      ++kept;
+    }
   ancestor_.resize(kept);
+  if (!mobility_.empty()) mobility_.resize(kept);
   floaters_ += removed;
 }
 

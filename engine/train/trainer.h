@@ -34,7 +34,8 @@ namespace engine::train {
 /// The Gaussians that are trained.
 struct Changeable {
   scene::GaussianCloud cloud;
-  std::vector<std::uint32_t> name;  ///< [rows] What messages call each; empty: by its row.
+  std::vector<std::uint32_t> name;   ///< [rows] What messages call each; empty: by its row.
+  std::vector<float> mobility = {};  ///< [rows] What each row's learning rates are multiplied by; empty: 1.
 };
 
 /// One iteration.
@@ -109,6 +110,7 @@ class Trainer {
   Frozen frozen_;
   scene::GaussianCloud cloud_;
   std::vector<std::uint32_t> name_;
+  std::vector<float> mobility_;  ///< Of all rows, children included, or empty.
   TrainOptions options_;
   optim::PerceptualLoss& loss_;
   std::size_t initial_rows_;
@@ -127,7 +129,7 @@ class Trainer {
   PullStatistic pull_;
   render::LocalFrame frame_;
   render::Gradients gradients_;
-  scene::Image rendered_, v_rendered_;
+  scene::Image rendered_, comparable_, v_rendered_;
   optim::LossWorkspace loss_workspace_;
   optim::EditWorkspace edit_workspace_;
 };

@@ -1,0 +1,64 @@
+#include "engine/correct/patch_field.h"
+
+#include <algorithm>
+#include <cassert>
+
+#include "engine/core/parallel.h"
+#include "engine/core/rng.h"
+#include "engine/correct/patch_field_simd.h"
+
+namespace engine::correct {
+
+Planes::Planes(const scene::Image& image) : Planes(image.width, image.height) {
+  assert(image.channels == 3);
+  std::copy(image.data.begin(), image.data.end(), data.begin());
+}
+
+PatchSource patch_source(const scene::Image& picture, const scene::Mask& allowed) {
+  assert(picture.width == allowed.width && picture.height == allowed.height);
+  const int width = picture.width, height = picture.height;
+  PatchSource source{Planes(picture), scene::Mask(width, height), {}};
+  // Length of the run of allowed pixels that ends here, along the row; then the same along the column.
+  std::vector<int> run(picture.pixels(), 0);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0, length = 0; x < width; ++x) {
+      length = allowed.at(x, y) != 0 ? length + 1 : 0;
+      run[source.picture.index(x, y)] = length;
+    }
+  for (int x = 0; x < width; ++x)
+    for (int y = 0, length = 0; y < height; ++y) {
+      length = run[source.picture.index(x, y)] >= patch_side ? length + 1 : 0;
+      if (length >= patch_side) source.centre_allowed.at(x - patch_radius, y - patch_radius) = 1;
+    }
+  for (std::size_t i = 0; i < source.centre_allowed.data.size(); ++i)
+    if (source.centre_allowed.data[i] != 0) source.centres.push_back(std::uint32_t(i));
+  return source;
+}
+
+std::vector<Match> random_field(const PatchQuery& query, std::uint64_t seed) {
+  std::vector<std::size_t> first{0};  // how many places the sources before have
+  for (const PatchSource& source : query.sources) first.push_back(first.back() + source.centres.size());
+  assert(first.back() > 0);
+  std::vector<Match> field(query.centres.size());
+  Rng rng(seed);
+  for (Match& match : field) {
+    const std::size_t drawn = rng.below(std::uint32_t(first.back()));
+    const auto next = std::upper_bound(first.begin(), first.end(), drawn);
+    match.source = std::uint32_t(next - first.begin() - 1);
+    const PatchSource& source = query.sources[match.source];
+    const std::uint32_t place = source.centres[drawn - first[match.source]];
+    match.centre = {std::int16_t(place % std::uint32_t(source.picture.width)),
+                    std::int16_t(place / std::uint32_t(source.picture.width))};
+  }
+  return field;
+}
+
+void improve(const PatchQuery& query, std::span<const Match> matches, int step, std::uint64_t seed,
+             std::span<Match> out) {
+  assert(matches.size() == query.centres.size() && out.size() == matches.size());
+  constexpr std::size_t grain = 512;  // about a millisecond
+  parallel_for(query.centres.size(), grain,
+               [&](std::size_t begin, std::size_t end) { improve_range(query, matches, step, seed, begin, end, out); });
+}
+
+}  // namespace engine::correct

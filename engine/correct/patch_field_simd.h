@@ -1,0 +1,16 @@
+// The inner part of improve(), in vectors.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "engine/correct/patch_field.h"
+
+namespace engine::correct {
+
+/// improve() for centres [begin, end).
+void improve_range(const PatchQuery& query, std::span<const Match> matches, int step, std::uint64_t seed,
+                   std::size_t begin, std::size_t end, std::span<Match> out);
+
+}  // namespace engine::correct
