@@ -104,7 +104,7 @@ void summarise(std::ostream& out, const path& folder, const EditReport& report) 
   const edit::Report& edit = report.edit;
   out << (folder / "scene.ply").string() << ": " << edit.output_gaussians << " Gaussians, "
       << edit.input_gaussians - edit.removed << " of the " << edit.input_gaussians << " before and " << edit.copies
-      << " deformed copies\n";
+      << " new ones\n";
   for (std::size_t i = 0; i < edit.handles.size(); ++i)
     out << "handle " << i + 1 << ": " << edit.handles[i].gaussians << " Gaussians\n";
   for (const ViewPictures& pictures : report.pictures) {
@@ -118,12 +118,13 @@ void summarise(std::ostream& out, const path& folder, const EditReport& report) 
 
 /// The edit itself, shown to the user as it goes.
 Result<edit::Outcome> run_shown(const scene::GaussianCloud& input, const std::vector<scene::Camera>& cameras,
-                                const edit::Request& request, Terminal& terminal) {
+                                const BothRequests& request, Terminal& terminal) {
   ProgressDisplay display(terminal.err,
                           terminal.err_is_terminal ? ProgressDisplay::Style::bar : ProgressDisplay::Style::lines);
   edit::Observer observer;
   observer.progress = [&](const edit::Progress& progress) { display.show(progress); };
-  return edit::run(input, cameras, request, observer);
+  const auto corrector = edits::make_corrector(request.asked.request);
+  return edit::run(input, cameras, request.engine, observer, nullptr, nullptr, corrector.get());
 }
 
 std::vector<std::string> all_warnings(const edit::Report& report, const proto::EditRequest& asked) {
@@ -157,7 +158,7 @@ Result<void> run(const EditOptions& options, Terminal& terminal) {
     const auto cameras = load_cameras(options.dataset);
     if (!cameras) return propagate(cameras);
     const auto start = std::chrono::steady_clock::now();
-    auto outcome = run_shown(input->cloud, *cameras, request->engine, terminal);
+    auto outcome = run_shown(input->cloud, *cameras, *request, terminal);
     if (!outcome) {
       locate_in_file(outcome.error(), options, request->asked);
       return propagate(outcome);

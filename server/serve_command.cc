@@ -83,8 +83,8 @@ proto::ServiceInfo service_info(const ServeOptions& options, const Machine& mach
   info.simd_available = engine::render::simd_targets();
   info.threads = machine.threads;
   info.correctors = {{"none", true, ""},
-                     {"scene", false, "this version does not correct pictures yet"},
-                     {"sd", false, "this version does not correct pictures yet"}};
+                     {"scene", true, ""},
+                     {"sd", false, "this version cannot load a diffusion model yet"}};
   info.perceptual = {{"msssim", true, ""}, {"lpips", false, "this version has no network to compare pictures with"}};
   info.read_formats = {"ply", "compressed_ply", "splat", "spz"};
   info.write_formats = {"ply", "splat", "spz"};

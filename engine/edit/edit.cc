@@ -129,7 +129,7 @@ class Run {
   Result<void> repair(int u);
   Result<Corrected> correct(int u, int a, std::span<const scene::Mask> dilated);
   Result<void> optimise(int u, int a, std::span<const scene::Mask> dilated, const Corrected& corrected);
-  Result<void> show(const char* stage, int u, double part);
+  Result<void> show(const char* stage, int u, double part, std::span<const scene::Image> pictures = {});
   Result<void> hand_out_checkpoint(int u, Clock::time_point start);
 
   const scene::GaussianCloud& scene_;
@@ -203,6 +203,8 @@ Result<void> Run::repair(int u) {
       auto pictures = correct(u, a, dilated);
       if (!pictures) return propagate(pictures);
       corrected = std::move(*pictures);
+      if (a == request_.params.annealing_steps)
+        if (auto shown = show("corrected", u, early(0.95), corrected.pictures); !shown) return shown;
     }
     if (auto optimised = optimise(u, a, dilated, corrected); !optimised) return optimised;
   }
@@ -242,11 +244,11 @@ Result<void> Run::optimise(int u, int a, std::span<const scene::Mask> dilated, c
   return {};
 }
 
-Result<void> Run::show(const char* stage, int u, double part) {
+Result<void> Run::show(const char* stage, int u, double part, std::span<const scene::Image> pictures) {
   if (!observer_.moment) return {};
   if (auto going = stages_.enter("renders", u, fraction(u, part)); !going) return going;
   const Published published = publish(working_, scene_, request_.mode);
-  return observer_.moment({u, intervals(), stage, published.overlay, views_});
+  return observer_.moment({u, intervals(), stage, published.overlay, views_, pictures});
 }
 
 Result<void> Run::hand_out_checkpoint(int u, Clock::time_point start) {

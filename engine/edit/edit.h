@@ -41,8 +41,9 @@ struct Moment {
   int intervals = 0;
   std::string
       stage;  ///< "before": as the interval found it; "deformed"; "corrected" and "optimised" where they happen.
-  const scene::Overlay& overlay;         ///< Over the input: the scene as it would be published.
-  std::span<const scene::Camera> views;  ///< Of the edit, best first.
+  const scene::Overlay& overlay;                ///< Over the input: the scene as it would be published.
+  std::span<const scene::Camera> views;         ///< Of the edit, best first.
+  std::span<const scene::Image> pictures = {};  ///< "corrected": I_e of each view; else empty: the overlay's are meant.
 };
 
 /// One interval is finished.

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "engine/correct/scene_corrector.h"
 #include "server/edits/points.h"
 
 namespace server::edits {
@@ -10,9 +11,6 @@ namespace {
 namespace edit = engine::edit;
 
 static_assert(proto::max_handles == edit::max_handles && proto::max_coordinate == edit::max_coordinate);
-
-// The numbers of `paper`; the other presets leave the deformation to the engine's defaults.
-constexpr int paper_intervals = 5, paper_views = 50;
 
 edit::Mode to_engine(proto::Mode mode) { return mode == proto::Mode::extend ? edit::Mode::extend : edit::Mode::move; }
 
@@ -64,17 +62,19 @@ proto::Interpolation to_wire(edit::Interpolation interpolation) {
   return proto::Interpolation::paper;
 }
 
-edit::Params to_engine(const proto::Params& given, std::optional<proto::Preset> preset) {
-  edit::Params params;
-  if (preset == proto::Preset::paper) {
-    params.intervals = paper_intervals;
-    params.views = paper_views;
-  }
+proto::Preset preset_of(const proto::EditRequest& request) { return request.preset.value_or(proto::Preset::standard); }
+
+edit::Params to_engine(const proto::Params& given, proto::Preset preset) {
+  edit::Params params = preset_params(preset);
   if (given.intervals) params.intervals = *given.intervals;
   if (given.views) params.views = *given.views;
   if (given.exclude_views) params.exclude_views = *given.exclude_views;
   if (given.iterations) params.iterations = *given.iterations;
   if (given.annealing_steps) params.annealing_steps = *given.annealing_steps;
+  if (given.strength_initial) params.strength_initial = *given.strength_initial;
+  if (given.strength_final) params.strength_final = *given.strength_final;
+  if (given.annealing)
+    params.annealing = *given.annealing == proto::Annealing::paper ? edit::Annealing::paper : edit::Annealing::linear;
   if (given.max_image_side) params.max_image_side = *given.max_image_side;
   if (given.rotation) params.rotation = to_engine(*given.rotation);
   if (given.interpolation) params.interpolation = to_engine(*given.interpolation);
@@ -83,14 +83,49 @@ edit::Params to_engine(const proto::Params& given, std::optional<proto::Preset> 
   return params;
 }
 
+/// Does a corrector do anything in such an edit?
+bool corrects(const proto::EditRequest& request, const edit::Params& params) {
+  return params.iterations > 0 && corrector_of(request) != proto::Corrector::none;
+}
+
 }  // namespace
 
+edit::Params preset_params(proto::Preset preset) {
+  edit::Params params;
+  switch (preset) {
+    case proto::Preset::preview:
+      params.iterations = 0;
+      break;
+    case proto::Preset::draft:
+      params.intervals = 1, params.annealing_steps = 1, params.iterations = 200;
+      params.views = 24, params.max_image_side = 384;
+      break;
+    case proto::Preset::standard:
+      params.intervals = 1, params.annealing_steps = 2, params.iterations = 500;
+      params.views = 50, params.max_image_side = 512;
+      break;
+    case proto::Preset::paper:
+      params.intervals = 5, params.annealing_steps = 4, params.iterations = 500;
+      params.views = 50, params.max_image_side = 512;
+      break;
+  }
+  return params;
+}
+
+proto::Corrector corrector_of(const proto::EditRequest& request) {
+  return request.params.corrector.value_or(preset_of(request) == proto::Preset::preview ? proto::Corrector::none
+                                                                                        : proto::Corrector::scene);
+}
+
+std::unique_ptr<engine::correct::Corrector> make_corrector(const proto::EditRequest& request) {
+  if (corrector_of(request) == proto::Corrector::scene) return std::make_unique<engine::correct::SceneCorrector>();
+  return nullptr;
+}
+
 engine::Result<edit::Request> to_engine(const proto::EditRequest& request) {
-  const auto corrector = request.params.corrector.value_or(proto::Corrector::none);
-  if (corrector != proto::Corrector::none)
+  if (corrector_of(request) == proto::Corrector::sd)
     return engine::fail(engine::ErrorCode::unsupported,
-                        "this build has no corrector \"" + std::string(name_of(corrector)) +
-                            "\"; available: \"none\", which is the default",
+                        "this build has no corrector \"sd\"; available: \"scene\", which is the default, and \"none\"",
                         "params.corrector");
   if (request.params.perceptual == proto::Perceptual::lpips)
     return engine::fail(engine::ErrorCode::unsupported,
@@ -111,21 +146,25 @@ engine::Result<edit::Request> to_engine(const proto::EditRequest& request) {
     made.group = handle.group;
   }
   if (request.region) out.region = {to_vec(request.region->center), to_vec(request.region->size)};
-  out.params = to_engine(request.params, request.preset);
+  out.params = to_engine(request.params, preset_of(request));
   return out;
 }
 
 proto::EditRequest resolved(const proto::EditRequest& asked, const edit::Params& used) {
   proto::EditRequest out = asked;
+  out.preset = preset_of(asked);
   out.params.intervals = used.intervals;
   out.params.iterations = used.iterations;
   out.params.annealing_steps = used.annealing_steps;
+  out.params.strength_initial = used.strength_initial;
+  out.params.strength_final = used.strength_final;
+  out.params.annealing = used.annealing == edit::Annealing::paper ? proto::Annealing::paper : proto::Annealing::linear;
   out.params.perceptual = proto::Perceptual::msssim;
   out.params.background = proto::Background::render;
   out.params.views = used.views;
   out.params.exclude_views = used.exclude_views;
   out.params.max_image_side = used.max_image_side;
-  out.params.corrector = proto::Corrector::none;
+  out.params.corrector = corrector_of(asked);
   out.params.rotation = to_wire(used.rotation);
   out.params.interpolation = to_wire(used.interpolation);
   out.params.rotate_sh = used.rotate_sh;
@@ -138,19 +177,21 @@ std::vector<std::string> fields_without_effect(const proto::EditRequest& request
   const auto note = [&](bool given, const char* field) {
     if (given) fields.emplace_back(field);
   };
+  note(request.prompt.has_value(), "prompt");  // no corrector of this build reads
   const proto::Params& params = request.params;
-  note(request.preset == proto::Preset::draft || request.preset == proto::Preset::standard, "preset");
-  note(request.prompt.has_value(), "prompt");
-  note(params.strength_initial.has_value(), "params.strength_initial");
-  note(params.strength_final.has_value(), "params.strength_final");
-  note(params.annealing.has_value(), "params.annealing");
+  if (!corrects(request, to_engine(params, preset_of(request)))) {
+    note(params.strength_initial.has_value(), "params.strength_initial");
+    note(params.strength_final.has_value(), "params.strength_final");
+    note(params.annealing.has_value(), "params.annealing");
+    note(params.corrector.value_or(proto::Corrector::none) != proto::Corrector::none, "params.corrector");
+  }
   return fields;
 }
 
 std::vector<std::string> warnings_about(const proto::EditRequest& request) {
   const auto unused = fields_without_effect(request);
   if (unused.empty()) return {};
-  std::string warning = "this build deforms and optimises, it does not correct; without effect:";
+  std::string warning = "without effect on this edit:";
   for (const std::string& field : unused) warning += " " + field;
   return {std::move(warning)};
 }

@@ -1,16 +1,27 @@
 // Between the edit request on the wire and the one the engine runs: for the program and the service alike.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/correct/corrector.h"
 #include "engine/edit/request.h"
 #include "proto/edit_request.h"
 
 namespace server::edits {
 
-/// The engine's request, with what was left open filled in from the preset, then from the engine's defaults.
+/// What a preset stands for. How the numbers were found: docs/tradeoff.md.
+[[nodiscard]] engine::edit::Params preset_params(proto::Preset preset);
+
+/// The corrector of a request: that of its preset if it names none.
+[[nodiscard]] proto::Corrector corrector_of(const proto::EditRequest& request);
+
+/// A new one of that kind; null: `none`. Precondition: to_engine(request) succeeds.
+[[nodiscard]] std::unique_ptr<engine::correct::Corrector> make_corrector(const proto::EditRequest& request);
+
+/// The engine's request, with what was left open filled in from the preset; no preset: `standard`.
 ///   errors  unsupported: a corrector, perceptual loss or background this build does not have (`where` is
 ///           "params.corrector")
 [[nodiscard]] engine::Result<engine::edit::Request> to_engine(const proto::EditRequest& request);
@@ -18,8 +29,7 @@ namespace server::edits {
 /// The request as it was carried out: `asked`, with every parameter that the edit used filled in.
 [[nodiscard]] proto::EditRequest resolved(const proto::EditRequest& asked, const engine::edit::Params& used);
 
-/// Fields of the request that concern correction, which this build does not do: given, but without
-/// effect.
+/// Fields of the request that are given, but without effect on this edit.
 [[nodiscard]] std::vector<std::string> fields_without_effect(const proto::EditRequest& request);
 
 /// What a user should know about the request itself, one sentence each: that it has such fields.

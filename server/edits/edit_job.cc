@@ -131,14 +131,16 @@ class Run {
     // A checkpoint that could not be used is made up for first: the record promises its interval.
     observer.keep = [this] { return context_.stop_requested() && last_interval_ >= context_.finished_intervals(); };
     observer.stop = context_.cancel_token();
+    const auto corrector = make_corrector(asked_);
     if (const auto checkpoint = last_checkpoint()) {
       last_interval_ = checkpoint->interval;
-      auto outcome = edit::run(*input_, cameras_, request_, observer, &*checkpoint, workshop_.perceptual);
+      auto outcome =
+          edit::run(*input_, cameras_, request_, observer, &*checkpoint, workshop_.perceptual, corrector.get());
       if (outcome || outcome.error().where != "checkpoint") return outcome;
       begin_again(outcome.error());
     }
     last_interval_ = 0;
-    return edit::run(*input_, cameras_, request_, observer, nullptr, workshop_.perceptual);
+    return edit::run(*input_, cameras_, request_, observer, nullptr, workshop_.perceptual, corrector.get());
   }
 
   std::optional<edit::Checkpoint> last_checkpoint() {

@@ -12,6 +12,12 @@ namespace {
 
 constexpr int jpeg_quality = 90;
 
+Result<std::string> encoded(const engine::scene::Image& picture) {
+  const auto bytes = engine::io::encode_image(picture, engine::io::ImageFormat::jpeg, {.jpeg_quality = jpeg_quality});
+  if (!bytes) return engine::propagate(bytes);
+  return std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+}
+
 }  // namespace
 
 std::string picture_name(int interval, std::size_t view, std::string_view stage) {
@@ -28,11 +34,18 @@ Result<void> IntervalPictures::add(const engine::edit::Moment& moment) {
   }
   const std::size_t count = std::min(count_, moment.views.size());
   if (count == 0) return {};
-  if (jpegs_.size() != count || shown_ != moment.overlay)
+  std::vector<std::string> given;
+  for (std::size_t v = 0; v < count && !moment.pictures.empty(); ++v) {
+    auto jpeg = encoded(moment.pictures[v]);
+    if (!jpeg) return engine::propagate(jpeg);
+    given.push_back(std::move(*jpeg));
+  }
+  if (given.empty() && (jpegs_.size() != count || shown_ != moment.overlay))
     if (auto rendered = render(moment); !rendered) return rendered;
+  const std::vector<std::string>& jpegs = given.empty() ? jpegs_ : given;
   Result<void> written = engine::jobs::create_folder(folder_);
   for (std::size_t v = 0; written && v < count; ++v)
-    written = engine::jobs::write_durably(folder_ / picture_name(moment.interval, v, moment.stage), jpegs_[v]);
+    written = engine::jobs::write_durably(folder_ / picture_name(moment.interval, v, moment.stage), jpegs[v]);
   if (!written)
     return engine::fail(written.error().code, "the pictures of interval " + std::to_string(moment.interval) +
                                                   " cannot be kept: " + written.error().message);
@@ -54,10 +67,9 @@ Result<void> IntervalPictures::render(const engine::edit::Moment& moment) {
   engine::render::Rendering picture;
   for (std::size_t v = 0; v < std::min(count_, moment.views.size()); ++v) {
     engine::render::forward(cloud, moment.views[v], {}, {}, workspace, picture);
-    const auto bytes =
-        engine::io::encode_image(picture.color, engine::io::ImageFormat::jpeg, {.jpeg_quality = jpeg_quality});
-    if (!bytes) return engine::propagate(bytes);
-    jpegs_.emplace_back(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+    auto jpeg = encoded(picture.color);
+    if (!jpeg) return engine::propagate(jpeg);
+    jpegs_.push_back(std::move(*jpeg));
   }
   shown_ = moment.overlay;
   return {};
