@@ -144,7 +144,7 @@ void write(ByteWriter& out, const Params& params) {
   out.write(std::uint8_t(params.annealing));
   out.write(std::int32_t(params.max_image_side));
   out.write(params.seed);
-  out.write(std::uint8_t(params.optimise_unmoved));
+  out.write(std::uint8_t(params.local_mask)), out.write(std::uint8_t(params.optimise_unmoved));
 }
 
 void read(ByteReader& in, Params& params) {
@@ -158,6 +158,7 @@ void read(ByteReader& in, Params& params) {
   read(in, params.annealing, Annealing::paper);
   params.max_image_side = in.read<std::int32_t>();
   params.seed = in.read<std::uint64_t>();
+  params.local_mask = in.read<std::uint8_t>() != 0;
   params.optimise_unmoved = in.read<std::uint8_t>() != 0;
 }
 

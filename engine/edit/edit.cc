@@ -197,6 +197,8 @@ Result<void> Run::mask(int u, std::span<const std::uint32_t> rows, double from, 
 Result<void> Run::repair(int u) {
   std::vector<scene::Mask> dilated = masks_;
   dilate_masks(dilated);
+  if (!request_.params.local_mask)
+    for (scene::Mask& mask : dilated) std::fill(mask.data.begin(), mask.data.end(), std::uint8_t{1});
   for (int a = 1; a <= request_.params.annealing_steps; ++a) {
     Corrected corrected;
     if (corrector_ != nullptr) {

@@ -56,8 +56,10 @@ struct Params {
   double strength_initial = 0.5;           ///< S of an interval's first correction, 0 to 1.
   double strength_final = 0.3;             ///< S of its last one, 0 to 1.
   Annealing annealing = Annealing::linear;
-  int max_image_side = 512;                ///< Pixels, of the pictures an edit works on, 16 to 16384.
+  int max_image_side = 512;  ///< Pixels, of the pictures an edit works on, 16 to 16384.
   std::uint64_t seed = 0;
+  bool local_mask = true;  ///< False: the whole picture counts as edited, to measure what the mask is worth. Not on the
+                           ///< wire.
   bool optimise_unmoved = false;  ///< For tests: masks and optimises also what no handle moves. Not on the wire.
 };
 

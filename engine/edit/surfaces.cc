@@ -17,7 +17,10 @@ constexpr std::size_t most_points = 1500;  // that vote for a plane
 constexpr int trials = 200;           // for 99 % certainty with a quarter of the points on the plane: 293 with 1/4^3
 constexpr double on_plane = 0.006;    // relative difference of depths
 constexpr double in_front = 0.02;     // by so much nearer a surface hides what is behind it
-constexpr int directions_needed = 5;  // of eight in which the surface is met again
+constexpr int directions_needed = 7;  // of eight in which the surface is met again
+
+constexpr float same_surface = 0.05f;      // relative difference of depths between neighbouring pixels
+constexpr std::size_t least_together = 8;  // pixels
 
 /// Inverse depth as an affine function of the pixel.
 struct Plane {
@@ -129,6 +132,33 @@ std::vector<std::uint8_t> directions_met(const SurfaceView& view, const Plane& p
   return met;
 }
 
+/// Without crumbs: a few pixels that hang together with nothing else are an error of the depth, not a surface.
+scene::Image without_crumbs(const scene::Image& found) {
+  scene::Image out = found;
+  std::vector<std::uint8_t> seen(found.data.size(), 0);
+  std::vector<std::size_t> together;
+  const int width = found.width, height = found.height;
+  for (std::size_t start = 0; start < found.data.size(); ++start) {
+    if (found.data[start] == 0 || seen[start] != 0) continue;
+    together.assign(1, start);
+    seen[start] = 1;
+    for (std::size_t k = 0; k < together.size(); ++k) {
+      const std::size_t at = together[k];
+      const int x = int(at % std::size_t(width)), y = int(at / std::size_t(width));
+      for (int v = std::max(y - 1, 0); v <= std::min(y + 1, height - 1); ++v)
+        for (int u = std::max(x - 1, 0); u <= std::min(x + 1, width - 1); ++u) {
+          const std::size_t next = std::size_t(v) * std::size_t(width) + std::size_t(u);
+          const bool joined =
+              found.data[next] > 0 && std::abs(found.data[next] - found.data[at]) <= same_surface * found.data[at];
+          if (joined && seen[next] == 0) seen[next] = 1, together.push_back(next);
+        }
+    }
+    if (together.size() < least_together)
+      for (const std::size_t at : together) out.data[at] = 0;
+  }
+  return out;
+}
+
 }  // namespace
 
 scene::Image continued_surfaces(const SurfaceView& view, const IsFree& is_free, std::uint64_t seed) {
@@ -151,7 +181,7 @@ scene::Image continued_surfaces(const SurfaceView& view, const IsFree& is_free, 
         }
     });
   }
-  return out;
+  return without_crumbs(out);
 }
 
 }  // namespace engine::edit

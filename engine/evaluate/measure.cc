@@ -17,52 +17,9 @@ namespace {
 constexpr double identical_db = 100;
 constexpr int rim_px_at_360 = 4;
 
-/// Sums over views, to be turned into a Likeness.
-struct Sums {
-  double squares = 0, dissimilarity = 0;
-  std::size_t pixels = 0;
-
-  void add(const scene::Image& result, const scene::Image& truth, const scene::Mask& counts) {
-    const std::size_t area = counts.area();
-    if (area == 0) return;
-    for (int c = 0; c < 3; ++c) {
-      const auto a = result.plane(c), b = truth.plane(c);
-      for (std::size_t i = 0; i < a.size(); ++i)
-        if (counts.data[i] != 0) squares += (double(a[i]) - double(b[i])) * (double(a[i]) - double(b[i])) / 3;
-    }
-    scene::Mask ignored = counts;
-    for (std::uint8_t& flag : ignored.data) flag = flag == 0;
-    optim::LossWorkspace workspace;
-    scene::Image gradient(result.width, result.height, 3);
-    // A mean over the whole picture, in which pixels that do not count are alike.
-    const std::size_t all = counts.data.size();
-    dissimilarity += double(all) * optim::ssim_loss(optim::view(result), optim::view(truth), optim::view(ignored), all,
-                                                    0, workspace, optim::view(gradient));
-    pixels += area;
-  }
-  [[nodiscard]] Likeness likeness() const {
-    if (pixels == 0) return {};
-    const double mean = squares / double(pixels);
-    return {mean > 0 ? std::min(-10 * std::log10(mean), identical_db) : identical_db,
-            1 - dissimilarity / double(pixels), pixels};
-  }
-};
-
-/// As a screen shows it.
-scene::Image picture(const scene::GaussianCloud& cloud, const scene::Camera& camera) {
-  scene::Image image = render::forward(cloud, camera).color;
-  for (float& value : image.data) value = std::clamp(value, 0.0f, 1.0f);
-  return image;
-}
-
 scene::Mask shown(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows, const scene::Camera& camera) {
   render::Workspace workspace;
   return mask::mask2d(edit::footprint(cloud, rows, camera, workspace));
-}
-
-scene::Mask complement(scene::Mask mask) {
-  for (std::uint8_t& flag : mask.data) flag = flag == 0;
-  return mask;
 }
 
 double miss(const Case& the_case, const scene::GaussianCloud& result) {
@@ -84,6 +41,42 @@ double miss(const Case& the_case, const scene::GaussianCloud& result) {
 
 }  // namespace
 
+void LikenessSum::add(const scene::Image& result, const scene::Image& truth, const scene::Mask& counts) {
+  const std::size_t area = counts.area();
+  if (area == 0) return;
+  for (int c = 0; c < 3; ++c) {
+    const auto a = result.plane(c), b = truth.plane(c);
+    for (std::size_t i = 0; i < a.size(); ++i)
+      if (counts.data[i] != 0) squares_ += (double(a[i]) - double(b[i])) * (double(a[i]) - double(b[i])) / 3;
+  }
+  const scene::Mask ignored = complement(counts);
+  optim::LossWorkspace workspace;
+  scene::Image gradient(result.width, result.height, 3);
+  // A mean over the whole picture, in which pixels that do not count are alike.
+  const std::size_t all = counts.data.size();
+  dissimilarity_ += double(all) * optim::ssim_loss(optim::view(result), optim::view(truth), optim::view(ignored), all,
+                                                   0, workspace, optim::view(gradient));
+  pixels_ += area;
+}
+
+Likeness LikenessSum::likeness() const {
+  if (pixels_ == 0) return {};
+  const double mean = squares_ / double(pixels_);
+  return {mean > 0 ? std::min(-10 * std::log10(mean), identical_db) : identical_db,
+          1 - dissimilarity_ / double(pixels_), pixels_};
+}
+
+scene::Image picture(const scene::GaussianCloud& cloud, const scene::Camera& camera) {
+  scene::Image image = render::forward(cloud, camera).color;
+  for (float& value : image.data) value = std::clamp(value, 0.0f, 1.0f);
+  return image;
+}
+
+scene::Mask complement(scene::Mask mask) {
+  for (std::uint8_t& flag : mask.data) flag = flag == 0;
+  return mask;
+}
+
 Kinds kinds_of(const Case& the_case, const scene::Camera& camera) {
   Kinds kinds;
   kinds.arrived = shown(the_case.truth, the_case.part, camera);
@@ -97,7 +90,7 @@ Kinds kinds_of(const Case& the_case, const scene::Camera& camera) {
 }
 
 Quality judge(const Case& the_case, const scene::GaussianCloud& result) {
-  Sums edited, vacated, arrived, outside;
+  LikenessSum edited, vacated, arrived, outside;
   for (const scene::Camera& camera : the_case.held_out) {
     const Kinds kinds = kinds_of(the_case, camera);
     const scene::Image is = picture(result, camera), should_be = picture(the_case.truth, camera);

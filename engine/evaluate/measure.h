@@ -19,6 +19,22 @@ struct Likeness {
   std::size_t pixels = 0;  ///< That count. 0: the rest says nothing.
 };
 
+/// Takes in picture after picture.
+class LikenessSum {
+ public:
+  ///   counts  the pixels that do
+  void add(const scene::Image& result, const scene::Image& truth, const scene::Mask& counts);
+  [[nodiscard]] Likeness likeness() const;
+
+ private:
+  double squares_ = 0, dissimilarity_ = 0;
+  std::size_t pixels_ = 0;
+};
+
+/// A render as a screen shows it.
+[[nodiscard]] scene::Image picture(const scene::GaussianCloud& cloud, const scene::Camera& camera);
+[[nodiscard]] scene::Mask complement(scene::Mask mask);
+
 struct Quality {
   Likeness edited;   ///< What the part dominates before or after, and 4 pixels (at 360 of height) around it.
   Likeness vacated;  ///< What it dominates before, and not after.

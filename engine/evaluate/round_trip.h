@@ -1,0 +1,37 @@
+// There and back: a drag and the drag that undoes it, on a real capture, where nobody knows what the edited scene
+// should look like. What comes back should be what was there.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/correct/corrector.h"
+#include "engine/edit/request.h"
+#include "engine/evaluate/measure.h"
+#include "engine/scene/camera.h"
+#include "engine/scene/gaussian_cloud.h"
+
+namespace engine::evaluate {
+
+struct RoundTrip {
+  double arrived = 0;  ///< Part of the drag that the half-way scene shows near the handles' points: the least of them.
+  Likeness inside;     ///< Of the scene that came back to the input, where the part is or was half-way.
+  Likeness outside;    ///< Elsewhere.
+  scene::GaussianCloud halfway, back;
+  std::vector<scene::Camera> cameras;  ///< Between those of the edit: what is judged.
+};
+
+/// Carries the request out, and then the one from where its handles have come to back to where they were.
+///   cameras    of the capture, at least two
+///   corrector  null: none
+///   errors     those of edit::run()
+[[nodiscard]] Result<RoundTrip> there_and_back(const scene::GaussianCloud& scene,
+                                               std::span<const scene::Camera> cameras, const edit::Request& request,
+                                               correct::Corrector* corrector);
+
+/// A camera half-way between two: position, direction, lens. Name of the first with "+" and that of the second.
+[[nodiscard]] scene::Camera between(const scene::Camera& a, const scene::Camera& b);
+
+}  // namespace engine::evaluate
