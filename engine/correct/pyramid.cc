@@ -41,10 +41,10 @@ scene::Image doubled(const scene::Image& coarse, int width, int height) {
   scene::Image fine(width, height, coarse.channels);
   // Pixel u of the fine picture has its middle at u / 2 - 1 / 4 of the coarse one.
   for (int y = 0; y < height; ++y) {
-    const int y0 = y % 2 != 0 ? y / 2 : std::max(y / 2 - 1, 0), y1 = std::min(y0 + 1, coarse.height - 1);
+    const int y0 = std::max((y - 1) / 2, 0), y1 = std::min((y + 1) / 2, coarse.height - 1);
     const float fy = y % 2 != 0 ? 0.25f : 0.75f;
     for (int x = 0; x < width; ++x) {
-      const int x0 = x % 2 != 0 ? x / 2 : std::max(x / 2 - 1, 0), x1 = std::min(x0 + 1, coarse.width - 1);
+      const int x0 = std::max((x - 1) / 2, 0), x1 = std::min((x + 1) / 2, coarse.width - 1);
       const float fx = x % 2 != 0 ? 0.25f : 0.75f;
       for (int c = 0; c < coarse.channels; ++c)
         fine.at(x, y, c) = (1 - fy) * ((1 - fx) * coarse.at(x0, y0, c) + fx * coarse.at(x1, y0, c)) +

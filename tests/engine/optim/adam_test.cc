@@ -75,21 +75,76 @@ TEST(Adam, AZeroGradientMovesNothing) {
   EXPECT_EQ(value, before);
 }
 
+TEST(Adam, MobilityMultipliesTheRatesOfARow) {
+  constexpr std::size_t rows = 37, columns = 3;
+  const std::vector<double> one_rate{0.01}, rates{0.1, 0.0, 0.003};
+  std::vector<float> mobility(rows);
+  for (std::size_t row = 0; row < rows; ++row) mobility[row] = float(row % 5) / 2;  // 0 to 2
+  Adam adam({{"a", 1}, {"b", columns}}, rows, {.epsilon = 1e-8});
+  std::vector<float> a = normals(rows, 1), b = normals(rows * columns, 2);
+  const std::vector<float> first_a = a, first_b = b;
+  std::vector<double> expected_a(a.begin(), a.end()), expected_b(b.begin(), b.end());
+  std::vector<ScalarAdam> scalar_a(rows), scalar_b(rows * columns);
+  for (std::uint64_t t = 0; t < 50; ++t) {
+    const auto v_a = normals(rows, 100 + t), v_b = normals(rows * columns, 200 + t);
+    ASSERT_TRUE(adam.step(std::vector<AdamGroup>{{a, v_a, one_rate}, {b, v_b, rates}}, mobility));
+    for (std::size_t i = 0; i < rows; ++i)
+      expected_a[i] = scalar_a[i].step(expected_a[i], v_a[i], 0.01 * double(mobility[i]));
+    for (std::size_t i = 0; i < b.size(); ++i)
+      expected_b[i] = scalar_b[i].step(expected_b[i], v_b[i], rates[i % columns] * double(mobility[i / columns]));
+  }
+  for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(a[i], expected_a[i], 1e-5) << "a, row " << i;
+  for (std::size_t i = 0; i < b.size(); ++i) EXPECT_NEAR(b[i], expected_b[i], 1e-5) << "b, value " << i;
+  for (std::size_t i = 0; i < rows; i += 5) EXPECT_EQ(a[i], first_a[i]) << "row " << i << " is not to move";
+  for (std::size_t i = 0; i < rows; i += 5) EXPECT_EQ(b[columns * i], first_b[columns * i]) << "row " << i;
+}
+
+TEST(Adam, AMobilityOfOneEverywhereIsTheSameAsNone) {
+  constexpr std::size_t rows = 300;
+  const std::vector<double> rate{0.01}, rates{0.1, 0.2};
+  const auto optimise = [&](std::span<const float> mobility) {
+    Adam adam({{"a", 1}, {"b", 2}}, rows);
+    std::vector<float> a = normals(rows, 1), b = normals(rows * 2, 2);
+    for (std::uint64_t t = 0; t < 3; ++t) {
+      const auto v_a = normals(rows, 10 + t), v_b = normals(rows * 2, 20 + t);
+      EXPECT_TRUE(adam.step(std::vector<AdamGroup>{{a, v_a, rate}, {b, v_b, rates}}, mobility));
+    }
+    return std::pair{a, b};
+  };
+  EXPECT_EQ(optimise({}), optimise(std::vector<float>(rows, 1.0f)));
+}
+
+TEST(Adam, ARowThatMayNotMoveRemembersItsGradientsAllTheSame) {
+  const std::vector<double> rate{0.25};
+  const std::vector<float> gradient{1, 1}, none(2);
+  std::vector<float> value{0, 0};
+  Adam adam({{"x"}}, 2);
+  ASSERT_TRUE(adam.step(std::vector<AdamGroup>{{value, gradient, rate}}, std::vector<float>{0, 1}));
+  EXPECT_EQ(value[0], 0.0f);
+  const float before = value[1];
+  ASSERT_TRUE(adam.step(std::vector<AdamGroup>{{value, none, rate}}));
+  EXPECT_LT(value[0], 0.0f);
+  EXPECT_FLOAT_EQ(value[0], value[1] - before);
+}
+
 TEST(Adam, HasTheSameBytesForAnyNumberOfThreads) {
   constexpr std::size_t rows = 40000;
   const std::vector<double> rate{0.01}, rates{0.1, 0.2, 0.3, 0.4};
-  auto optimise = [&](int threads) {
+  std::vector<float> mobilities(rows);
+  for (std::size_t row = 0; row < rows; ++row) mobilities[row] = float(row % 7) / 6;
+  auto optimise = [&](int threads, std::span<const float> mobility) {
     std::vector<float> a = normals(rows, 1), b = normals(rows * 4, 2);
     WorkArena(threads).run([&] {
       Adam adam({{"a", 1}, {"b", 4}}, rows);
       for (std::uint64_t t = 0; t < 3; ++t) {
         const auto v_a = normals(rows, 10 + t), v_b = normals(rows * 4, 20 + t);
-        EXPECT_TRUE(adam.step(std::vector<AdamGroup>{{a, v_a, rate}, {b, v_b, rates}}));
+        EXPECT_TRUE(adam.step(std::vector<AdamGroup>{{a, v_a, rate}, {b, v_b, rates}}, mobility));
       }
     });
     return std::pair{a, b};
   };
-  EXPECT_EQ(optimise(1), optimise(4));
+  EXPECT_EQ(optimise(1, {}), optimise(4, {}));
+  EXPECT_EQ(optimise(1, mobilities), optimise(4, mobilities));
 }
 
 TEST(Adam, NamesTheFirstPoisonedParameter) {

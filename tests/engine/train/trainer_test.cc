@@ -32,6 +32,7 @@ scene::GaussianCloud blob(std::size_t n, std::uint64_t seed, Vec3 centre, float 
 struct Setting {
   scene::GaussianCloud base = blob(3000, 1, {0, 0, 0}, 0.5f);
   scene::GaussianCloud changeable = blob(150, 2, {0.3f, 0.2f, -2}, 0.1f);
+  std::vector<float> mobility;  // of the changeable ones
   std::vector<std::uint32_t> hidden{5, 90};
   std::vector<scene::Camera> cameras;
   scene::Mask mask{320, 240};
@@ -44,7 +45,7 @@ struct Setting {
       for (int x = 145; x < 230; ++x) mask.at(x, y) = 1;
   }
   [[nodiscard]] Trainer trainer(const TrainOptions& options = {}) {
-    return Trainer({&base, hidden}, {changeable, {}}, 10, options, loss);
+    return Trainer({&base, hidden}, {changeable, {}, mobility}, 10, options, loss);
   }
   /// A trainer whose views show something else than they should: the changeable part as it was before a push and in its
   /// old colours.
@@ -192,6 +193,45 @@ TEST(Trainer, ChildrenKnowTheirAncestorAndStayWithinTheCap) {
       EXPECT_EQ(trainer.ancestors()[row], row);
     }
   }
+}
+
+TEST(Trainer, RowsOfNoMobilityStayAsTheyAre) {
+  Setting setting;
+  setting.mobility.resize(150);
+  for (std::size_t row = 0; row < 150; ++row) setting.mobility[row] = float(row % 2);
+  Trainer trainer = setting.pushed();
+  const scene::GaussianCloud before = trainer.cloud();
+  train(trainer, 20);
+  ASSERT_EQ(trainer.cloud().size(), 150u);
+  std::vector<std::uint8_t> stays(150);
+  for (std::size_t row = 0; row < 150; ++row) stays[row] = row % 2 == 0;
+  EXPECT_TRUE(scene::select(trainer.cloud(), stays) == scene::select(before, stays));
+  std::size_t moved = 0;
+  for (std::size_t row = 1; row < 150; row += 2) moved += trainer.cloud().mean.get(row) != before.mean.get(row);
+  EXPECT_GT(moved, 50u);
+}
+
+TEST(Trainer, AMobilityOfOneEverywhereIsTheSameAsNone) {
+  Setting one, other;
+  other.mobility.assign(150, 1.0f);
+  TrainOptions options;
+  options.densify.every = 5, options.densify.gradient = 1e-12;
+  Trainer without = one.pushed(options), with = other.pushed(options);
+  EXPECT_EQ(train(without, 20), train(with, 20));
+  EXPECT_GT(with.cloud().size(), 150u) << "children have a mobility as well";
+  EXPECT_TRUE(with.cloud() == without.cloud());
+}
+
+TEST(Trainer, RowsThatHardlyMoveGetNoChildren) {
+  Setting setting;
+  setting.mobility.resize(150);
+  for (std::size_t row = 0; row < 150; ++row) setting.mobility[row] = row % 3 == 0 ? 1.0f : 0.01f;
+  TrainOptions options;
+  options.densify.every = 5, options.densify.gradient = 1e-12, options.densify.most_growth = 2;
+  Trainer trainer = setting.pushed(options);
+  train(trainer, 30);
+  ASSERT_GT(trainer.cloud().size(), 150u);
+  for (std::size_t row = 150; row < trainer.cloud().size(); ++row) EXPECT_EQ(trainer.ancestors()[row] % 3, 0u) << row;
 }
 
 TEST(Trainer, RemovesChildrenThatFloatInFrontOfThePart) {

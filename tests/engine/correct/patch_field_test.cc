@@ -1,0 +1,201 @@
+#include "engine/correct/patch_field.h"
+
+#include <gtest/gtest.h>
+#include <hwy/targets.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/core/parallel.h"
+#include "tests/engine/correct/samples.h"
+
+namespace engine::correct {
+namespace {
+
+/// All patches of a target, looked up in sources.
+struct Lookup {
+  Planes target;
+  std::vector<float> weight;
+  std::vector<Place> centres;
+  std::vector<std::uint32_t> number;
+  std::vector<PatchSource> sources;
+
+  Lookup(const scene::Image& picture, std::vector<PatchSource> from) : target(picture), sources(std::move(from)) {
+    weight.assign(target.pixels() + Planes::spare, 1.0f);
+    number.assign(target.pixels(), no_centre);
+    for (int y = patch_radius; y < picture.height - patch_radius; ++y)
+      for (int x = patch_radius; x < picture.width - patch_radius; ++x) {
+        number[target.index(x, y)] = std::uint32_t(centres.size());
+        centres.push_back({std::int16_t(x), std::int16_t(y)});
+      }
+  }
+  [[nodiscard]] PatchQuery query() const { return {&target, weight, centres, number, sources}; }
+
+  /// The field after so many passes.
+  [[nodiscard]] std::vector<Match> searched(int passes, std::uint64_t seed = 1) const {
+    std::vector<Match> field = random_field(query(), seed), next(field.size());
+    for (int pass = 0; pass < passes; ++pass) {
+      improve(query(), field, 1 << pass % 3, seed + std::uint64_t(pass) + 1, next);
+      field.swap(next);
+    }
+    return field;
+  }
+  /// What Match::distance is, pixel by pixel.
+  [[nodiscard]] double distance(std::size_t k, const Match& match) const {
+    const Planes& source = sources[match.source].picture;
+    double sum = 0, weights = 0;
+    for (int dy = -patch_radius; dy <= patch_radius; ++dy)
+      for (int dx = -patch_radius; dx <= patch_radius; ++dx) {
+        const std::size_t here = target.index(centres[k].x + dx, centres[k].y + dy),
+                          there = source.index(match.centre.x + dx, match.centre.y + dy);
+        weights += double(weight[here]);
+        for (std::size_t c = 0; c < 3; ++c)
+          sum += double(weight[here]) * std::pow(double(target.data[c * target.pixels() + here]) -
+                                                     double(source.data[c * source.pixels() + there]),
+                                                 2);
+      }
+    return sum / weights;
+  }
+};
+
+scene::Mask mostly_allowed(int width, int height, std::uint64_t seed) {
+  scene::Mask allowed(width, height);
+  Rng rng(seed);
+  for (std::uint8_t& flag : allowed.data) flag = rng.below(60) != 0;
+  return allowed;
+}
+
+Lookup of_noise() {
+  Lookup lookup(noise(31, 26, 1), {patch_source(noise(40, 33, 2), mostly_allowed(40, 33, 3)),
+                                   patch_source(noise(28, 37, 4), mostly_allowed(28, 37, 5))});
+  Rng rng(6);
+  for (std::size_t i = 0; i < lookup.target.pixels(); ++i) lookup.weight[i] = rng.uniform(0.1f, 2.0f);
+  return lookup;
+}
+
+bool same_bytes(const std::vector<Match>& a, const std::vector<Match>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Match& m, const Match& n) {
+    return m.source == n.source && m.centre.x == n.centre.x && m.centre.y == n.centre.y && m.distance == n.distance;
+  });
+}
+
+TEST(PatchSource, AllowsPatchesWithoutAnExcludedPixel) {
+  for (const auto& [width, height] : {std::pair{23, 19}, {7, 7}, {7, 30}}) {
+    const scene::Mask allowed = mostly_allowed(width, height, std::uint64_t(width));
+    const PatchSource source = patch_source(noise(width, height, 1), allowed);
+    std::vector<std::uint32_t> expected;
+    for (int y = patch_radius; y < height - patch_radius; ++y)
+      for (int x = patch_radius; x < width - patch_radius; ++x) {
+        bool whole = true;
+        for (int dy = -patch_radius; dy <= patch_radius; ++dy)
+          for (int dx = -patch_radius; dx <= patch_radius; ++dx) whole = whole && allowed.at(x + dx, y + dy) != 0;
+        if (whole) expected.push_back(std::uint32_t(y * width + x));
+      }
+    EXPECT_EQ(source.centres, expected) << width;
+    EXPECT_EQ(source.centre_allowed.area(), expected.size());
+    for (const std::uint32_t place : source.centres) EXPECT_EQ(source.centre_allowed.data[place], 1);
+  }
+}
+
+TEST(PatchSource, OfAPictureSmallerThanAPatchHasNone) {
+  EXPECT_TRUE(patch_source(noise(6, 40, 1), all_set(6, 40)).centres.empty());
+  EXPECT_TRUE(patch_source(noise(40, 6, 1), all_set(40, 6)).centres.empty());
+  EXPECT_EQ(patch_source(noise(7, 7, 1), all_set(7, 7)).centres, (std::vector<std::uint32_t>{24}));
+}
+
+TEST(RandomField, ComesFromAllowedPlacesOfAllSources) {
+  const Lookup lookup = of_noise();
+  const auto field = random_field(lookup.query(), 3);
+  ASSERT_EQ(field.size(), lookup.centres.size());
+  std::size_t of_first = 0;
+  for (const Match& match : field) {
+    ASSERT_LT(match.source, 2u);
+    ASSERT_EQ(lookup.sources[match.source].centre_allowed.at(match.centre.x, match.centre.y), 1);
+    of_first += match.source == 0;
+  }
+  const double share = double(lookup.sources[0].centres.size()) /
+                       double(lookup.sources[0].centres.size() + lookup.sources[1].centres.size());
+  EXPECT_NEAR(double(of_first) / double(field.size()), share, 0.1) << "each place is as likely";
+}
+
+TEST(RandomField, PassesOverSourcesWithoutAPlace) {
+  const Lookup lookup(noise(12, 12, 1),
+                      {patch_source(noise(12, 12, 2), scene::Mask(12, 12)),
+                       patch_source(noise(12, 12, 3), all_set(12, 12)), patch_source(noise(3, 3, 4), all_set(3, 3))});
+  for (const Match& match : lookup.searched(4)) EXPECT_EQ(match.source, 1u);
+}
+
+TEST(Improve, FindsPatchesThatAreThere) {
+  // The target is a part of the second source.
+  const scene::Image whole = noise(64, 48, 7);
+  const Lookup lookup(scene::cut_out(whole, {20, 10, 60, 40}),
+                      {patch_source(noise(50, 50, 8), all_set(50, 50)), patch_source(whole, all_set(64, 48))});
+  std::size_t found = 0;
+  const auto field = lookup.searched(20);
+  for (std::size_t k = 0; k < field.size(); ++k) {
+    const Match& match = field[k];
+    const bool there =
+        match.source == 1 && match.centre.x == lookup.centres[k].x + 20 && match.centre.y == lookup.centres[k].y + 10;
+    found += there;
+    EXPECT_EQ(there, match.distance == 0) << k;
+  }
+  EXPECT_GT(double(found), 0.99 * double(field.size()));
+}
+
+TEST(Improve, NeverMakesAMatchWorseNorTakesWhatIsNotAllowed) {
+  const Lookup lookup = of_noise();
+  std::vector<Match> field = random_field(lookup.query(), 1), next(field.size());
+  for (std::uint64_t pass = 0; pass < 8; ++pass) {
+    std::size_t better = 0;
+    improve(lookup.query(), field, 1 + int(pass % 4), pass, next);
+    for (std::size_t k = 0; k < field.size(); ++k) {
+      ASSERT_EQ(lookup.sources[next[k].source].centre_allowed.at(next[k].centre.x, next[k].centre.y), 1) << k;
+      ASSERT_LE(lookup.distance(k, next[k]), lookup.distance(k, field[k]) + 1e-6) << k << ", pass " << pass;
+      better += next[k].distance < float(lookup.distance(k, field[k])) - 1e-4f;
+    }
+    EXPECT_GT(better, 0u) << pass;
+    field.swap(next);
+  }
+}
+
+TEST(Improve, MeasuresTheWeightedMeanOfSquaredDifferencesWithEveryInstructionSet) {
+  const Lookup lookup = of_noise();
+  for (const std::int64_t instruction_set : hwy::SupportedAndGeneratedTargets()) {
+    SCOPED_TRACE(hwy::TargetName(instruction_set));
+    hwy::GetChosenTarget().Update(instruction_set);
+    const auto field = lookup.searched(2);
+    for (std::size_t k = 0; k < field.size(); ++k)
+      ASSERT_NEAR(field[k].distance, lookup.distance(k, field[k]), 1e-6) << k;
+  }
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+}
+
+TEST(Improve, PixelsThatCountNothingDoNotMatter) {
+  Lookup lookup = of_noise();
+  Lookup other = lookup;
+  for (std::size_t i = 0; i < lookup.target.pixels(); i += 3) {
+    lookup.weight[i] = other.weight[i] = 0;
+    for (std::size_t c = 0; c < 3; ++c) other.target.data[c * other.target.pixels() + i] = 50;
+  }
+  EXPECT_TRUE(same_bytes(lookup.searched(3), other.searched(3)));
+  std::fill(lookup.weight.begin(), lookup.weight.end(), 0.0f);
+  for (const Match& match : lookup.searched(2)) ASSERT_EQ(match.distance, 0) << "nothing counts";
+}
+
+TEST(Improve, GivesTheSameBytesForAnyNumberOfThreads) {
+  const scene::Image picture = noise(70, 60, 1);
+  std::vector<Match> first;
+  for (const int threads : {1, 2, 4}) {
+    WorkArena arena(threads);
+    arena.run([&] {
+      const Lookup lookup(picture, {patch_source(noise(80, 50, 2), mostly_allowed(80, 50, 3))});
+      const auto field = lookup.searched(4);
+      if (first.empty()) first = field;
+      EXPECT_TRUE(same_bytes(field, first)) << threads;
+      EXPECT_FALSE(same_bytes(lookup.searched(4, 99), first)) << "another seed";
+    });
+  }
+}
+
+}  // namespace
+}  // namespace engine::correct

@@ -1,0 +1,239 @@
+// Edits with a corrector, from end to end.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "engine/core/parallel.h"
+#include "engine/correct/scene_corrector.h"
+#include "engine/edit/checkpoint.h"
+#include "engine/edit/edit.h"
+#include "engine/render/forward.h"
+#include "tests/engine/edit/block.h"
+#include "tests/engine/edit/likeness.h"
+
+namespace engine::edit {
+namespace {
+
+Outcome run_with(const BlockScene& block, correct::Corrector* corrector, const Observer& observer = {},
+                 const Checkpoint* resume = nullptr) {
+  auto outcome = run(block.cloud, block.cameras, block.request, observer, resume, nullptr, corrector);
+  if (!outcome) {
+    ADD_FAILURE() << outcome.error().message << " at " << outcome.error().where;
+    return {};
+  }
+  return std::move(*outcome);
+}
+
+Outcome run_with_scene_corrector(const BlockScene& block, const Observer& observer = {},
+                                 const Checkpoint* resume = nullptr) {
+  correct::SceneCorrector corrector;
+  return run_with(block, &corrector, observer, resume);
+}
+
+/// What the outcome shows where the floor was hidden below the block, over all views.
+struct Below {
+  float least_alpha = 1;
+  Vec3 mean_color{0.0f};
+  float most_red = 0;
+};
+Below below_block(const BlockScene& block, const Outcome& outcome) {
+  Below below;
+  const scene::GaussianCloud after = scene::flatten(block.cloud, outcome.overlay);
+  float count = 0;
+  for (const scene::Camera& view : block.cameras) {
+    const render::Rendering shown = render::forward(after, view);
+    for (const DVec3 point : BlockScene::below_block()) {
+      const DVec2 at = view.pixel_from_cam(view.cam_from_world(point));
+      const int x = int(at.x), y = int(at.y);
+      below.least_alpha = std::min(below.least_alpha, shown.alpha.at(x, y));
+      below.most_red = std::max(below.most_red, shown.color.at(x, y, 0));
+      below.mean_color += Vec3(shown.color.at(x, y, 0), shown.color.at(x, y, 1), shown.color.at(x, y, 2));
+      count += 1;
+    }
+  }
+  below.mean_color /= count;
+  return below;
+}
+
+TEST(EditWithACorrector, ClosesTheHoleThatAMoveUncoversInTheColourOfWhatIsAround) {
+  const BlockScene block;
+  const Outcome open = run_with(block, nullptr), closed = run_with_scene_corrector(block);
+  const Below without = below_block(block, open), with = below_block(block, closed);
+  EXPECT_LT(without.least_alpha, 0.3f);
+  EXPECT_GT(with.least_alpha, 0.9f);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(with.mean_color[c], floor_color[c], 0.04f) << c;
+  EXPECT_LT(with.most_red, floor_color.x + 0.1f) << "nothing of the block is painted onto the floor";
+  EXPECT_EQ(open.report.seeds, 0u);
+  EXPECT_GT(closed.report.seeds, 0u);
+  EXPECT_FALSE(scene::first_not_finite(closed.overlay.rows));
+}
+
+TEST(EditWithACorrector, FrozenRowsStayTheInputs) {
+  const BlockScene block;
+  const Outcome outcome = run_with_scene_corrector(block);
+  EXPECT_TRUE(scene::validate(outcome.overlay, block.cloud));
+  for (const std::uint32_t row : outcome.overlay.removed) EXPECT_GE(row, block.floor_rows);
+  for (const std::uint32_t row : outcome.overlay.changed) EXPECT_GE(row, block.floor_rows);
+  EXPECT_EQ(outcome.report.copies, outcome.overlay.added());
+  EXPECT_LE(outcome.report.seeds + 512, outcome.report.copies + 20) << "the block's copies, seeds, their children";
+}
+
+TEST(EditWithACorrector, SeedsNothingBehindAPartThatHangsBeforeAWholeSurface) {
+  const BlockScene block(/*gap=*/0.5f);
+  const Outcome outcome = run_with_scene_corrector(block);
+  EXPECT_EQ(outcome.report.seeds, 0u);
+  const Below below = below_block(block, outcome);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(below.mean_color[c], floor_color[c], 0.02f) << c;
+}
+
+TEST(EditWithACorrector, LooksOutsideItsMasksLikeTheInput) {
+  const BlockScene block;
+  const Outcome outcome = run_with_scene_corrector(block);
+  const scene::GaussianCloud after = scene::flatten(block.cloud, outcome.overlay);
+  ASSERT_EQ(outcome.masks.size(), block.cameras.size());
+  for (std::size_t v = 0; v < outcome.views.size(); ++v) {
+    const scene::Image before = render::forward(block.cloud, outcome.views[v]).color,
+                       now = render::forward(after, outcome.views[v]).color;
+    EXPECT_GT(psnr_where(before, now, outcome.masks[v], 0), 40) << v;
+    EXPECT_LT(psnr_where(before, now, outcome.masks[v], 1), 25) << v << ": the block is not there any more";
+  }
+}
+
+TEST(EditWithACorrector, GivesTheSameBytesForAnyNumberOfThreads) {
+  for (const Mode mode : {Mode::move, Mode::extend}) {
+    const BlockScene block(0, mode);
+    std::optional<Outcome> first;
+    for (const int threads : {1, 2, 4})
+      WorkArena(threads).run([&] {
+        Outcome outcome = run_with_scene_corrector(block);
+        if (!first)
+          first = std::move(outcome);
+        else
+          EXPECT_EQ(outcome.overlay, first->overlay) << threads;
+      });
+  }
+}
+
+TEST(EditWithACorrector, GoesOnAfterAnIntervalToTheSameBytes) {
+  for (const Mode mode : {Mode::move, Mode::extend})
+    for (const bool far_away : {false, true}) {
+      BlockScene block(0, mode);
+      block.request.params.intervals = 3;
+      block.request.params.annealing_steps = 2;
+      block.request.params.iterations = 4;
+      if (far_away) {
+        const DVec3 by(4096, -4096, 2048);
+        for (std::size_t i = 0; i < block.cloud.size(); ++i)
+          block.cloud.mean.set(i, block.cloud.mean.get(i) + Vec3(by));
+        for (scene::Camera& camera : block.cameras) camera.translation -= camera.rotation * by;
+        block.request.handles[0].source += by;
+        *block.request.handles[0].target += by;
+        block.request.region->center += by;
+      }
+      std::map<int, std::string> checkpoints;
+      Observer observer;
+      observer.interval_done = [&](const IntervalDone& done) {
+        checkpoints[done.interval] = encode(done.checkpoint);
+        return Result<void>{};
+      };
+      const Outcome undisturbed = run_with_scene_corrector(block, observer);
+      ASSERT_EQ(checkpoints.size(), 3u);
+      if (mode == Mode::move) {
+        EXPECT_GT(undisturbed.report.seeds, 0u);
+      }
+      for (const auto& [interval, bytes] : checkpoints) {
+        const auto from = decode(bytes);
+        ASSERT_TRUE(from) << from.error().message;
+        const Outcome resumed = run_with_scene_corrector(block, {}, &*from);
+        EXPECT_EQ(resumed.overlay, undisturbed.overlay) << interval;
+        EXPECT_EQ(resumed.masks, undisturbed.masks) << interval;
+        EXPECT_EQ(resumed.report.seeds, undisturbed.report.seeds) << interval;
+        EXPECT_EQ(resumed.report.losses, undisturbed.report.losses) << interval;
+      }
+    }
+}
+
+TEST(EditWithACorrector, AnExtendIsDrawnOutOpaque) {
+  // Without a corrector the pictures show the original half transparent, as it was made; with one they do not.
+  BlockScene block(0, Mode::extend);
+  block.request.params.iterations = 60;
+  const auto mean_logit_of_originals = [&](const Outcome& outcome) {
+    const scene::GaussianCloud after = scene::flatten(block.cloud, outcome.overlay);
+    double sum = 0;
+    for (std::size_t row = block.floor_rows; row < block.cloud.size(); ++row) sum += double(after.opacity_logit[row]);
+    return sum / double(block.cloud.size() - block.floor_rows);
+  };
+  EXPECT_GT(mean_logit_of_originals(run_with_scene_corrector(block)),
+            mean_logit_of_originals(run_with(block, nullptr)) + 0.1);
+}
+
+/// Cannot do its work.
+class Failing final : public correct::Corrector {
+ public:
+  explicit Failing(bool when_tuned) : when_tuned_(when_tuned) {}
+  Result<void> fine_tune(std::span<const correct::Example>, int) override {
+    if (when_tuned_) return fail(ErrorCode::unavailable, "the corrector cannot learn", "tuning");
+    return {};
+  }
+  Result<std::vector<scene::Image>> correct(std::span<const correct::Flawed>, double, std::uint64_t) override {
+    return fail(ErrorCode::unavailable, "the corrector is out of order", "corrector");
+  }
+
+ private:
+  bool when_tuned_;
+};
+
+TEST(EditWithACorrector, AnErrorOfTheCorrectorEndsTheEdit) {
+  const BlockScene block;
+  for (const bool when_tuned : {false, true}) {
+    Failing failing(when_tuned);
+    const auto outcome = run(block.cloud, block.cameras, block.request, {}, nullptr, nullptr, &failing);
+    ASSERT_FALSE(outcome);
+    EXPECT_EQ(outcome.error().code, ErrorCode::unavailable);
+    EXPECT_EQ(outcome.error().where, when_tuned ? "tuning" : "corrector");
+  }
+}
+
+TEST(EditWithACorrector, IsNotAskedWhereNothingIsOptimisedOrMoved) {
+  BlockScene block;
+  Failing failing(true);
+  block.request.params.iterations = 0;
+  run_with(block, &failing);
+  block.request.params.iterations = 5;
+  block.request.handles[0].target = block.request.handles[0].source;
+  EXPECT_EQ(run_with(block, &failing).overlay, scene::no_change(block.cloud));
+}
+
+TEST(EditWithACorrector, ReportsItsProgressAndStopsWhenAsked) {
+  const BlockScene block;
+  std::vector<double> correcting;
+  double last = 0;
+  Observer observer;
+  observer.progress = [&](const Progress& progress) {
+    EXPECT_GE(progress.fraction, last);
+    last = progress.fraction;
+    if (progress.stage == "correct") correcting.push_back(progress.fraction);
+  };
+  run_with_scene_corrector(block, observer);
+  EXPECT_EQ(last, 1.0);
+  EXPECT_GE(correcting.size(), block.cameras.size());
+
+  std::stop_source stop;
+  observer = {};
+  observer.stop = stop.get_token();
+  int steps = 0;
+  observer.progress = [&](const Progress& progress) {
+    if (progress.stage == "correct" && ++steps == 2) stop.request_stop();
+  };
+  correct::SceneCorrector corrector;
+  const auto stopped = run(block.cloud, block.cameras, block.request, observer, nullptr, nullptr, &corrector);
+  ASSERT_FALSE(stopped);
+  EXPECT_EQ(stopped.error().code, ErrorCode::cancelled);
+  EXPECT_EQ(steps, 2) << "at once";
+}
+
+}  // namespace
+}  // namespace engine::edit

@@ -1,0 +1,300 @@
+#include "engine/edit/repair.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <set>
+
+#include "engine/edit/drag.h"
+#include "engine/edit/look.h"
+#include "engine/mask/mask.h"
+#include "engine/render/forward.h"
+#include "tests/engine/edit/block.h"
+
+namespace engine::edit {
+namespace {
+
+/// Notes what it is asked and gives back what it gets, or something else.
+class Recorder final : public correct::Corrector {
+ public:
+  std::vector<correct::Example> buffer;
+  std::vector<correct::Flawed> asked;
+  std::vector<double> strengths;
+  std::vector<std::uint64_t> seeds;
+  std::function<Result<scene::Image>(const correct::Flawed&)> answer = [](const correct::Flawed& flawed) {
+    return Result<scene::Image>(flawed.picture);
+  };
+
+  Result<void> fine_tune(std::span<const correct::Example> examples, int) override {
+    buffer.assign(examples.begin(), examples.end());
+    return {};
+  }
+  Result<std::vector<scene::Image>> correct(std::span<const correct::Flawed> views, double strength,
+                                            std::uint64_t seed) override {
+    std::vector<scene::Image> out;
+    for (const correct::Flawed& flawed : views) {
+      asked.push_back(flawed), strengths.push_back(strength), seeds.push_back(seed);
+      auto picture = answer(flawed);
+      if (!picture) return propagate(picture);
+      out.push_back(std::move(*picture));
+    }
+    return out;
+  }
+};
+
+/// An edit after its deformation, about to be corrected.
+struct Moved {
+  BlockScene block;
+  scene::GaussianCloud original;
+  WorkingScene working;
+  std::vector<scene::Mask> masks;
+  Recorder corrector;
+
+  explicit Moved(float gap = 0, Mode mode = Mode::move) : block(gap, mode), original(block.cloud) {
+    working = begin(block.cloud, block.request, assign(block.cloud.mean, block.request).value().handle);
+    const auto copies = drag_through(working, block.request, 1, true).copies;
+    for (const scene::Camera& view : block.cameras) masks.emplace_back(view.width, view.height);
+    std::vector<std::uint32_t> parents;
+    for (const std::uint32_t copy : copies) parents.push_back(working.parent[copy]);
+    const auto go_on = [](double) { return Result<void>{}; };
+    EXPECT_TRUE(unite_masks(working, copies, block.cameras, masks, go_on));
+    WorkingScene before = begin(block.cloud, block.request, deform::HandleColumn(block.cloud.size(), 0));
+    EXPECT_TRUE(unite_masks(before, parents, block.cameras, masks, go_on));
+    dilate_masks(masks);
+  }
+  [[nodiscard]] Repair repair() {
+    return {original, block.cameras, block.cameras, block.request.params, block.request.mode, corrector};
+  }
+  Result<Repair::Outcome> correct(int u = 1, int a = 1) {
+    return repair().correct(working, masks, u, a, [](double) { return Result<void>{}; });
+  }
+  /// Pixels of view v where the floor below the block is, and the moved block is not.
+  [[nodiscard]] scene::Mask uncovered(std::size_t v) const {
+    scene::Mask pixels(block.cameras[v].width, block.cameras[v].height);
+    for (const DVec3 point : BlockScene::below_block()) {
+      const DVec2 at = block.cameras[v].pixel_from_cam(block.cameras[v].cam_from_world(point));
+      pixels.at(int(at.x), int(at.y)) = 1;
+    }
+    return pixels;
+  }
+};
+
+scene::Image shown(const WorkingScene& working, const scene::Camera& camera) {
+  return render::forward(working.cloud, camera).color;
+}
+
+TEST(Repair, AsksForEachViewFirstWhatIsBehindAndThenAll) {
+  Moved moved;
+  const auto outcome = moved.correct();
+  ASSERT_TRUE(outcome);
+  const Recorder& corrector = moved.corrector;
+  ASSERT_EQ(corrector.asked.size(), 2 * moved.block.cameras.size());
+  EXPECT_EQ(std::set(corrector.seeds.begin(), corrector.seeds.end()).size(), corrector.seeds.size())
+      << "each picture has a seed of its own";
+  for (std::size_t k = 0; k < corrector.asked.size(); ++k) {
+    const correct::Flawed& flawed = corrector.asked[k];
+    const std::size_t v = flawed.examples.at(0);  // the view itself is the most alike
+    EXPECT_EQ(flawed.examples.size(), 5u);
+    EXPECT_EQ(flawed.picture.width, 64);
+    const scene::Mask uncovered = moved.uncovered(v);
+    double red = 0, trust = 0;
+    for (std::size_t i = 0; i < uncovered.data.size(); ++i) {
+      if (uncovered.data[i] == 0) continue;
+      EXPECT_EQ(flawed.mask.data[i], 1) << k;
+      red += double(flawed.picture.plane(0)[i]), trust += double(flawed.trust.data[i]);
+    }
+    EXPECT_LT(red / double(uncovered.area()), 0.3) << k << ": the block is not there any more";
+    if (k % 2 == 0) {
+      if (k == 0) {
+        EXPECT_LT(trust / double(uncovered.area()), 0.05) << "nobody has seen what is there";
+      } else {
+        EXPECT_GT(trust / double(uncovered.area()), 0.95) << "the views before have decided what is there";
+      }
+      EXPECT_LT(flawed.mask.area(), moved.masks[v].area());
+    } else {
+      EXPECT_GT(trust / double(uncovered.area()), 0.95) << "what was filled in is not asked for again";
+      EXPECT_EQ(flawed.mask, moved.masks[v]);
+    }
+  }
+}
+
+TEST(Repair, TheBufferIsTheUneditedSceneWithoutTheBlockInItsPlace) {
+  Moved moved;
+  ASSERT_TRUE(moved.correct());
+  ASSERT_EQ(moved.corrector.buffer.size(), moved.block.cameras.size());
+  for (std::size_t v = 0; v < moved.corrector.buffer.size(); ++v) {
+    const correct::Example& example = moved.corrector.buffer[v];
+    EXPECT_EQ(example.picture, render::forward(moved.original, moved.block.cameras[v]).color);
+    EXPECT_EQ(example.box, mask::bounding_box(moved.masks[v]));
+    for (std::size_t i = 0; i < example.excluded.data.size(); ++i)
+      if (example.excluded.data[i] == 0) {
+        EXPECT_LT(example.picture.plane(0)[i], 0.35f) << v << ": no red that may be learned from";
+      }
+    EXPECT_LT(example.excluded.area(), example.picture.pixels() / 2);
+  }
+}
+
+TEST(Repair, LaysWhatTheCorrectorFindsIntoTheSceneSoThatLaterViewsShowIt) {
+  Moved moved;
+  const Vec3 found{0.1f, 0.9f, 0.2f};
+  moved.corrector.answer = [&](const correct::Flawed& flawed) {
+    scene::Image picture = flawed.picture;
+    const scene::Mask flaws = correct::flaws_of(flawed);
+    for (int c = 0; c < 3; ++c)
+      for (std::size_t i = 0; i < flaws.data.size(); ++i)
+        if (flaws.data[i] != 0) picture.plane(c)[i] = found[c];
+    return Result<scene::Image>(std::move(picture));
+  };
+  const std::size_t rows = moved.working.cloud.size();
+  const auto outcome = moved.correct();
+  ASSERT_TRUE(outcome);
+  EXPECT_GT(outcome->seeds, 30u);
+  ASSERT_EQ(moved.working.cloud.size(), rows + outcome->seeds);
+  ASSERT_EQ(moved.working.role.size(), rows + outcome->seeds);
+  for (std::size_t row = rows; row < moved.working.role.size(); ++row) {
+    EXPECT_EQ(moved.working.role[row], Role::seed);
+    EXPECT_NEAR(moved.working.cloud.mean.y[row], 0, 0.05) << "on the floor, to the size of its Gaussians";
+  }
+  for (std::size_t v = 0; v < moved.block.cameras.size(); ++v) {
+    const scene::Image now = shown(moved.working, moved.block.cameras[v]);
+    const scene::Mask uncovered = moved.uncovered(v);
+    double in_scene = 0, in_picture = 0;
+    for (std::size_t i = 0; i < uncovered.data.size(); ++i) {
+      if (uncovered.data[i] == 0) continue;
+      for (int c = 0; c < 3; ++c) {
+        in_scene += double(std::abs(now.plane(c)[i] - found[c])) / 3;
+        in_picture += double(std::abs(outcome->corrected.pictures[v].plane(c)[i] - found[c])) / 3;
+      }
+    }
+    EXPECT_LT(in_scene / double(uncovered.area()), 0.08) << v << ": what was found shows in the scene";
+    EXPECT_LT(in_picture / double(uncovered.area()), 0.08) << v << ": and in the picture";
+  }
+  // The first view needs most of them; the others see them and add little.
+  std::size_t first = 0;
+  for (std::size_t i = 0; i < moved.corrector.asked[0].mask.data.size(); ++i)
+    first += correct::flaws_of(moved.corrector.asked[0]).data[i];
+  EXPECT_LT(outcome->seeds, 3 * first);
+}
+
+TEST(Repair, SeedsNothingWhereAllIsKnown) {
+  Moved moved(/*gap=*/0.5f);
+  const auto outcome = moved.correct();
+  ASSERT_TRUE(outcome);
+  EXPECT_EQ(outcome->seeds, 0u);
+}
+
+TEST(Repair, OfAnExtendShowsThePartOpaqueAndAsksOnce) {
+  Moved moved(0, Mode::extend);
+  const WorkingScene before = moved.working;
+  const auto outcome = moved.correct();
+  ASSERT_TRUE(outcome);
+  EXPECT_EQ(outcome->seeds, 0u);
+  EXPECT_EQ(moved.corrector.asked.size(), moved.block.cameras.size());
+  EXPECT_EQ(moved.working.cloud, before.cloud) << "opacities are lowered again afterwards";
+  for (std::size_t v = 0; v < moved.block.cameras.size(); ++v) {
+    const scene::Camera& camera = moved.block.cameras[v];
+    const scene::Image input = render::forward(moved.original, camera).color, lowered = shown(before, camera);
+    double of_picture = 0, of_lowered = 0, count = 0;
+    for (std::size_t i = 0; i < input.pixels(); ++i) {
+      if (input.plane(0)[i] < 0.5f) continue;  // not the block
+      of_picture += double(std::abs(outcome->corrected.pictures[v].plane(0)[i] - input.plane(0)[i]));
+      of_lowered += double(std::abs(lowered.plane(0)[i] - input.plane(0)[i]));
+      ++count;
+    }
+    EXPECT_GT(count, 50) << v;
+    EXPECT_LT(of_picture / count, 0.01) << v;
+    EXPECT_GT(of_lowered / count, 0.03) << v << ": otherwise this shows nothing";
+  }
+}
+
+TEST(Repair, HoldsWhatWasSeenAndLetsTheRestGo) {
+  Moved moved;
+  const auto outcome = moved.correct();
+  ASSERT_TRUE(outcome);
+  const auto& trust = outcome->corrected.trust;
+  ASSERT_EQ(trust.size(), moved.working.role.size());
+  float least = 1, most = 0;
+  for (std::size_t row = 0; row < trust.size(); ++row) {
+    ASSERT_GE(trust[row], 0);
+    ASSERT_LE(trust[row], 1);
+    const Role role = moved.working.role[row];
+    if (role == Role::copy) {
+      least = std::min(least, trust[row]), most = std::max(most, trust[row]);
+    } else {
+      EXPECT_EQ(trust[row], 0) << row;
+    }
+  }
+  EXPECT_EQ(most, 1) << "the block's top";
+  EXPECT_LT(least, 0.05f) << "its inside";
+}
+
+TEST(Repair, StrengthFallsFromTheFirstCorrectionToTheLast) {
+  const auto strengths = [](Annealing annealing, int steps) {
+    std::vector<double> out;
+    for (int a = 1; a <= steps; ++a) {
+      Moved moved(0.5f);
+      moved.block.request.params.annealing = annealing;
+      moved.block.request.params.annealing_steps = steps;
+      moved.block.request.params.strength_initial = 0.8;
+      moved.block.request.params.strength_final = 0.2;
+      EXPECT_TRUE(moved.correct(1, a));
+      for (const double strength : moved.corrector.strengths) EXPECT_EQ(strength, moved.corrector.strengths[0]);
+      out.push_back(moved.corrector.strengths.at(0));
+    }
+    return out;
+  };
+  const auto linear = strengths(Annealing::linear, 3), paper = strengths(Annealing::paper, 3);
+  for (std::size_t a = 0; a < 3; ++a) {
+    EXPECT_NEAR(linear[a], 0.8 - 0.3 * double(a), 1e-12) << a;
+    EXPECT_NEAR(paper[a], 0.8 - 0.2 * double(a), 1e-12) << a;
+  }
+  EXPECT_EQ(strengths(Annealing::linear, 1), std::vector<double>{0.8});
+}
+
+TEST(Repair, GoesOutwardFromTheBestViewAndTellsHowFarItIs) {
+  Moved moved;
+  std::swap(moved.block.cameras[0], moved.block.cameras[2]);  // the middle one of the arc is the best
+  std::swap(moved.masks[0], moved.masks[2]);
+  std::vector<double> told;
+  Repair repair = moved.repair();
+  ASSERT_TRUE(repair.correct(moved.working, moved.masks, 1, 1, [&](double done) {
+    told.push_back(done);
+    return Result<void>{};
+  }));
+  ASSERT_EQ(told.size(), 5u);
+  for (std::size_t k = 0; k < 5; ++k) EXPECT_NEAR(told[k], 0.2 * double(k + 1), 1e-12);
+  std::vector<std::size_t> order;
+  for (std::size_t k = 0; k < moved.corrector.asked.size(); k += 2)
+    order.push_back(moved.corrector.asked[k].examples[0]);
+  ASSERT_EQ(order.size(), 5u);
+  EXPECT_EQ(order[0], 0u);
+  EXPECT_EQ(std::set(order.begin(), order.end()).size(), 5u);
+  const int place_on_arc[] = {2, 1, 0, 3, 4};
+  for (std::size_t k = 1; k < 5; ++k)
+    EXPECT_TRUE(
+        std::any_of(order.begin(), order.begin() + std::ptrdiff_t(k),
+                    [&](std::size_t before) { return std::abs(place_on_arc[before] - place_on_arc[order[k]]) == 1; }))
+        << k << ": beside one that is done";
+}
+
+TEST(Repair, EndsWithTheErrorOfTheCorrectorOrOfWhoeverIsTold) {
+  Moved failing;
+  failing.corrector.answer = [](const correct::Flawed&) -> Result<scene::Image> {
+    return fail(ErrorCode::unavailable, "out of order", "corrector");
+  };
+  const auto failed = failing.correct();
+  ASSERT_FALSE(failed);
+  EXPECT_EQ(failed.error().where, "corrector");
+  Moved told;
+  const auto ended = told.repair().correct(told.working, told.masks, 1, 1, [](double) -> Result<void> {
+    return fail(ErrorCode::cancelled, "enough", "here");
+  });
+  ASSERT_FALSE(ended);
+  EXPECT_EQ(ended.error().where, "here");
+  EXPECT_EQ(told.corrector.asked.size(), 2u) << "after one view";
+}
+
+}  // namespace
+}  // namespace engine::edit

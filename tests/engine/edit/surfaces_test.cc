@@ -1,0 +1,147 @@
+#include "engine/edit/surfaces.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <mutex>
+
+#include "engine/core/parallel.h"
+#include "engine/core/rng.h"
+
+namespace engine::edit {
+namespace {
+
+constexpr int width = 72, height = 60;
+constexpr scene::Rect hole{25, 20, 50, 42};
+constexpr double far_behind = 0.05;
+
+bool inside(scene::Rect rect, int x, int y) { return x >= rect.x0 && x < rect.x1 && y >= rect.y0 && y < rect.y1; }
+
+/// Inverse depth of a tilted plane at a pixel.
+double tilted(int x, int y) { return 0.3 + 0.002 * (x + 0.5) - 0.001 * (y + 0.5); }
+
+/// A plane all over the picture, but for `gap`, where something far behind it is seen.
+SurfaceView plane_with(scene::Rect gap, double seen_in_gap = far_behind) {
+  SurfaceView view{scene::Image(width, height, 1), scene::Mask(width, height), scene::Mask(width, height),
+                   scene::Mask(width, height)};
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      const bool is_gap = inside(gap, x, y);
+      view.inverse_depth.at(x, y) = float(is_gap ? seen_in_gap : tilted(x, y));
+      view.shows_surface.at(x, y) = !is_gap;
+      view.vacated.at(x, y) = is_gap;
+    }
+  return view;
+}
+
+bool nowhere_free(DVec2, double) { return false; }
+
+std::size_t count(const scene::Image& surface) {
+  return std::size_t(std::count_if(surface.data.begin(), surface.data.end(), [](float value) { return value != 0; }));
+}
+
+/// The plane goes on in the whole hole, and nowhere else.
+void expect_goes_on(const scene::Image& surface, double tolerance = 0.01) {
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      if (inside(hole, x, y)) {
+        ASSERT_NEAR(surface.at(x, y), tilted(x, y), tolerance * tilted(x, y)) << x << ", " << y;
+      } else {
+        ASSERT_EQ(surface.at(x, y), 0) << x << ", " << y;
+      }
+}
+
+TEST(ContinuedSurfaces, APlaneGoesOnAcrossAHole) {
+  expect_goes_on(continued_surfaces(plane_with(hole), nowhere_free, 1), 1e-4);
+  expect_goes_on(continued_surfaces(plane_with(hole, /*nothing is seen*/ 0), nowhere_free, 1), 1e-4);
+}
+
+TEST(ContinuedSurfaces, NoiseAndOtherThingsAroundDoNotMatter) {
+  for (std::uint64_t seed = 0; seed < 5; ++seed) {
+    SCOPED_TRACE(seed);
+    SurfaceView view = plane_with(hole);
+    Rng rng(seed);
+    for (std::size_t i = 0; i < view.inverse_depth.data.size(); ++i)
+      if (view.shows_surface.data[i] != 0) {
+        float& value = view.inverse_depth.data[i];
+        value = rng.below(10) < 3 ? rng.uniform(0.1f, 0.25f) : value * (1 + 0.002f * rng.normal());
+      }
+    expect_goes_on(continued_surfaces(view, nowhere_free, seed));
+  }
+}
+
+TEST(ContinuedSurfaces, StopsWhereSomebodyHasLookedThrough) {
+  std::mutex asked;
+  bool all_on_plane = true;
+  const auto left_is_free = [&](DVec2 pixel, double inverse_depth) {
+    const std::lock_guard lock(asked);
+    const double expected = tilted(int(pixel.x), int(pixel.y));
+    all_on_plane =
+        all_on_plane && pixel.x - std::floor(pixel.x) == 0.5 && std::abs(inverse_depth - expected) < 0.01 * expected;
+    return pixel.x < 40;
+  };
+  const scene::Image surface = continued_surfaces(plane_with(hole), left_is_free, 1);
+  EXPECT_TRUE(all_on_plane) << "it asks for the point at the middle of a pixel, on the plane";
+  for (int y = hole.y0; y < hole.y1; ++y)
+    for (int x = hole.x0; x < hole.x1; ++x) ASSERT_EQ(surface.at(x, y) != 0, x >= 40) << x << ", " << y;
+}
+
+TEST(ContinuedSurfaces, ItDoesNotGoOnBeyondItsEnd) {
+  // The surface is in one half only: what is missing beside it, or below it, is not amid it.
+  EXPECT_EQ(count(continued_surfaces(plane_with({36, 0, width, height}), nowhere_free, 1)), 0u);
+  EXPECT_EQ(count(continued_surfaces(plane_with({0, 40, width, height}), nowhere_free, 1)), 0u);
+}
+
+TEST(ContinuedSurfaces, WhatIsSeenInFrontHidesIt) {
+  EXPECT_EQ(count(continued_surfaces(plane_with(hole, 0.8), nowhere_free, 1)), 0u);
+}
+
+TEST(ContinuedSurfaces, WhereItIsSeenItselfItOnlyReplacesWhatIsDoubtful) {
+  SurfaceView view = plane_with(hole);
+  for (int y = hole.y0; y < hole.y1; ++y)
+    for (int x = hole.x0; x < hole.x1; ++x) view.inverse_depth.at(x, y) = float(tilted(x, y));
+  EXPECT_EQ(count(continued_surfaces(view, nowhere_free, 1)), 0u);
+  view.doubtful = view.vacated;
+  expect_goes_on(continued_surfaces(view, nowhere_free, 1));
+}
+
+TEST(ContinuedSurfaces, OnlyWherePartsHaveLeft) {
+  SurfaceView view = plane_with(hole);
+  view.vacated = scene::Mask(width, height);
+  EXPECT_EQ(count(continued_surfaces(view, nowhere_free, 1)), 0u);
+}
+
+TEST(ContinuedSurfaces, OfTwoTheNearerGoesOnAndTheFartherWhereThatCannotBe) {
+  // A near plane as a frame around the hole, within a far one.
+  SurfaceView view = plane_with(hole);
+  const double far_plane = 0.2;
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      if (!inside({15, 10, 60, 52}, x, y)) view.inverse_depth.at(x, y) = float(far_plane);
+  expect_goes_on(continued_surfaces(view, nowhere_free, 1));
+  const auto near_is_free = [](DVec2, double inverse_depth) { return inverse_depth > 0.25; };
+  const scene::Image surface = continued_surfaces(view, near_is_free, 1);
+  for (int y = hole.y0; y < hole.y1; ++y)
+    for (int x = hole.x0; x < hole.x1; ++x) ASSERT_NEAR(surface.at(x, y), far_plane, 0.002) << x << ", " << y;
+}
+
+TEST(ContinuedSurfaces, AFewPixelsAreNoSurface) {
+  SurfaceView view = plane_with(hole);
+  view.shows_surface = scene::Mask(width, height);
+  EXPECT_EQ(count(continued_surfaces(view, nowhere_free, 1)), 0u) << "none at all";
+  for (int i = 0; i < 8; ++i) view.shows_surface.at(5 + 8 * i, 10) = view.shows_surface.at(5 + 8 * i, 50) = 1;
+  EXPECT_EQ(count(continued_surfaces(view, nowhere_free, 1)), 0u);
+}
+
+TEST(ContinuedSurfaces, GivesTheSameBytesForAnyNumberOfThreads) {
+  SurfaceView view = plane_with(hole);
+  Rng rng(3);
+  for (float& value : view.inverse_depth.data) value *= 1 + 0.002f * rng.normal();
+  const scene::Image first = continued_surfaces(view, nowhere_free, 7);
+  EXPECT_GT(count(first), 0u);
+  for (const int threads : {1, 2, 4})
+    WorkArena(threads).run([&] { EXPECT_EQ(continued_surfaces(view, nowhere_free, 7), first) << threads; });
+}
+
+}  // namespace
+}  // namespace engine::edit
