@@ -11,6 +11,7 @@
 #include "engine/edit/trust.h"
 #include "engine/mask/mask.h"
 #include "engine/render/forward.h"
+#include "engine/render/project.h"
 
 namespace engine::edit {
 namespace {
@@ -58,6 +59,12 @@ std::vector<std::size_t> nearest_views(std::span<const scene::Camera> views, std
   return order;
 }
 
+/// Logit of the opacity two of which, one behind the other, are as opaque as one of this.
+float halved(float logit) {
+  const double through = std::sqrt(1 - render::opacity<double>(logit));
+  return float(std::log1p(-through) - std::log(through));
+}
+
 /// While it lives, what a drawn-out part leaves along its way is as opaque as the part: it was only made half
 /// transparent so that the optimisation can choose, and a picture that shows it so is no picture of the scene.
 class Opaque {
@@ -65,10 +72,12 @@ class Opaque {
   Opaque(WorkingScene& working, const scene::GaussianCloud& original, Mode mode)
       : working_(working), lowered_(working.cloud.opacity_logit) {
     if (mode == Mode::move) return;
+    const bool trails = std::find(working.role.begin(), working.role.end(), Role::trail) != working.role.end();
     for (std::size_t row = 0; row < working.role.size(); ++row)
       if (working.role[row] == Role::original || working.role[row] == Role::trail) {
         float& logit = working.cloud.opacity_logit[row];
-        logit = std::max(logit, original.opacity_logit[working.parent[row]]);
+        logit = std::max(logit, trails ? halved(original.opacity_logit[working.parent[row]])
+                                       : original.opacity_logit[working.parent[row]]);
       }
   }
   ~Opaque() { std::copy(lowered_.begin(), lowered_.end(), working_.cloud.opacity_logit.begin()); }
