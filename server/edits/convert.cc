@@ -62,8 +62,6 @@ proto::Interpolation to_wire(edit::Interpolation interpolation) {
   return proto::Interpolation::paper;
 }
 
-proto::Preset preset_of(const proto::EditRequest& request) { return request.preset.value_or(proto::Preset::standard); }
-
 edit::Params to_engine(const proto::Params& given, proto::Preset preset) {
   edit::Params params = preset_params(preset);
   if (given.intervals) params.intervals = *given.intervals;
@@ -111,6 +109,8 @@ edit::Params preset_params(proto::Preset preset) {
   }
   return params;
 }
+
+proto::Preset preset_of(const proto::EditRequest& request) { return request.preset.value_or(proto::Preset::standard); }
 
 proto::Corrector corrector_of(const proto::EditRequest& request) {
   return request.params.corrector.value_or(preset_of(request) == proto::Preset::preview ? proto::Corrector::none
