@@ -81,11 +81,6 @@ edit::Params to_engine(const proto::Params& given, proto::Preset preset) {
   return params;
 }
 
-/// Does a corrector do anything in such an edit?
-bool corrects(const proto::EditRequest& request, const edit::Params& params) {
-  return params.iterations > 0 && corrector_of(request) != proto::Corrector::none;
-}
-
 }  // namespace
 
 edit::Params preset_params(proto::Preset preset) {
@@ -115,6 +110,10 @@ proto::Preset preset_of(const proto::EditRequest& request) { return request.pres
 proto::Corrector corrector_of(const proto::EditRequest& request) {
   return request.params.corrector.value_or(preset_of(request) == proto::Preset::preview ? proto::Corrector::none
                                                                                         : proto::Corrector::scene);
+}
+
+bool corrects(const proto::EditRequest& request, const edit::Params& params) {
+  return params.iterations > 0 && corrector_of(request) != proto::Corrector::none;
 }
 
 std::unique_ptr<engine::correct::Corrector> make_corrector(const proto::EditRequest& request) {

@@ -21,6 +21,10 @@ namespace server::edits {
 /// The corrector of a request: that of its preset if it names none.
 [[nodiscard]] proto::Corrector corrector_of(const proto::EditRequest& request);
 
+/// Does a corrector do anything in this edit? It works for the optimisation only. Precondition: `params` are those of
+/// to_engine(request).
+[[nodiscard]] bool corrects(const proto::EditRequest& request, const engine::edit::Params& params);
+
 /// A new one of that kind; null: `none`. Precondition: to_engine(request) succeeds.
 [[nodiscard]] std::unique_ptr<engine::correct::Corrector> make_corrector(const proto::EditRequest& request);
 

@@ -16,7 +16,10 @@ Workload typical() {
           .dragged = 6000,
           .copies = 6000,
           .intervals = 4,
+          .iterations = 100,
+          .corrections = 1,
           .candidates = 40,
+          .candidate_pixels = 640 * 480,
           .virtual_views = false,
           .views = 40,
           .pictured = 4,
@@ -41,7 +44,9 @@ TEST(Estimate, GrowsWithEverythingThatCosts) {
                                        {"virtual views", [](Workload& w) { w.virtual_views = true; }, true, false},
                                        {"views", [](Workload& w) { ++w.views; }, true, true},
                                        {"pictures", [](Workload& w) { ++w.pictured; }, true, false},
-                                       {"iterations", [](Workload& w) { w.iterations = 100; }, true, true},
+                                       {"iterations", [](Workload& w) { w.iterations *= 2; }, true, false},
+                                       {"corrections", [](Workload& w) { ++w.corrections; }, true, false},
+                                       {"candidates' size", [](Workload& w) { w.candidate_pixels *= 2; }, true, false},
                                        {"picture size", [](Workload& w) { w.view_pixels *= 2; }, true, true},
                                        {"a slower machine", [](Workload& w) { w.probe_seconds *= 2; }, true, false}};
   for (const Growth& growth : growths) {
@@ -73,6 +78,7 @@ TEST(Estimate, MemoryHoldsTheWorkingCopyAndAPicturesScene) {
 
 TEST(Estimate, AnOptimisationHoldsEveryViewItSetsUp) {
   Workload work = typical();
+  work.iterations = work.corrections = 0;
   const auto plain = estimated_bytes(work);
   work.iterations = 1;
   const auto one = estimated_bytes(work);
@@ -82,6 +88,25 @@ TEST(Estimate, AnOptimisationHoldsEveryViewItSetsUp) {
   work.iterations = 1000;
   EXPECT_EQ(estimated_bytes(work), one) << "more iterations take more time, not more memory";
   EXPECT_GT(estimated_seconds(work), seconds);
+}
+
+TEST(Estimate, ACorrectionHoldsTheUneditedSceneAndLooksAtEveryView) {
+  Workload work = typical();
+  work.corrections = 0;
+  const auto plain = estimated_bytes(work);
+  const double seconds = estimated_seconds(work);
+  work.corrections = 1;
+  const auto one = estimated_bytes(work);
+  const double once = estimated_seconds(work);
+  EXPECT_GE(one - plain, work.views * (16 + 1 + 12) * work.view_pixels + work.gaussians * work.row_bytes);
+  // Two frames of each view in each interval, and one of each camera and view before the first.
+  const double frames = frame_seconds(work, work.view_pixels) * double(work.views);
+  EXPECT_GE(once - seconds, (2 * work.intervals + 1) * frames);
+  work.corrections = 3;
+  EXPECT_EQ(estimated_bytes(work), one) << "more corrections take more time, not more memory";
+  EXPECT_GE(estimated_seconds(work) - once, 2 * 2 * work.intervals * frames);
+  work.intervals *= 2;
+  EXPECT_GE(estimated_seconds(work) - once, 5 * 2 * double(work.intervals) / 2 * frames);
 }
 
 }  // namespace
