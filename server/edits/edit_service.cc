@@ -248,7 +248,8 @@ Result<proto::EditEstimate> EditService::estimate(const proto::EditRequest& requ
   work.copies = checked->preview.overlay.added();
   work.intervals = checked->preview.intervals;
   work.iterations = std::size_t(params.iterations) * std::size_t(params.annealing_steps);
-  work.corrections = corrects(*asked, params) ? std::size_t(params.annealing_steps) : 0;
+  work.rounds = std::size_t(params.annealing_steps);
+  work.corrected = corrects(*asked, params);
   work.candidates = candidates->count;
   work.candidate_pixels = std::size_t(camera.width) * std::size_t(camera.height);
   work.virtual_views = candidates->are_virtual;

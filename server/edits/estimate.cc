@@ -18,8 +18,9 @@ constexpr double row_seconds = 2e-8;         // to copy one Gaussian
 constexpr double dome_seconds = 1e-7;        // per Gaussian, to find virtual cameras
 constexpr double drag_seconds = 2e-6;        // to deform, paste and relocate one dragged Gaussian
 constexpr double jpeg_pixel_seconds = 1.5e-8;
-constexpr double write_seconds = 1e-3;  // until a picture is on disk
-constexpr double observe_share = 0.7;   // of a whole frame's time: what a camera has seen
+constexpr double write_seconds = 1e-3;                    // until a picture is on disk
+constexpr double least_part = 0.06, part_of_dragged = 7;  // of a whole frame's time: an iteration
+constexpr double observe_share = 0.7;                     // of a whole frame's time: what a camera has seen
 constexpr double correction_frames = 2.5;
 constexpr double correction_pixel_seconds = 2e-7;  // to fill a picture, where a tenth of it is to be filled
 constexpr double least_seconds = 0.05;             // records, checkpoints, the version file
@@ -46,11 +47,14 @@ double estimated_seconds(const Workload& work) {
                           2 * intervals * pictured * write_seconds;
   const double rows = row_seconds * n * (work.layered ? 3 : 2) + (work.virtual_views ? dome_seconds * n : 0) +
                       drag_seconds * double(work.dragged) * intervals;
-  const double iterations = work.iterations > 0 ? intervals * (views + double(work.iterations)) * view_frame : 0.0;
+  const double part = n > 0 ? std::min(1.0, least_part + part_of_dragged * double(work.dragged) / n) : 0.0;
+  const double iterations =
+      work.iterations > 0 ? intervals * (double(work.rounds) * views + part * double(work.iterations)) * view_frame
+                          : 0.0;
   const double corrections =
-      work.corrections > 0
+      work.corrected
           ? observe_share * double(work.candidates) * frame_seconds(work, work.candidate_pixels) + views * view_frame +
-                intervals * double(work.corrections) * views *
+                intervals * double(work.rounds) * views *
                     (correction_frames * view_frame + correction_pixel_seconds * pixels)
           : 0.0;
   return least_seconds + masks + pictures + iterations + corrections + rows;
@@ -63,9 +67,9 @@ std::uint64_t estimated_bytes(const Workload& work) {
       work.iterations > 0 ? work.views * trained_pixel_bytes * work.view_pixels +
                                 std::min<std::uint64_t>(work.views * frozen_row_bytes * n, engine::edit::frozen_memory)
                           : 0;
-  const std::uint64_t corrected = work.corrections > 0 ? work.views * corrected_pixel_bytes * work.view_pixels +
-                                                             n * (work.row_bytes + corrected_row_bytes)
-                                                       : 0;
+  const std::uint64_t corrected = work.corrected ? work.views * corrected_pixel_bytes * work.view_pixels +
+                                                       n * (work.row_bytes + corrected_row_bytes)
+                                                 : 0;
   return rows * work.row_bytes + n * frame_row_bytes + (work.views + frame_pixel_bytes) * work.view_pixels + trained +
          corrected;
 }
