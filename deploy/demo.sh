@@ -58,11 +58,11 @@ scene=$(call POST '/v1/scenes?name=demo' --header 'Content-Type: application/oct
 call_json PUT "/v1/scenes/$scene/dataset" '{"path": "."}' |
   jq -r '"Scene \(.id): \(.gaussians) Gaussians, \(.views) views"'
 
-request=$(jq --arg scene "$scene" '. + {scene: $scene, version: 0}' "$out/input/drags/ball.json")
+request=$(jq --arg scene "$scene" '. + {scene: $scene, version: 0, preset: "draft"}' "$out/input/drags/ball.json")
 edit=$(call_json POST /v1/edits "$request" | jq -r .id)
 while :; do
   status=$(call GET "/v1/edits/$edit")
-  jq -r '"Edit \(.id): \(.state), interval \(.interval) of \(.intervals), \((.progress * 100) | floor) %"' <<<"$status"
+  jq -r '"Edit \(.id): \(.state), interval \(.interval) of \(.intervals), \((.progress * 100) | floor) %\(if .stage then ": " + .stage else "" end)"' <<<"$status"
   case $(jq -r .state <<<"$status") in
     succeeded) break ;;
     failed | cancelled)

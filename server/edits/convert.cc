@@ -62,8 +62,6 @@ proto::Interpolation to_wire(edit::Interpolation interpolation) {
   return proto::Interpolation::paper;
 }
 
-proto::Preset preset_of(const proto::EditRequest& request) { return request.preset.value_or(proto::Preset::standard); }
-
 edit::Params to_engine(const proto::Params& given, proto::Preset preset) {
   edit::Params params = preset_params(preset);
   if (given.intervals) params.intervals = *given.intervals;
@@ -81,11 +79,6 @@ edit::Params to_engine(const proto::Params& given, proto::Preset preset) {
   if (given.rotate_sh) params.rotate_sh = *given.rotate_sh;
   if (given.seed) params.seed = *given.seed;
   return params;
-}
-
-/// Does a corrector do anything in such an edit?
-bool corrects(const proto::EditRequest& request, const edit::Params& params) {
-  return params.iterations > 0 && corrector_of(request) != proto::Corrector::none;
 }
 
 }  // namespace
@@ -112,9 +105,15 @@ edit::Params preset_params(proto::Preset preset) {
   return params;
 }
 
+proto::Preset preset_of(const proto::EditRequest& request) { return request.preset.value_or(proto::Preset::standard); }
+
 proto::Corrector corrector_of(const proto::EditRequest& request) {
   return request.params.corrector.value_or(preset_of(request) == proto::Preset::preview ? proto::Corrector::none
                                                                                         : proto::Corrector::scene);
+}
+
+bool corrects(const proto::EditRequest& request, const edit::Params& params) {
+  return params.iterations > 0 && corrector_of(request) != proto::Corrector::none;
 }
 
 std::unique_ptr<engine::correct::Corrector> make_corrector(const proto::EditRequest& request) {

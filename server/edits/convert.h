@@ -15,13 +15,20 @@ namespace server::edits {
 /// What a preset stands for. How the numbers were found: docs/tradeoff.md.
 [[nodiscard]] engine::edit::Params preset_params(proto::Preset preset);
 
+/// The preset of a request: `standard` if it names none.
+[[nodiscard]] proto::Preset preset_of(const proto::EditRequest& request);
+
 /// The corrector of a request: that of its preset if it names none.
 [[nodiscard]] proto::Corrector corrector_of(const proto::EditRequest& request);
+
+/// Does a corrector do anything in this edit? It works for the optimisation only. Precondition: `params` are those of
+/// to_engine(request).
+[[nodiscard]] bool corrects(const proto::EditRequest& request, const engine::edit::Params& params);
 
 /// A new one of that kind; null: `none`. Precondition: to_engine(request) succeeds.
 [[nodiscard]] std::unique_ptr<engine::correct::Corrector> make_corrector(const proto::EditRequest& request);
 
-/// The engine's request, with what was left open filled in from the preset; no preset: `standard`.
+/// The engine's request, with what was left open filled in from the preset.
 ///   errors  unsupported: a corrector, perceptual loss or background this build does not have (`where` is
 ///           "params.corrector")
 [[nodiscard]] engine::Result<engine::edit::Request> to_engine(const proto::EditRequest& request);

@@ -248,7 +248,10 @@ Result<proto::EditEstimate> EditService::estimate(const proto::EditRequest& requ
   work.copies = checked->preview.overlay.added();
   work.intervals = checked->preview.intervals;
   work.iterations = std::size_t(params.iterations) * std::size_t(params.annealing_steps);
+  work.rounds = std::size_t(params.annealing_steps);
+  work.corrected = corrects(*asked, params);
   work.candidates = candidates->count;
+  work.candidate_pixels = std::size_t(camera.width) * std::size_t(camera.height);
   work.virtual_views = candidates->are_virtual;
   work.views = std::min(candidates->usable, std::size_t(params.views));
   work.pictured = std::min(work.views, std::size_t(std::max(0, impl_->options.pictured_views)));

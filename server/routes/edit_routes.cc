@@ -8,6 +8,7 @@
 #include "engine/core/numbers.h"
 #include "proto/edit_request.h"
 #include "proto/edit_status.h"
+#include "server/edits/convert.h"
 #include "server/http/negotiation.h"
 
 namespace server::routes {
@@ -58,7 +59,7 @@ engine::Error beyond(const std::string& limit, const std::string& option, std::s
           std::move(where)};
 }
 
-/// Holds a value against a limit. What is not given is the engine's default, or the limit where that is less.
+/// Holds a value against a limit. What is not given is left to the preset, or is the limit where that is less.
 Result<void> check(std::optional<int>& value, int usual, int limit, const std::string& option,
                    const std::string& where) {
   if (value && *value > limit) return tl::make_unexpected(beyond(std::to_string(limit), option, where));
@@ -72,7 +73,7 @@ Result<proto::EditRequest> requested(const Call& call, const EditLimits& limits)
   if (!request) return request;
   if (request->handles.size() > limits.handles)
     return tl::make_unexpected(beyond(std::to_string(limits.handles), "--max-handles", "handles"));
-  const engine::edit::Params usual;
+  const engine::edit::Params usual = edits::preset_params(edits::preset_of(*request));
   proto::Params& params = request->params;
   if (auto ok = check(params.views, usual.views, limits.views, "--max-views", "params.views"); !ok)
     return propagate(ok);

@@ -60,7 +60,7 @@ TEST(EditRequest, ReadsEveryField) {
   EXPECT_EQ(params.views, 30);
   EXPECT_EQ(params.exclude_views, std::vector<std::string>{"view_03.png"});
   EXPECT_EQ(params.max_image_side, 512);
-  EXPECT_EQ(params.corrector, Corrector::none);
+  EXPECT_EQ(params.corrector, Corrector::scene);
   EXPECT_EQ(params.perceptual, Perceptual::msssim);
   EXPECT_EQ(params.rotation, Rotation::shortest_arc);
   EXPECT_EQ(params.interpolation, Interpolation::smooth);

@@ -266,6 +266,32 @@ describe('an edit', () => {
     await client.get(`/v1/edits/${first.id}/intervals/1/renders/99`, { query: { stage: 'before' }, expect: 404 });
   });
 
+  test('asked for nothing special is corrected as well, tells so, and shows what it was corrected to', async () => {
+    const { preset: _, ...plain } = demo.ball;
+    const request = { scene: scene.id, ...plain, params: { intervals: 2, annealing_steps: 2, iterations: 10, views: 6, max_image_side: 160 } };
+    const accepted = await client.submit(request);
+    assert.equal(accepted.request.preset, 'standard');
+    assert.equal(accepted.request.params.corrector, 'scene');
+    const events = await client.events(accepted.id);
+    assert.ok(events.some(({ edit }) => edit.stage === 'correct'), `${[...new Set(events.map(({ edit }) => edit.stage))]}`);
+    events.slice(1).forEach(({ edit }, i) => assert.ok(edit.progress >= events[i].edit.progress, 'progress never falls'));
+    const edit = events.at(-1).edit;
+    assert.equal(edit.state, 'succeeded', JSON.stringify(edit.error));
+    assert.deepEqual(edit.warnings, []);
+    assert.equal(edit.request.params.annealing_steps, 2);
+    for (const field of ['strength_initial', 'strength_final', 'annealing']) assert.ok(edit.request.params[field], field);
+    assert.equal(edit.finished_intervals.length, 2);
+    for (const { renders, loss } of edit.finished_intervals) {
+      assert.ok(loss > 0);
+      for (const { stages } of renders) {
+        assert.deepEqual(Object.keys(stages), ['before', 'deformed', 'corrected', 'optimised']);
+        const pictures = await Promise.all(Object.values(stages).map(async (link) => (await client.get(link)).body.toString('base64')));
+        assert.equal(new Set(pictures).size, 4, 'each shows something else');
+      }
+    }
+    assert.deepEqual((await client.get(edit.links.file)).body, await editedByCommandLine(path.join(demo.folder, 'scene.ply'), demo.folder, request));
+  });
+
   test('can be followed by events, each of them news, to the last', async () => {
     const { id } = await client.submit({ scene: scene.id, ...demo.leaf });
     const events = await client.events(id);
@@ -283,14 +309,14 @@ describe('an edit', () => {
     const before = await client.file(scene.id, 1);
     const [handle] = demo.ball.handles;
     const back = { ...handle, source: handle.target, target: handle.source };
-    const { id } = await client.submit({ scene: scene.id, version: 1, handles: [back] });
+    const { id } = await client.submit({ scene: scene.id, version: 1, preset: 'preview', handles: [back] });
     const { result_version: version } = await client.succeeded(id);
     const info = (await client.get(`/v1/scenes/${scene.id}`)).json().versions.find((one) => one.version === version);
     assert.equal(info.parent, 1);
     assert.deepEqual(await client.file(scene.id, 1), before);
     const folder = temporaryFolder();
     await writeFile(path.join(folder, 'v1.ply'), before);
-    assert.deepEqual(await client.file(scene.id, version), await editedByCommandLine(path.join(folder, 'v1.ply'), demo.folder, { handles: [back] }));
+    assert.deepEqual(await client.file(scene.id, version), await editedByCommandLine(path.join(folder, 'v1.ply'), demo.folder, { preset: 'preview', handles: [back] }));
   });
 
   test('of nothing gives the very bytes back', async () => {
@@ -493,7 +519,7 @@ describe('a real capture', () => {
     assert.equal(withDataset.dataset.views, 50);
     assert.ok(Math.abs(withDataset.dataset.psnr_mean_db - 35.2) < 1, `PSNR ${withDataset.dataset.psnr_mean_db}`);  // 35.2 is of all photos
     assert.equal(withDataset.dataset.psnr_worst_view, '0115.jpg');
-    const request = { scene: capture.id, ...real.drags.ear_up };
+    const request = { scene: capture.id, ...real.drags.ear_up, preset: 'preview' };
     const preview = (await client.post('/v1/previews', request)).json();
     const { id } = await client.submit(request);
     const [events, edit] = await Promise.all([client.events(id), client.succeeded(id)]);

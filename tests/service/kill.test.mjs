@@ -66,23 +66,28 @@ test('killed at twenty moments, an edit goes on each time and ends with the same
   assert.ok(resumed >= 3, `only ${resumed} of ${kills} kills hit an edit with a finished interval`);
 });
 
-test('killed in the middle of optimising, with other numbers of threads, an edit ends with the same bytes', async () => {
-  const params = { intervals: 3, iterations: 75, annealing_steps: 2, views: 8, max_image_side: 320 };
-  const optimised = { ...request, params };
-  const undisturbed = await service.client.succeeded((await service.client.submit(optimised)).id);
-  for (const finished of undisturbed.finished_intervals) assert.ok(finished.loss > 0);
+test('killed in the middle of correcting and optimising, with other numbers of threads, an edit ends with the same bytes', async () => {
+  const params = { intervals: 3, iterations: 75, annealing_steps: 2, views: 8, max_image_side: 320, corrector: 'scene' };
+  const corrected = { ...request, params };
+  const undisturbed = await service.client.succeeded((await service.client.submit(corrected)).id);
+  assert.equal(undisturbed.request.params.corrector, 'scene');
+  for (const { loss, renders } of undisturbed.finished_intervals) {
+    assert.ok(loss > 0);
+    assert.ok(renders[0].stages.corrected);
+  }
+  const pictures = async (edit) => Promise.all(edit.finished_intervals.flatMap(({ renders }) => renders).flatMap(({ stages }) =>
+    ['corrected', 'optimised'].map(async (stage) => (await service.client.get(stages[stage])).body.toString('base64'))));
   const expected = await service.client.file(scene.id, undisturbed.result_version);
   assert.notDeepEqual(expected, truth, 'it makes a difference');
 
-  const { id } = await service.client.submit(optimised);
+  const { id } = await service.client.submit(corrected);
   const args = service.args;
   try {
-    for (const [interval, threads] of [[1, 1], [2, 4], [2, 2], [3, 4], [3, 1]]) {
-      const from = 1 + Math.floor(random() * 90);  // of 150: news come ten times a second
-      const hit = await service.client.until(id, (edit) => edit.interval === interval && edit.iteration >= from, { every: 5 });
-      assert.equal(hit.stage, 'optimise');
+    for (const [interval, stage, threads] of [[1, 'optimise', 1], [1, 'correct', 3], [2, 'optimise', 4], [2, 'correct', 2], [3, 'optimise', 4], [3, 'optimise', 1]]) {
+      const from = stage === 'optimise' ? 1 + Math.floor(random() * 90) : 0;  // of 150: news come ten times a second
+      const hit = await service.client.until(id, (edit) => edit.interval === interval && edit.stage === stage && edit.iteration >= from, { every: 5 });
       assert.equal(hit.iterations, 150);
-      assert.ok(hit.loss > 0, 'the loss of a running iteration is told');
+      if (stage === 'optimise') assert.ok(hit.loss > 0, 'the loss of a running iteration is told');
       service.args = [...args, '--threads', threads];
       await again();
       const edit = await service.client.edit(id);
@@ -95,6 +100,7 @@ test('killed in the middle of optimising, with other numbers of threads, an edit
   assert.equal(edit.loss, null);
   assert.deepEqual(edit.finished_intervals.map(({ loss }) => loss), undisturbed.finished_intervals.map(({ loss }) => loss));
   assert.deepEqual(await service.client.file(scene.id, edit.result_version), expected);
+  assert.deepEqual(await pictures(edit), await pictures(undisturbed));
   await again();  // with the usual threads
 });
 

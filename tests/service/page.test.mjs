@@ -113,8 +113,14 @@ describe('the page', () => {
 
   test('runs the edit, shows its pictures as they come, and stops it to keep what there is', async () => {
     await id('settings').locator('summary').click();
+    const offered = (testid) => id(testid).locator('option:not([disabled])').evaluateAll((options) => options.map(({ value }) => value));
+    assert.deepEqual(await offered('preset'), ['', 'draft', 'standard', 'paper']);
+    assert.deepEqual(await offered('corrector'), ['', 'none', 'scene'], 'what this build has');
+    await id('preset').selectOption('draft');
+    await id('corrector').selectOption('scene');
     await id('param-intervals').fill('20');
-    await id('param-image-side').fill('800');
+    await id('param-views').fill('4');
+    await id('param-image-side').fill('160');
     await id('param-image-side').blur();
     await id('run').click();
     await id('tab-edits').waitFor();
@@ -125,6 +131,8 @@ describe('the page', () => {
     assert.equal(edit.stopped_early, true);
     assert.ok(edit.finished_intervals.length < 20);
     assert.equal(edit.result_version, 1);
+    assert.deepEqual([edit.request.preset, edit.request.params.corrector], ['draft', 'scene']);
+    assert.ok(edit.finished_intervals[0].renders[0].stages.corrected);
   });
 
   test('shows the result, and downloads it', async () => {

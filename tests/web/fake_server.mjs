@@ -273,11 +273,11 @@ export function start({ port = 0, token = null, slow = 0, empty = false, tick = 
         `handles[${i}].radius`,
       );
     });
-    if (request.params?.corrector && request.params.corrector !== "none")
+    if (request.params?.corrector === "sd")
       fail(
         422,
         "unsupported",
-        `this build has no corrector "${request.params.corrector}"; available: "none"`,
+        'this build has no corrector "sd"; available: "scene", which is the default, and "none"',
         "params.corrector",
       );
     const intervals =
@@ -388,7 +388,8 @@ export function start({ port = 0, token = null, slow = 0, empty = false, tick = 
         devices: ["cpu"],
         correctors: [
           { name: "none", available: true, reason: null },
-          { name: "scene", available: false, reason: "not in this build" },
+          { name: "scene", available: true, reason: null },
+          { name: "sd", available: false, reason: "this version cannot load a diffusion model yet" },
         ],
         formats: {
           read: ["ply", "compressed_ply", "splat", "spz"],
@@ -533,7 +534,7 @@ export function start({ port = 0, token = null, slow = 0, empty = false, tick = 
           intervals,
           gaussians: { input: points.length, output: points.length, removed: 0, copies: moved, changeable: 2 * moved },
           seconds: 0.08,
-          warnings: json.preset === "standard" ? ["preset has no effect in this build"] : [],
+          warnings: json.prompt ? ["without effect on this edit: prompt"] : [],
           links: {},
         };
       },
@@ -543,9 +544,12 @@ export function start({ port = 0, token = null, slow = 0, empty = false, tick = 
       /^\/v1\/edits$/,
       ({ json, query, reply }) => {
         const { counts, intervals } = check(json);
+        const preset = json.preset ?? "standard";
         const request = {
           ...json,
+          preset,
           params: {
+            corrector: preset === "preview" ? "none" : "scene",
             views: 50,
             max_image_side: 512,
             rotation: "shortest_arc",

@@ -2,12 +2,21 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
+#include <vector>
+
+#include "tests/engine/jobs/jobs_support.h"
 #include "tests/proto/examples.h"
 
 namespace server::edits {
 namespace {
 
 namespace edit = engine::edit;
+
+using engine::jobs::value;
+
+constexpr proto::Preset every_preset[] = {proto::Preset::preview, proto::Preset::draft, proto::Preset::standard,
+                                          proto::Preset::paper};
 
 proto::EditRequest full_request() { return proto::parse_edit_request(proto::example("move_ball.json")).value(); }
 
@@ -39,38 +48,127 @@ TEST(Convert, CarriesEveryFieldTheEngineKnows) {
   EXPECT_TRUE(edit::validate(*request));
 }
 
-TEST(Convert, LeavesWhatIsNotGivenToTheEngine) {
+/// Equal in what a preset sets.
+void expect_same(const edit::Params& a, const edit::Params& b) {
+  EXPECT_EQ(a.intervals, b.intervals);
+  EXPECT_EQ(a.views, b.views);
+  EXPECT_EQ(a.max_image_side, b.max_image_side);
+  EXPECT_EQ(a.iterations, b.iterations);
+  EXPECT_EQ(a.annealing_steps, b.annealing_steps);
+  EXPECT_EQ(a.strength_initial, b.strength_initial);
+  EXPECT_EQ(a.strength_final, b.strength_final);
+  EXPECT_EQ(a.annealing, b.annealing);
+}
+
+TEST(Convert, LeavesWhatNeitherRequestNorPresetSaysToTheEngine) {
   const auto request = to_engine(proto::parse_edit_request(proto::example("stretch_apple.json")).value());
   ASSERT_TRUE(request);
   const edit::Params defaults;
   EXPECT_EQ(request->mode, edit::Mode::extend);
-  EXPECT_EQ(request->params.intervals, defaults.intervals);
-  EXPECT_EQ(request->params.views, defaults.views);
   EXPECT_EQ(request->params.rotation, defaults.rotation);
   EXPECT_EQ(request->params.interpolation, defaults.interpolation);
   EXPECT_EQ(request->params.rotate_sh, defaults.rotate_sh);
+  EXPECT_EQ(request->params.seed, defaults.seed);
 }
 
-TEST(Convert, FillsInThePaperPresetWhereNothingIsGiven) {
-  proto::EditRequest asked = full_request();
-  ASSERT_EQ(asked.preset, proto::Preset::paper);
-  EXPECT_EQ(to_engine(asked)->params.intervals, 4) << "given, so the preset does not count";
-  asked.params = {};
-  EXPECT_EQ(to_engine(asked)->params.intervals, 5);
-  EXPECT_EQ(to_engine(asked)->params.views, 50);
-  asked.preset = proto::Preset::preview;
-  EXPECT_EQ(to_engine(asked)->params.intervals, 0) << "from the length of the drag";
+TEST(Convert, NoPresetIsStandard) {
+  const proto::EditRequest none = proto::parse_edit_request(proto::example("stretch_apple.json")).value();
+  ASSERT_EQ(none.preset, std::nullopt);
+  EXPECT_EQ(preset_of(none), proto::Preset::standard);
+  proto::EditRequest standard = none;
+  standard.preset = proto::Preset::standard;
+  expect_same(value(to_engine(none)).params, value(to_engine(standard)).params);
+  EXPECT_EQ(corrector_of(none), corrector_of(standard));
 }
 
-TEST(Convert, RefusesACorrectorThisBuildHasNotAndNamesTheOneItHas) {
-  for (const auto corrector : {proto::Corrector::scene, proto::Corrector::sd}) {
+TEST(Convert, EachPresetFillsInWhatIsNotGiven) {
+  for (const auto preset : every_preset) {
+    SCOPED_TRACE(proto::name_of(preset));
     proto::EditRequest asked = full_request();
-    asked.params.corrector = corrector;
+    asked.preset = preset;
+    asked.params = {};
+    expect_same(value(to_engine(asked)).params, preset_params(preset));
+    EXPECT_TRUE(edit::validate(value(to_engine(asked))));
+  }
+}
+
+TEST(Convert, WhatIsGivenCountsMoreThanAnyPreset) {
+  for (const auto preset : every_preset) {
+    SCOPED_TRACE(proto::name_of(preset));
+    const edit::Params usual = preset_params(preset);
+    proto::EditRequest asked = full_request();
+    asked.preset = preset;
+    asked.params = {};
+    asked.params.intervals = 1 + usual.intervals % 20;
+    asked.params.views = usual.views + 1;
+    asked.params.max_image_side = usual.max_image_side + 1;
+    asked.params.iterations = usual.iterations + 1;
+    asked.params.annealing_steps = usual.annealing_steps + 1;
+    asked.params.strength_initial = usual.strength_initial / 2;
+    asked.params.strength_final = usual.strength_final / 2;
+    asked.params.annealing = proto::Annealing::paper;
+    const edit::Params params = value(to_engine(asked)).params;
+    EXPECT_EQ(params.intervals, asked.params.intervals);
+    EXPECT_EQ(params.views, asked.params.views);
+    EXPECT_EQ(params.max_image_side, asked.params.max_image_side);
+    EXPECT_EQ(params.iterations, asked.params.iterations);
+    EXPECT_EQ(params.annealing_steps, asked.params.annealing_steps);
+    EXPECT_EQ(params.strength_initial, asked.params.strength_initial);
+    EXPECT_EQ(params.strength_final, asked.params.strength_final);
+    EXPECT_EQ(params.annealing, edit::Annealing::paper);
+  }
+}
+
+TEST(Convert, APreviewDeformsAndEveryOtherPresetOptimisesAtMostAsMuchAsTheNext) {
+  const auto work = [](proto::Preset preset) {
+    const edit::Params params = preset_params(preset);
+    return params.intervals * params.annealing_steps * params.iterations;
+  };
+  EXPECT_EQ(preset_params(proto::Preset::preview).iterations, 0);
+  EXPECT_EQ(preset_params(proto::Preset::preview).intervals, 0) << "from the length of the drag";
+  EXPECT_GT(work(proto::Preset::draft), 0);
+  EXPECT_LE(work(proto::Preset::draft), work(proto::Preset::standard));
+  EXPECT_LE(work(proto::Preset::standard), work(proto::Preset::paper));
+  // What the contract promises of the default, and the numbers of the paper.
+  const edit::Params standard = preset_params(proto::Preset::standard), paper = preset_params(proto::Preset::paper);
+  EXPECT_LE(work(proto::Preset::standard), 3000);
+  EXPECT_LE(standard.intervals * standard.annealing_steps * standard.views, 300);
+  EXPECT_EQ(paper.intervals, 5);
+  EXPECT_EQ(paper.annealing_steps, 4);
+  EXPECT_EQ(paper.iterations, 500);
+  EXPECT_EQ(paper.views, 50);
+  EXPECT_EQ(paper.strength_initial, 0.5);
+  EXPECT_EQ(paper.strength_final, 0.3);
+}
+
+TEST(Convert, TheCorrectorIsTheGivenOneOrThatOfThePreset) {
+  for (const auto preset : every_preset) {
+    SCOPED_TRACE(proto::name_of(preset));
+    proto::EditRequest asked;
+    asked.preset = preset;
+    const bool deforms_only = preset == proto::Preset::preview;
+    EXPECT_EQ(corrector_of(asked), deforms_only ? proto::Corrector::none : proto::Corrector::scene);
+    EXPECT_EQ(make_corrector(asked) == nullptr, deforms_only);
+    for (const auto corrector : {proto::Corrector::none, proto::Corrector::scene}) {
+      asked.params.corrector = corrector;
+      EXPECT_TRUE(to_engine(asked));
+      EXPECT_EQ(corrector_of(asked), corrector);
+      EXPECT_EQ(make_corrector(asked) == nullptr, corrector == proto::Corrector::none);
+    }
+  }
+}
+
+TEST(Convert, RefusesTheCorrectorThisBuildHasNotAndNamesThoseItHas) {
+  proto::EditRequest asked = full_request();
+  asked.params.corrector = proto::Corrector::sd;
+  for (const auto preset : every_preset) {
+    asked.preset = preset;
     const auto request = to_engine(asked);
     ASSERT_FALSE(request);
     EXPECT_EQ(request.error().code, engine::ErrorCode::unsupported);
     EXPECT_EQ(request.error().where, "params.corrector");
-    EXPECT_NE(request.error().message.find("\"none\""), std::string::npos) << request.error().message;
+    for (const char* name : {"no corrector \"sd\"", "available: \"scene\"", "\"none\""})
+      EXPECT_NE(request.error().message.find(name), std::string::npos) << request.error().message;
   }
 }
 
@@ -86,25 +184,22 @@ TEST(Convert, RefusesALossOrABackgroundThisBuildHasNot) {
   EXPECT_EQ(to_engine(asked).error().where, "params.background");
 }
 
-TEST(Convert, HandsTheParametersOfTheOptimisationOn) {
-  proto::EditRequest asked;
-  EXPECT_EQ(to_engine(asked)->params.iterations, 0);
-  asked.params.iterations = 70, asked.params.annealing_steps = 3;
-  EXPECT_EQ(to_engine(asked)->params.iterations, 70);
-  EXPECT_EQ(to_engine(asked)->params.annealing_steps, 3);
-}
-
 TEST(Convert, EchoesTheRequestWithEveryUsedParameterFilledIn) {
   const auto asked = proto::parse_edit_request(proto::example("stretch_apple.json")).value();
   edit::Params used = to_engine(asked)->params;
   used.intervals = 3;
   const proto::EditRequest echoed = resolved(asked, used);
   EXPECT_EQ(echoed.handles, asked.handles);
+  EXPECT_EQ(echoed.preset, proto::Preset::standard);
   EXPECT_EQ(echoed.params.intervals, 3);
-  EXPECT_EQ(echoed.params.corrector, proto::Corrector::none);
+  EXPECT_EQ(echoed.params.corrector, proto::Corrector::scene);
+  EXPECT_EQ(echoed.params.iterations, used.iterations);
+  EXPECT_EQ(echoed.params.annealing_steps, used.annealing_steps);
+  EXPECT_EQ(echoed.params.strength_initial, used.strength_initial);
+  EXPECT_EQ(echoed.params.strength_final, used.strength_final);
+  EXPECT_EQ(echoed.params.annealing, proto::Annealing::linear);
   EXPECT_EQ(echoed.params.rotation, proto::Rotation::shortest_arc);
   EXPECT_EQ(echoed.params.seed, 0u);
-  EXPECT_EQ(echoed.params.iterations, 0) << "nothing was optimised";
   EXPECT_EQ(echoed.params.perceptual, proto::Perceptual::msssim);
   EXPECT_EQ(echoed.params.background, proto::Background::render);
   const auto again = to_engine(echoed);
@@ -112,7 +207,34 @@ TEST(Convert, EchoesTheRequestWithEveryUsedParameterFilledIn) {
   EXPECT_EQ(again->params.interpolation, used.interpolation);
 }
 
+TEST(Convert, WhatIsEchoedAsksForTheSameAgainWhateverPresetsBecome) {
+  for (const auto preset : every_preset) {
+    SCOPED_TRACE(proto::name_of(preset));
+    proto::EditRequest asked = proto::parse_edit_request(proto::example("stretch_apple.json")).value();
+    asked.preset = preset;
+    edit::Params used = value(to_engine(asked)).params;
+    used.intervals = 3;
+    proto::EditRequest echoed = resolved(asked, used);
+    EXPECT_EQ(echoed.preset, preset);
+    for (const auto other : every_preset) {
+      echoed.preset = other;
+      expect_same(value(to_engine(echoed)).params, used);
+      EXPECT_EQ(corrector_of(echoed), corrector_of(asked));
+    }
+  }
+}
+
 TEST(Convert, EveryEnumeratorComesBack) {
+  for (const auto annealing : {proto::Annealing::linear, proto::Annealing::paper}) {
+    proto::EditRequest asked = full_request();
+    asked.params.annealing = annealing;
+    EXPECT_EQ(resolved(asked, to_engine(asked)->params).params.annealing, annealing);
+  }
+  for (const auto corrector : {proto::Corrector::none, proto::Corrector::scene}) {
+    proto::EditRequest asked = full_request();
+    asked.params.corrector = corrector;
+    EXPECT_EQ(resolved(asked, to_engine(asked)->params).params.corrector, corrector);
+  }
   for (const auto rotation : {proto::Rotation::shortest_arc, proto::Rotation::paper, proto::Rotation::none}) {
     proto::EditRequest asked = full_request();
     asked.params.rotation = rotation;
@@ -127,14 +249,33 @@ TEST(Convert, EveryEnumeratorComesBack) {
 }
 
 TEST(Convert, ListsFieldsThatHaveNoEffect) {
+  using Fields = std::vector<std::string>;
   proto::EditRequest asked = full_request();
+  ASSERT_EQ(asked.params.corrector, proto::Corrector::scene);
+  EXPECT_EQ(fields_without_effect(asked), Fields{});
   asked.prompt = "a ball";
-  EXPECT_EQ(fields_without_effect(asked), (std::vector<std::string>{"prompt", "params.strength_initial",
-                                                                    "params.strength_final", "params.annealing"}));
-  for (const auto preset : {proto::Preset::draft, proto::Preset::standard}) {
+  EXPECT_EQ(fields_without_effect(asked), Fields{"prompt"});
+  asked.prompt = std::nullopt;
+  const Fields of_strength = {"params.strength_initial", "params.strength_final", "params.annealing"};
+  asked.params.corrector = proto::Corrector::none;
+  EXPECT_EQ(fields_without_effect(asked), of_strength) << "nothing corrects; that was asked for";
+  asked.params.corrector = std::nullopt;
+  EXPECT_EQ(fields_without_effect(asked), Fields{});
+  asked.preset = proto::Preset::preview;
+  EXPECT_EQ(fields_without_effect(asked), of_strength) << "which has no corrector";
+  asked.params.corrector = proto::Corrector::scene;
+  EXPECT_EQ(fields_without_effect(asked), Fields{}) << "but can have one";
+  asked.params.iterations = 0;
+  Fields all = of_strength;
+  all.push_back("params.corrector");
+  EXPECT_EQ(fields_without_effect(asked), all) << "no optimisation would use what is corrected";
+}
+
+TEST(Convert, APresetAloneIsNeverWithoutEffect) {
+  for (const auto preset : every_preset) {
     proto::EditRequest plain;
     plain.preset = preset;
-    EXPECT_EQ(fields_without_effect(plain), std::vector<std::string>{"preset"});
+    EXPECT_TRUE(fields_without_effect(plain).empty()) << proto::name_of(preset);
   }
   EXPECT_TRUE(fields_without_effect(proto::parse_edit_request(proto::example("stretch_apple.json")).value()).empty());
 }
@@ -144,9 +285,10 @@ TEST(Convert, WarnsOnceOfAllFieldsThatHaveNoEffect) {
   EXPECT_TRUE(warnings_about(asked).empty());
   asked.prompt = "a ball";
   asked.params.strength_final = 0.3;
+  asked.params.iterations = 0;
   const auto warnings = warnings_about(asked);
   ASSERT_EQ(warnings.size(), 1u);
-  EXPECT_TRUE(warnings[0].ends_with("without effect: prompt params.strength_final")) << warnings[0];
+  EXPECT_TRUE(warnings[0].ends_with("without effect on this edit: prompt params.strength_final")) << warnings[0];
 }
 
 }  // namespace

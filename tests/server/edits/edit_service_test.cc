@@ -1,10 +1,12 @@
 #include "server/edits/edit_service.h"
 
+#include <algorithm>
 #include <optional>
 #include <set>
 #include <thread>
 
 #include "engine/core/rng.h"
+#include "server/edits/convert.h"
 #include "tests/server/edits/service_support.h"
 
 namespace server::edits {
@@ -57,6 +59,21 @@ TEST_F(ServiceTest, FillsInTheRequestFromTheStart) {
   EXPECT_EQ(wait_for_end(*service, accepted.status.id).request, accepted.status.request);
 }
 
+TEST_F(ServiceTest, FillsInTheDefaultPresetToo) {
+  submit(move_ball_slowly(scene));
+  proto::EditRequest request = move_ball(scene);
+  request.preset = std::nullopt;
+  request.params = {};
+  const auto id = submit(request);
+  const proto::EditStatus waiting = value(service->find(id));
+  EXPECT_EQ(waiting.request.preset, proto::Preset::standard);
+  EXPECT_EQ(waiting.request.params.corrector, proto::Corrector::scene);
+  const auto standard = preset_params(proto::Preset::standard);
+  EXPECT_EQ(waiting.request.params.iterations, standard.iterations);
+  EXPECT_EQ(waiting.iterations, standard.iterations * standard.annealing_steps);
+  (void)value(service->cancel(id));
+}
+
 TEST_F(ServiceTest, TellsOfEveryFinishedInterval) {
   const auto done = wait_for_end(*service, submit(move_ball(scene, 3)));
   ASSERT_EQ(done.finished_intervals.size(), 3u);
@@ -88,6 +105,56 @@ TEST_F(ServiceTest, TellsTheLossOfAnOptimisedIntervalAndShowsItsPicture) {
   EXPECT_TRUE(value(service->interval_picture(id, 1, 0, "optimised")).starts_with("\xff\xd8\xff"));
   EXPECT_EQ(done.request.params.iterations, 5);
   EXPECT_TRUE(done.warnings.empty());
+}
+
+TEST_F(ServiceTest, ShowsWhatACorrectedIntervalWasCorrectedTo) {
+  const auto id = submit(move_and_correct_ball(scene));
+  const auto done = wait_for_end(*service, id);
+  ASSERT_EQ(done.state, "succeeded");
+  ASSERT_EQ(done.finished_intervals.size(), 2u);
+  for (const auto& finished : done.finished_intervals) {
+    EXPECT_TRUE(finished.loss);
+    ASSERT_EQ(finished.renders.size(), 2u);
+    for (const auto& render : finished.renders)
+      EXPECT_EQ(render.stages, (std::vector<std::string>{"before", "deformed", "corrected", "optimised"})) << "once";
+  }
+  const auto deformed = value(service->interval_picture(id, 1, 0, "deformed")),
+             corrected = value(service->interval_picture(id, 1, 0, "corrected")),
+             optimised = value(service->interval_picture(id, 1, 0, "optimised"));
+  EXPECT_TRUE(corrected.starts_with("\xff\xd8\xff"));
+  EXPECT_NE(corrected, deformed);
+  EXPECT_NE(corrected, optimised);
+  EXPECT_EQ(value(service->interval_picture(id, 2, 0, "before")), optimised) << "not what was only aimed at";
+  EXPECT_EQ(done.request.params.corrector, proto::Corrector::scene);
+  EXPECT_TRUE(done.warnings.empty());
+  EXPECT_EQ(std::count_if(done.timings.begin(), done.timings.end(),
+                          [](const auto& timing) { return timing.stage == "correct"; }),
+            1);
+}
+
+TEST_F(ServiceTest, TellsWhenItCorrects) {
+  proto::EditRequest request = move_and_correct_ball(scene);
+  request.params.views = 20;
+  request.params.max_image_side = 160;
+  const auto id = submit(request);
+  const auto correcting = wait_for(*service, id, [](const auto& status) { return status.stage == "correct"; });
+  EXPECT_EQ(correcting.iteration, 0);
+  EXPECT_FALSE(correcting.loss);
+  (void)value(service->cancel(id));
+  EXPECT_EQ(wait_for_end(*service, id).state, "cancelled");
+  EXPECT_EQ(versions(), 1u);
+}
+
+TEST_F(ServiceTest, ACorrectedEditGoesOnToTheSameBytes) {
+  const auto whole = wait_for_end(*service, submit(move_and_correct_ball(scene, 3)));
+  ASSERT_EQ(whole.state, "succeeded");
+  const auto id = submit(move_and_correct_ball(scene, 3));
+  wait_for_interval(*service, id, 1);
+  reopen();
+  const auto resumed = wait_for_end(*service, id);
+  ASSERT_EQ(resumed.state, "succeeded");
+  EXPECT_TRUE(resumed.warnings.empty()) << resumed.warnings.front();
+  EXPECT_EQ(version_bytes(*store, scene, *resumed.result_version), version_bytes(*store, scene, *whole.result_version));
 }
 
 TEST_F(ServiceTest, ShowsPicturesOfEveryInterval) {
@@ -534,6 +601,19 @@ TEST_F(ServiceTest, AnEstimateKnowsTheRequestAndGrowsWithIt) {
   EXPECT_GT(large.seconds, small.seconds);
   EXPECT_GT(large.memory_bytes, small.memory_bytes);
   EXPECT_TRUE(value(service->list({})).empty()) << "nothing was accepted";
+}
+
+TEST_F(ServiceTest, AnEstimateCountsTheCorrection) {
+  proto::EditRequest request = move_and_correct_ball(scene);
+  request.params.corrector = proto::Corrector::none;
+  const auto without = value(service->estimate(request));
+  request.params.corrector = proto::Corrector::scene;
+  const auto with = value(service->estimate(request));
+  EXPECT_GT(with.memory_bytes, without.memory_bytes);
+  request.params.iterations = 0;
+  const auto no_use = value(service->estimate(request));
+  request.params.corrector = proto::Corrector::none;
+  EXPECT_EQ(no_use.memory_bytes, value(service->estimate(request)).memory_bytes) << "nothing would be corrected";
 }
 
 TEST_F(ServiceTest, CountsEditsByState) {

@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
+#include <vector>
+
+#include "engine/io/image_file.h"
 #include "tests/engine/edit/samples.h"
 #include "tests/engine/jobs/jobs_support.h"
 #include "tests/support/data.h"
@@ -25,6 +29,13 @@ class IntervalPicturesTest : public testing::Test {
   }
   Moment moment(int interval, const std::string& stage, const engine::scene::Overlay& overlay) const {
     return {.interval = interval, .intervals = 9, .stage = stage, .overlay = overlay, .views = views};
+  }
+  /// One for each view, each of another grey.
+  [[nodiscard]] std::vector<engine::scene::Image> plain_pictures() const {
+    std::vector<engine::scene::Image> pictures;
+    for (const engine::scene::Camera& view : views)
+      pictures.emplace_back(view.width, view.height, 3, 0.2f * float(1 + pictures.size()));
+    return pictures;
   }
   std::string picture(int interval, std::size_t view, const std::string& stage) const {
     return support::read_file(folder / picture_name(interval, view, stage));
@@ -65,6 +76,49 @@ TEST_F(IntervalPicturesTest, AnotherRunWritesTheSameBytes) {
   EXPECT_EQ(picture(2, 2, "deformed"), last);
   EXPECT_EQ(resumed.of(2)[0].stages, whole.of(2)[0].stages);
   EXPECT_TRUE(resumed.of(1).empty());
+}
+
+TEST_F(IntervalPicturesTest, ShowsThePicturesThatAMomentBrings) {
+  IntervalPictures pictures(folder, input, 2);
+  const auto overlay = without(30);
+  value(pictures.add(moment(1, "deformed", overlay)));
+  Moment corrected = moment(1, "corrected", overlay);
+  const auto given = plain_pictures();
+  corrected.pictures = given;
+  value(pictures.add(corrected));
+  for (std::size_t v = 0; v < 2; ++v) {
+    SCOPED_TRACE(v);
+    const engine::scene::Image shown = value(engine::io::read_image(folder / picture_name(1, v, "corrected")));
+    ASSERT_EQ(shown.width, given[v].width);
+    ASSERT_EQ(shown.height, given[v].height);
+    for (const std::size_t i : {std::size_t{0}, shown.data.size() / 2, shown.data.size() - 1})
+      EXPECT_NEAR(shown.data[i], given[v].data[i], 0.02) << i;
+  }
+  EXPECT_EQ(pictures.of(1)[1].stages, (std::vector<std::string>{"deformed", "corrected"}));
+  EXPECT_FALSE(std::filesystem::exists(folder / picture_name(1, 2, "corrected"))) << "of two views only";
+}
+
+TEST_F(IntervalPicturesTest, PicturesThatAMomentBringsStandForNoOtherMoment) {
+  const auto overlay = without(30);
+  IntervalPictures plain(folder, input, 2);
+  value(plain.add(moment(1, "deformed", overlay)));
+  const std::string deformed = picture(1, 0, "deformed");
+
+  // The scene is still what it was: what came between must not be taken for a picture of it, nor be needed for one.
+  for (const bool begins_with_it : {false, true}) {
+    SCOPED_TRACE(begins_with_it);
+    IntervalPictures pictures(folder, input, 2);
+    if (!begins_with_it) value(pictures.add(moment(1, "deformed", overlay)));
+    Moment corrected = moment(1, "corrected", overlay);
+    const auto given = plain_pictures();
+    corrected.pictures = given;
+    value(pictures.add(corrected));
+    value(pictures.add(moment(1, "optimised", overlay)));
+    value(pictures.add(moment(2, "before", overlay)));
+    EXPECT_NE(picture(1, 0, "corrected"), deformed);
+    EXPECT_EQ(picture(1, 0, "optimised"), deformed);
+    EXPECT_EQ(picture(2, 0, "before"), deformed);
+  }
 }
 
 TEST_F(IntervalPicturesTest, TakesWhatViewsThereAre) {

@@ -54,10 +54,11 @@ inline std::string add_ball(scenes::SceneStore& store, const std::filesystem::pa
   return value(store.add_upload(path, "ball.ply", "ball")).id;
 }
 
-/// Moves the ball to the right, in small pictures.
+/// Moves the ball to the right, in small pictures. Deforms only, which is quick.
 inline proto::EditRequest move_ball(const std::string& scene, int intervals = 2) {
   proto::EditRequest request;
   request.scene = scene;
+  request.preset = proto::Preset::preview;
   request.handles.push_back({.source = {0, 0, 0}, .target = proto::Point{0.5, 0, 0}, .radius = 0.3});
   request.params.intervals = intervals;
   request.params.views = 3;
@@ -65,7 +66,16 @@ inline proto::EditRequest move_ball(const std::string& scene, int intervals = 2)
   return request;
 }
 
-/// The same with so many pictures that there is time to interfere: half a second in all, or two where
+/// The same, each interval corrected twice and optimised a little.
+inline proto::EditRequest move_and_correct_ball(const std::string& scene, int intervals = 2) {
+  proto::EditRequest request = move_ball(scene, intervals);
+  request.params.corrector = proto::Corrector::scene;
+  request.params.annealing_steps = 2;
+  request.params.iterations = 5;
+  return request;
+}
+
+/// Deforms only, but with so many pictures that there is time to interfere: half a second in all, or two where
 /// ThreadSanitizer looks at each access to memory, which makes a pixel cost forty times as much.
 inline proto::EditRequest move_ball_slowly(const std::string& scene) {
   proto::EditRequest request = move_ball(scene, 20);

@@ -4,8 +4,10 @@
 #include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <thread>
 
+#include "server/edits/convert.h"
 #include "tests/server/edits/service_support.h"
 
 namespace server::routes {
@@ -152,6 +154,20 @@ TEST_F(EditRoutesTest, AskForNoMoreThanTheServiceAllows) {
   EXPECT_EQ(edit.at("request").at("params").at("max_image_side"), 100);
 }
 
+TEST_F(EditRoutesTest, ALimitAboveWhatThePresetAsksForChangesNothing) {
+  const engine::edit::Params draft = edits::preset_params(proto::Preset::draft);
+  router = {};
+  add_edit_routes(router, *service, {.limits = {.views = draft.views + 1, .image_side = draft.max_image_side + 1}});
+  proto::EditRequest request = edits::move_ball(scene);
+  request.preset = proto::Preset::draft;
+  request.params = {};
+  Request only_validated = with_body(proto::to_json(request));
+  only_validated.in_query["validate_only"] = "true";
+  const json params = json::parse(value(call("POST", "/v1/edits", only_validated)).body).at("request").at("params");
+  EXPECT_EQ(params.at("views"), draft.views);
+  EXPECT_EQ(params.at("max_image_side"), draft.max_image_side);
+}
+
 TEST_F(EditRoutesTest, AKeyedRequestIsReplayed) {
   Request request = edit_body();
   request.headers["Idempotency-Key"] = "my key";
@@ -259,6 +275,25 @@ TEST_F(EditRoutesTest, PicturesOfIntervalsAreJpegAndKnownByTheirBytes) {
     request.in_path["u"] = bad;
     EXPECT_EQ(code_of(call("GET", path, request)), ErrorCode::not_found) << bad;
   }
+}
+
+TEST_F(EditRoutesTest, CorrectedPicturesAreListedAndServed) {
+  edits::wait_for_end(*service, submit(edits::move_and_correct_ball(scene)));
+  const json edit = json::parse(value(call("GET", "/v1/edits/{id}", about("e000001"))).body);
+  ASSERT_EQ(edit.at("state"), "succeeded");
+  const json& stages = edit.at("finished_intervals").at(1).at("renders").at(0).at("stages");
+  EXPECT_EQ(stages.at("corrected"), "/v1/edits/e000001/intervals/2/renders/0?stage=corrected");
+  Request request = about("e000001");
+  request.in_path["u"] = "2";
+  request.in_path["k"] = "0";
+  std::set<std::string> pictures;
+  for (const char* stage : {"before", "deformed", "corrected", "optimised"}) {
+    request.in_query["stage"] = stage;
+    const auto picture = value(call("GET", "/v1/edits/{id}/intervals/{u}/renders/{k}", request));
+    EXPECT_EQ(picture.media_type, "image/jpeg");
+    pictures.insert(picture.body);
+  }
+  EXPECT_EQ(pictures.size(), 4u);
 }
 
 TEST_F(EditRoutesTest, StopCancelAndDeleteAnswerByTheState) {

@@ -5,12 +5,12 @@ import path from 'node:path';
 import { root, run, temporaryFolder } from './program.mjs';
 import { zip } from './zip.mjs';
 
-/// A demo scene: {folder, ply, ball, leaf}; `ball` and `leaf` are requests without a scene.
+/// A demo scene: {folder, ply, ball, leaf}; `ball` and `leaf` are requests without a scene that deform only, which is quick.
 ///   photos  whether its views are rendered as photos of the dataset
 export const demoScene = async ({ gaussians = 5000, views = 16, size = '320x240', photos = true } = {}) => {
   const folder = path.join(temporaryFolder(), 'demo');
   await run('demo-scene', '--out', folder, '--gaussians', gaussians, '--views', views, '--size', size, ...(photos ? ['--render'] : []));
-  const drag = (name) => JSON.parse(readFileSync(path.join(folder, 'drags', `${name}.json`), 'utf8'));
+  const drag = (name) => ({ ...JSON.parse(readFileSync(path.join(folder, 'drags', `${name}.json`), 'utf8')), preset: 'preview' });
   return { folder, ply: await readFile(path.join(folder, 'scene.ply')), ball: drag('ball'), leaf: drag('leaf') };
 };
 
