@@ -71,10 +71,9 @@ ordered_json encode(const evaluate::Quality& quality) {
 }
 
 /// What is given on the command line, over the preset.
-void apply(const BenchOptions& options, edit::Params& params) {
-  const auto interpolation = options.interpolation.value_or(params.interpolation);
-  params = edits::preset_params(options.preset);
-  params.interpolation = interpolation;
+void apply(const BenchOptions& options, edit::Mode mode, edit::Params& params) {
+  params = edits::preset_params(options.preset, mode == edit::Mode::extend ? proto::Mode::extend : proto::Mode::move);
+  if (options.interpolation) params.interpolation = *options.interpolation;
   if (options.intervals) params.intervals = *options.intervals;
   if (options.iterations) params.iterations = *options.iterations;
   if (options.annealing_steps) params.annealing_steps = *options.annealing_steps;
@@ -210,7 +209,7 @@ Result<ordered_json> kept_or(const path& file, const std::function<Result<ordere
 Result<ordered_json> result_of(const evaluate::Case& the_case, const std::string& corrector,
                                const BenchOptions& options, const Machine& machine) {
   edit::Request request = the_case.request;
-  apply(options, request.params);
+  apply(options, request.mode, request.params);
   const std::string key = key_of(the_case.name, corrector, request, options, machine);
   return kept_or(path(options.out) / "results" / (key + ".json"), [&]() -> Result<ordered_json> {
     scene::GaussianCloud edited;
@@ -243,7 +242,7 @@ Result<std::vector<std::string>> chosen_cases(const BenchOptions& options) {
 /// What stands at the head of every report.
 ordered_json settings(const BenchOptions& options, const Machine& machine) {
   edit::Params params;
-  apply(options, params);
+  apply(options, edit::Mode::move, params);
   return {{"splatdrag", SPLATDRAG_VERSION},
           {"threads", machine.threads},
           {"simd", machine.simd},
@@ -302,7 +301,7 @@ Result<void> run_trips(const BenchOptions& options, const Machine& machine, Term
   if (!asked) return propagate(asked);
   auto request = edits::to_engine(asked->request);
   if (!request) return propagate(request);
-  apply(options, request->params);
+  apply(options, request->mode, request->params);
   const auto input = io::read_scene(options.scene);
   if (!input) return propagate(input);
   const auto dataset = io::read_dataset(options.dataset, {.points = false});
@@ -383,7 +382,7 @@ void add_bench_edit_command(CLI::App& program, Action& action) {
   override_with("--annealing-steps", options->annealing_steps, 1, 100, "Corrections per interval");
   override_with("--views", options->views, 1, edit::max_views, "Most views an edit looks through");
   override_with("--image-side", options->image_side, 16, 16384, "Longer side of the pictures it works on, pixels");
-  command->add_option("--interpolation", options->interpolation, "In place of the case's own")
+  command->add_option("--interpolation", options->interpolation, "In place of the preset's")
       ->transform(
           CLI::CheckedTransformer(std::map<std::string, edit::Interpolation>{{"paper", edit::Interpolation::paper},
                                                                              {"smooth", edit::Interpolation::smooth},

@@ -191,7 +191,6 @@ Plan arm() {
     handles.push_back(handle(point, lower(point), 0.125, 2));
   }
   plan.request = drag(std::move(handles), edit::Region{from + dat(0.5, 0.004, 0), {1.002, double(thick), 0.118}});
-  plan.request.params.interpolation = edit::Interpolation::rigid;
   return plan;
 }
 
@@ -215,7 +214,6 @@ Plan bush() {
     handles.push_back(handle(soil + dat(0.32 * std::cos(angle), 0, 0.32 * std::sin(angle)), std::nullopt, 0.25));
   }
   plan.request = drag(std::move(handles), edit::Region{soil + dat(0, 0.6, 0), {2.6, 1.9, 2.2}});
-  plan.request.params.interpolation = edit::Interpolation::smooth;
   return plan;
 }
 

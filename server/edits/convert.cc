@@ -62,8 +62,8 @@ proto::Interpolation to_wire(edit::Interpolation interpolation) {
   return proto::Interpolation::paper;
 }
 
-edit::Params to_engine(const proto::Params& given, proto::Preset preset) {
-  edit::Params params = preset_params(preset);
+edit::Params to_engine(const proto::Params& given, proto::Preset preset, proto::Mode mode) {
+  edit::Params params = preset_params(preset, mode);
   if (given.intervals) params.intervals = *given.intervals;
   if (given.views) params.views = *given.views;
   if (given.exclude_views) params.exclude_views = *given.exclude_views;
@@ -83,8 +83,9 @@ edit::Params to_engine(const proto::Params& given, proto::Preset preset) {
 
 }  // namespace
 
-edit::Params preset_params(proto::Preset preset) {
+edit::Params preset_params(proto::Preset preset, proto::Mode mode) {
   edit::Params params;
+  if (preset != proto::Preset::paper) params.interpolation = edit::Interpolation::rigid;
   switch (preset) {
     case proto::Preset::preview:
       params.iterations = 0;
@@ -94,7 +95,9 @@ edit::Params preset_params(proto::Preset preset) {
       params.views = 24, params.max_image_side = 384;
       break;
     case proto::Preset::standard:
-      params.intervals = 1, params.annealing_steps = 2, params.iterations = 500;
+      // A part that is drawn out leaves its trail where its intervals end: as many as the length of the drag asks for.
+      params.intervals = mode == proto::Mode::move ? 4 : 0;
+      params.annealing_steps = 1, params.iterations = 500;
       params.views = 50, params.max_image_side = 512;
       break;
     case proto::Preset::paper:
@@ -105,7 +108,9 @@ edit::Params preset_params(proto::Preset preset) {
   return params;
 }
 
-proto::Preset preset_of(const proto::EditRequest& request) { return request.preset.value_or(proto::Preset::standard); }
+proto::Preset preset_of(const proto::EditRequest& request) {
+  return request.preset.value_or(proto::Preset::standard);
+}
 
 proto::Corrector corrector_of(const proto::EditRequest& request) {
   return request.params.corrector.value_or(preset_of(request) == proto::Preset::preview ? proto::Corrector::none
@@ -145,7 +150,7 @@ engine::Result<edit::Request> to_engine(const proto::EditRequest& request) {
     made.group = handle.group;
   }
   if (request.region) out.region = {to_vec(request.region->center), to_vec(request.region->size)};
-  out.params = to_engine(request.params, preset_of(request));
+  out.params = to_engine(request.params, preset_of(request), request.mode);
   return out;
 }
 
@@ -178,7 +183,7 @@ std::vector<std::string> fields_without_effect(const proto::EditRequest& request
   };
   note(request.prompt.has_value(), "prompt");  // no corrector of this build reads
   const proto::Params& params = request.params;
-  if (!corrects(request, to_engine(params, preset_of(request)))) {
+  if (!corrects(request, to_engine(params, preset_of(request), request.mode))) {
     note(params.strength_initial.has_value(), "params.strength_initial");
     note(params.strength_final.has_value(), "params.strength_final");
     note(params.annealing.has_value(), "params.annealing");

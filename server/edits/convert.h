@@ -13,7 +13,7 @@
 namespace server::edits {
 
 /// What a preset stands for. How the numbers were found: docs/tradeoff.md.
-[[nodiscard]] engine::edit::Params preset_params(proto::Preset preset);
+[[nodiscard]] engine::edit::Params preset_params(proto::Preset preset, proto::Mode mode = proto::Mode::move);
 
 /// The preset of a request: `standard` if it names none.
 [[nodiscard]] proto::Preset preset_of(const proto::EditRequest& request);
