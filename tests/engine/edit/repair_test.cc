@@ -132,6 +132,18 @@ TEST(Repair, AsksForEachViewFirstWhatIsBehindAndThenAll) {
   }
 }
 
+TEST(Repair, EveryCorrectionHasSeedsOfItsOwn) {
+  std::set<std::uint64_t> seeds;
+  std::size_t pictures = 0;
+  for (const auto& [u, a] : {std::pair{1, 1}, {1, 2}, {2, 1}, {2, 2}}) {
+    Moved moved;
+    ASSERT_TRUE(moved.correct(u, a));
+    seeds.insert(moved.corrector.seeds.begin(), moved.corrector.seeds.end());
+    pictures += moved.corrector.seeds.size();
+  }
+  EXPECT_EQ(seeds.size(), pictures);
+}
+
 TEST(Repair, TheBufferIsTheUneditedSceneWithoutTheBlockInItsPlace) {
   Moved moved;
   ASSERT_TRUE(moved.correct());
