@@ -116,6 +116,8 @@ TEST(RandomField, ComesFromAllowedPlacesOfAllSources) {
   const double share = double(lookup.sources[0].centres.size()) /
                        double(lookup.sources[0].centres.size() + lookup.sources[1].centres.size());
   EXPECT_NEAR(double(of_first) / double(field.size()), share, 0.1) << "each place is as likely";
+  EXPECT_TRUE(same_bytes(random_field(lookup.query(), 3), field));
+  EXPECT_FALSE(same_bytes(random_field(lookup.query(), 4), field));
 }
 
 TEST(RandomField, PassesOverSourcesWithoutAPlace) {

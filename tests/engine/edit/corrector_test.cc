@@ -81,6 +81,24 @@ TEST(EditWithACorrector, FrozenRowsStayTheInputs) {
   EXPECT_LE(outcome.report.seeds + 512, outcome.report.copies + 20) << "the block's copies, seeds, their children";
 }
 
+TEST(EditWithACorrector, WhatWasSeenHardlyMovesInTheOptimisation) {
+  BlockScene block;
+  const auto copies = [&](const Outcome& outcome) {
+    std::vector<DVec3> means;
+    for (std::size_t k = 0; k < 512; ++k)
+      means.emplace_back(outcome.overlay.rows.mean.get(outcome.overlay.changed.size() + k));
+    return means;
+  };
+  const auto with = copies(run_with_scene_corrector(block)), without = copies(run_with(block, nullptr));
+  block.request.params.iterations = 0;
+  const auto deformed = copies(run_with(block, nullptr));
+  double moved_with = 0, moved_without = 0;
+  for (std::size_t k = 0; k < 512; ++k)
+    moved_with += glm::distance(with[k], deformed[k]), moved_without += glm::distance(without[k], deformed[k]);
+  EXPECT_GT(moved_without, 0);
+  EXPECT_LT(moved_with, 0.5 * moved_without);
+}
+
 TEST(EditWithACorrector, SeedsNothingBehindAPartThatHangsBeforeAWholeSurface) {
   const BlockScene block(/*gap=*/0.5f);
   const Outcome outcome = run_with_scene_corrector(block);

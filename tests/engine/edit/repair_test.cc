@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <set>
+#include <utility>
 
 #include "engine/edit/drag.h"
 #include "engine/edit/look.h"
@@ -52,7 +53,8 @@ struct Moved {
   std::vector<scene::Mask> masks;
   Recorder corrector;
 
-  explicit Moved(float gap = 0, Mode mode = Mode::move) : block(gap, mode), original(block.cloud) {
+  explicit Moved(float gap = 0, Mode mode = Mode::move) : Moved(BlockScene(gap, mode)) {}
+  explicit Moved(BlockScene scene) : block(std::move(scene)), original(block.cloud) {
     working = begin(block.cloud, block.request, assign(block.cloud.mean, block.request).value().handle);
     const auto copies = drag_through(working, block.request, 1, true).copies;
     for (const scene::Camera& view : block.cameras) masks.emplace_back(view.width, view.height);
@@ -80,6 +82,16 @@ struct Moved {
     return pixels;
   }
 };
+
+/// Paints what it is asked for in one colour.
+Result<scene::Image> painted(const correct::Flawed& flawed, Vec3 color) {
+  scene::Image picture = flawed.picture;
+  const scene::Mask flaws = correct::flaws_of(flawed);
+  for (int c = 0; c < 3; ++c)
+    for (std::size_t i = 0; i < flaws.data.size(); ++i)
+      if (flaws.data[i] != 0) picture.plane(c)[i] = color[c];
+  return picture;
+}
 
 scene::Image shown(const WorkingScene& working, const scene::Camera& camera) {
   return render::forward(working.cloud, camera).color;
@@ -120,6 +132,18 @@ TEST(Repair, AsksForEachViewFirstWhatIsBehindAndThenAll) {
   }
 }
 
+TEST(Repair, EveryCorrectionHasSeedsOfItsOwn) {
+  std::set<std::uint64_t> seeds;
+  std::size_t pictures = 0;
+  for (const auto& [u, a] : {std::pair{1, 1}, {1, 2}, {2, 1}, {2, 2}}) {
+    Moved moved;
+    ASSERT_TRUE(moved.correct(u, a));
+    seeds.insert(moved.corrector.seeds.begin(), moved.corrector.seeds.end());
+    pictures += moved.corrector.seeds.size();
+  }
+  EXPECT_EQ(seeds.size(), pictures);
+}
+
 TEST(Repair, TheBufferIsTheUneditedSceneWithoutTheBlockInItsPlace) {
   Moved moved;
   ASSERT_TRUE(moved.correct());
@@ -139,14 +163,7 @@ TEST(Repair, TheBufferIsTheUneditedSceneWithoutTheBlockInItsPlace) {
 TEST(Repair, LaysWhatTheCorrectorFindsIntoTheSceneSoThatLaterViewsShowIt) {
   Moved moved;
   const Vec3 found{0.1f, 0.9f, 0.2f};
-  moved.corrector.answer = [&](const correct::Flawed& flawed) {
-    scene::Image picture = flawed.picture;
-    const scene::Mask flaws = correct::flaws_of(flawed);
-    for (int c = 0; c < 3; ++c)
-      for (std::size_t i = 0; i < flaws.data.size(); ++i)
-        if (flaws.data[i] != 0) picture.plane(c)[i] = found[c];
-    return Result<scene::Image>(std::move(picture));
-  };
+  moved.corrector.answer = [&](const correct::Flawed& flawed) { return painted(flawed, found); };
   const std::size_t rows = moved.working.cloud.size();
   const auto outcome = moved.correct();
   ASSERT_TRUE(outcome);
@@ -155,7 +172,7 @@ TEST(Repair, LaysWhatTheCorrectorFindsIntoTheSceneSoThatLaterViewsShowIt) {
   ASSERT_EQ(moved.working.role.size(), rows + outcome->seeds);
   for (std::size_t row = rows; row < moved.working.role.size(); ++row) {
     EXPECT_EQ(moved.working.role[row], Role::seed);
-    EXPECT_NEAR(moved.working.cloud.mean.y[row], 0, 0.05) << "on the floor, to the size of its Gaussians";
+    EXPECT_NEAR(moved.working.cloud.mean.y[row], 0, 0.1) << "on the floor, to the size of its Gaussians";
   }
   for (std::size_t v = 0; v < moved.block.cameras.size(); ++v) {
     const scene::Image now = shown(moved.working, moved.block.cameras[v]);
@@ -168,7 +185,7 @@ TEST(Repair, LaysWhatTheCorrectorFindsIntoTheSceneSoThatLaterViewsShowIt) {
         in_picture += double(std::abs(outcome->corrected.pictures[v].plane(c)[i] - found[c])) / 3;
       }
     }
-    EXPECT_LT(in_scene / double(uncovered.area()), 0.08) << v << ": what was found shows in the scene";
+    EXPECT_LT(in_scene / double(uncovered.area()), 0.12) << v << ": what was found shows in the scene";
     EXPECT_LT(in_picture / double(uncovered.area()), 0.08) << v << ": and in the picture";
   }
   // The first view needs most of them; the others see them and add little.
@@ -183,6 +200,59 @@ TEST(Repair, SeedsNothingWhereAllIsKnown) {
   const auto outcome = moved.correct();
   ASSERT_TRUE(outcome);
   EXPECT_EQ(outcome->seeds, 0u);
+}
+
+TEST(Repair, LeavesAPitOpenThatViewsHaveLookedInto) {
+  // The block hangs before a pit in the floor for the view in the middle; those at the ends see into it past the block.
+  BlockScene block(/*gap=*/0.5f);
+  const auto in_pit = [](Vec3 mean, float reach) {
+    return std::abs(mean.x) < reach && std::abs(mean.z - 0.75f) < reach;
+  };
+  for (std::size_t row = 0; row < block.floor_rows; ++row)
+    if (in_pit(block.cloud.mean.get(row), 0.25f)) block.cloud.mean.y[row] = 0.5f;  // its bottom
+  for (int i = -12; i <= 12; ++i)
+    for (int k = -12; k <= 12; ++k)
+      add_gaussian(block.cloud, {0.15f * float(i), 0.5f, 0.15f * float(k)}, {0.1f, 0.01f, 0.1f}, 4, floor_color);
+  for (scene::Camera& camera : block.cameras) {  // finer, so that the rim of the pit is narrow
+    camera.width *= 2, camera.height *= 2;
+    camera.fx *= 2, camera.fy *= 2, camera.cx *= 2, camera.cy *= 2;
+  }
+  Moved moved(std::move(block));
+  moved.corrector.answer = [](const correct::Flawed& flawed) { return painted(flawed, {0, 1, 0}); };
+  ASSERT_TRUE(moved.correct());
+  std::size_t over_pit = 0, beside = 0;
+  for (std::size_t row = moved.original.size(); row < moved.working.role.size(); ++row) {
+    if (moved.working.role[row] != Role::seed || std::abs(moved.working.cloud.mean.y[row]) > 0.15f) continue;
+    ++(in_pit(moved.working.cloud.mean.get(row), 0.12f) ? over_pit : beside);
+  }
+  // Only along the rim, where fewer than two views see past the block into it; else there would be some 45.
+  EXPECT_LT(over_pit, 25u) << beside << " beside it";
+}
+
+TEST(Repair, KeepsInThePictureWhatWasFilledInWhereNoSurfaceGoesOn) {
+  // Nothing but the block: behind it is a void.
+  BlockScene block;
+  std::vector<std::uint8_t> keep(block.cloud.size(), 1);
+  std::fill_n(keep.begin(), block.floor_rows, std::uint8_t(0));
+  block.cloud = scene::select(block.cloud, keep);
+  block.floor_rows = 0;
+  Moved moved(std::move(block));
+  bool first = true;
+  moved.corrector.answer = [&](const correct::Flawed& flawed) {
+    const bool is_background = std::exchange(first, !first);
+    return painted(flawed, is_background ? Vec3(0, 1, 0) : Vec3(0, 0, 1));
+  };
+  const auto outcome = moved.correct();
+  ASSERT_TRUE(outcome);
+  EXPECT_EQ(outcome->seeds, 0u);
+  for (std::size_t v = 0; v < moved.block.cameras.size(); ++v) {
+    const scene::Mask uncovered = moved.uncovered(v);
+    for (std::size_t i = 0; i < uncovered.data.size(); ++i) {
+      if (uncovered.data[i] == 0) continue;
+      EXPECT_GT(outcome->corrected.pictures[v].plane(1)[i], 0.99f) << v;
+      EXPECT_LT(outcome->corrected.pictures[v].plane(2)[i], 0.01f) << v << ": it is not asked for again";
+    }
+  }
 }
 
 TEST(Repair, OfAnExtendShowsThePartOpaqueAndAsksOnce) {

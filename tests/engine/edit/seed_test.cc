@@ -14,10 +14,10 @@
 namespace engine::edit {
 namespace {
 
-/// A camera that looks down at the floor y = 0 from the side, by this angle about the vertical.
+/// A tilted camera that looks down at the floor y = 0 from the side, by this angle about the vertical.
 scene::Camera above_floor(int side, double angle_rad = 0) {
   const DVec3 eye(2 * std::sin(angle_rad), -1.5, -2 * std::cos(angle_rad));
-  return scene::look_at(eye, DVec3(0), DVec3(0, -1, 0), 0.8, side, side);
+  return scene::look_at(eye, DVec3(0), DVec3(0.5, -1, 0), 0.8, side, side);
 }
 
 /// Inverse depth of the floor at the pixels of a part of the picture, 0 elsewhere.

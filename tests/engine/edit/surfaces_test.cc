@@ -92,6 +92,13 @@ TEST(ContinuedSurfaces, ItDoesNotGoOnBeyondItsEnd) {
   EXPECT_EQ(count(continued_surfaces(plane_with({0, 40, width, height}), nowhere_free, 1)), 0u);
 }
 
+TEST(ContinuedSurfaces, AtTheRimOfThePictureFiveDirectionsOfEightAreEnough) {
+  const scene::Rect at_rim{50, 20, width, 42};
+  const scene::Image surface = continued_surfaces(plane_with(at_rim), nowhere_free, 1);
+  for (int y = at_rim.y0; y < at_rim.y1; ++y)
+    for (int x = at_rim.x0; x < at_rim.x1; ++x) ASSERT_NEAR(surface.at(x, y), tilted(x, y), 1e-3) << x << ", " << y;
+}
+
 TEST(ContinuedSurfaces, WhatIsSeenInFrontHidesIt) {
   EXPECT_EQ(count(continued_surfaces(plane_with(hole, 0.8), nowhere_free, 1)), 0u);
 }
@@ -112,17 +119,19 @@ TEST(ContinuedSurfaces, OnlyWherePartsHaveLeft) {
 }
 
 TEST(ContinuedSurfaces, OfTwoTheNearerGoesOnAndTheFartherWhereThatCannotBe) {
-  // A near plane as a frame around the hole, within a far one.
-  SurfaceView view = plane_with(hole);
+  // A near plane as a frame around the hole, within a far one; of which either has more pixels.
   const double far_plane = 0.2;
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x)
-      if (!inside({15, 10, 60, 52}, x, y)) view.inverse_depth.at(x, y) = float(far_plane);
-  expect_goes_on(continued_surfaces(view, nowhere_free, 1));
-  const auto near_is_free = [](DVec2, double inverse_depth) { return inverse_depth > 0.25; };
-  const scene::Image surface = continued_surfaces(view, near_is_free, 1);
-  for (int y = hole.y0; y < hole.y1; ++y)
-    for (int x = hole.x0; x < hole.x1; ++x) ASSERT_NEAR(surface.at(x, y), far_plane, 0.002) << x << ", " << y;
+  for (const scene::Rect frame : {scene::Rect{15, 10, 60, 52}, scene::Rect{6, 5, 66, 55}}) {
+    SurfaceView view = plane_with(hole);
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x)
+        if (!inside(frame, x, y)) view.inverse_depth.at(x, y) = float(far_plane);
+    expect_goes_on(continued_surfaces(view, nowhere_free, 1));
+    const auto near_is_free = [](DVec2, double inverse_depth) { return inverse_depth > 0.25; };
+    const scene::Image surface = continued_surfaces(view, near_is_free, 1);
+    for (int y = hole.y0; y < hole.y1; ++y)
+      for (int x = hole.x0; x < hole.x1; ++x) ASSERT_NEAR(surface.at(x, y), far_plane, 0.002) << x << ", " << y;
+  }
 }
 
 TEST(ContinuedSurfaces, AFewPixelsAreNoSurface) {
