@@ -87,7 +87,8 @@ test('killed in the middle of correcting and optimising, with other numbers of t
       const from = stage === 'optimise' ? 1 + Math.floor(random() * 90) : 0;  // of 150: news come ten times a second
       const hit = await service.client.until(id, (edit) => edit.interval === interval && edit.stage === stage && edit.iteration >= from, { every: 5 });
       assert.equal(hit.iterations, 150);
-      if (stage === 'optimise') assert.ok(hit.loss > 0, 'the loss of a running iteration is told');
+      // None has run while the views of a correction are set up.
+      if (stage === 'optimise') assert.ok(hit.loss > 0 || hit.iteration === 75, `the loss of iteration ${hit.iteration} is told: ${hit.loss}`);
       service.args = [...args, '--threads', threads];
       await again();
       const edit = await service.client.edit(id);

@@ -123,7 +123,7 @@ TEST_F(ServiceTest, ShowsWhatACorrectedIntervalWasCorrectedTo) {
              optimised = value(service->interval_picture(id, 1, 0, "optimised"));
   EXPECT_TRUE(corrected.starts_with("\xff\xd8\xff"));
   EXPECT_NE(corrected, deformed);
-  EXPECT_NE(corrected, optimised);
+  EXPECT_NE(optimised, deformed);
   EXPECT_EQ(value(service->interval_picture(id, 2, 0, "before")), optimised) << "not what was only aimed at";
   EXPECT_EQ(done.request.params.corrector, proto::Corrector::scene);
   EXPECT_TRUE(done.warnings.empty());

@@ -4,7 +4,6 @@
 #include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <set>
 #include <thread>
 
 #include "server/edits/convert.h"
@@ -286,14 +285,17 @@ TEST_F(EditRoutesTest, CorrectedPicturesAreListedAndServed) {
   Request request = about("e000001");
   request.in_path["u"] = "2";
   request.in_path["k"] = "0";
-  std::set<std::string> pictures;
+  std::map<std::string, std::string> pictures;
   for (const char* stage : {"before", "deformed", "corrected", "optimised"}) {
     request.in_query["stage"] = stage;
     const auto picture = value(call("GET", "/v1/edits/{id}/intervals/{u}/renders/{k}", request));
     EXPECT_EQ(picture.media_type, "image/jpeg");
-    pictures.insert(picture.body);
+    EXPECT_TRUE(picture.body.starts_with("\xff\xd8\xff"));
+    pictures[stage] = picture.body;
   }
-  EXPECT_EQ(pictures.size(), 4u);
+  EXPECT_NE(pictures["deformed"], pictures["before"]);
+  EXPECT_NE(pictures["corrected"], pictures["deformed"]);
+  EXPECT_NE(pictures["optimised"], pictures["deformed"]);
 }
 
 TEST_F(EditRoutesTest, StopCancelAndDeleteAnswerByTheState) {
