@@ -66,9 +66,14 @@ TEST(Convert, LeavesWhatNeitherRequestNorPresetSaysToTheEngine) {
   const edit::Params defaults;
   EXPECT_EQ(request->mode, edit::Mode::extend);
   EXPECT_EQ(request->params.rotation, defaults.rotation);
-  EXPECT_EQ(request->params.interpolation, defaults.interpolation);
   EXPECT_EQ(request->params.rotate_sh, defaults.rotate_sh);
   EXPECT_EQ(request->params.seed, defaults.seed);
+}
+
+TEST(Convert, OnlyThePaperPresetInterpolatesAsPrinted) {
+  for (const auto preset : every_preset)
+    EXPECT_EQ(preset_params(preset).interpolation,
+              preset == proto::Preset::paper ? edit::Interpolation::paper : edit::Interpolation::rigid);
 }
 
 TEST(Convert, NoPresetIsStandard) {
