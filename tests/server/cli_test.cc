@@ -192,13 +192,15 @@ TEST_F(Cli, BenchEditJudgesEditsWhoseRightResultIsKnown) {
   const json said = json::parse(support::read_file(at("bench/bench.json")));
   ASSERT_EQ(said["cases"].size(), 1u);
   const json& found = said["cases"][0];
-  // The crate arrives as it was; where it stood, there is nothing.
+  // The crate arrives as it was, and where it stood there is a table, better than a smooth filling (32 dB).
   EXPECT_GT(found["result"]["arrived"]["psnr_db"], 45) << found;
   EXPECT_GT(found["result"]["outside"]["psnr_db"], 36) << found;
-  EXPECT_GT(found["result"]["edited"]["psnr_db"], found["untouched"]["edited"]["psnr_db"].get<double>() + 5) << found;
+  EXPECT_GT(found["result"]["edited"]["psnr_db"], 33) << found;
+  EXPECT_GT(found["result"]["vacated"]["psnr_db"], 29.5) << found;
+  EXPECT_GT(found["seeds"], 50) << found;
   EXPECT_LT(found["result"]["miss"], 0.01) << found;
   EXPECT_NE(run.out.find("| slide | "), std::string::npos) << run.out;
-  EXPECT_TRUE(io::read_image(at("bench/slide_view_04.png"))) << "a held-out view";
+  EXPECT_TRUE(io::read_image(at("bench/slide_scene_view_04.png"))) << "a held-out view";
 
   // What is there is not worked out again; what is damaged is.
   std::string kept;

