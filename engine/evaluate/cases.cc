@@ -143,7 +143,7 @@ made::Object ring(Vec3 foot, float radius, float height, bool red) {
 Plan pole() {
   constexpr int rings = 8, more = 4, dragged = 4;
   constexpr float height = 0.09f, radius = 0.10f;
-  Plan plan{.what = "A striped pole drawn out to one and a half of its length."};
+  Plan plan{.what = "A striped pole drawn out to one and a half of its length.", .textured = false};
   plan.surroundings = furnished_room();
   const auto foot = [&](int k) { return at(0.1f, float(k) * height, -0.1f); };
   for (int k = 0; k < rings - dragged; ++k) plan.surroundings.push_back(ring(foot(k), radius, height, k % 2 == 0));

@@ -21,7 +21,7 @@ namespace engine::evaluate {
 struct Case {
   std::string name;      ///< "slide"
   std::string what;      ///< One sentence for people.
-  bool textured = true;  ///< What the part uncovers has a pattern, so that a smooth filling is a wrong one.
+  bool textured = true;  ///< The part uncovers something, and with a pattern: a smooth filling is wrong.
 
   scene::GaussianCloud before;             ///< What is edited.
   scene::GaussianCloud truth;              ///< What it should become.

@@ -1,0 +1,188 @@
+// What speed costs in quality: each knob of an edit alone, the front of all of them, and what the presets buy.
+//
+//   build/release/bench/tradeoff build/release/splatdrag docs out/tradeoff
+//
+// writes docs/tradeoff.md and docs/tradeoff.svg from edits whose right result is known (`splatdrag bench-edit`).
+// Results are kept in the last folder: what is there is not measured again, so that it may be interrupted. Half an hour
+// on two cores, which it wants to itself.
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iomanip>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "bench/svg_plot.h"
+
+namespace {
+
+using nlohmann::json;
+using std::filesystem::path;
+
+/// What an edit came to, on the mean over cases.
+struct Point {
+  std::string setting;
+  double edited_db = 0, ssim = 0, vacated_db = 0, outside_db = 0, seconds = 0;
+};
+
+class Bench {
+ public:
+  Bench(std::string program, path results) : program_(std::move(program)), results_(std::move(results)) {}
+
+  /// Of the cases and corrector that the arguments of bench-edit name.
+  [[nodiscard]] Point measure(const std::string& setting, const std::string& arguments) const {
+    const std::string command =
+        "'" + program_ + "' bench-edit --pictures 0 --out '" + results_.string() + "' " + arguments + " > /dev/null";
+    if (std::system(command.c_str()) != 0) throw std::runtime_error("this failed: " + command);
+    std::ifstream file(results_ / "bench.json");
+    const json found = json::parse(file);
+    Point point{.setting = setting};
+    double textured = 0;
+    const double cases = double(found.at("cases").size());
+    for (const json& each : found.at("cases")) {
+      const json& result = each.at("result");
+      point.edited_db += result.at("edited").at("psnr_db").get<double>() / cases;
+      point.ssim += result.at("edited").at("ssim").get<double>() / cases;
+      point.outside_db += result.at("outside").at("psnr_db").get<double>() / cases;
+      point.seconds += each.at("seconds").get<double>() / cases;
+      if (!each.at("textured").get<bool>()) continue;
+      point.vacated_db += result.at("vacated").at("psnr_db").get<double>();
+      textured += 1;
+    }
+    if (textured > 0) point.vacated_db /= textured;
+    std::fprintf(stderr, "%-40s %6.2f dB %8.2f s\n", setting.c_str(), point.edited_db, point.seconds);
+    return point;
+  }
+
+ private:
+  std::string program_;
+  path results_;
+};
+
+struct Knob {
+  std::string name, flag;
+  std::vector<std::string> values;
+};
+
+const std::vector<Knob>& knobs() {
+  static const std::vector<Knob> all{{"intervals", "--intervals", {"1", "2", "5", "10", "20"}},
+                                     {"iterations", "--iterations", {"1", "25", "50", "100", "200", "400", "800"}},
+                                     {"annealing_steps", "--annealing-steps", {"1", "2", "4"}},
+                                     {"views", "--views", {"2", "4", "8", "16", "24"}},
+                                     {"max_image_side", "--image-side", {"80", "120", "160", "200", "240"}},
+                                     {"interpolation", "--interpolation", {"paper", "smooth", "rigid"}},
+                                     {"corrector", "--corrector", {"none", "harmonic", "scene"}}};
+  return all;
+}
+
+std::string row(const Point& point) {
+  std::ostringstream out;
+  out << "| " << point.setting << std::fixed << std::setprecision(2) << " | " << point.edited_db << " | "
+      << std::setprecision(4) << point.ssim << std::setprecision(2) << " | " << point.vacated_db << " | "
+      << point.outside_db << " | " << std::setprecision(point.seconds < 10 ? 2 : 1) << point.seconds << " |\n";
+  return out.str();
+}
+
+constexpr const char* head =
+    "| setting | edited, dB | SSIM | vacated, dB | outside, dB | s |\n| --- | ---: | ---: | ---: | ---: | ---: |\n";
+
+bench::Series series(const std::string& name, const std::vector<Point>& points) {
+  bench::Series out{name, {}};
+  for (const Point& point : points) out.points.emplace_back(point.seconds, point.edited_db);
+  std::sort(out.points.begin(), out.points.end());
+  return out;
+}
+
+/// Those that no other one beats in both time and quality, by time.
+std::vector<Point> front(std::vector<Point> points) {
+  std::sort(points.begin(), points.end(), [](const Point& a, const Point& b) { return a.seconds < b.seconds; });
+  std::vector<Point> best;
+  for (const Point& point : points)
+    if (best.empty() || point.edited_db > best.back().edited_db) best.push_back(point);
+  return best;
+}
+
+void write_docs(const Bench& bench, const path& folder) {
+  std::ostringstream page;
+  page << "# What speed costs in quality\n\n"
+          "Made by `build/release/bench/tradeoff build/release/splatdrag docs out/tradeoff`. Edits whose right result "
+          "is\n"
+          "known, judged at cameras that they have not seen: PSNR and SSIM of the edited region, PSNR of what was "
+          "vacated\n"
+          "where that has a texture, and outside; seconds of an edit; means over the cases.\n\n"
+          "![](tradeoff.svg)\n\n## Presets, all cases\n\n"
+       << head;
+  std::vector<bench::Chart> charts;
+  std::vector<Point> presets;
+  for (const std::string preset : {"preview", "draft", "standard"})
+    for (const std::string corrector : {"none", "harmonic", "scene"}) {
+      if (preset == "preview" && corrector != "none") continue;
+      presets.push_back(bench.measure(preset + ", " + corrector, "--preset " + preset + " --corrector " + corrector));
+      page << row(presets.back());
+    }
+  page << "\n## The two small cases\n\n" << head;
+  for (const std::string preset : {"draft", "standard", "paper"})
+    page << row(bench.measure(preset + ", scene", "--small --preset " + preset + " --corrector scene"));
+
+  page << "\n## Each knob alone\n\nThe small cases, preset `draft`, corrector `scene` but where it says otherwise.\n";
+  std::vector<Point> all;
+  bench::Chart by_knob{"Each knob alone",         "seconds",           "edited region, dB", {},
+                       bench::Scale::logarithmic, bench::Scale::linear};
+  for (const Knob& knob : knobs()) {
+    page << "\n### " << knob.name << "\n\n" << head;
+    std::vector<Point> points;
+    for (const std::string& value : knob.values) {
+      const std::string corrector = knob.flag == "--corrector" ? "" : " --corrector scene";
+      points.push_back(
+          bench.measure(knob.name + " " + value, "--small --preset draft" + corrector + " " + knob.flag + " " + value));
+      page << row(points.back());
+    }
+    if (knob.name == "corrector") {
+      points.push_back(
+          bench.measure("whole picture for a mask", "--small --preset draft --corrector scene --whole-picture"));
+      page << row(points.back());
+    } else {
+      by_knob.series.push_back(series(knob.name, points));
+    }
+    all.insert(all.end(), points.begin(), points.end());
+  }
+  const std::vector<Point> best = front(all);
+  page << "\n## The front\n\nSettings above that no other one beats in both time and quality.\n\n" << head;
+  for (const Point& point : best) page << row(point);
+  charts.push_back(by_knob);
+  charts.push_back({"The front",
+                    "seconds",
+                    "edited region, dB",
+                    {series("best of all knobs", best)},
+                    bench::Scale::logarithmic,
+                    bench::Scale::linear});
+  charts.push_back({"Presets, all cases",
+                    "seconds",
+                    "edited region, dB",
+                    {series("presets", front(presets))},
+                    bench::Scale::logarithmic,
+                    bench::Scale::linear});
+  std::ofstream(folder / "tradeoff.md") << page.str();
+  std::ofstream(folder / "tradeoff.svg") << bench::to_svg(charts);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 4) {
+    std::fprintf(stderr, "usage: tradeoff SPLATDRAG FOLDER RESULTS\n");
+    return 2;
+  }
+  try {
+    write_docs(Bench(argv[1], argv[3]), argv[2]);
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "%s\n", e.what());
+    return 1;
+  }
+  return 0;
+}
