@@ -220,7 +220,8 @@ Result<Corrected> Run::correct(int u, int a, std::span<const scene::Mask> dilate
     original_ = begin(scene_, request_, deform::HandleColumn(scene_.size(), 0));
     const auto in_frame = [&](std::span<const scene::Camera> cameras) {
       std::vector<scene::Camera> out;
-      for (const scene::Camera& camera : cameras) out.push_back(in_frame_of(working_, camera));
+      for (const scene::Camera& camera : cameras)
+        out.push_back(scene::fit_within(in_frame_of(working_, camera), request_.params.max_image_side));
       return out;
     };
     repair_.emplace(original_->cloud, in_frame(observers_), in_frame(views_), request_.params, request_.mode,
