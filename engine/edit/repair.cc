@@ -11,7 +11,7 @@
 #include "engine/edit/trust.h"
 #include "engine/mask/mask.h"
 #include "engine/render/forward.h"
-#include "engine/render/project.h"
+#include "engine/train/densify.h"
 
 namespace engine::edit {
 namespace {
@@ -59,12 +59,6 @@ std::vector<std::size_t> nearest_views(std::span<const scene::Camera> views, std
   return order;
 }
 
-/// Logit of the opacity two of which, one behind the other, are as opaque as one of this.
-float halved(float logit) {
-  const double through = std::sqrt(1 - render::opacity<double>(logit));
-  return float(std::log1p(-through) - std::log(through));
-}
-
 /// While it lives, what a drawn-out part leaves along its way is as opaque as the part: it was only made half
 /// transparent so that the optimisation can choose, and a picture that shows it so is no picture of the scene.
 class Opaque {
@@ -76,7 +70,7 @@ class Opaque {
     for (std::size_t row = 0; row < working.role.size(); ++row)
       if (working.role[row] == Role::original || working.role[row] == Role::trail) {
         float& logit = working.cloud.opacity_logit[row];
-        logit = std::max(logit, trails ? halved(original.opacity_logit[working.parent[row]])
+        logit = std::max(logit, trails ? train::halved_opacity(original.opacity_logit[working.parent[row]])
                                        : original.opacity_logit[working.parent[row]]);
       }
   }

@@ -11,12 +11,6 @@ namespace {
 
 constexpr double shrink_of_split = 1.6;
 
-/// Of a clone and of what it was cloned from. 1 - alpha is kept from cancelling near 1.
-float halved_opacity(float logit) {
-  const double through = std::sqrt(render::opacity<double>(-double(logit)));  // sqrt(1 - alpha)
-  return float(std::log1p(-through) - std::log(through));
-}
-
 /// A place drawn from the Gaussian.
 Vec3 drawn(Vec3 mean, DVec3 sigma, DMat3 rotation, Rng& rng) {
   DVec3 local;
@@ -25,6 +19,12 @@ Vec3 drawn(Vec3 mean, DVec3 sigma, DMat3 rotation, Rng& rng) {
 }
 
 }  // namespace
+
+float halved_opacity(float logit) {
+  // Of the logit's negative: 1 - alpha would cancel near 1.
+  const double through = std::sqrt(render::opacity<double>(-double(logit)));  // sqrt(1 - alpha)
+  return float(std::log1p(-through) - std::log(through));
+}
 
 void PullStatistic::reset(std::size_t rows) {
   sum.assign(rows, 0.0);

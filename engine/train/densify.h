@@ -30,6 +30,9 @@ struct PullStatistic {
 /// Rows whose mean pull exceeds the threshold, ascending: at most `most`, the strongest (the lower row if two tie).
 [[nodiscard]] std::vector<std::uint32_t> rows_to_densify(const PullStatistic& pull, double threshold, std::size_t most);
 
+/// Logit of the opacity 1 - sqrt(1 - alpha), two of which, one behind the other, blend like the alpha of this logit.
+[[nodiscard]] float halved_opacity(float logit);
+
 /// Appends a child for each of `rows` (ascending), in their order, with the parent's extra bytes.
 ///   larger_than  world units: a Gaussian whose largest sigma exceeds this is split: it and its child take places drawn
 ///                from it, at 1 / 1.6 of its size. Others are cloned: both at the same place, with the opacity
