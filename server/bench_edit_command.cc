@@ -112,8 +112,14 @@ std::string key_of(const std::string& subject, const std::string& corrector, con
   ordered_json all{subject,       corrector,        p.intervals,          p.iterations, p.annealing_steps,
                    p.views,       p.max_image_side, int(p.interpolation), p.local_mask, options.pictures,
                    options.scene, options.dataset,  machine.threads,      machine.simd, program};
-  for (const edit::Handle& handle : request.handles)
-    for (int axis = 0; axis < 3; ++axis) all.push_back(handle.source[axis]);
+  all.push_back(int(request.mode));
+  for (const edit::Handle& handle : request.handles) {
+    all.push_back({handle.radius, handle.group, handle.target.has_value()});
+    for (int axis = 0; axis < 3; ++axis)
+      all.push_back({handle.source[axis], handle.target.value_or(handle.source)[axis]});
+  }
+  for (int axis = 0; request.region && axis < 3; ++axis)
+    all.push_back({request.region->center[axis], request.region->size[axis]});
   const std::string text = all.dump();
   std::ostringstream key;
   key << std::hex << std::setfill('0') << std::setw(16) << engine::fnv1a(std::as_bytes(std::span(text)));
