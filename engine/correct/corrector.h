@@ -52,7 +52,7 @@ class Corrector {
   [[nodiscard]] virtual Result<void> fine_tune(std::span<const Example> buffer, int steps) = 0;
 
   /// Corrected pictures, one for each. Pixels outside the mask, and trusted ones, are those given.
-  ///   strength  S, 0 to 1: how much of what is doubtful is made anew; 1 all of it, 0 only its finest detail
+  ///   strength  S, 0 to 1: how much of what is doubtful is made anew; 1 all of it, 0 nothing
   ///   seed      same seed, same bytes, for any number of threads
   [[nodiscard]] virtual Result<std::vector<scene::Image>> correct(std::span<const Flawed> views, double strength,
                                                                   std::uint64_t seed) = 0;

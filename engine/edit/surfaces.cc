@@ -14,9 +14,9 @@ namespace {
 
 constexpr std::size_t most_planes = 5;
 constexpr std::size_t most_points = 1500;  // that vote for a plane
-constexpr int trials = 200;           // for 99 % certainty with a quarter of the points on the plane: 293 with 1/4^3
-constexpr double on_plane = 0.006;    // relative difference of depths
-constexpr double in_front = 0.02;     // by so much nearer a surface hides what is behind it
+constexpr int trials = 200;         // 1 - (1 - 1/4^3)^200: 96 % certain of a plane that a quarter of the points lie on
+constexpr double on_plane = 0.006;  // relative difference of depths
+constexpr double in_front = 0.02;   // by so much nearer a surface hides what is behind it
 constexpr int directions_needed = 7;  // of eight in which the surface is met again
 
 constexpr float same_surface = 0.05f;      // relative difference of depths between neighbouring pixels

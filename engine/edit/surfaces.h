@@ -1,8 +1,8 @@
 // Surfaces that go on behind what left: where a part stood on something, nobody has seen what is under it.
 //
 // A surface near the place is a plane in a picture of inverse depth (a plane in space is affine there). It goes on at a
-// pixel of the vacated place if the pixel lies amid pixels that show it, if nothing trusted in front of it is seen
-// there, and if no view has looked through the point where it would be.
+// pixel of the vacated place if the pixel lies amid pixels that show it, if nothing in front of it is seen there,
+// and if no view has looked through the point where it would be.
 #pragma once
 
 #include <cstdint>
