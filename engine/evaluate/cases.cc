@@ -121,7 +121,7 @@ Plan slide() {
 }
 
 Plan lift() {
-  const DVec3 shift = dat(0.1, 0.55, 0), foot = dat(-0.75, 0.25, 0.95);
+  const DVec3 shift = dat(0.1, 0.55, 0), foot = dat(-0.75, 0.25, 1.05);
   Plan plan{.what = "A hanging ball lifted before a wall with prints."};
   plan.surroundings = furnished_room();
   plan.parts = {
@@ -195,25 +195,27 @@ Plan arm() {
 }
 
 Plan bush() {
-  const made::Placement pot{{0.0f, 0, -0.1f}, 0.3f};
-  Plan plan{.what = "A leafy bush widened to both sides.", .textured = false};
-  plan.surroundings = {made::make_room(-1.5f), made::make_table({}, {3.7f, 1.5f, 2.1f}), made::make_pot(pot)};
-  const made::Plant plant = made::make_plant(pot, 40, seed);
-  const DVec3 soil = DVec3(pot.position) + dat(0, double(made::soil_height), 0);
-  const Motion motion{.pivot = soil, .widen = 0.22, .reach = 0.35};
+  constexpr float thick = 0.17f;
+  const DVec3 foot = dat(0, 0, -0.1), top = foot + dat(0, double(made::soil_height), 0);
+  Plan plan{.what = "A leafy bush on a post, widened to both sides.", .textured = false};
+  plan.surroundings = {
+      made::make_room(-1.5f),
+      made::make_table({}, {3.7f, 1.5f, 2.1f}),
+      {"post",
+       {Vec3(foot), 0.3f},
+       made::box({0, 0, 0}, {thick, made::soil_height, thick}, made::plain(made::srgb(178, 92, 60), 0.1f), 2)}};
+  const made::Plant plant = made::make_plant({Vec3(foot), 0}, 40, seed);
+  const Motion motion{.pivot = top, .widen = 0.8, .reach = 1.0};
   plan.parts = {{plant.object, motion}};
   std::vector<edit::Handle> handles;
-  for (const double height : {0.15, 0.4, 0.65})
-    for (const double depth : {-0.25, 0.25})
-      for (const double side : {-0.5, -0.25, 0.0, 0.25, 0.5}) {
-        const DVec3 point = soil + dat(side, height, depth);
-        handles.push_back(handle(point, motion(point), 0.4));
-      }
-  for (int k = 0; k < 10; ++k) {  // the pot stays
-    const double angle = 2 * pi * k / 10;
-    handles.push_back(handle(soil + dat(0.32 * std::cos(angle), 0, 0.32 * std::sin(angle)), std::nullopt, 0.25));
-  }
-  plan.request = drag(std::move(handles), edit::Region{soil + dat(0, 0.6, 0), {2.6, 1.9, 2.2}});
+  for (const made::Blade& blade : plant.blades)
+    for (const float along : {0.15f, 0.55f, 0.95f}) {
+      const DVec3 point = foot + DVec3(blade.midrib(along));
+      handles.push_back(handle(point, motion(point), 0.3));
+    }
+  for (const double below : {0.04, 0.12, 0.2})  // the post stays
+    handles.push_back(handle(top - dat(0, below, 0), std::nullopt, 0.12));
+  plan.request = drag(std::move(handles), edit::Region{top + dat(0, 0.42, 0), {2.2, 1.3, 2.2}});
   return plan;
 }
 
@@ -264,8 +266,25 @@ const std::vector<Known>& known_cases() {
   return all;
 }
 
+/// Row i of the cloud, a flat disc, drawn out with what it lies on: a surface that grows stays closed.
+///   low, high  of its extents are in its plane
+void widen_row(scene::GaussianCloud& cloud, std::size_t i, const Motion& motion) {
+  const DMat3 axes = glm::mat3_cast(glm::normalize(DQuat(cloud.rotation.get(i))));
+  const DVec3 extent = glm::exp(DVec3(cloud.log_scale.get(i)));
+  const DVec3 middle(cloud.mean.get(i));
+  const auto drawn = [&](int axis) { return motion(middle + extent[axis] * axes[axis]) - motion(middle); };
+  // The two half-axes are no longer at right angles: those of the same ellipse that are.
+  const DVec3 a = drawn(0), b = drawn(1);
+  const double angle = 0.5 * std::atan2(2 * glm::dot(a, b), glm::dot(a, a) - glm::dot(b, b));
+  const DVec3 longer = std::cos(angle) * a + std::sin(angle) * b, shorter = std::cos(angle) * b - std::sin(angle) * a;
+  const DVec3 u = glm::normalize(longer), v = glm::normalize(shorter);
+  cloud.rotation.set(i, Quat(glm::quat_cast(DMat3(u, v, glm::cross(u, v)))));
+  cloud.log_scale.set(i, Vec3(glm::log(DVec3(glm::length(longer), glm::length(shorter), extent.z))));
+}
+
 /// Row i of the cloud, carried along by the motion.
 void move_row(scene::GaussianCloud& cloud, std::size_t i, const Motion& motion, const deform::ShRotation& sh) {
+  if (motion.widen != 0) widen_row(cloud, i, motion);
   cloud.mean.set(i, Vec3(motion(DVec3(cloud.mean.get(i)))));
   if (motion.turn == DQuat(1, 0, 0, 0)) return;
   cloud.rotation.set(i, Quat(motion.turn * DQuat(cloud.rotation.get(i))));
