@@ -13,7 +13,7 @@ constexpr int max_intervals = 20;
 /// One drag as the schedule sees it: how far, compared with the radius of the handle. World units.
 struct DragLength {
   double distance = 0;  ///< |p_t - p_h|, 0 for an anchor.
-  double radius = 0;    ///< tau > 0
+  double radius = 0;    ///< tau > 0; or as far as one interval may go otherwise
 };
 
 /// T = ceil(max_i distance_i / radius_i), limited to 1..max_intervals: no step carries a handle out of its own sphere,

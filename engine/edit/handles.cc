@@ -7,9 +7,12 @@ namespace engine::edit {
 
 int resolved_intervals(const Request& request) {
   if (request.params.intervals > 0) return request.params.intervals;
+  // What an extend leaves along its way is as long as the part is: its sphere's diameter. More intervals than close the
+  // gap only lay half-transparent layers of it over each other.
+  const double step = request.mode == Mode::extend ? 2 : 1;
   std::vector<deform::DragLength> drags;
   for (const Handle& handle : request.handles)
-    drags.push_back({glm::distance(handle.target.value_or(handle.source), handle.source), handle.radius});
+    drags.push_back({glm::distance(handle.target.value_or(handle.source), handle.source), step * handle.radius});
   return deform::default_intervals(drags);
 }
 

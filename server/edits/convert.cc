@@ -91,7 +91,8 @@ edit::Params preset_params(proto::Preset preset, proto::Mode mode) {
       params.iterations = 0;
       break;
     case proto::Preset::draft:
-      params.intervals = 1, params.annealing_steps = 1, params.iterations = 200;
+      params.intervals = mode == proto::Mode::move ? 1 : 0;
+      params.annealing_steps = 1, params.iterations = 200;
       params.views = 24, params.max_image_side = 384;
       break;
     case proto::Preset::standard:

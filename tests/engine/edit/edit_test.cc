@@ -6,6 +6,7 @@
 #include <stop_token>
 
 #include "engine/core/parallel.h"
+#include "engine/edit/handles.h"
 #include "tests/engine/edit/samples.h"
 
 namespace engine::edit {
@@ -147,6 +148,14 @@ TEST(Edit, ChoosesTheNumberOfIntervalsFromTheDrag) {
   const scene::GaussianCloud scene = ball_before_wall(30);
   const Outcome outcome = run_well(scene, arc_of_cameras(1, 32), drag_right(0));
   EXPECT_EQ(outcome.report.resolved.intervals, 3);  // 0.7 / 0.3, rounded up
+}
+
+TEST(Edit, InAnExtendAnIntervalReachesAsFarAsThePartIsWide) {
+  Request request = drag_right(0);
+  request.mode = Mode::extend;
+  EXPECT_EQ(resolved_intervals(request), 2);  // 0.7 / 0.6, rounded up
+  request.params.intervals = 5;
+  EXPECT_EQ(resolved_intervals(request), 5);
 }
 
 TEST(Edit, ReportsProgressThatNeverFallsAndEveryInterval) {

@@ -146,6 +146,12 @@ TEST(Convert, APreviewDeformsAndEveryOtherPresetOptimisesAtMostAsMuchAsTheNext) 
   EXPECT_EQ(paper.strength_final, 0.3);
 }
 
+TEST(Convert, AnExtendTakesNoMoreIntervalsThanItsLengthAsksFor) {
+  for (const auto preset : {proto::Preset::preview, proto::Preset::draft, proto::Preset::standard})
+    EXPECT_EQ(preset_params(preset, proto::Mode::extend).intervals, 0) << proto::name_of(preset);
+  EXPECT_EQ(preset_params(proto::Preset::paper, proto::Mode::extend).intervals, 5);
+}
+
 TEST(Convert, TheCorrectorIsTheGivenOneOrThatOfThePreset) {
   for (const auto preset : every_preset) {
     SCOPED_TRACE(proto::name_of(preset));
