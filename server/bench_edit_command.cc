@@ -71,8 +71,9 @@ ordered_json encode(const evaluate::Quality& quality) {
 }
 
 /// What is given on the command line, over the preset.
-void apply(const BenchOptions& options, edit::Mode mode, edit::Params& params) {
-  params = edits::preset_params(options.preset, mode == edit::Mode::extend ? proto::Mode::extend : proto::Mode::move);
+void apply(const BenchOptions& options, edit::Request& request) {
+  edit::Params& params = request.params;
+  params = edits::preset_params(options.preset, request);
   if (options.interpolation) params.interpolation = *options.interpolation;
   if (options.intervals) params.intervals = *options.intervals;
   if (options.iterations) params.iterations = *options.iterations;
@@ -215,7 +216,7 @@ Result<ordered_json> kept_or(const path& file, const std::function<Result<ordere
 Result<ordered_json> result_of(const evaluate::Case& the_case, const std::string& corrector,
                                const BenchOptions& options, const Machine& machine) {
   edit::Request request = the_case.request;
-  apply(options, request.mode, request.params);
+  apply(options, request);
   const std::string key = key_of(the_case.name, corrector, request, options, machine);
   return kept_or(path(options.out) / "results" / (key + ".json"), [&]() -> Result<ordered_json> {
     scene::GaussianCloud edited;
@@ -247,14 +248,15 @@ Result<std::vector<std::string>> chosen_cases(const BenchOptions& options) {
 
 /// What stands at the head of every report.
 ordered_json settings(const BenchOptions& options, const Machine& machine) {
-  edit::Params params;
-  apply(options, edit::Mode::move, params);
+  edit::Request any;
+  apply(options, any);
+  const edit::Params& params = any.params;
   return {{"splatdrag", SPLATDRAG_VERSION},
           {"threads", machine.threads},
           {"simd", machine.simd},
           {"params",
            {{"preset", proto::name_of(options.preset)},
-            {"intervals", params.intervals},
+            {"intervals", options.intervals ? ordered_json(*options.intervals) : ordered_json(nullptr)},
             {"iterations", params.iterations},
             {"annealing_steps", params.annealing_steps},
             {"views", params.views},
@@ -307,7 +309,7 @@ Result<void> run_trips(const BenchOptions& options, const Machine& machine, Term
   if (!asked) return propagate(asked);
   auto request = edits::to_engine(asked->request);
   if (!request) return propagate(request);
-  apply(options, request->mode, request->params);
+  apply(options, *request);
   const auto input = io::read_scene(options.scene);
   if (!input) return propagate(input);
   const auto dataset = io::read_dataset(options.dataset, {.points = false});

@@ -1,5 +1,7 @@
 #include "engine/edit/handles.h"
 
+#include <algorithm>
+
 #include "engine/deform/intervals.h"
 #include "engine/render/project.h"
 
@@ -14,6 +16,18 @@ int resolved_intervals(const Request& request) {
   for (const Handle& handle : request.handles)
     drags.push_back({glm::distance(handle.target.value_or(handle.source), handle.source), step * handle.radius});
   return deform::default_intervals(drags);
+}
+
+bool only_shifts(const Request& request) {
+  const auto way = [](const Handle& handle) { return handle.target.value_or(handle.source) - handle.source; };
+  // Shifts that a program has worked out differ in their last digits.
+  constexpr double rounding = 1e-6;
+  for (const Handle& handle : request.handles) {
+    const auto first = std::find_if(request.handles.begin(), request.handles.end(),
+                                    [&](const Handle& other) { return other.group == handle.group; });
+    if (glm::distance(way(handle), way(*first)) > rounding * glm::length(way(*first))) return false;
+  }
+  return !request.handles.empty();
 }
 
 std::vector<DVec3> handle_sources(const WorkingScene& working, const Request& request) {

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "engine/correct/scene_corrector.h"
+#include "engine/edit/handles.h"
 #include "server/edits/points.h"
 
 namespace server::edits {
@@ -62,8 +63,8 @@ proto::Interpolation to_wire(edit::Interpolation interpolation) {
   return proto::Interpolation::paper;
 }
 
-edit::Params to_engine(const proto::Params& given, proto::Preset preset, proto::Mode mode) {
-  edit::Params params = preset_params(preset, mode);
+edit::Params to_engine(const proto::Params& given, proto::Preset preset, const edit::Request& drag) {
+  edit::Params params = preset_params(preset, drag);
   if (given.intervals) params.intervals = *given.intervals;
   if (given.views) params.views = *given.views;
   if (given.exclude_views) params.exclude_views = *given.exclude_views;
@@ -83,7 +84,9 @@ edit::Params to_engine(const proto::Params& given, proto::Preset preset, proto::
 
 }  // namespace
 
-edit::Params preset_params(proto::Preset preset, proto::Mode mode) {
+edit::Params preset_params(proto::Preset preset, const edit::Request& drag) {
+  // A part that is drawn out leaves its trail where its intervals end: as many as the length of the drag asks for.
+  const bool extends = drag.mode == edit::Mode::extend;
   edit::Params params;
   if (preset != proto::Preset::paper) params.interpolation = edit::Interpolation::rigid;
   switch (preset) {
@@ -91,13 +94,12 @@ edit::Params preset_params(proto::Preset preset, proto::Mode mode) {
       params.iterations = 0;
       break;
     case proto::Preset::draft:
-      params.intervals = mode == proto::Mode::move ? 1 : 0;
+      params.intervals = extends ? 0 : 1;
       params.annealing_steps = 1, params.iterations = 200;
       params.views = 24, params.max_image_side = 384;
       break;
     case proto::Preset::standard:
-      // A part that is drawn out leaves its trail where its intervals end: as many as the length of the drag asks for.
-      params.intervals = mode == proto::Mode::move ? 4 : 0;
+      params.intervals = extends ? 0 : edit::only_shifts(drag) ? 1 : 4;
       params.annealing_steps = 1, params.iterations = 500;
       params.views = 50, params.max_image_side = 512;
       break;
@@ -109,9 +111,7 @@ edit::Params preset_params(proto::Preset preset, proto::Mode mode) {
   return params;
 }
 
-proto::Preset preset_of(const proto::EditRequest& request) {
-  return request.preset.value_or(proto::Preset::standard);
-}
+proto::Preset preset_of(const proto::EditRequest& request) { return request.preset.value_or(proto::Preset::standard); }
 
 proto::Corrector corrector_of(const proto::EditRequest& request) {
   return request.params.corrector.value_or(preset_of(request) == proto::Preset::preview ? proto::Corrector::none
@@ -151,7 +151,7 @@ engine::Result<edit::Request> to_engine(const proto::EditRequest& request) {
     made.group = handle.group;
   }
   if (request.region) out.region = {to_vec(request.region->center), to_vec(request.region->size)};
-  out.params = to_engine(request.params, preset_of(request), request.mode);
+  out.params = to_engine(request.params, preset_of(request), out);
   return out;
 }
 
@@ -184,7 +184,7 @@ std::vector<std::string> fields_without_effect(const proto::EditRequest& request
   };
   note(request.prompt.has_value(), "prompt");  // no corrector of this build reads
   const proto::Params& params = request.params;
-  if (!corrects(request, to_engine(params, preset_of(request), request.mode))) {
+  if (!corrects(request, to_engine(params, preset_of(request), {}))) {
     note(params.strength_initial.has_value(), "params.strength_initial");
     note(params.strength_final.has_value(), "params.strength_final");
     note(params.annealing.has_value(), "params.annealing");

@@ -13,7 +13,8 @@
 namespace server::edits {
 
 /// What a preset stands for. How the numbers were found: docs/tradeoff.md.
-[[nodiscard]] engine::edit::Params preset_params(proto::Preset preset, proto::Mode mode = proto::Mode::move);
+///   drag  its mode and handles, on which intervals depend; the rest of it does not count
+[[nodiscard]] engine::edit::Params preset_params(proto::Preset preset, const engine::edit::Request& drag = {});
 
 /// The preset of a request: `standard` if it names none.
 [[nodiscard]] proto::Preset preset_of(const proto::EditRequest& request);

@@ -158,6 +158,19 @@ TEST(Edit, InAnExtendAnIntervalReachesAsFarAsThePartIsWide) {
   EXPECT_EQ(resolved_intervals(request), 5);
 }
 
+TEST(Edit, OnlyShiftsWhereEachGroupGoesOneWay) {
+  Request request;
+  EXPECT_FALSE(only_shifts(request));
+  request.handles = {{DVec3(0), DVec3(0.3, 0, 0), 0.1, 1}, {DVec3(1), DVec3(1.3, 1, 1), 0.1, 1}};
+  EXPECT_TRUE(only_shifts(request)) << "0.3 and 1.3 - 1 differ in their last digits";
+  request.handles.push_back({DVec3(2), DVec3(2, 9, 2), 0.1, 2});
+  EXPECT_TRUE(only_shifts(request));
+  request.handles.push_back({DVec3(3), std::nullopt, 0.1, 2});
+  EXPECT_FALSE(only_shifts(request)) << "an anchor holds what the other carries off";
+  request.handles = {{DVec3(3), std::nullopt, 0.1, 0}};
+  EXPECT_TRUE(only_shifts(request));
+}
+
 TEST(Edit, ReportsProgressThatNeverFallsAndEveryInterval) {
   const scene::GaussianCloud scene = ball_before_wall(30);
   std::vector<Progress> seen;

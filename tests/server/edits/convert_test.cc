@@ -92,7 +92,8 @@ TEST(Convert, EachPresetFillsInWhatIsNotGiven) {
     proto::EditRequest asked = full_request();
     asked.preset = preset;
     asked.params = {};
-    expect_same(value(to_engine(asked)).params, preset_params(preset));
+    const edit::Request made = value(to_engine(asked));
+    expect_same(made.params, preset_params(preset, made));
     EXPECT_TRUE(edit::validate(value(to_engine(asked))));
   }
 }
@@ -147,9 +148,22 @@ TEST(Convert, APreviewDeformsAndEveryOtherPresetOptimisesAtMostAsMuchAsTheNext) 
 }
 
 TEST(Convert, AnExtendTakesNoMoreIntervalsThanItsLengthAsksFor) {
+  edit::Request drag;
+  drag.mode = edit::Mode::extend;
+  drag.handles = {{engine::DVec3(0), engine::DVec3(1, 0, 0), 0.3, 0}};
   for (const auto preset : {proto::Preset::preview, proto::Preset::draft, proto::Preset::standard})
-    EXPECT_EQ(preset_params(preset, proto::Mode::extend).intervals, 0) << proto::name_of(preset);
-  EXPECT_EQ(preset_params(proto::Preset::paper, proto::Mode::extend).intervals, 5);
+    EXPECT_EQ(preset_params(preset, drag).intervals, 0) << proto::name_of(preset);
+  EXPECT_EQ(preset_params(proto::Preset::paper, drag).intervals, 5);
+}
+
+TEST(Convert, StandardTakesOneIntervalForWhatOnlyShifts) {
+  edit::Request drag;
+  drag.handles = {{engine::DVec3(0), engine::DVec3(1, 0, 0), 0.3, 1},
+                  {engine::DVec3(5), engine::DVec3(5, 7, 5), 0.3, 2}};
+  EXPECT_EQ(preset_params(proto::Preset::standard, drag).intervals, 1);
+  EXPECT_EQ(preset_params(proto::Preset::paper, drag).intervals, 5);
+  drag.handles[1].group = 1;
+  EXPECT_EQ(preset_params(proto::Preset::standard, drag).intervals, 4);
 }
 
 TEST(Convert, TheCorrectorIsTheGivenOneOrThatOfThePreset) {
