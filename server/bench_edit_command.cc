@@ -133,13 +133,22 @@ Result<ordered_json> judge(const evaluate::Case& the_case, const edit::Request& 
   forget_peak();
   const std::uint64_t before = status_bytes("VmRSS");
   const auto corrector = corrector_named(corrector_name);
-  const auto outcome = edit::run(the_case.before, the_case.cameras, request, {}, nullptr, nullptr, corrector.get());
+  evaluate::Agreement agreement;  // of the last correction
+  edit::Observer observer;
+  observer.moment = [&](const edit::Moment& moment) -> Result<void> {
+    if (!moment.pictures.empty() && moment.interval == moment.intervals)
+      agreement = evaluate::agreement(the_case, moment.views, moment.pictures);
+    return {};
+  };
+  const auto outcome =
+      edit::run(the_case.before, the_case.cameras, request, observer, nullptr, nullptr, corrector.get());
   if (!outcome) return propagate(outcome);
   const std::uint64_t peak = status_bytes("VmHWM");
   edited = scene::flatten(the_case.before, outcome->overlay);
   double seconds = 0;
   ordered_json stages = ordered_json::object();
   for (const edit::StageTime& time : outcome->report.times) {
+    if (time.stage == "renders") continue;  // for the judge alone
     stages[time.stage] = time.seconds;
     seconds += time.seconds;
   }
@@ -153,6 +162,7 @@ Result<ordered_json> judge(const evaluate::Case& the_case, const edit::Request& 
                       {"intervals", outcome->report.resolved.intervals},
                       {"untouched", encode(evaluate::judge(the_case, the_case.before))},
                       {"result", encode(evaluate::judge(the_case, edited))},
+                      {"corrected_views_agree", {{"psnr_db", agreement.psnr_db}, {"pixels", agreement.pixels}}},
                       {"seconds", seconds},
                       {"stages", std::move(stages)},
                       {"peak_memory_bytes", peak > before ? peak - before : 0},
@@ -185,18 +195,36 @@ std::string row(const ordered_json& found) {
   for (const char* kind : {"edited", "vacated", "arrived", "outside"})
     out << " | " << std::setprecision(2) << found.at("result").at(kind).at("psnr_db").get<double>() << " | "
         << std::setprecision(4) << found.at("result").at(kind).at("ssim").get<double>();
-  out << " | " << std::setprecision(4) << found.at("result").at("miss").get<double>() << " | " << std::setprecision(1)
-      << found.at("seconds").get<double>() << " |\n";
+  out << " | " << std::setprecision(4) << found.at("result").at("miss").get<double>() << " | " << std::setprecision(2);
+  const ordered_json& agreement = found.at("corrected_views_agree");
+  if (agreement.at("pixels").get<std::size_t>() > 0)
+    out << agreement.at("psnr_db").get<double>();
+  else
+    out << "-";
+  out << " | " << std::setprecision(1) << found.at("seconds").get<double>() << " |\n";
   return out.str();
 }
 
+std::string trip_line(const ordered_json& found) {
+  const auto decibels = [&](const char* kind) { return found.at(kind).at("psnr_db").get<double>(); };
+  std::ostringstream out;
+  out << std::fixed << std::setprecision(2) << "there and back, " << found.at("corrector").get<std::string>() << ": "
+      << 100 * found.at("arrived").get<double>() << " % of the drag arrived; inside " << decibels("inside")
+      << " dB, outside " << decibels("outside") << " dB; " << std::setprecision(1) << found.at("seconds").get<double>()
+      << " s there; zero drag, inside " << decibels("zero_drag") << " dB\n";
+  return out.str();
+}
+
+/// How a result reads; throws what nlohmann::json does where a field is missing.
+using Line = std::string (*)(const ordered_json& found);
+
 /// A result of an earlier run, if it is there and whole.
-std::optional<ordered_json> kept_result(const path& file) {
+std::optional<ordered_json> kept_result(const path& file, Line line) {
   std::ifstream in(file);
   ordered_json kept = ordered_json::parse(in, nullptr, /*allow_exceptions=*/false);
   if (kept.is_discarded()) return std::nullopt;
   try {
-    static_cast<void>(row(kept));
+    static_cast<void>(line(kept));
   } catch (const nlohmann::json::exception&) {
     return std::nullopt;  // not what we wrote
   }
@@ -204,8 +232,8 @@ std::optional<ordered_json> kept_result(const path& file) {
 }
 
 /// A result: kept from an earlier run, or new and then kept.
-Result<ordered_json> kept_or(const path& file, const std::function<Result<ordered_json>()>& find) {
-  if (auto kept = kept_result(file)) return std::move(*kept);
+Result<ordered_json> kept_or(const path& file, Line line, const std::function<Result<ordered_json>()>& find) {
+  if (auto kept = kept_result(file, line)) return std::move(*kept);
   auto found = find();
   if (!found) return found;
   const std::string text = proto::pretty(*found) + "\n";
@@ -218,7 +246,7 @@ Result<ordered_json> result_of(const evaluate::Case& the_case, const std::string
   edit::Request request = the_case.request;
   apply(options, request);
   const std::string key = key_of(the_case.name, corrector, request, options, machine);
-  return kept_or(path(options.out) / "results" / (key + ".json"), [&]() -> Result<ordered_json> {
+  return kept_or(path(options.out) / "results" / (key + ".json"), row, [&]() -> Result<ordered_json> {
     scene::GaussianCloud edited;
     auto found = judge(the_case, request, corrector, edited);
     if (!found) return found;
@@ -229,9 +257,9 @@ Result<ordered_json> result_of(const evaluate::Case& the_case, const std::string
 }
 
 constexpr const char* table_head =
-    "| case | corrector | edited, dB | SSIM | vacated, dB | SSIM | arrived, dB | SSIM | outside, dB | SSIM | miss | s "
-    "|\n"
-    "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n";
+    "| case | corrector | edited, dB | SSIM | vacated, dB | SSIM | arrived, dB | SSIM | outside, dB | SSIM | miss "
+    "| views agree, dB | s |\n"
+    "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n";
 
 /// The cases asked for, by name.
 Result<std::vector<std::string>> chosen_cases(const BenchOptions& options) {
@@ -320,10 +348,12 @@ Result<void> run_trips(const BenchOptions& options, const Machine& machine, Term
   ordered_json all = ordered_json::array();
   for (const std::string& corrector : options.correctors) {
     const std::string key = key_of("trip", corrector, *request, options, machine);
-    auto found = kept_or(path(options.out) / "results" / (key + ".json"), [&]() -> Result<ordered_json> {
+    auto found = kept_or(path(options.out) / "results" / (key + ".json"), trip_line, [&]() -> Result<ordered_json> {
       const auto own = corrector_named(corrector);
       const auto trip = evaluate::there_and_back(input->cloud, cameras, *request, own.get());
       if (!trip) return propagate(trip);
+      const auto still = evaluate::zero_drag(input->cloud, cameras, *request, own.get());
+      if (!still) return propagate(still);
       for (std::size_t v = 0; v < std::min(std::size_t(options.pictures), trip->cameras.size()); ++v) {
         const path file = path(options.out) / ("trip_" + corrector + "_" + std::to_string(v) + ".png");
         if (auto saved = io::write_image(file, trip_picture(input->cloud, *trip, trip->cameras[v])); !saved)
@@ -331,14 +361,11 @@ Result<void> run_trips(const BenchOptions& options, const Machine& machine, Term
       }
       return ordered_json{{"request", options.name},          {"corrector", corrector},
                           {"arrived", trip->arrived},         {"inside", encode(trip->inside)},
-                          {"outside", encode(trip->outside)}, {"cameras", trip->cameras.size()}};
+                          {"outside", encode(trip->outside)}, {"zero_drag", encode(*still)},
+                          {"cameras", trip->cameras.size()},  {"seconds", trip->seconds}};
     });
     if (!found) return propagate(found);
-    terminal.out << std::fixed << std::setprecision(2) << "there and back, " << corrector << ": "
-                 << 100 * found->at("arrived").get<double>() << " % of the drag arrived; inside "
-                 << found->at("inside").at("psnr_db").get<double>() << " dB, outside "
-                 << found->at("outside").at("psnr_db").get<double>() << " dB\n"
-                 << std::flush;
+    terminal.out << trip_line(*found) << std::flush;
     all.push_back(std::move(*found));
   }
   ordered_json report = settings(options, machine);

@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "engine/edit/footprint.h"
+#include "engine/edit/seed.h"
 #include "engine/mask/mask.h"
 #include "engine/neighbours/point_index.h"
 #include "engine/optim/losses.h"
@@ -39,6 +40,43 @@ double miss(const Case& the_case, const scene::GaussianCloud& result) {
   return sum / double(nearest.size());
 }
 
+/// 100 where nothing differs.
+double psnr_db(double mean_square) {
+  return mean_square > 0 ? std::min(-10 * std::log10(mean_square), identical_db) : identical_db;
+}
+
+/// Depth along the optical axis of what a view shows most of. World units; 0: nothing.
+scene::Image true_depth(const scene::GaussianCloud& truth, const scene::Camera& camera) {
+  render::ForwardOptions options;
+  options.depth = true;
+  render::Workspace workspace;
+  render::Rendering rendering;
+  render::forward(truth, camera, options, {}, workspace, rendering);
+  return std::move(rendering.median_depth);
+}
+
+DVec3 bilinear(const scene::Image& image, DVec2 pixel) {
+  const double x = std::clamp(pixel.x - 0.5, 0.0, image.width - 1.0);
+  const double y = std::clamp(pixel.y - 0.5, 0.0, image.height - 1.0);
+  const int x0 = int(x), y0 = int(y), x1 = std::min(x0 + 1, image.width - 1), y1 = std::min(y0 + 1, image.height - 1);
+  DVec3 color;
+  for (int c = 0; c < 3; ++c) {
+    const double above = std::lerp(double(image.at(x0, y0, c)), double(image.at(x1, y0, c)), x - x0);
+    const double below = std::lerp(double(image.at(x0, y1, c)), double(image.at(x1, y1, c)), x - x0);
+    color[c] = std::lerp(above, below, y - y0);
+  }
+  return color;
+}
+
+std::size_t nearest_other(std::span<const scene::Camera> views, std::size_t v) {
+  std::size_t best = v;
+  double least = 1e300;
+  for (std::size_t w = 0; w < views.size(); ++w)
+    if (const double far = glm::distance(views[v].centre(), views[w].centre()); w != v && far < least)
+      least = far, best = w;
+  return best;
+}
+
 }  // namespace
 
 void LikenessSum::add(const scene::Image& result, const scene::Image& truth, const scene::Mask& counts) {
@@ -61,9 +99,7 @@ void LikenessSum::add(const scene::Image& result, const scene::Image& truth, con
 
 Likeness LikenessSum::likeness() const {
   if (pixels_ == 0) return {};
-  const double mean = squares_ / double(pixels_);
-  return {mean > 0 ? std::min(-10 * std::log10(mean), identical_db) : identical_db,
-          1 - dissimilarity_ / double(pixels_), pixels_};
+  return {psnr_db(squares_ / double(pixels_)), 1 - dissimilarity_ / double(pixels_), pixels_};
 }
 
 scene::Image picture(const scene::GaussianCloud& cloud, const scene::Camera& camera) {
@@ -100,6 +136,37 @@ Quality judge(const Case& the_case, const scene::GaussianCloud& result) {
     outside.add(is, should_be, complement(kinds.edited));
   }
   return {edited.likeness(), vacated.likeness(), arrived.likeness(), outside.likeness(), miss(the_case, result)};
+}
+
+Agreement agreement(const Case& the_case, std::span<const scene::Camera> views,
+                    std::span<const scene::Image> pictures) {
+  constexpr double same_surface = 0.01;  // relative difference of depths
+  if (views.size() < 2) return {};
+  std::vector<scene::Image> depth;
+  for (const scene::Camera& view : views) depth.push_back(true_depth(the_case.truth, view));
+  Agreement out;
+  double squares = 0;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const std::size_t w = nearest_other(views, v);
+    const scene::Camera &from = views[v], &to = views[w];
+    const scene::Mask vacated = kinds_of(the_case, from).vacated;
+    for (int y = 0; y < from.height; ++y)
+      for (int x = 0; x < from.width; ++x) {
+        const double z = double(depth[v].at(x, y));
+        if (vacated.at(x, y) == 0 || z <= 0) continue;
+        const DVec3 there = to.cam_from_world(edit::point_at(from, DVec2(x + 0.5, y + 0.5), 1 / z));
+        if (there.z <= 0) continue;
+        const DVec2 pixel = to.pixel_from_cam(there);
+        if (pixel.x < 0 || pixel.y < 0 || pixel.x >= to.width || pixel.y >= to.height) continue;
+        if (std::abs(double(depth[w].at(int(pixel.x), int(pixel.y))) - there.z) > same_surface * there.z) continue;
+        const DVec3 shown(pictures[v].at(x, y, 0), pictures[v].at(x, y, 1), pictures[v].at(x, y, 2));
+        const DVec3 difference = shown - bilinear(pictures[w], pixel);
+        squares += glm::dot(difference, difference) / 3;
+        ++out.pixels;
+      }
+  }
+  if (out.pixels > 0) out.psnr_db = psnr_db(squares / double(out.pixels));
+  return out;
 }
 
 scene::Image comparison(const Case& the_case, const scene::GaussianCloud& deformed, const scene::GaussianCloud& result,

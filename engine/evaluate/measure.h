@@ -54,6 +54,16 @@ struct Kinds {
 /// Judges `result`, which came of the_case.before.
 [[nodiscard]] Quality judge(const Case& the_case, const scene::GaussianCloud& result);
 
+/// How well corrected views of one edit agree where the part has gone: each pixel there, carried to the nearest other
+/// view by the true depth, against what that view shows.
+struct Agreement {
+  double psnr_db = 0;      ///< Of the mean square difference.
+  std::size_t pixels = 0;  ///< That two views show. 0: the rest says nothing.
+};
+///   pictures  per view, in its size
+[[nodiscard]] Agreement agreement(const Case& the_case, std::span<const scene::Camera> views,
+                                  std::span<const scene::Image> pictures);
+
 /// A case at one view, side by side: before, deformed, result, truth, and four times the difference of the last two.
 [[nodiscard]] scene::Image comparison(const Case& the_case, const scene::GaussianCloud& deformed,
                                       const scene::GaussianCloud& result, const scene::Camera& camera);

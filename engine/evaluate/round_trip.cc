@@ -52,15 +52,15 @@ edit::Request reversed(const edit::Request& request, const edit::Report& report,
     if (!distances[i].empty())
       handle.radius = std::max(handle.radius, distances[i][std::size_t(held_again * double(distances[i].size() - 1))]);
     if (handle.target) handle.target = std::exchange(handle.source, at[i]);
-    // The region limits what may be dragged; what came here was within it before.
-    if (back.region)
-      for (int axis = 0; axis < 3; ++axis) {
-        const double low =
-            std::min(back.region->center[axis] - back.region->size[axis] / 2, at[i][axis] - handle.radius);
-        const double high =
-            std::max(back.region->center[axis] + back.region->size[axis] / 2, at[i][axis] + handle.radius);
-        back.region->center[axis] = (low + high) / 2, back.region->size[axis] = high - low;
-      }
+  }
+  if (request.region) {  // what came here was within it before, wherever handles have carried it
+    DVec3 low(1e300), high(-1e300);
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      const DVec3 middle = request.region->center + at[i] - request.handles[i].source;
+      low = glm::min(low, middle - request.region->size / 2.0),
+      high = glm::max(high, middle + request.region->size / 2.0);
+    }
+    back.region = edit::Region{(low + high) / 2.0, high - low};
   }
   return back;
 }
@@ -126,6 +126,22 @@ scene::Mask shown_change(const scene::GaussianCloud& input, const scene::Overlay
 
 }  // namespace
 
+Result<Likeness> zero_drag(const scene::GaussianCloud& scene, std::span<const scene::Camera> cameras,
+                           const edit::Request& request, correct::Corrector* corrector) {
+  edit::Request still = request;
+  for (edit::Handle& handle : still.handles)
+    if (handle.target) handle.target = handle.source;
+  still.params.intervals = 1;
+  still.params.optimise_unmoved = true;
+  const auto outcome = edit::run(scene, cameras, still, {}, nullptr, nullptr, corrector);
+  if (!outcome) return propagate(outcome);
+  const scene::GaussianCloud edited = scene::flatten(scene, outcome->overlay);
+  LikenessSum inside;
+  for (std::size_t v = 0; v < outcome->views.size(); ++v)
+    inside.add(picture(edited, outcome->views[v]), picture(scene, outcome->views[v]), outcome->masks[v]);
+  return inside.likeness();
+}
+
 scene::Camera between(const scene::Camera& a, const scene::Camera& b) {
   scene::Camera out = a;
   out.name = a.name + "+" + b.name;
@@ -146,6 +162,7 @@ Result<RoundTrip> there_and_back(const scene::GaussianCloud& scene, std::span<co
   const auto dry = edit::run(scene, cameras, deform_only);
   if (!dry) return propagate(dry);
   RoundTrip trip;
+  for (const edit::StageTime& time : there->report.times) trip.seconds += time.seconds;
   trip.arrived = arrived(scene, request, there->overlay);
   trip.halfway = scene::flatten(scene, there->overlay);
   const auto back =

@@ -1,5 +1,6 @@
-// There and back: a drag and the drag that undoes it, on a real capture, where nobody knows what the edited scene
-// should look like. What comes back should be what was there.
+// What can be said of an edit of a real capture, where nobody knows what the edited scene should look like.
+// There and back: a drag and the drag that undoes it. What comes back should be what was there.
+// Zero drag: handles that stay where they are. What was there should stay, also if it is optimised all the same.
 #pragma once
 
 #include <span>
@@ -19,6 +20,7 @@ struct RoundTrip {
   double arrived = 0;  ///< Part of the drag that the half-way scene shows near the handles' points: the least of them.
   Likeness inside;     ///< Of the scene that came back to the input, where the part is or was half-way.
   Likeness outside;    ///< Elsewhere.
+  double seconds = 0;  ///< The way there took.
   scene::GaussianCloud halfway, back;
   std::vector<scene::Camera> cameras;  ///< Between those of the edit: what is judged.
 };
@@ -30,6 +32,13 @@ struct RoundTrip {
 [[nodiscard]] Result<RoundTrip> there_and_back(const scene::GaussianCloud& scene,
                                                std::span<const scene::Camera> cameras, const edit::Request& request,
                                                correct::Corrector* corrector);
+
+/// The request with all targets at their sources, corrected and optimised although nothing moves: how near it stays to
+/// the input, in the edit's views within its masks.
+///   corrector  null: none
+///   errors     those of edit::run()
+[[nodiscard]] Result<Likeness> zero_drag(const scene::GaussianCloud& scene, std::span<const scene::Camera> cameras,
+                                         const edit::Request& request, correct::Corrector* corrector);
 
 /// A camera half-way between two: position, direction, lens. Name of the first with "+" and that of the second.
 [[nodiscard]] scene::Camera between(const scene::Camera& a, const scene::Camera& b);

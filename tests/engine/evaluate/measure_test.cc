@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <span>
+#include <vector>
+
 #include "engine/render/forward.h"
 
 namespace engine::evaluate {
@@ -37,6 +40,34 @@ TEST(Judge, PixelsOfAKindAreThoseOfItsName) {
     EXPECT_FALSE(kinds.vacated.data[i] && kinds.arrived.data[i]);
     EXPECT_TRUE(kinds.edited.data[i] || !(kinds.vacated.data[i] || kinds.arrived.data[i]));
   }
+}
+
+/// Every view's picture of the truth.
+std::vector<scene::Image> true_pictures() {
+  std::vector<scene::Image> pictures;
+  for (const scene::Camera& camera : speck().cameras) pictures.push_back(picture(speck().truth, camera));
+  return pictures;
+}
+
+TEST(Agreement, PicturesOfOneSceneAgree) {
+  const Agreement found = agreement(speck(), speck().cameras, true_pictures());
+  EXPECT_GT(found.pixels, 500u);
+  EXPECT_GT(found.psnr_db, 35) << "but for what lies between pixels";
+}
+
+TEST(Agreement, AViewThatShowsSomethingElseIsNoticed) {
+  auto pictures = true_pictures();
+  for (std::size_t v = 0; v < pictures.size(); v += 2)
+    for (float& value : pictures[v].data) value += 0.1f;
+  const Agreement found = agreement(speck(), speck().cameras, pictures);
+  EXPECT_LT(found.psnr_db, 24);
+  EXPECT_GT(found.psnr_db, 19) << "0.1 everywhere is 20 dB; some nearest views are alike";
+}
+
+TEST(Agreement, OneViewAgreesWithNobody) {
+  const auto pictures = true_pictures();
+  EXPECT_EQ(agreement(speck(), std::span(speck().cameras).first(1), std::span(pictures).first(1)).pixels, 0u);
+  EXPECT_EQ(agreement(speck(), {}, {}).pixels, 0u);
 }
 
 TEST(Comparison, ShowsFivePanels) {
