@@ -2,7 +2,8 @@
 //
 //   build/release/bench/tradeoff build/release/splatdrag docs out/tradeoff
 //
-// writes docs/tradeoff.md and docs/tradeoff.svg from edits whose right result is known (`splatdrag bench-edit`).
+// writes docs/tradeoff.md and docs/tradeoff.svg from edits whose right result is known (`splatdrag bench-edit`), and
+// from drags of the fox capture and back ($SPLATDRAG_DATA, or shared/data beside the project).
 // Results are kept in the last folder: what is there is not measured again, so that it may be interrupted. Half an hour
 // on two cores, which it wants to itself.
 #include <algorithm>
@@ -17,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "bench/fox.h"
 #include "bench/svg_plot.h"
 
 namespace {
@@ -34,13 +36,29 @@ class Bench {
  public:
   Bench(std::string program, path results) : program_(std::move(program)), results_(std::move(results)) {}
 
+  /// A drag of the fox and back, with the corrector `scene`: a row of a table.
+  [[nodiscard]] std::string trip(const std::string& setting, const std::string& drag,
+                                 const std::string& arguments) const {
+    const path fox = bench::fox_folder();
+    const json found = run("trips.json", "--scene '" + (fox / "point_cloud.ply").string() + "' --dataset '" +
+                                             (fox / "sparse/0").string() + "' --request '" +
+                                             (fox / "drags.json").string() + "' --name " + drag + " " + arguments)
+                           .at("trips")
+                           .at(0);
+    std::ostringstream out;
+    out << "| " << setting << " | " << drag << std::fixed << std::setprecision(1) << " | "
+        << 100 * found.at("arrived").get<double>() << std::setprecision(2) << " | "
+        << found.at("inside").at("psnr_db").get<double>() << " | " << std::setprecision(4)
+        << found.at("inside").at("ssim").get<double>() << std::setprecision(2) << " | "
+        << found.at("outside").at("psnr_db").get<double>() << " | " << std::setprecision(1)
+        << found.at("seconds").get<double>() << " |\n";
+    std::fprintf(stderr, "%s", out.str().c_str());
+    return out.str();
+  }
+
   /// Of the cases and corrector that the arguments of bench-edit name.
   [[nodiscard]] Point measure(const std::string& setting, const std::string& arguments) const {
-    const std::string command =
-        "'" + program_ + "' bench-edit --pictures 0 --out '" + results_.string() + "' " + arguments + " > /dev/null";
-    if (std::system(command.c_str()) != 0) throw std::runtime_error("this failed: " + command);
-    std::ifstream file(results_ / "bench.json");
-    const json found = json::parse(file);
+    const json found = run("bench.json", arguments);
     Point point{.setting = setting};
     double textured = 0;
     const double cases = double(found.at("cases").size());
@@ -60,6 +78,15 @@ class Bench {
   }
 
  private:
+  /// What bench-edit reports in that file.
+  [[nodiscard]] json run(const std::string& report, const std::string& arguments) const {
+    const std::string command =
+        "'" + program_ + "' bench-edit --pictures 0 --out '" + results_.string() + "' " + arguments + " > /dev/null";
+    if (std::system(command.c_str()) != 0) throw std::runtime_error("this failed: " + command);
+    std::ifstream file(results_ / report);
+    return json::parse(file);
+  }
+
   std::string program_;
   path results_;
 };
@@ -151,6 +178,27 @@ void write_docs(const Bench& bench, const path& folder) {
     }
     all.insert(all.end(), points.begin(), points.end());
   }
+  page << "\n## Intervals of a drag that turns\n\nThe case `arm`, preset `draft`, corrector `scene`: both "
+          "interpolations.\n\n"
+       << head;
+  for (const std::string interpolation : {"paper", "rigid"})
+    for (const std::string intervals : {"1", "2", "5", "10", "20"})
+      page << row(
+          bench.measure(intervals + ", " + interpolation, "--case arm --preset draft --corrector scene --intervals " +
+                                                              intervals + " --interpolation " + interpolation));
+  page << "\n## Intervals on a capture\n\nThe fox, preset `draft`, corrector `scene`: there and back, judged at "
+          "cameras between those of the\ncapture; `arrived` is the part of the drag that the half-way scene shows.\n\n"
+          "| intervals | drag | arrived, % | inside, dB | SSIM | outside, dB | s there |\n"
+          "| --- | --- | ---: | ---: | ---: | ---: | ---: |\n";
+  for (const std::string drag : {"ear_up", "snout_out"})
+    for (const std::string intervals : {"1", "2", "5", "10", "20"})
+      page << bench.trip(intervals, drag, "--preset draft --corrector scene --intervals " + intervals);
+  page << "\n### What each preset does there\n\n"
+          "| preset | drag | arrived, % | inside, dB | SSIM | outside, dB | s there |\n"
+          "| --- | --- | ---: | ---: | ---: | ---: | ---: |\n";
+  for (const std::string drag : {"ear_up", "snout_out"})
+    for (const std::string preset : {"preview", "draft", "standard", "paper"})
+      page << bench.trip(preset, drag, "--preset " + preset + " --corrector scene");
   const std::vector<Point> best = front(all);
   page << "\n## The front\n\nSettings above that no other one beats in both time and quality.\n\n" << head;
   for (const Point& point : best) page << row(point);

@@ -53,6 +53,24 @@ std::vector<Match> random_field(const PatchQuery& query, std::uint64_t seed) {
   return field;
 }
 
+std::vector<Match> doubled_field(const PatchQuery& query, const Field& coarse, std::uint64_t seed) {
+  std::vector<Match> field = random_field(query, seed);
+  const int coarse_height = int(coarse.number.size()) / coarse.width;
+  for (std::size_t k = 0; k < field.size(); ++k) {
+    const Place here = query.centres[k];
+    const int x = here.x / 2, y = here.y / 2;
+    if (x >= coarse.width || y >= coarse_height) continue;
+    const std::uint32_t number = coarse.number[std::size_t(y) * std::size_t(coarse.width) + std::size_t(x)];
+    if (number == no_centre) continue;
+    const Match& found = coarse.matches[number];
+    const scene::Mask& allowed = query.sources[found.source].centre_allowed;
+    const int there_x = 2 * found.centre.x + here.x % 2, there_y = 2 * found.centre.y + here.y % 2;
+    if (there_x >= allowed.width || there_y >= allowed.height || allowed.at(there_x, there_y) == 0) continue;
+    field[k] = {found.source, {std::int16_t(there_x), std::int16_t(there_y)}, 0};
+  }
+  return field;
+}
+
 void improve(const PatchQuery& query, std::span<const Match> matches, int step, std::uint64_t seed,
              std::span<Match> out) {
   assert(matches.size() == query.centres.size() && out.size() == matches.size());

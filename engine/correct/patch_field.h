@@ -55,12 +55,23 @@ struct PatchQuery {
   std::span<const float> weight;          ///< [height][width] (+ Planes::spare) of the target: what a pixel counts.
   std::span<const Place> centres;         ///< Of target patches, all wholly inside.
   std::span<const std::uint32_t> number;  ///< [height][width] which of `centres` is at a pixel; nothing: no_centre.
-  std::span<const PatchSource> sources;   ///< At least one with an allowed centre.
+  std::span<const PatchSource> sources;   ///< At least one has an allowed centre.
 };
 constexpr std::uint32_t no_centre = ~std::uint32_t{0};
 
 /// Any patches at all: a field to begin with.
 [[nodiscard]] std::vector<Match> random_field(const PatchQuery& query, std::uint64_t seed);
+
+/// What was found at one scale.
+struct Field {
+  int width = 0;                      ///< Of the target.
+  std::vector<std::uint32_t> number;  ///< As in PatchQuery.
+  std::vector<Match> matches;         ///< [centres]
+};
+
+/// A field to begin with at twice the scale of `coarse`: what was found there, and any patches where that says nothing.
+///   coarse  of the same sources, each halved
+[[nodiscard]] std::vector<Match> doubled_field(const PatchQuery& query, const Field& coarse, std::uint64_t seed);
 
 /// One pass over the field: distances are measured anew, then each patch looks at what its neighbours `step` pixels
 /// away have found, around its own match, and at one random patch.

@@ -20,7 +20,7 @@ constexpr int thin_px = 2;
 // How much less a missing pixel counts in a comparison with each step away from known ones.
 constexpr double falling_confidence = 1.3;
 constexpr int most_scales = 8;
-constexpr int first_passes = 8;  // of the search at each scale, which begins anywhere
+constexpr int first_passes = 8;  // of the search at the coarsest scale, which begins anywhere
 
 scene::Rect padded(scene::Rect box, const scene::Image& picture) {
   const int by = std::max(24, std::max(box.width(), box.height()) / 2);
@@ -48,8 +48,7 @@ struct SourceScale {
 std::vector<PatchSource> patch_sources(const SourceScale& scale) {
   std::vector<PatchSource> out;
   for (std::size_t s = 0; s < scale.pictures.size(); ++s)
-    if (PatchSource source = patch_source(scale.pictures[s].picture, scale.allowed[s]); !source.centres.empty())
-      out.push_back(std::move(source));
+    out.push_back(patch_source(scale.pictures[s].picture, scale.allowed[s]));
   return out;
 }
 
@@ -69,8 +68,10 @@ scene::Mask unknown_of(const Partial& partial) {
 /// The work at one scale: fills the unknown pixels of a picture that has a first guess there.
 class Synthesis {
  public:
-  ///   seed  of this one and the next few hundred
-  Synthesis(scene::Image& picture, const scene::Mask& unknown, std::span<const PatchSource> sources, std::uint64_t seed)
+  ///   coarser  what was found at half the scale; empty: nothing yet
+  ///   seed     of this one and the next few hundred
+  Synthesis(scene::Image& picture, const scene::Mask& unknown, std::span<const PatchSource> sources,
+            const Field& coarser, std::uint64_t seed)
       : picture_(picture), unknown_(unknown), sources_(sources), seed_(seed), target_(picture) {
     const std::vector<int> depth = depth_within(unknown);
     weight_.assign(depth.size() + Planes::spare, 0.0f);
@@ -82,8 +83,10 @@ class Synthesis {
           number_[target_.index(x, y)] = std::uint32_t(centres_.size());
           centres_.push_back({std::int16_t(x), std::int16_t(y)});
         }
-    field_ = random_field(query(), seed_);
+    field_ = coarser.matches.empty() ? random_field(query(), seed_) : doubled_field(query(), coarser, seed_);
   }
+
+  [[nodiscard]] Field field() && { return {picture_.width, std::move(number_), std::move(field_)}; }
 
   /// Searches, then lets the patches found vote for the colours.
   void round(int passes) {
@@ -214,6 +217,7 @@ void copy_where(const scene::Mask& where, const scene::Image& from, scene::Image
 scene::Image synthesise(std::span<const Partial> targets, std::span<const SourceScale> sources, int rounds, int passes,
                         std::uint64_t seed) {
   scene::Image guess;
+  Field found;
   for (std::size_t s = targets.size(); s-- > 0;) {
     const scene::Mask unknown = unknown_of(targets[s]);
     scene::Image picture = targets[s].picture;
@@ -221,10 +225,12 @@ scene::Image synthesise(std::span<const Partial> targets, std::span<const Source
       fill_harmonic(picture, unknown);
     else
       copy_where(unknown, doubled(guess, picture.width, picture.height), picture);
-    if (const std::vector<PatchSource> patches = patch_sources(sources[s]); !patches.empty()) {
-      Synthesis synthesis(picture, unknown, patches, seed + s * 1000);
-      synthesis.round(first_passes);
+    const std::vector<PatchSource> patches = patch_sources(sources[s]);
+    if (std::any_of(patches.begin(), patches.end(), [](const PatchSource& p) { return !p.centres.empty(); })) {
+      Synthesis synthesis(picture, unknown, patches, found, seed + s * 1000);
+      synthesis.round(found.matches.empty() ? first_passes : passes);
       for (int r = 1; r < rounds; ++r) synthesis.round(passes);
+      found = std::move(synthesis).field();
     }
     guess = std::move(picture);
   }

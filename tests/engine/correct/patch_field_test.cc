@@ -127,6 +127,42 @@ TEST(RandomField, PassesOverSourcesWithoutAPlace) {
   for (const Match& match : lookup.searched(4)) EXPECT_EQ(match.source, 1u);
 }
 
+TEST(DoubledField, CarriesOverWhatWasFoundWhereThatIsAllowed) {
+  const Lookup lookup = of_noise();
+  Lookup small(noise(16, 13, 1), {patch_source(noise(20, 17, 2), mostly_allowed(20, 17, 3)),
+                                  patch_source(noise(14, 19, 4), mostly_allowed(14, 19, 5))});
+  const Field coarse{16, small.number, small.searched(2)};
+  const auto field = doubled_field(lookup.query(), coarse, 3);
+  const auto drawn = random_field(lookup.query(), 3);
+  ASSERT_EQ(field.size(), lookup.centres.size());
+  std::size_t carried = 0, not_allowed = 0, beyond = 0;
+  for (std::size_t k = 0; k < field.size(); ++k) {
+    const Place here = lookup.centres[k];
+    const scene::Mask& allowed = lookup.sources[field[k].source].centre_allowed;
+    EXPECT_EQ(allowed.at(field[k].centre.x, field[k].centre.y), 1);
+    const std::uint32_t number = small.number[small.target.index(here.x / 2, here.y / 2)];
+    if (number == no_centre) {
+      EXPECT_TRUE(same_bytes({field[k]}, {drawn[k]})) << "the coarse rim has no patches";
+      ++beyond;
+      continue;
+    }
+    const Match& found = coarse.matches[number];
+    const Place there{std::int16_t(2 * found.centre.x + here.x % 2), std::int16_t(2 * found.centre.y + here.y % 2)};
+    if (lookup.sources[found.source].centre_allowed.at(there.x, there.y) == 0) {
+      EXPECT_TRUE(same_bytes({field[k]}, {drawn[k]}));
+      ++not_allowed;
+      continue;
+    }
+    EXPECT_EQ(field[k].source, found.source);
+    EXPECT_EQ(field[k].centre.x, there.x);
+    EXPECT_EQ(field[k].centre.y, there.y);
+    ++carried;
+  }
+  EXPECT_GT(carried, 20u);
+  EXPECT_GT(not_allowed, 20u);
+  EXPECT_GT(beyond, 20u);
+}
+
 TEST(Improve, FindsPatchesThatAreThere) {
   // The target is a part of the second source.
   const scene::Image whole = noise(64, 48, 7);
