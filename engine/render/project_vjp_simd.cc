@@ -224,14 +224,41 @@ HWY_INLINE void ColorVjpRow(const float* sh, std::size_t stored, int degree, std
     rows.v_mean[axis][i] += (v_to[axis] - along * to[axis]) * rows.inverse_distance[i];
 }
 
+/// Sums a row's gradients over its tiles, in their order and in double, into the seen row i. False if all are zero.
+HWY_INLINE bool SumOverTiles(const TileGradient* first, const TileGradient* last, std::size_t i, SeenRows& rows) {
+  constexpr std::size_t size = sizeof(TileGradient) / sizeof(float);
+  const hn::CappedTag<double, 4> d64;
+  const hn::Rebind<float, decltype(d64)> d32;
+  constexpr std::size_t lanes = hn::MaxLanes(d64), parts = size / lanes;
+  hn::Vec<decltype(d64)> total[parts];
+  for (auto& part : total) part = hn::Zero(d64);
+  for (; first != last; ++first) {
+    const auto* const values = reinterpret_cast<const float*>(first);
+    for (std::size_t p = 0; p < parts; ++p)
+      total[p] = hn::Add(total[p], hn::PromoteTo(d64, hn::LoadU(d32, values + p * lanes)));
+  }
+  alignas(32) float sums[size];
+  for (std::size_t p = 0; p < parts; ++p) hn::Store(hn::DemoteTo(d32, total[p]), d32, sums + p * lanes);
+  bool any = false;
+  for (std::size_t k = 0; k < TileGradient::sums; ++k) {
+    rows.sums[k][i] = sums[k];
+    any |= sums[k] != 0;
+  }
+  return any;
+}
+
 void ProjectRowsVjp(const scene::GaussianCloud& cloud, std::size_t first_row, const ViewParams<float>& view,
-                    int sh_degree, const std::uint32_t* rows, const RowGradients& v_rows, std::size_t begin,
+                    int sh_degree, const std::uint32_t* rows, const RowPairs& v_rows, std::size_t begin,
                     std::size_t end, Gradients& out) {
   const VjpD d;
   SeenRows seen;
   for (std::size_t r = begin; r < end; ++r) {
-    if (v_rows.seen[r] == 0) continue;
-    const std::size_t row = rows[r] - first_row, i = seen.count++;
+    const TileGradient *const first = v_rows.pairs + v_rows.first_pair[r], *const last =
+                                                                               v_rows.pairs + v_rows.first_pair[r + 1];
+    const std::size_t i = seen.count;
+    if (!SumOverTiles(first, last, i, seen)) continue;
+    ++seen.count;
+    const std::size_t row = rows[r] - first_row;
     seen.slot[i] = std::uint32_t(r);
     seen.mean[0][i] = cloud.mean.x[row], seen.mean[1][i] = cloud.mean.y[row], seen.mean[2][i] = cloud.mean.z[row];
     seen.log_scale[0][i] = cloud.log_scale.x[row], seen.log_scale[1][i] = cloud.log_scale.y[row];
@@ -239,11 +266,6 @@ void ProjectRowsVjp(const scene::GaussianCloud& cloud, std::size_t first_row, co
     seen.rotation[0][i] = cloud.rotation.w[row], seen.rotation[1][i] = cloud.rotation.x[row];
     seen.rotation[2][i] = cloud.rotation.y[row], seen.rotation[3][i] = cloud.rotation.z[row];
     seen.logit[i] = cloud.opacity_logit[row];
-    const TileGradient& sums = v_rows.sums[r];
-    seen.sums[0][i] = sums.g, seen.sums[1][i] = sums.along, seen.sums[2][i] = sums.across;
-    seen.sums[3][i] = sums.along_along, seen.sums[4][i] = sums.along_across, seen.sums[5][i] = sums.across_across;
-    seen.sums[6][i] = sums.red, seen.sums[7][i] = sums.green, seen.sums[8][i] = sums.blue;
-    seen.sums[9][i] = sums.depth;
   }
   if (seen.count == 0) return;
   // What fills up the last vector: the last row once more.
@@ -281,7 +303,7 @@ namespace engine::render {
 HWY_EXPORT(ProjectRowsVjp);
 
 void project_rows_vjp(const scene::GaussianCloud& cloud, std::size_t first_row, const ViewParams<float>& view,
-                      int sh_degree, std::span<const std::uint32_t> rows, const RowGradients& v_rows, std::size_t begin,
+                      int sh_degree, std::span<const std::uint32_t> rows, const RowPairs& v_rows, std::size_t begin,
                       std::size_t end, Gradients& out) {
   HWY_DYNAMIC_DISPATCH(ProjectRowsVjp)(cloud, first_row, view, sh_degree, rows.data(), v_rows, begin, end, out);
 }
