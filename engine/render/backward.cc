@@ -86,22 +86,28 @@ namespace {
 /// zero.
 bool load_tile(const UpstreamPlanes& upstream, scene::Rect area, Vec3 background, int x0, int y0, TileUpstream& tile) {
   tile = {};
+  const int first_x = std::max(x0, area.x0), last_x = std::min(x0 + tile_size, area.x1);
+  const int first_y = std::max(y0, area.y0), last_y = std::min(y0 + tile_size, area.y1);
+  if (first_x >= last_x || first_y >= last_y) return false;
+  const auto load = [&](const scene::Image* image, int channel, float* to) {
+    if (image == nullptr) return;
+    const float* const plane = image->plane(channel).data();
+    for (int y = first_y; y < last_y; ++y)
+      std::copy_n(plane + std::ptrdiff_t(y - area.y0) * image->width + (first_x - area.x0), last_x - first_x,
+                  to + (y - y0) * tile_size + (first_x - x0));
+  };
+  load(upstream.color, 0, tile.red);
+  load(upstream.color, 1, tile.green);
+  load(upstream.color, 2, tile.blue);
+  load(upstream.depth, 0, tile.depth);
+  alignas(64) float v_alpha[TilePixels::count] = {};
+  load(upstream.alpha, 0, v_alpha);
   bool any = false;
-  for (int y = std::max(y0, area.y0); y < std::min(y0 + tile_size, area.y1); ++y)
-    for (int x = std::max(x0, area.x0); x < std::min(x0 + tile_size, area.x1); ++x) {
-      const auto at = std::size_t((y - y0) * tile_size + x - x0);
-      const int from_x = x - area.x0, from_y = y - area.y0;
-      if (upstream.color != nullptr) {
-        tile.red[at] = upstream.color->at(from_x, from_y, 0);
-        tile.green[at] = upstream.color->at(from_x, from_y, 1);
-        tile.blue[at] = upstream.color->at(from_x, from_y, 2);
-      }
-      if (upstream.depth != nullptr) tile.depth[at] = upstream.depth->at(from_x, from_y);
-      const float v_alpha = upstream.alpha != nullptr ? upstream.alpha->at(from_x, from_y) : 0.0f;
-      tile.transmittance[at] =
-          background.x * tile.red[at] + background.y * tile.green[at] + background.z * tile.blue[at] - v_alpha;
-      any |= tile.red[at] != 0 || tile.green[at] != 0 || tile.blue[at] != 0 || tile.depth[at] != 0 || v_alpha != 0;
-    }
+  for (std::size_t i = 0; i < TilePixels::count; ++i) {
+    tile.transmittance[i] =
+        background.x * tile.red[i] + background.y * tile.green[i] + background.z * tile.blue[i] - v_alpha[i];
+    any |= tile.red[i] != 0 || tile.green[i] != 0 || tile.blue[i] != 0 || tile.depth[i] != 0 || v_alpha[i] != 0;
+  }
   return any;
 }
 

@@ -98,11 +98,43 @@ HWY_INLINE void StoreSums(D d, V a, V b, V c, V e, float* to) {
 #endif
 }
 
+/// Bit k: entry k of the n has a number.
+HWY_INLINE std::uint64_t Changeable(const std::uint32_t* pair_of_entry, std::size_t n) {
+  const hn::RebindToUnsigned<D> du;
+  const auto no_pair = hn::Set(du, ForwardBuffers::no_pair);
+  std::uint64_t bits = 0;
+  std::size_t k = 0;
+  for (; k + Blocks::lanes <= n; k += Blocks::lanes)
+    bits |= Bits(du, hn::Ne(hn::LoadU(du, pair_of_entry + k), no_pair)) << k;
+  for (; k < n; ++k) bits |= std::uint64_t{pair_of_entry[k] != ForwardBuffers::no_pair} << k;
+  return bits;
+}
+
 /// A set of blocks.
 struct BlockSet {
   static constexpr std::size_t words = (Blocks::count + 63) / 64;
   std::uint64_t bits[words];
 };
+
+/// From the splats that reach each block to the blocks that each splat reaches.
+///   out  [Batch::size]
+HWY_INLINE void Transpose(const std::uint64_t* reach, BlockSet* out) {
+  const hn::RebindToUnsigned<D> du;
+  std::fill_n(out, Batch::size, BlockSet{});
+  for (std::size_t block = 0; block < Blocks::count; block += Blocks::lanes) {
+    alignas(64) std::uint32_t lower[Blocks::lanes], upper[Blocks::lanes];
+    for (std::size_t i = 0; i < Blocks::lanes; ++i) {
+      lower[i] = std::uint32_t(reach[block + i]);
+      upper[i] = std::uint32_t(reach[block + i] >> 32);
+    }
+    const auto low = hn::Load(du, lower), high = hn::Load(du, upper);
+    for (std::size_t k = 0; k < 32; ++k) {
+      const auto bit = hn::Set(du, std::uint32_t{1} << k);
+      out[k].bits[block / 64] |= Bits(du, hn::TestBit(low, bit)) << block % 64;
+      out[k + 32].bits[block / 64] |= Bits(du, hn::TestBit(high, bit)) << block % 64;
+    }
+  }
+}
 
 /// Walks all rays back through a batch, splat by splat: a splat's sums stay in registers. The pullbacks are blend_vjp()
 /// and falloff_vjp() of blend.h in another form: with X = dL/dT of what lies beyond, per unit of transmittance,
@@ -115,14 +147,13 @@ HWY_INLINE void WalkBack(D d, const Places& places, std::size_t first, const Tra
                          const TileUpstream& upstream, Rays& rays, const std::uint32_t* pair_of_entry,
                          TileGradient* pairs) {
   const Batch& batch = traced.batch;
-  BlockSet blocks[Batch::size] = {};
+  BlockSet blocks[Batch::size];
+  Transpose(batch.reach, blocks);
   const float* ends[Blocks::count];
   std::uint64_t met = 0;
   for (std::size_t block = 0; block < Blocks::count; ++block) {
     ends[block] = traced.steps + traced.end[block];
     met |= batch.reach[block];
-    for (std::uint64_t rest = batch.reach[block]; rest != 0; rest &= rest - 1)
-      blocks[hwy::Num0BitsBelowLS1Bit_Nonzero64(rest)].bits[block / 64] |= std::uint64_t{1} << block % 64;
   }
   const V zero = hn::Zero(d), ceiling = hn::Set(d, float(max_alpha));
   for (std::uint64_t rest = (met | traced.changeable) >> first << first; rest != 0;) {
