@@ -1,4 +1,5 @@
 // The pullbacks of project_vjp.h, a vector of Gaussians at a time.
+#include <hwy/cache_control.h>
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "engine/render/project_vjp_simd.cc"
 #include <hwy/foreach_target.h>
@@ -269,7 +270,9 @@ HWY_INLINE bool SumOverTiles(const TileGradient* first, const TileGradient* last
   constexpr std::size_t lanes = hn::MaxLanes(d64), parts = size / lanes;
   hn::Vec<decltype(d64)> total[parts];
   for (auto& part : total) part = hn::Zero(d64);
+  constexpr std::ptrdiff_t ahead = 16;  // rows' pairs follow each other
   for (; first != last; ++first) {
+    hwy::Prefetch(first + ahead);
     const auto* const values = reinterpret_cast<const float*>(first);
     for (std::size_t p = 0; p < parts; ++p)
       total[p] = hn::Add(total[p], hn::PromoteTo(d64, hn::LoadU(d32, values + p * lanes)));
