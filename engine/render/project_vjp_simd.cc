@@ -255,9 +255,12 @@ void ColorVjp(const scene::GaussianCloud& cloud, std::size_t first_row, const st
   const std::size_t stored = scene::sh_coefficients(cloud.sh_degree), stride = cloud.sh_stride();
   Bases bases;
   EachBasis<kDegree>(rows, bases);
+  const auto sh = [&](std::size_t i) { return cloud.sh.data() + (row_of_slot[rows.slot[i]] - first_row) * stride; };
+  const auto v_sh = [&](std::size_t i) { return out.sh.data() + rows.slot[i] * stride; };
   for (std::size_t i = 0; i < rows.count; ++i) {
-    const std::size_t r = rows.slot[i], row = row_of_slot[r] - first_row;
-    ColorVjpRow(d, cloud.sh.data() + row * stride, stored, used, i, rows, bases, out.sh.data() + r * stride);
+    const std::size_t coming = HWY_MIN(i + 8, rows.count - 1);
+    for (std::size_t k = 0; k < stride; k += 16) hwy::Prefetch(sh(coming) + k), hwy::Prefetch(v_sh(coming) + k);
+    ColorVjpRow(d, sh(i), stored, used, i, rows, bases, v_sh(i));
   }
   EachBasisVjp<kDegree>(bases, rows);
 }
