@@ -1,7 +1,5 @@
 #include "engine/render/backward.h"
 
-#include <hwy/cache_control.h>
-
 #include <algorithm>
 #include <cassert>
 
@@ -84,85 +82,33 @@ void Gradients::reset(std::size_t rows, int degree) {
 
 namespace {
 
-constexpr std::size_t sum_block = 2048;  // splats per unit of parallel work
-constexpr std::size_t sum_tiles = 16;    // tiles whose entries are fetched ahead
-
 /// Reads dL/d(pictures) of the tile whose first pixel is (x0, y0), and what they make of the ray's end. False if all is
 /// zero.
 bool load_tile(const UpstreamPlanes& upstream, scene::Rect area, Vec3 background, int x0, int y0, TileUpstream& tile) {
   tile = {};
+  const int first_x = std::max(x0, area.x0), last_x = std::min(x0 + tile_size, area.x1);
+  const int first_y = std::max(y0, area.y0), last_y = std::min(y0 + tile_size, area.y1);
+  if (first_x >= last_x || first_y >= last_y) return false;
+  const auto load = [&](const scene::Image* image, int channel, float* to) {
+    if (image == nullptr) return;
+    const float* const plane = image->plane(channel).data();
+    for (int y = first_y; y < last_y; ++y)
+      std::copy_n(plane + std::ptrdiff_t(y - area.y0) * image->width + (first_x - area.x0), last_x - first_x,
+                  to + (y - y0) * tile_size + (first_x - x0));
+  };
+  load(upstream.color, 0, tile.red);
+  load(upstream.color, 1, tile.green);
+  load(upstream.color, 2, tile.blue);
+  load(upstream.depth, 0, tile.depth);
+  alignas(64) float v_alpha[TilePixels::count] = {};
+  load(upstream.alpha, 0, v_alpha);
   bool any = false;
-  for (int y = std::max(y0, area.y0); y < std::min(y0 + tile_size, area.y1); ++y)
-    for (int x = std::max(x0, area.x0); x < std::min(x0 + tile_size, area.x1); ++x) {
-      const auto at = std::size_t((y - y0) * tile_size + x - x0);
-      const int from_x = x - area.x0, from_y = y - area.y0;
-      if (upstream.color != nullptr) {
-        tile.red[at] = upstream.color->at(from_x, from_y, 0);
-        tile.green[at] = upstream.color->at(from_x, from_y, 1);
-        tile.blue[at] = upstream.color->at(from_x, from_y, 2);
-      }
-      if (upstream.depth != nullptr) tile.depth[at] = upstream.depth->at(from_x, from_y);
-      const float v_alpha = upstream.alpha != nullptr ? upstream.alpha->at(from_x, from_y) : 0.0f;
-      tile.transmittance[at] =
-          background.x * tile.red[at] + background.y * tile.green[at] + background.z * tile.blue[at] - v_alpha;
-      any |= tile.red[at] != 0 || tile.green[at] != 0 || tile.blue[at] != 0 || tile.depth[at] != 0 || v_alpha != 0;
-    }
+  for (std::size_t i = 0; i < TilePixels::count; ++i) {
+    tile.transmittance[i] =
+        background.x * tile.red[i] + background.y * tile.green[i] + background.z * tile.blue[i] - v_alpha[i];
+    any |= tile.red[i] != 0 || tile.green[i] != 0 || tile.blue[i] != 0 || tile.depth[i] != 0 || v_alpha[i] != 0;
+  }
   return any;
-}
-
-/// Sums the tiles' gradients of each splat, in the order of tiles, into those of its row. A block of splats has a part
-/// of each tile's list to itself, since lists are in the order of splats: no two threads add to the same sum.
-void sum_over_tiles(const ForwardBuffers& forward, std::size_t rows, WalkBuffers& work) {
-  work.rows.seen.assign(rows, 0);
-  TileGradient* const sums = work.rows.sums.reserve(rows);
-  parallel_for(forward.count, sum_block, [&](std::size_t begin, std::size_t end) {
-    const std::int32_t* const slots = work.slot_of_splat.data();
-    if (std::all_of(slots + begin, slots + end, [](std::int32_t slot) { return slot < 0; })) return;
-    std::vector<std::array<double, TileGradient::sums>> totals(end - begin);
-    std::vector<std::uint8_t> seen(end - begin, 0);
-    const std::uint32_t* const list = forward.entries.data();
-    std::array<const std::uint32_t*, sum_tiles> first;
-    for (std::size_t tiles = 0; tiles < work.walked.size(); tiles += sum_tiles) {
-      const std::size_t tiles_end = std::min(tiles + sum_tiles, work.walked.size());
-      for (std::size_t tile = tiles; tile < tiles_end; ++tile) {
-        if (work.walked[tile] == 0) continue;
-        const std::uint32_t* const from = std::lower_bound(list + forward.tile_begin[tile],
-                                                           list + forward.tile_begin[tile + 1], std::uint32_t(begin));
-        first[tile - tiles] = from;
-        const auto* const line = reinterpret_cast<const char*>(work.entries.data() + (from - list));
-        for (std::size_t i = 0; i < 4; ++i) hwy::Prefetch(line + 64 * i);
-      }
-      for (std::size_t tile = tiles; tile < tiles_end; ++tile) {
-        if (work.walked[tile] == 0) continue;
-        const std::uint32_t* const last = list + forward.tile_begin[tile + 1];
-        for (const std::uint32_t* entry = first[tile - tiles]; entry != last && *entry < end; ++entry) {
-          if (slots[*entry] < 0) continue;
-          const TileGradient& v = work.entries[std::size_t(entry - list)];
-          const std::array<float, TileGradient::sums> values{
-              v.g, v.along, v.across, v.along_along, v.along_across, v.across_across, v.red, v.green, v.blue, v.depth};
-          auto& total = totals[*entry - begin];
-          for (std::size_t k = 0; k < values.size(); ++k) total[k] += double(values[k]);
-          seen[*entry - begin] = 1;
-        }
-      }
-    }
-    for (std::size_t i = begin; i < end; ++i) {
-      if (seen[i - begin] == 0) continue;
-      const auto slot = std::size_t(slots[i]);
-      const auto& total = totals[i - begin];
-      sums[slot] = {.g = float(total[0]),
-                    .along = float(total[1]),
-                    .across = float(total[2]),
-                    .along_along = float(total[3]),
-                    .along_across = float(total[4]),
-                    .across_across = float(total[5]),
-                    .red = float(total[6]),
-                    .green = float(total[7]),
-                    .blue = float(total[8]),
-                    .depth = float(total[9])};
-      work.rows.seen[slot] = 1;
-    }
-  });
 }
 
 }  // namespace
@@ -173,25 +119,27 @@ void clear_mean2d(Gradients& out) {
 }
 
 void walk_tiles(const ForwardBuffers& forward, const TileGrid& grid, const UpstreamPlanes& upstream, Vec3 background,
-                std::size_t rows, WalkBuffers& work) {
-  const std::int32_t* const slot_of_splat = work.slot_of_splat.data();
+                std::size_t pairs, WalkBuffers& work) {
   const std::size_t tiles = std::size_t(grid.columns) * std::size_t(grid.rows);
-  work.walked.assign(tiles, 0);
-  TileGradient* const entries = work.entries.reserve(forward.tile_begin[tiles]);
+  TileGradient* const gradients = work.pairs.reserve(pairs);
   parallel_for(tiles, 1, [&](std::size_t tile, std::size_t) {
     const std::uint32_t first = forward.tile_begin[tile], last = forward.tile_begin[tile + 1];
     const std::span list(forward.entries.data() + first, last - first);
-    if (std::none_of(list.begin(), list.end(), [&](std::uint32_t splat) { return slot_of_splat[splat] >= 0; })) return;
+    const std::span pair_of_entry(forward.pair_of_entry.data() + first, last - first);
+    const auto may_change = [](std::uint32_t pair) { return pair != ForwardBuffers::no_pair; };
+    if (std::none_of(pair_of_entry.begin(), pair_of_entry.end(), may_change)) return;
     const int x0 = int(tile) % grid.columns * tile_size, y0 = int(tile) / grid.columns * tile_size;
     TileUpstream tile_upstream;
-    if (!load_tile(upstream, grid.pixels, background, x0, y0, tile_upstream)) return;
+    if (!load_tile(upstream, grid.pixels, background, x0, y0, tile_upstream)) {
+      for (const std::uint32_t pair : pair_of_entry)
+        if (may_change(pair)) gradients[pair] = {};
+      return;
+    }
     auto trace = work.traces.take();
-    composite_tile_vjp(forward.splats.data(), list, slot_of_splat, x0, y0, tile_upstream, upstream.depth != nullptr,
-                       *trace, entries + first);
+    composite_tile_vjp(forward.splats.data(), list, pair_of_entry.data(), x0, y0, tile_upstream,
+                       upstream.depth != nullptr, *trace, gradients);
     work.traces.give_back(std::move(trace));
-    work.walked[tile] = 1;
   });
-  sum_over_tiles(forward, rows, work);
 }
 
 namespace {
@@ -220,24 +168,25 @@ void backward_simd(const Layers& layers, const scene::Camera& camera, const Back
   ForwardBuffers& forward = work.forward;
   project(layers, view, sh_degree, {}, Culling::exact, grid.pixels, forward);
   sort_by_depth(forward);
-  bin(grid, forward);
 
   std::int32_t* const slot_of_row = work.slot_of_row.reserve(layers.size());
   std::fill_n(slot_of_row, layers.size(), -1);
   for (std::size_t r = 0; r < rows.size(); ++r) slot_of_row[rows[r]] = std::int32_t(r);
-  std::int32_t* const slot_of_splat = work.walk.slot_of_splat.reserve(forward.count);
-  for (std::size_t i = 0; i < forward.count; ++i) slot_of_splat[i] = slot_of_row[forward.splats[i].row];
+  const auto* const slots = find_slots(
+      forward, [&](std::uint32_t row) { return slot_of_row[row]; }, work.walk.slot_of_splat);
+  bin(grid, forward, slots, rows.size());
 
   const UpstreamPlanes planes{.color = plane_or_none(upstream.color),
                               .depth = plane_or_none(upstream.depth),
                               .alpha = plane_or_none(upstream.alpha)};
-  walk_tiles(forward, grid, planes, options.forward.background, rows.size(), work.walk);
+  walk_tiles(forward, grid, planes, options.forward.background, forward.first_pair[rows.size()], work.walk);
+  const RowPairs row_pairs{.first_pair = forward.first_pair.data(), .pairs = work.walk.pairs.data()};
   const std::size_t base_rows = layers.base->size();
   const auto of_base = std::size_t(std::lower_bound(rows.begin(), rows.end(), base_rows) - rows.begin());
   parallel_for(rows.size(), project_vjp_block, [&](std::size_t begin, std::size_t end) {
     const std::size_t split = std::clamp(of_base, begin, end);
-    if (begin < split) project_rows_vjp(*layers.base, 0, view, sh_degree, rows, work.walk.rows, begin, split, out);
-    if (split < end) project_rows_vjp(*layers.top, base_rows, view, sh_degree, rows, work.walk.rows, split, end, out);
+    if (begin < split) project_rows_vjp(*layers.base, 0, view, sh_degree, rows, row_pairs, begin, split, out);
+    if (split < end) project_rows_vjp(*layers.top, base_rows, view, sh_degree, rows, row_pairs, split, end, out);
   });
 }
 

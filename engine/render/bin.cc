@@ -124,7 +124,12 @@ void sort_by_depth(ForwardBuffers& buffers) {
   });
 }
 
-void bin(const TileGrid& grid, ForwardBuffers& buffers) {
+namespace {
+
+/// Counts the entries of each tile and says where they go; place_entries() puts them there.
+/// Calls reached_tiles(i, n) for each splat: in how many tiles it is listed.
+template <class Reached>
+void count_entries(const TileGrid& grid, ForwardBuffers& buffers, Reached&& reached_tiles) {
   const std::size_t tiles = std::size_t(grid.columns) * std::size_t(grid.rows);
   const std::size_t blocks = chunk_count(buffers.count, bin_block);
   if (buffers.bin_blocks.size() < blocks) buffers.bin_blocks.resize(blocks);
@@ -148,6 +153,7 @@ void bin(const TileGrid& grid, ForwardBuffers& buffers) {
         ++block.position[tile];
       });
       *reached++ = std::uint32_t(next - before);
+      reached_tiles(i, std::uint32_t(next - before));
     }
   });
 
@@ -164,13 +170,53 @@ void bin(const TileGrid& grid, ForwardBuffers& buffers) {
   }
   buffers.tile_begin[tiles] = sum;
 
-  std::uint32_t* entries = buffers.entries.reserve(sum);
+  buffers.entries.reserve(sum);
+}
+
+/// Lists the splats in their tiles. placing(i) returns what is told of each entry of splat i, in the order of tiles.
+template <class Placing>
+void place_entries(ForwardBuffers& buffers, Placing&& placing) {
+  std::uint32_t* const entries = buffers.entries.data();
   parallel_for(buffers.count, bin_block, [&](std::size_t first, std::size_t last) {
     auto& block = buffers.bin_blocks[first / bin_block];
     const std::uint32_t* tile = block.tiles.data();
-    for (std::size_t i = first; i < last; ++i)
-      for (std::uint32_t k = 0; k < block.reached[i - first]; ++k)
-        entries[block.position[*tile++]++] = std::uint32_t(i);
+    const std::uint32_t* const reached = block.reached.data();
+    std::uint32_t* const position = block.position.data();
+    for (std::size_t i = first; i < last; ++i) {
+      auto placed = placing(i);
+      for (const std::uint32_t* const tiles_end = tile + reached[i - first]; tile != tiles_end; ++tile) {
+        const std::uint32_t at = position[*tile]++;
+        entries[at] = std::uint32_t(i);
+        placed(at);
+      }
+    }
+  });
+}
+
+}  // namespace
+
+void bin(const TileGrid& grid, ForwardBuffers& buffers) {
+  count_entries(grid, buffers, [](std::size_t, std::uint32_t) {});
+  place_entries(buffers, [](std::size_t) { return [](std::uint32_t) {}; });
+}
+
+void bin(const TileGrid& grid, ForwardBuffers& buffers, const std::int32_t* slot_of_splat, std::size_t rows) {
+  std::uint32_t* const first_pair = buffers.first_pair.reserve(rows + 1);
+  std::fill_n(first_pair, rows + 1, 0u);
+  count_entries(grid, buffers, [&](std::size_t i, std::uint32_t tiles) {
+    if (slot_of_splat[i] >= 0) first_pair[slot_of_splat[i]] = tiles;
+  });
+  std::uint32_t sum = 0;
+  for (std::size_t r = 0; r <= rows; ++r) sum += std::exchange(first_pair[r], sum);
+  std::uint32_t* const pair_of_entry = buffers.pair_of_entry.reserve(buffers.tile_begin.back());
+  place_entries(buffers, [&](std::size_t i) {
+    const bool changeable = slot_of_splat[i] >= 0;
+    const std::uint32_t step = changeable ? 1 : 0;
+    std::uint32_t pair = changeable ? first_pair[slot_of_splat[i]] : ForwardBuffers::no_pair;
+    return [pair_of_entry, pair, step](std::uint32_t at) mutable {
+      pair_of_entry[at] = pair;
+      pair += step;
+    };
   });
 }
 

@@ -98,30 +98,62 @@ HWY_INLINE void StoreSums(D d, V a, V b, V c, V e, float* to) {
 #endif
 }
 
+/// Bit k: entry k of the n has a number.
+HWY_INLINE std::uint64_t Changeable(const std::uint32_t* pair_of_entry, std::size_t n) {
+  const hn::RebindToUnsigned<D> du;
+  const auto no_pair = hn::Set(du, ForwardBuffers::no_pair);
+  std::uint64_t bits = 0;
+  std::size_t k = 0;
+  for (; k + Blocks::lanes <= n; k += Blocks::lanes)
+    bits |= Bits(du, hn::Ne(hn::LoadU(du, pair_of_entry + k), no_pair)) << k;
+  for (; k < n; ++k) bits |= std::uint64_t{pair_of_entry[k] != ForwardBuffers::no_pair} << k;
+  return bits;
+}
+
 /// A set of blocks.
 struct BlockSet {
   static constexpr std::size_t words = (Blocks::count + 63) / 64;
   std::uint64_t bits[words];
 };
 
+/// From the splats that reach each block to the blocks that each splat reaches.
+///   out  [Batch::size]
+HWY_INLINE void Transpose(const std::uint64_t* reach, BlockSet* out) {
+  const hn::RebindToUnsigned<D> du;
+  std::fill_n(out, Batch::size, BlockSet{});
+  for (std::size_t block = 0; block < Blocks::count; block += Blocks::lanes) {
+    alignas(64) std::uint32_t lower[Blocks::lanes], upper[Blocks::lanes];
+    for (std::size_t i = 0; i < Blocks::lanes; ++i) {
+      lower[i] = std::uint32_t(reach[block + i]);
+      upper[i] = std::uint32_t(reach[block + i] >> 32);
+    }
+    const auto low = hn::Load(du, lower), high = hn::Load(du, upper);
+    for (std::size_t k = 0; k < 32; ++k) {
+      const auto bit = hn::Set(du, std::uint32_t{1} << k);
+      out[k].bits[block / 64] |= Bits(du, hn::TestBit(low, bit)) << block % 64;
+      out[k + 32].bits[block / 64] |= Bits(du, hn::TestBit(high, bit)) << block % 64;
+    }
+  }
+}
+
 /// Walks all rays back through a batch, splat by splat: a splat's sums stay in registers. The pullbacks are blend_vjp()
 /// and falloff_vjp() of blend.h in another form: with X = dL/dT of what lies beyond, per unit of transmittance,
 ///   dL/dalpha = T (v_weight - X),   X <- X + alpha (v_weight - X),
 /// which needs no division, and T alpha is the weight.
 ///   first  of the splats that are asked for: in front of it nothing may change
-///   out    [splats of the batch] written for those that may change
+///   pair_of_entry  [splats of the batch] see composite_tile_vjp()
 template <bool kDepth>
 HWY_INLINE void WalkBack(D d, const Places& places, std::size_t first, const TracedBatch& traced,
-                         const TileUpstream& upstream, Rays& rays, TileGradient* out) {
+                         const TileUpstream& upstream, Rays& rays, const std::uint32_t* pair_of_entry,
+                         TileGradient* pairs) {
   const Batch& batch = traced.batch;
-  BlockSet blocks[Batch::size] = {};
+  BlockSet blocks[Batch::size];
+  Transpose(batch.reach, blocks);
   const float* ends[Blocks::count];
   std::uint64_t met = 0;
   for (std::size_t block = 0; block < Blocks::count; ++block) {
     ends[block] = traced.steps + traced.end[block];
     met |= batch.reach[block];
-    for (std::uint64_t rest = batch.reach[block]; rest != 0; rest &= rest - 1)
-      blocks[hwy::Num0BitsBelowLS1Bit_Nonzero64(rest)].bits[block / 64] |= std::uint64_t{1} << block % 64;
   }
   const V zero = hn::Zero(d), ceiling = hn::Set(d, float(max_alpha));
   for (std::uint64_t rest = (met | traced.changeable) >> first << first; rest != 0;) {
@@ -174,11 +206,10 @@ HWY_INLINE void WalkBack(D d, const Places& places, std::size_t first, const Tra
       sum_blue = hn::MulAdd(weight, v_blue, sum_blue);
       if constexpr (kDepth) sum_depth = hn::MulAdd(weight, hn::Load(d, upstream.depth + at), sum_depth);
     });
-    // The members of TileGradient, in order; two are written twice, as they fill up the last four.
-    auto* const to = reinterpret_cast<float*>(out + k);
+    auto* const to = reinterpret_cast<float*>(pairs + pair_of_entry[k]);  // the members of TileGradient, in order
     StoreSums(d, sum_g, sum_u, sum_v, sum_uu, to);
     StoreSums(d, sum_uv, sum_vv, sum_red, sum_green, to + 4);
-    StoreSums(d, sum_red, sum_green, sum_blue, sum_depth, to + 6);
+    StoreSums(d, sum_blue, sum_depth, zero, zero, to + 8);
   }
 }
 
@@ -192,8 +223,8 @@ HWY_INLINE void ToBlocks(const float* rows, float* blocks) {
 }
 
 template <bool kDepth>
-void WalkTile(const Splat* splats, const std::uint32_t* list, std::size_t count, const std::int32_t* row_slot, int x0,
-              int y0, const TileUpstream& rows_upstream, TileTrace& trace, TileGradient* out) {
+void WalkTile(const Splat* splats, const std::uint32_t* list, std::size_t count, const std::uint32_t* pair_of_entry,
+              int x0, int y0, const TileUpstream& rows_upstream, TileTrace& trace, TileGradient* pairs) {
   const D d;
   const auto part = [&](std::size_t i) -> TracedBatch& { return *reinterpret_cast<TracedBatch*>(trace.part(i).bytes); };
   const std::size_t batches = (count + Batch::size - 1) / Batch::size;
@@ -210,7 +241,8 @@ void WalkTile(const Splat* splats, const std::uint32_t* list, std::size_t count,
     for (std::size_t k = first + n; k < HWY_MIN(first + n + Batch::size, count); ++k) hwy::Prefetch(&splats[list[k]]);
     FindReach(d, n, traced.batch);
     traced.changeable = 0;
-    for (std::size_t k = 0; k < n; ++k) traced.changeable |= std::uint64_t{row_slot[list[first + k]] >= 0} << k;
+    for (std::size_t k = 0; k < n; ++k)
+      traced.changeable |= std::uint64_t{pair_of_entry[first + k] != ForwardBuffers::no_pair} << k;
     if (traced.changeable != 0) first_changeable = HWY_MIN(first_changeable, traced_batches);
     std::size_t vectors = 0;
     for (const std::uint64_t reach : traced.batch.reach) vectors += std::size_t(std::popcount(reach));
@@ -221,7 +253,7 @@ void WalkTile(const Splat* splats, const std::uint32_t* list, std::size_t count,
   }
   // What no ray got to.
   for (std::size_t k = traced_batches * Batch::size; k < count; ++k)
-    if (row_slot[list[k]] >= 0) out[k] = {};
+    if (pair_of_entry[k] != ForwardBuffers::no_pair) pairs[pair_of_entry[k]] = {};
 
   TileUpstream upstream;
   ToBlocks(rows_upstream.red, upstream.red);
@@ -235,17 +267,17 @@ void WalkTile(const Splat* splats, const std::uint32_t* list, std::size_t count,
     const TracedBatch& traced = part(b);
     const std::size_t first_asked =
         b == first_changeable ? hwy::Num0BitsBelowLS1Bit_Nonzero64(traced.changeable) : std::size_t{0};
-    WalkBack<kDepth>(d, places, first_asked, traced, upstream, rays, out + b * Batch::size);
+    WalkBack<kDepth>(d, places, first_asked, traced, upstream, rays, pair_of_entry + b * Batch::size, pairs);
   }
 }
 
-void CompositeTileVjp(const Splat* splats, const std::uint32_t* list, std::size_t count, const std::int32_t* row_slot,
-                      int x0, int y0, const TileUpstream& upstream, bool with_depth, TileTrace& trace,
-                      TileGradient* out) {
+void CompositeTileVjp(const Splat* splats, const std::uint32_t* list, std::size_t count,
+                      const std::uint32_t* pair_of_entry, int x0, int y0, const TileUpstream& upstream, bool with_depth,
+                      TileTrace& trace, TileGradient* pairs) {
   if (with_depth) {
-    WalkTile<true>(splats, list, count, row_slot, x0, y0, upstream, trace, out);
+    WalkTile<true>(splats, list, count, pair_of_entry, x0, y0, upstream, trace, pairs);
   } else {
-    WalkTile<false>(splats, list, count, row_slot, x0, y0, upstream, trace, out);
+    WalkTile<false>(splats, list, count, pair_of_entry, x0, y0, upstream, trace, pairs);
   }
 }
 
@@ -258,10 +290,11 @@ namespace engine::render {
 
 HWY_EXPORT(CompositeTileVjp);
 
-void composite_tile_vjp(const Splat* splats, std::span<const std::uint32_t> list, const std::int32_t* row_slot, int x0,
-                        int y0, const TileUpstream& upstream, bool with_depth, TileTrace& trace, TileGradient* out) {
+void composite_tile_vjp(const Splat* splats, std::span<const std::uint32_t> list, const std::uint32_t* pair_of_entry,
+                        int x0, int y0, const TileUpstream& upstream, bool with_depth, TileTrace& trace,
+                        TileGradient* pairs) {
   HWY_DYNAMIC_DISPATCH(CompositeTileVjp)
-  (splats, list.data(), list.size(), row_slot, x0, y0, upstream, with_depth, trace, out);
+  (splats, list.data(), list.size(), pair_of_entry, x0, y0, upstream, with_depth, trace, pairs);
 }
 
 }  // namespace engine::render

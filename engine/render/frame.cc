@@ -35,7 +35,9 @@ void Frame::forward(const scene::GaussianCloud& cloud, const scene::Camera& came
   ForwardBuffers& buffers = frame.buffers;
   project(cloud, view_params<float>(camera), cloud.sh_degree, {}, Culling::exact, frame.grid.pixels, buffers);
   sort_by_depth(buffers);
-  bin(frame.grid, buffers);
+  const auto* const slots = find_slots(
+      buffers, [](std::uint32_t row) { return std::int32_t(row); }, frame.walk.slot_of_splat);
+  bin(frame.grid, buffers, slots, cloud.size());
   parallel_for(buffers.tile_begin.size() - 1, 1, [&](std::size_t tile, std::size_t) {
     const std::uint32_t first = buffers.tile_begin[tile], last = buffers.tile_begin[tile + 1];
     draw_tile(buffers.splats.data(), {buffers.entries.data() + first, last - first}, std::uint32_t(tile),
@@ -47,15 +49,15 @@ void Frame::backward(const scene::GaussianCloud& cloud, const scene::Image& v_co
   Impl& frame = *impl_;
   assert(v_color.width == frame.camera.width && v_color.height == frame.camera.height && v_color.channels == 3);
   assert(out.size() == cloud.size() && out.sh_degree == cloud.sh_degree);
-  std::int32_t* const slots = frame.walk.slot_of_splat.reserve(frame.buffers.count);
-  for (std::size_t i = 0; i < frame.buffers.count; ++i) slots[i] = std::int32_t(frame.buffers.splats[i].row);
   frame.rows.resize(cloud.size());
   std::iota(frame.rows.begin(), frame.rows.end(), 0u);
   const auto params = view_params<float>(frame.camera);
   clear_mean2d(out);
-  walk_tiles(frame.buffers, frame.grid, {.color = &v_color}, frame.background, cloud.size(), frame.walk);
+  walk_tiles(frame.buffers, frame.grid, {.color = &v_color}, frame.background, frame.buffers.first_pair[cloud.size()],
+             frame.walk);
+  const RowPairs row_pairs{.first_pair = frame.buffers.first_pair.data(), .pairs = frame.walk.pairs.data()};
   parallel_for(cloud.size(), project_vjp_block, [&](std::size_t begin, std::size_t end) {
-    project_rows_vjp(cloud, 0, params, cloud.sh_degree, frame.rows, frame.walk.rows, begin, end, out);
+    project_rows_vjp(cloud, 0, params, cloud.sh_degree, frame.rows, row_pairs, begin, end, out);
   });
 }
 

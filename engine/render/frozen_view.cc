@@ -141,7 +141,9 @@ scene::Rect LocalFrame::project(const scene::GaussianCloud& changeable, const sc
   render::project(changeable, view_params<float>(camera), changeable.sh_degree, {}, Culling::exact, grid.pixels,
                   buffers);
   sort_by_depth(buffers);
-  bin(grid, buffers);
+  const auto* const slots = find_slots(
+      buffers, [](std::uint32_t row) { return std::int32_t(row); }, impl_->walk.slot_of_splat);
+  bin(grid, buffers, slots, changeable.size());
 
   impl_->tiles.clear();
   scene::Rect reach;
@@ -168,7 +170,6 @@ void LocalFrame::merge(const FrozenView& frozen) {
   // Entries are numbered in 32 bits, and so are splats.
   if (merged.count > std::numeric_limits<std::int32_t>::max()) throw std::bad_alloc();
   Splat* const splats = merged.splats.reserve(merged.count);
-  std::int32_t* const slots = frame.walk.slot_of_splat.reserve(merged.count);
   std::uint32_t* const of_frozen = frame.of_frozen.reserve(view.splats.size());
   std::uint32_t* const of_change = frame.of_change.reserve(top.count);
   std::size_t at = 0, f = 0;
@@ -179,12 +180,10 @@ void LocalFrame::merge(const FrozenView& frozen) {
     else
       while (f < view.splats.size() && view.splats[f].depth <= top.splats[t].depth) ++f;
     std::copy_n(view.splats.data() + first, f - first, splats + at);
-    std::fill_n(slots + at, f - first, -1);
     std::iota(of_frozen + first, of_frozen + f, std::uint32_t(at));
     at += f - first;
     if (t == top.count) break;
     splats[at] = top.splats[t];
-    slots[at] = std::int32_t(top.splats[t].row);
     of_change[t] = std::uint32_t(at++);
   }
 
@@ -204,17 +203,25 @@ void LocalFrame::merge(const FrozenView& frozen) {
   }
   merged.tile_begin[all_tiles] = std::uint32_t(total);
   std::uint32_t* const entries = merged.entries.reserve(std::size_t(total));
+  std::uint32_t* const pair_of_entry = merged.pair_of_entry.reserve(std::size_t(total));
   parallel_for(frame.tiles.size(), 4, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t tile = frame.tiles[i];
       const std::span<const std::uint32_t> below = view.list(tile), above = list_of_change(tile);
       std::uint32_t* to = entries + merged.tile_begin[tile];
+      std::uint32_t* pair = pair_of_entry + merged.tile_begin[tile];
+      const std::uint32_t* const pair_above = top.pair_of_entry.data() + top.tile_begin[tile];
       std::size_t a = 0;
-      for (const std::uint32_t change : above) {
-        const std::uint32_t number = of_change[change];
-        for (; a < below.size() && of_frozen[below[a]] < number; ++a) *to++ = of_frozen[below[a]];
+      for (std::size_t c = 0; c < above.size(); ++c) {
+        const std::uint32_t number = of_change[above[c]];
+        for (; a < below.size() && of_frozen[below[a]] < number; ++a) {
+          *to++ = of_frozen[below[a]];
+          *pair++ = ForwardBuffers::no_pair;
+        }
         *to++ = number;
+        *pair++ = pair_above[c];
       }
+      std::fill_n(pair, below.size() - a, ForwardBuffers::no_pair);
       for (; a < below.size(); ++a) *to++ = of_frozen[below[a]];
     }
   });
@@ -252,10 +259,12 @@ void LocalFrame::backward(const FrozenView& frozen, const scene::GaussianCloud& 
   grid.pixels = view.region;
   const UpstreamPlanes upstream{.color = &v_color};
   clear_mean2d(out);
-  walk_tiles(impl_->merged, grid, upstream, view.background, rows.size(), impl_->walk);
+  const ForwardBuffers& top = impl_->changeable;
+  walk_tiles(impl_->merged, grid, upstream, view.background, top.first_pair[rows.size()], impl_->walk);
+  const RowPairs row_pairs{.first_pair = top.first_pair.data(), .pairs = impl_->walk.pairs.data()};
   const auto params = view_params<float>(view.camera);
   parallel_for(rows.size(), project_vjp_block, [&](std::size_t begin, std::size_t end) {
-    project_rows_vjp(changeable, 0, params, changeable.sh_degree, rows, impl_->walk.rows, begin, end, out);
+    project_rows_vjp(changeable, 0, params, changeable.sh_degree, rows, row_pairs, begin, end, out);
   });
 }
 

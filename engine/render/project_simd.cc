@@ -1,4 +1,5 @@
 // The projection of project.h, a vector of Gaussians at a time.
+#include <hwy/cache_control.h>
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "engine/render/project_simd.cc"
 #include <hwy/foreach_target.h>
@@ -212,6 +213,12 @@ HWY_INLINE void ShadeRow(const float* sh, std::size_t stored, std::size_t used, 
   splat.red = rgb[0], splat.green = rgb[1], splat.blue = rgb[2];
 }
 
+/// Coefficients are most of what a frame reads, and this is its first sight of them.
+constexpr std::size_t fetch_ahead = 16;  // rows
+HWY_INLINE void FetchRow(const float* sh, std::size_t stride) {
+  for (std::size_t k = 0; k < stride; k += 16) hwy::Prefetch(sh + k);
+}
+
 std::size_t ProjectRows(const ProjectedLayer& layer, const ViewParams<float>& view, int sh_degree, Culling culling,
                         scene::Rect pixels, std::size_t begin, std::size_t end, Splat* out, TileBox* boxes) {
   const D d;
@@ -243,6 +250,8 @@ std::size_t ProjectRows(const ProjectedLayer& layer, const ViewParams<float>& vi
     boxes[written++] = {std::uint16_t(found.columns[k] & 0xffff), std::uint16_t(found.columns[k] >> 16),
                         std::uint16_t(found.rows[k] & 0xffff), std::uint16_t(found.rows[k] >> 16)};
     if (sh_degree < 0) continue;
+    FetchRow(cloud.sh.data() + std::size_t(found.row[HWY_MIN(k + fetch_ahead, found.count - 1)]) * cloud.sh_stride(),
+             cloud.sh_stride());
     alignas(16) float basis[16];
     scene::sh_basis(sh_degree, found.to_x[k], found.to_y[k], found.to_z[k], basis);
     ShadeRow(cloud.sh.data() + row * cloud.sh_stride(), stored, used, basis, splat);

@@ -1,4 +1,5 @@
 // The pullbacks of project_vjp.h, a vector of Gaussians at a time.
+#include <hwy/cache_control.h>
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "engine/render/project_vjp_simd.cc"
 #include <hwy/foreach_target.h>
@@ -187,51 +188,120 @@ HWY_INLINE void ProjectVjpVector(VjpD d, const ViewParams<float>& view, std::siz
   hn::Store(inverse_distance, d, rows.inverse_distance + i);
 }
 
-/// color_vjp() for the seen row i, whose direction is known: adds to v_sh and to the row's v_mean.
-HWY_INLINE void ColorVjpRow(const float* sh, std::size_t stored, int degree, std::size_t i, SeenRows& rows,
-                            float* v_sh) {
-  const hn::CappedTag<float, 4> d4;
-  const std::size_t lanes = hn::Lanes(d4), used = scene::sh_coefficients(degree);
-  const float x = rows.to[0][i], y = rows.to[1][i], z = rows.to[2][i];
-  alignas(16) float basis[16], v_basis[16] = {};
-  scene::sh_basis(degree, x, y, z, basis);
+/// Bases of the seen rows' directions, row by row, and what they become: dL/dbasis.
+struct Bases {
+  static constexpr std::size_t size = scene::sh_coefficients(scene::max_sh_degree);
+  alignas(64) float basis[project_vjp_block][size], v_basis[project_vjp_block][size];
+};
+
+/// All rows at once: the compiler makes vectors of the loops, since the degree is a constant.
+template <int kDegree>
+HWY_INLINE void EachBasis(const SeenRows& rows, Bases& bases) {
+  for (std::size_t i = 0; i < rows.count; ++i)
+    scene::sh_basis(kDegree, rows.to[0][i], rows.to[1][i], rows.to[2][i], bases.basis[i]);
+}
+
+/// Adds to the rows' v_mean what their direction gets from v_basis.
+template <int kDegree>
+HWY_INLINE void EachBasisVjp(const Bases& bases, SeenRows& rows) {
+  for (std::size_t i = 0; i < rows.count; ++i) {
+    const float to[3] = {rows.to[0][i], rows.to[1][i], rows.to[2][i]};
+    const auto v_to = scene::sh_basis_vjp(kDegree, to[0], to[1], to[2], bases.v_basis[i]);
+    const float along = v_to[0] * to[0] + v_to[1] * to[1] + v_to[2] * to[2];
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      rows.v_mean[axis][i] += (v_to[axis] - along * to[axis]) * rows.inverse_distance[i];
+  }
+}
+
+/// color_vjp() for the seen row i, up to the basis: adds to v_sh and writes v_basis.
+template <class AnyD>
+HWY_INLINE void ColorVjpRow(AnyD d, const float* sh, std::size_t stored, std::size_t used, std::size_t i,
+                            const SeenRows& rows, Bases& bases, float* v_sh) {
+  const std::size_t lanes = hn::Lanes(d);
+  const float* const basis = bases.basis[i];
+  float* const v_basis = bases.v_basis[i];
+  std::fill_n(v_basis, Bases::size, 0.0f);
   for (std::size_t c = 0; c < 3; ++c, sh += stored, v_sh += stored) {
     const float v_color = rows.sums[6 + c][i];
     if (v_color == 0) continue;
     float sum = 0.5f;
     std::size_t k = 0;
     if (used >= lanes) {
-      auto sums = hn::Zero(d4);
-      for (; k + lanes <= used; k += lanes) sums = hn::MulAdd(hn::LoadU(d4, sh + k), hn::Load(d4, basis + k), sums);
-      sum += hn::GetLane(hn::SumOfLanes(d4, sums));
+      auto sums = hn::Zero(d);
+      for (; k + lanes <= used; k += lanes) sums = hn::MulAdd(hn::LoadU(d, sh + k), hn::Load(d, basis + k), sums);
+      sum += hn::GetLane(hn::SumOfLanes(d, sums));
     }
     for (; k < used; ++k) sum += sh[k] * basis[k];
     if (!(sum >= 0 && sum <= float(max_color))) continue;  // also when it is NaN
-    const auto v = hn::Set(d4, v_color);
+    const auto v = hn::Set(d, v_color);
     for (k = 0; k + lanes <= used; k += lanes) {
-      hn::StoreU(hn::MulAdd(v, hn::Load(d4, basis + k), hn::LoadU(d4, v_sh + k)), d4, v_sh + k);
-      hn::Store(hn::MulAdd(v, hn::LoadU(d4, sh + k), hn::Load(d4, v_basis + k)), d4, v_basis + k);
+      hn::StoreU(hn::MulAdd(v, hn::Load(d, basis + k), hn::LoadU(d, v_sh + k)), d, v_sh + k);
+      hn::Store(hn::MulAdd(v, hn::LoadU(d, sh + k), hn::Load(d, v_basis + k)), d, v_basis + k);
     }
     for (; k < used; ++k) {
       v_sh[k] += v_color * basis[k];
       v_basis[k] += v_color * sh[k];
     }
   }
-  const auto v_to = scene::sh_basis_vjp(degree, x, y, z, v_basis);
-  const float along = v_to[0] * x + v_to[1] * y + v_to[2] * z;
-  const float to[3] = {x, y, z};
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    rows.v_mean[axis][i] += (v_to[axis] - along * to[axis]) * rows.inverse_distance[i];
+}
+
+/// color_vjp() for the seen rows, whose directions are known: adds to their v_mean, and to out.sh.
+template <int kDegree>
+void ColorVjp(const scene::GaussianCloud& cloud, std::size_t first_row, const std::uint32_t* row_of_slot,
+              SeenRows& rows, Gradients& out) {
+  constexpr std::size_t used = scene::sh_coefficients(kDegree);
+  constexpr std::size_t lanes = used == 16 ? 16 : used >= 4 ? 4 : 1;
+  const hn::CappedTag<float, lanes> d;
+  const std::size_t stored = scene::sh_coefficients(cloud.sh_degree), stride = cloud.sh_stride();
+  Bases bases;
+  EachBasis<kDegree>(rows, bases);
+  const auto sh = [&](std::size_t i) { return cloud.sh.data() + (row_of_slot[rows.slot[i]] - first_row) * stride; };
+  const auto v_sh = [&](std::size_t i) { return out.sh.data() + rows.slot[i] * stride; };
+  for (std::size_t i = 0; i < rows.count; ++i) {
+    const std::size_t coming = HWY_MIN(i + 8, rows.count - 1);
+    for (std::size_t k = 0; k < stride; k += 16) hwy::Prefetch(sh(coming) + k), hwy::Prefetch(v_sh(coming) + k);
+    ColorVjpRow(d, sh(i), stored, used, i, rows, bases, v_sh(i));
+  }
+  EachBasisVjp<kDegree>(bases, rows);
+}
+
+/// Sums a row's gradients over its tiles, in their order and in double, into the seen row i. False if all are zero.
+HWY_INLINE bool SumOverTiles(const TileGradient* first, const TileGradient* last, std::size_t i, SeenRows& rows) {
+  constexpr std::size_t size = sizeof(TileGradient) / sizeof(float);
+  const hn::CappedTag<double, 4> d64;
+  const hn::Rebind<float, decltype(d64)> d32;
+  constexpr std::size_t lanes = hn::MaxLanes(d64), parts = size / lanes;
+  hn::Vec<decltype(d64)> total[parts];
+  for (auto& part : total) part = hn::Zero(d64);
+  constexpr std::ptrdiff_t ahead = 16;  // rows' pairs follow each other
+  for (; first != last; ++first) {
+    hwy::Prefetch(first + ahead);
+    const auto* const values = reinterpret_cast<const float*>(first);
+    for (std::size_t p = 0; p < parts; ++p)
+      total[p] = hn::Add(total[p], hn::PromoteTo(d64, hn::LoadU(d32, values + p * lanes)));
+  }
+  alignas(32) float sums[size];
+  for (std::size_t p = 0; p < parts; ++p) hn::Store(hn::DemoteTo(d32, total[p]), d32, sums + p * lanes);
+  bool any = false;
+  for (std::size_t k = 0; k < TileGradient::sums; ++k) {
+    rows.sums[k][i] = sums[k];
+    any |= sums[k] != 0;
+  }
+  return any;
 }
 
 void ProjectRowsVjp(const scene::GaussianCloud& cloud, std::size_t first_row, const ViewParams<float>& view,
-                    int sh_degree, const std::uint32_t* rows, const RowGradients& v_rows, std::size_t begin,
+                    int sh_degree, const std::uint32_t* rows, const RowPairs& v_rows, std::size_t begin,
                     std::size_t end, Gradients& out) {
   const VjpD d;
   SeenRows seen;
   for (std::size_t r = begin; r < end; ++r) {
-    if (v_rows.seen[r] == 0) continue;
-    const std::size_t row = rows[r] - first_row, i = seen.count++;
+    const TileGradient *const first = v_rows.pairs + v_rows.first_pair[r], *const last =
+                                                                               v_rows.pairs + v_rows.first_pair[r + 1];
+    const std::size_t i = seen.count;
+    if (!SumOverTiles(first, last, i, seen)) continue;
+    ++seen.count;
+    const std::size_t row = rows[r] - first_row;
     seen.slot[i] = std::uint32_t(r);
     seen.mean[0][i] = cloud.mean.x[row], seen.mean[1][i] = cloud.mean.y[row], seen.mean[2][i] = cloud.mean.z[row];
     seen.log_scale[0][i] = cloud.log_scale.x[row], seen.log_scale[1][i] = cloud.log_scale.y[row];
@@ -239,11 +309,6 @@ void ProjectRowsVjp(const scene::GaussianCloud& cloud, std::size_t first_row, co
     seen.rotation[0][i] = cloud.rotation.w[row], seen.rotation[1][i] = cloud.rotation.x[row];
     seen.rotation[2][i] = cloud.rotation.y[row], seen.rotation[3][i] = cloud.rotation.z[row];
     seen.logit[i] = cloud.opacity_logit[row];
-    const TileGradient& sums = v_rows.sums[r];
-    seen.sums[0][i] = sums.g, seen.sums[1][i] = sums.along, seen.sums[2][i] = sums.across;
-    seen.sums[3][i] = sums.along_along, seen.sums[4][i] = sums.along_across, seen.sums[5][i] = sums.across_across;
-    seen.sums[6][i] = sums.red, seen.sums[7][i] = sums.green, seen.sums[8][i] = sums.blue;
-    seen.sums[9][i] = sums.depth;
   }
   if (seen.count == 0) return;
   // What fills up the last vector: the last row once more.
@@ -257,10 +322,21 @@ void ProjectRowsVjp(const scene::GaussianCloud& cloud, std::size_t first_row, co
   }
   for (std::size_t i = 0; i < seen.count; i += hn::Lanes(d)) ProjectVjpVector(d, view, i, seen);
 
-  const std::size_t stored = scene::sh_coefficients(cloud.sh_degree), stride = cloud.sh_stride();
+  switch (sh_degree) {
+    case 0:
+      ColorVjp<0>(cloud, first_row, rows, seen, out);
+      break;
+    case 1:
+      ColorVjp<1>(cloud, first_row, rows, seen, out);
+      break;
+    case 2:
+      ColorVjp<2>(cloud, first_row, rows, seen, out);
+      break;
+    default:
+      ColorVjp<3>(cloud, first_row, rows, seen, out);
+  }
   for (std::size_t i = 0; i < seen.count; ++i) {
-    const std::size_t r = seen.slot[i], row = rows[r] - first_row;
-    ColorVjpRow(cloud.sh.data() + row * stride, stored, sh_degree, i, seen, out.sh.data() + r * stride);
+    const std::size_t r = seen.slot[i];
     out.mean.x[r] += seen.v_mean[0][i], out.mean.y[r] += seen.v_mean[1][i], out.mean.z[r] += seen.v_mean[2][i];
     out.log_scale.x[r] += seen.v_log_scale[0][i], out.log_scale.y[r] += seen.v_log_scale[1][i];
     out.log_scale.z[r] += seen.v_log_scale[2][i];
@@ -281,7 +357,7 @@ namespace engine::render {
 HWY_EXPORT(ProjectRowsVjp);
 
 void project_rows_vjp(const scene::GaussianCloud& cloud, std::size_t first_row, const ViewParams<float>& view,
-                      int sh_degree, std::span<const std::uint32_t> rows, const RowGradients& v_rows, std::size_t begin,
+                      int sh_degree, std::span<const std::uint32_t> rows, const RowPairs& v_rows, std::size_t begin,
                       std::size_t end, Gradients& out) {
   HWY_DYNAMIC_DISPATCH(ProjectRowsVjp)(cloud, first_row, view, sh_degree, rows.data(), v_rows, begin, end, out);
 }

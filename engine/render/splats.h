@@ -87,6 +87,10 @@ struct ForwardBuffers {
   std::vector<BinBlock> bin_blocks;
   Buffer<std::uint32_t> entries;          ///< Indices into splats.
   std::vector<std::uint32_t> tile_begin;  ///< [tiles + 1] into entries.
+  // bin, if told which rows may change: their entries numbered row by row, those of a row in the order of tiles
+  Buffer<std::uint32_t> pair_of_entry;  ///< Number of an entry, or no_pair if its row may not change.
+  Buffer<std::uint32_t> first_pair;     ///< [rows that may change + 1] The first number of a row.
+  static constexpr std::uint32_t no_pair = 0xffffffff;
 };
 
 struct Workspace::Impl {
@@ -151,5 +155,8 @@ void project(const Layers& layers, const ViewParams<float>& view, int sh_degree,
 /// The stages between projection and blending.
 void sort_by_depth(ForwardBuffers& buffers);
 void bin(const TileGrid& grid, ForwardBuffers& buffers);
+/// The same, and numbers the entries of the rows [R] that may change.
+///   slot_of_splat  [count] where a splat's row is in their list, or -1
+void bin(const TileGrid& grid, ForwardBuffers& buffers, const std::int32_t* slot_of_splat, std::size_t rows);
 
 }  // namespace engine::render
