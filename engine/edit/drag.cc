@@ -2,6 +2,7 @@
 
 #include <optional>
 
+#include "engine/deform/rigid.h"
 #include "engine/edit/handles.h"
 #include "engine/edit/messages.h"
 #include "engine/edit/paste.h"
@@ -20,7 +21,9 @@ Step plan_step(const WorkingScene& working, const Request& request, std::span<co
                int intervals) {
   Step step;
   const auto drags = interval_drags(working, request, positions, u, intervals);
-  const auto motions = deform::handle_motions(drags, request.params.rotation);
+  auto motions = deform::handle_motions(drags, request.params.rotation);
+  if (request.params.interpolation == Interpolation::rigid && request.params.rotation == Rotation::shortest_arc)
+    deform::turn_whole_groups(drags, motions);
   step.rows = dragged_rows(working);
   step.deformation =
       deform::deformation(working.cloud, step.rows, working.handle, motions, request.params.interpolation);

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "engine/deform/intervals.h"
+#include "engine/deform/rigid.h"
 #include "engine/render/project.h"
 
 namespace engine::edit {
@@ -18,16 +19,17 @@ int resolved_intervals(const Request& request) {
   return deform::default_intervals(drags);
 }
 
-bool only_shifts(const Request& request) {
-  const auto way = [](const Handle& handle) { return handle.target.value_or(handle.source) - handle.source; };
-  // Shifts that a program has worked out differ in their last digits.
-  constexpr double rounding = 1e-6;
-  for (const Handle& handle : request.handles) {
-    const auto first = std::find_if(request.handles.begin(), request.handles.end(),
-                                    [&](const Handle& other) { return other.group == handle.group; });
-    if (glm::distance(way(handle), way(*first)) > rounding * glm::length(way(*first))) return false;
-  }
-  return !request.handles.empty();
+bool moves_as_one_piece(const Request& request) {
+  std::vector<deform::Drag> drags;
+  for (const Handle& handle : request.handles)
+    drags.push_back({handle.source, handle.target.value_or(handle.source), handle.group, !handle.target});
+  const auto goes_whole = [&](const deform::Drag& drag) {
+    const bool is_held = std::any_of(drags.begin(), drags.end(), [&](const deform::Drag& other) {
+      return other.anchor && other.group == drag.group;
+    });
+    return drag.anchor || (!is_held && deform::moves_as_one_piece(drags, drag.group));
+  };
+  return !drags.empty() && std::all_of(drags.begin(), drags.end(), goes_whole);
 }
 
 std::vector<DVec3> handle_sources(const WorkingScene& working, const Request& request) {

@@ -15,9 +15,9 @@ namespace engine::edit {
 /// T as the request sets it, or from the drags.
 [[nodiscard]] int resolved_intervals(const Request& request);
 
-/// Every group has handles that all go the same way, equally far: one step carries what they hold there exactly.
-/// Without handles: false.
-[[nodiscard]] bool only_shifts(const Request& request);
+/// Every group is shifted and turned as one piece, and no anchor holds a part of it back: with `rigid` interpolation
+/// one step carries it there exactly. Without handles: false.
+[[nodiscard]] bool moves_as_one_piece(const Request& request);
 
 /// Where the handles are before the first interval, in the frame of the working scene.
 [[nodiscard]] std::vector<DVec3> handle_sources(const WorkingScene& working, const Request& request);

@@ -99,7 +99,7 @@ edit::Params preset_params(proto::Preset preset, const edit::Request& drag) {
       params.views = 24, params.max_image_side = 384;
       break;
     case proto::Preset::standard:
-      params.intervals = extends ? 0 : edit::only_shifts(drag) ? 1 : 4;
+      params.intervals = extends ? 0 : edit::moves_as_one_piece(drag) ? 1 : 4;
       params.annealing_steps = 1, params.iterations = 500;
       params.views = 50, params.max_image_side = 512;
       break;

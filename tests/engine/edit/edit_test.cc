@@ -158,17 +158,35 @@ TEST(Edit, InAnExtendAnIntervalReachesAsFarAsThePartIsWide) {
   EXPECT_EQ(resolved_intervals(request), 5);
 }
 
-TEST(Edit, OnlyShiftsWhereEachGroupGoesOneWay) {
+TEST(Edit, AGroupWithoutAnchorsMayMoveAsOnePiece) {
   Request request;
-  EXPECT_FALSE(only_shifts(request));
+  EXPECT_FALSE(moves_as_one_piece(request));
   request.handles = {{DVec3(0), DVec3(0.3, 0, 0), 0.1, 1}, {DVec3(1), DVec3(1.3, 1, 1), 0.1, 1}};
-  EXPECT_TRUE(only_shifts(request)) << "0.3 and 1.3 - 1 differ in their last digits";
+  EXPECT_TRUE(moves_as_one_piece(request)) << "0.3 and 1.3 - 1 differ in their last digits";
   request.handles.push_back({DVec3(2), DVec3(2, 9, 2), 0.1, 2});
-  EXPECT_TRUE(only_shifts(request));
+  EXPECT_TRUE(moves_as_one_piece(request)) << "each group by itself";
   request.handles.push_back({DVec3(3), std::nullopt, 0.1, 2});
-  EXPECT_FALSE(only_shifts(request)) << "an anchor holds what the other carries off";
+  EXPECT_FALSE(moves_as_one_piece(request)) << "an anchor holds what the other carries off";
   request.handles = {{DVec3(3), std::nullopt, 0.1, 0}};
-  EXPECT_TRUE(only_shifts(request));
+  EXPECT_TRUE(moves_as_one_piece(request));
+}
+
+TEST(Edit, WhatIsTurnedAsOnePieceKeepsItsShape) {
+  const scene::GaussianCloud scene = ball_before_wall(100);
+  const DQuat turn = glm::angleAxis(1.1, glm::normalize(DVec3(1, 2, -1)));
+  Request request;
+  for (const DVec3& at : {DVec3(0.1, 0, 0), DVec3(0, 0.1, 0), DVec3(0, 0, 0.1), DVec3(-0.1, -0.1, 0.05)})
+    request.handles.push_back({at, turn * at + DVec3(0.5, 0, 0), 0.3, 0});
+  request.params.intervals = 1, request.params.interpolation = Interpolation::rigid;
+  ASSERT_TRUE(moves_as_one_piece(request));
+  const Outcome outcome = run_well(scene, arc_of_cameras(1, 32), request);
+  ASSERT_EQ(outcome.overlay.removed.size(), 100u);
+  ASSERT_EQ(outcome.overlay.added(), 100u);
+  for (std::size_t k = 0; k < 100; ++k) {
+    const DVec3 was(scene.mean.get(outcome.overlay.removed[k]));
+    const DVec3 is(outcome.overlay.rows.mean.get(outcome.overlay.changed.size() + k));
+    EXPECT_LT(glm::distance(is, turn * was + DVec3(0.5, 0, 0)), 1e-5) << k;
+  }
 }
 
 TEST(Edit, ReportsProgressThatNeverFallsAndEveryInterval) {

@@ -156,7 +156,7 @@ TEST(Convert, AnExtendTakesNoMoreIntervalsThanItsLengthAsksFor) {
   EXPECT_EQ(preset_params(proto::Preset::paper, drag).intervals, 5);
 }
 
-TEST(Convert, StandardTakesOneIntervalForWhatOnlyShifts) {
+TEST(Convert, StandardTakesOneIntervalForWhatMovesAsOnePiece) {
   edit::Request drag;
   drag.handles = {{engine::DVec3(0), engine::DVec3(1, 0, 0), 0.3, 1},
                   {engine::DVec3(5), engine::DVec3(5, 7, 5), 0.3, 2}};

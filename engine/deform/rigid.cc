@@ -1,0 +1,121 @@
+#include "engine/deform/rigid.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <vector>
+
+namespace engine::deform {
+namespace {
+
+constexpr double one_piece = 0.01;  // of the longest way; who places handles by hand is not more exact
+
+using Row = std::array<double, 4>;
+using Symmetric4 = std::array<Row, 4>;
+
+/// Horn's matrix: the quaternion of the best turn is the eigenvector of its largest eigenvalue.
+Symmetric4 horn_matrix(std::span<const DVec3> from, DVec3 from_middle, std::span<const DVec3> to, DVec3 to_middle) {
+  DMat3 s(0.0);  // s[a][b]: component a before times component b after
+  for (std::size_t i = 0; i < from.size(); ++i)
+    for (int a = 0; a < 3; ++a) s[a] += (from[i] - from_middle)[a] * (to[i] - to_middle);
+  Symmetric4 n{Row{s[0][0] + s[1][1] + s[2][2], s[1][2] - s[2][1], s[2][0] - s[0][2], s[0][1] - s[1][0]},
+               Row{0, s[0][0] - s[1][1] - s[2][2], s[0][1] + s[1][0], s[2][0] + s[0][2]},
+               Row{0, 0, s[1][1] - s[0][0] - s[2][2], s[1][2] + s[2][1]}, Row{0, 0, 0, s[2][2] - s[0][0] - s[1][1]}};
+  for (std::size_t a = 0; a < 4; ++a)
+    for (std::size_t b = 0; b < a; ++b) n[a][b] = n[b][a];
+  return n;
+}
+
+double largest_entry(const Symmetric4& n) {
+  double largest = 0;
+  for (const Row& row : n)
+    for (const double value : row) largest = std::max(largest, std::abs(value));
+  return largest;
+}
+
+/// Projection of the identity onto the eigenvectors of the largest eigenvalue: of the best turns, the least. Its length
+/// is the cosine of half the angle. Found by squaring until nothing else is left.
+DQuat least_of_best_turns(Symmetric4 n) {
+  const double size = 4 * largest_entry(n);
+  for (std::size_t a = 0; a < 4; ++a) n[a][a] += size;  // no eigenvalue is negative now
+  constexpr int squarings = 40;                         // eigenvalues that differ by 1e-11 of them are told apart
+  double trace = 0;
+  for (int k = 0; k < squarings; ++k) {
+    Symmetric4 squared{};
+    for (std::size_t a = 0; a < 4; ++a)
+      for (std::size_t b = 0; b < 4; ++b)
+        for (std::size_t c = 0; c < 4; ++c) squared[a][b] += n[a][c] * n[c][b];
+    const double largest = largest_entry(squared);
+    trace = 0;
+    for (std::size_t a = 0; a < 4; ++a) {
+      for (double& value : squared[a]) value /= largest;
+      trace += squared[a][a];
+    }
+    n = squared;
+  }
+  return DQuat(n[0][0], n[1][0], n[2][0], n[3][0]) / trace;
+}
+
+std::vector<int> groups_of(std::span<const Drag> drags) {
+  std::vector<int> groups;
+  for (const Drag& drag : drags) groups.push_back(drag.group);
+  std::sort(groups.begin(), groups.end());
+  groups.erase(std::unique(groups.begin(), groups.end()), groups.end());
+  return groups;
+}
+
+DVec3 target_of(const Drag& drag) { return drag.anchor ? drag.source : drag.target; }
+
+RigidMotion motion_of(std::span<const Drag> drags, int group) {
+  std::vector<DVec3> from, to;
+  for (const Drag& drag : drags)
+    if (drag.group == group) from.push_back(drag.source), to.push_back(target_of(drag));
+  return fit_rigid(from, to);
+}
+
+bool explains(const RigidMotion& motion, std::span<const Drag> drags, int group) {
+  double longest = 0;
+  for (const Drag& drag : drags)
+    if (drag.group == group) longest = std::max(longest, glm::distance(drag.source, target_of(drag)));
+  return motion.residual <= one_piece * longest;
+}
+
+}  // namespace
+
+RigidMotion fit_rigid(std::span<const DVec3> from, std::span<const DVec3> to) {
+  assert(from.size() == to.size());
+  RigidMotion motion;
+  if (from.empty()) return motion;
+  DVec3 after(0.0);
+  for (std::size_t i = 0; i < from.size(); ++i)
+    motion.centre += from[i] / double(from.size()), after += to[i] / double(from.size());
+  motion.shift = after - motion.centre;
+  if (const Symmetric4 n = horn_matrix(from, motion.centre, to, after); largest_entry(n) > 0) {
+    const DQuat turn = least_of_best_turns(n);
+    const double length = std::sqrt(glm::dot(turn, turn));
+    constexpr double half_turn = 1e-6;  // cosine of half the angle: below it the axis is rounding
+    constexpr double no_turn = 1e-9;    // sine of it: what only shifts shall not turn by rounding either
+    if (length > half_turn && glm::length(DVec3(turn.x, turn.y, turn.z)) > no_turn * length)
+      motion.turn = turn / length;
+  }
+  for (std::size_t i = 0; i < from.size(); ++i)
+    motion.residual = std::max(motion.residual, glm::distance(motion(from[i]), to[i]));
+  return motion;
+}
+
+bool moves_as_one_piece(std::span<const Drag> drags, int group) {
+  return explains(motion_of(drags, group), drags, group);
+}
+
+void turn_whole_groups(std::span<const Drag> drags, std::span<HandleMotion> motions) {
+  assert(drags.size() == motions.size());
+  for (const int group : groups_of(drags)) {
+    const RigidMotion motion = motion_of(drags, group);
+    if (!explains(motion, drags, group)) continue;
+    for (std::size_t i = 0; i < drags.size(); ++i)
+      if (drags[i].group == group && !drags[i].anchor) motions[i].rotation = motion.turn;
+  }
+}
+
+}  // namespace engine::deform

@@ -1,0 +1,35 @@
+// Handles that ask for one rigid motion: then no handle needs to guess from its neighbours how it turns.
+// Source: Horn 1987, "Closed-form solution of absolute orientation using unit quaternions".
+#pragma once
+
+#include <span>
+
+#include "engine/core/vec.h"
+#include "engine/deform/motion.h"
+
+namespace engine::deform {
+
+/// A turn about `centre`, and the shift after it.
+struct RigidMotion {
+  DVec3 centre{0.0};
+  DQuat turn{1.0, 0.0, 0.0, 0.0};  ///< Unit.
+  DVec3 shift{0.0};
+  double residual = 0;  ///< Farthest that a point is from where the motion takes it, units of the points.
+
+  [[nodiscard]] DVec3 operator()(DVec3 point) const { return centre + turn * (point - centre) + shift; }
+};
+
+/// The motion that takes `from` to `to` with the least squares, and of equally good ones the one that turns least.
+/// Points in one place do not turn. Nor does a half-turn, of which none is the least: its residual tells.
+/// Precondition: as many points as targets.
+[[nodiscard]] RigidMotion fit_rigid(std::span<const DVec3> from, std::span<const DVec3> to);
+
+/// Do the handles of the group move as one piece, to a hundredth of the longest way? Anchors count as points that stay.
+/// A group without handles does.
+[[nodiscard]] bool moves_as_one_piece(std::span<const Drag> drags, int group);
+
+/// Where a group moves as one piece, all its handles turn as the piece does, in place of the blend of pairs that
+/// handle_motions() gives them. Anchors still do not turn.
+void turn_whole_groups(std::span<const Drag> drags, std::span<HandleMotion> motions);
+
+}  // namespace engine::deform
