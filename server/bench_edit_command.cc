@@ -75,12 +75,12 @@ void apply(const BenchOptions& options, edit::Request& request) {
   edit::Params& params = request.params;
   params = edits::preset_params(options.preset, request);
   if (options.interpolation) params.interpolation = *options.interpolation;
-  if (options.intervals) params.intervals = *options.intervals;
   if (options.iterations) params.iterations = *options.iterations;
   if (options.annealing_steps) params.annealing_steps = *options.annealing_steps;
   if (options.views) params.views = *options.views;
   if (options.image_side) params.max_image_side = *options.image_side;
   params.local_mask = !options.whole_picture;
+  params.intervals = options.intervals.value_or(edits::preset_intervals(options.preset, request));
 }
 
 /// The corrector of that name; null: none.
@@ -134,16 +134,19 @@ Result<ordered_json> judge(const evaluate::Case& the_case, const edit::Request& 
   const std::uint64_t before = status_bytes("VmRSS");
   const auto corrector = corrector_named(corrector_name);
   evaluate::Agreement agreement;  // of the last correction
+  std::uint64_t peak = 0;
   edit::Observer observer;
   observer.moment = [&](const edit::Moment& moment) -> Result<void> {
+    peak = std::max(peak, status_bytes("VmHWM"));  // what the judge takes does not count
     if (!moment.pictures.empty() && moment.interval == moment.intervals)
       agreement = evaluate::agreement(the_case, moment.views, moment.pictures);
+    forget_peak();
     return {};
   };
   const auto outcome =
       edit::run(the_case.before, the_case.cameras, request, observer, nullptr, nullptr, corrector.get());
   if (!outcome) return propagate(outcome);
-  const std::uint64_t peak = status_bytes("VmHWM");
+  peak = std::max(peak, status_bytes("VmHWM"));
   edited = scene::flatten(the_case.before, outcome->overlay);
   double seconds = 0;
   ordered_json stages = ordered_json::object();

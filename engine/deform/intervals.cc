@@ -8,7 +8,7 @@ namespace engine::deform {
 
 int default_intervals(std::span<const DragLength> drags) {
   double longest = 1;
-  for (const DragLength& drag : drags) longest = std::max(longest, drag.distance / drag.radius);
+  for (const DragLength& drag : drags) longest = std::max(longest, drag.distance / drag.step);
   // The user's 0.3 over 0.1 may come out as 3.0000000000000004; that is three steps, not four.
   constexpr double rounding = 1e-9;
   return int(std::min(std::ceil(longest * (1 - rounding)), double(max_intervals)));

@@ -25,7 +25,7 @@ enum class Rotation {
 enum class Interpolation {
   paper,   ///< Weighted sum over the K nearest handles. Jumps where the set of nearest handles changes.
   smooth,  ///< The same with weights that are continuous in space.
-  rigid,   ///< The weights of `smooth`, and each handle also turns the space around it.
+  rigid,   ///< The weights of `smooth`, and each handle also turns the space around it (see rigid.h, too).
 };
 
 /// K of the paper: how many handles a handle or a Gaussian looks at.

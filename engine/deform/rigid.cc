@@ -34,27 +34,33 @@ double largest_entry(const Symmetric4& n) {
   return largest;
 }
 
-/// Projection of the identity onto the eigenvectors of the largest eigenvalue: of the best turns, the least. Its length
-/// is the cosine of half the angle. Found by squaring until nothing else is left.
-DQuat least_of_best_turns(Symmetric4 n) {
+/// Projection of the identity onto the eigenvectors of the largest eigenvalue, of any length: of the best turns, the
+/// least. The shorter it is the nearer to a half-turn. Found by squaring: eigenvalues whose relative difference is
+/// below 2^-squarings are one.
+DQuat least_of_best_turns(Symmetric4 n, int squarings) {
   const double size = 4 * largest_entry(n);
   for (std::size_t a = 0; a < 4; ++a) n[a][a] += size;  // no eigenvalue is negative now
-  constexpr int squarings = 40;                         // eigenvalues that differ by 1e-11 of them are told apart
-  double trace = 0;
   for (int k = 0; k < squarings; ++k) {
     Symmetric4 squared{};
     for (std::size_t a = 0; a < 4; ++a)
       for (std::size_t b = 0; b < 4; ++b)
         for (std::size_t c = 0; c < 4; ++c) squared[a][b] += n[a][c] * n[c][b];
     const double largest = largest_entry(squared);
-    trace = 0;
-    for (std::size_t a = 0; a < 4; ++a) {
-      for (double& value : squared[a]) value /= largest;
-      trace += squared[a][a];
-    }
+    for (Row& row : squared)
+      for (double& value : row) value /= largest;
     n = squared;
   }
+  const double trace = n[0][0] + n[1][1] + n[2][2] + n[3][3];
   return DQuat(n[0][0], n[1][0], n[2][0], n[3][0]) / trace;
+}
+
+/// So many that turns are told apart by what they make of the points, if that is more than the slack.
+///   spread  sum of squared distances from the middle
+int squarings_for(double spread, std::size_t points, double slack) {
+  constexpr double most = 40;  // 1e-12: beyond, rounding decides
+  const double told_apart = double(points) * slack * slack;
+  if (!(told_apart > 0)) return int(most);
+  return int(std::clamp(std::ceil(std::log2(spread / told_apart)), 0.0, most));
 }
 
 std::vector<int> groups_of(std::span<const Drag> drags) {
@@ -67,23 +73,32 @@ std::vector<int> groups_of(std::span<const Drag> drags) {
 
 DVec3 target_of(const Drag& drag) { return drag.anchor ? drag.source : drag.target; }
 
+double longest_way(std::span<const Drag> drags, int group) {
+  double longest = 0;
+  for (const Drag& drag : drags)
+    if (drag.group == group) longest = std::max(longest, glm::distance(drag.source, target_of(drag)));
+  return longest;
+}
+
 RigidMotion motion_of(std::span<const Drag> drags, int group) {
   std::vector<DVec3> from, to;
   for (const Drag& drag : drags)
     if (drag.group == group) from.push_back(drag.source), to.push_back(target_of(drag));
-  return fit_rigid(from, to);
+  return fit_rigid(from, to, one_piece * longest_way(drags, group));
 }
 
 bool explains(const RigidMotion& motion, std::span<const Drag> drags, int group) {
-  double longest = 0;
+  // Handles that all stay, or go no farther than coordinates are exact, are one piece too.
+  constexpr double rounding = 1e-12;
+  double extent = 0;
   for (const Drag& drag : drags)
-    if (drag.group == group) longest = std::max(longest, glm::distance(drag.source, target_of(drag)));
-  return motion.residual <= one_piece * longest;
+    if (drag.group == group) extent = std::max({extent, glm::length(drag.source), glm::length(target_of(drag))});
+  return motion.residual <= one_piece * longest_way(drags, group) + rounding * extent;
 }
 
 }  // namespace
 
-RigidMotion fit_rigid(std::span<const DVec3> from, std::span<const DVec3> to) {
+RigidMotion fit_rigid(std::span<const DVec3> from, std::span<const DVec3> to, double slack) {
   assert(from.size() == to.size());
   RigidMotion motion;
   if (from.empty()) return motion;
@@ -91,8 +106,14 @@ RigidMotion fit_rigid(std::span<const DVec3> from, std::span<const DVec3> to) {
   for (std::size_t i = 0; i < from.size(); ++i)
     motion.centre += from[i] / double(from.size()), after += to[i] / double(from.size());
   motion.shift = after - motion.centre;
+  double spread_from = 0, spread_to = 0;
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    spread_from += glm::dot(from[i] - motion.centre, from[i] - motion.centre);
+    spread_to += glm::dot(to[i] - after, to[i] - after);
+  }
+  const int squarings = squarings_for(std::sqrt(spread_from * spread_to), from.size(), slack);
   if (const Symmetric4 n = horn_matrix(from, motion.centre, to, after); largest_entry(n) > 0) {
-    const DQuat turn = least_of_best_turns(n);
+    const DQuat turn = least_of_best_turns(n, squarings);
     const double length = std::sqrt(glm::dot(turn, turn));
     constexpr double half_turn = 1e-6;  // cosine of half the angle: below it the axis is rounding
     constexpr double no_turn = 1e-9;    // sine of it: what only shifts shall not turn by rounding either

@@ -22,7 +22,9 @@ struct RigidMotion {
 /// The motion that takes `from` to `to` with the least squares, and of equally good ones the one that turns least.
 /// Points in one place do not turn. Nor does a half-turn, of which none is the least: its residual tells.
 /// Precondition: as many points as targets.
-[[nodiscard]] RigidMotion fit_rigid(std::span<const DVec3> from, std::span<const DVec3> to);
+///   slack  motions whose residuals differ by no more are equally good, about: points in a row, but for that much, say
+///          nothing of a turn about the row. Units of the points.
+[[nodiscard]] RigidMotion fit_rigid(std::span<const DVec3> from, std::span<const DVec3> to, double slack = 0);
 
 /// Do the handles of the group move as one piece, to a hundredth of the longest way? Anchors count as points that stay.
 /// A group without handles does.

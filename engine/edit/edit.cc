@@ -13,6 +13,7 @@
 #include "engine/edit/paste.h"
 #include "engine/edit/repair.h"
 #include "engine/edit/stages.h"
+#include "engine/edit/stretch.h"
 #include "engine/edit/working_scene.h"
 
 namespace engine::edit {
@@ -283,6 +284,7 @@ Result<void> Run::next_interval() {
   // 4. Copy and paste.
   if (auto going = stages_.enter("deform", u, fraction(u, early(0.45))); !going) return going;
   shown_ = paste(working_, step.deformation, step.rows, request_.mode, request_.params.rotate_sh);
+  if (corrector_ != nullptr && request_.params.iterations > 0) draw_out(working_);
   std::sort(shown_.begin(), shown_.end());
   if (forced) shown_ = dragged_rows(working_);
   if (auto shown = show("deformed", u, early(0.48)); !shown) return shown;

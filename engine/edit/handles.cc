@@ -19,7 +19,9 @@ int resolved_intervals(const Request& request) {
   return deform::default_intervals(drags);
 }
 
-bool moves_as_one_piece(const Request& request) {
+bool one_interval_is_exact(const Request& request) {
+  const Params& params = request.params;
+  if (params.interpolation != Interpolation::rigid || params.rotation != Rotation::shortest_arc) return false;
   std::vector<deform::Drag> drags;
   for (const Handle& handle : request.handles)
     drags.push_back({handle.source, handle.target.value_or(handle.source), handle.group, !handle.target});

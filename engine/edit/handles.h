@@ -12,12 +12,12 @@
 
 namespace engine::edit {
 
-/// T as the request sets it, or from the drags.
+/// T as the request sets it; or the longest drag over the radius of its handle, in an extend over the diameter.
 [[nodiscard]] int resolved_intervals(const Request& request);
 
-/// Every group is shifted and turned as one piece, and no anchor holds a part of it back: with `rigid` interpolation
-/// one step carries it there exactly. Without handles: false.
-[[nodiscard]] bool moves_as_one_piece(const Request& request);
+/// Every group is shifted and turned as one piece, no anchor holds a part of it back, and the parameters (`rigid`, by the
+/// shortest arc) keep it one piece: one step carries it there. Without handles: false.
+[[nodiscard]] bool one_interval_is_exact(const Request& request);
 
 /// Where the handles are before the first interval, in the frame of the working scene.
 [[nodiscard]] std::vector<DVec3> handle_sources(const WorkingScene& working, const Request& request);

@@ -7,7 +7,6 @@
 
 #include "engine/edit/footprint.h"
 #include "engine/edit/seed.h"
-#include "engine/edit/stretch.h"
 #include "engine/edit/surfaces.h"
 #include "engine/edit/trust.h"
 #include "engine/mask/mask.h"
@@ -200,7 +199,6 @@ Result<scene::Image> Repair::correct_view(const WorkingScene& working, const Row
 
 Result<Repair::Outcome> Repair::correct(WorkingScene& working, std::span<const scene::Mask> masks, int u, int a,
                                         const std::function<Result<void>(double)>& advance) {
-  if (a == 1) draw_out(working);
   Outcome outcome;
   outcome.corrected.pictures.resize(views_.size());
   const Rows rows = rows_of(working);

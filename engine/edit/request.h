@@ -45,7 +45,7 @@ struct Region {
 };
 
 struct Params {
-  int intervals = 0;  ///< T, 1 to 20; 0: from the longest drag over its radius.
+  int intervals = 0;  ///< T, 1 to 20; 0: from the longest drag over its radius, in an extend over its diameter.
   Rotation rotation = Rotation::shortest_arc;
   Interpolation interpolation = Interpolation::paper;
   bool rotate_sh = true;                   ///< Turn SH bands 1 to 3 with their Gaussian.

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/core/parallel.h"
 #include "engine/neighbours/point_index.h"
 
 namespace engine::edit {
@@ -35,7 +36,7 @@ struct Svd {
 /// One-sided Jacobi (Hestenes 1958): turns pairs of columns until all are at right angles.
 Svd decompose(DMat3 m) {
   DMat3 v(1.0);
-  constexpr int enough = 12;  // sweeps; 3 x 3 settles within six
+  constexpr int enough = 6;  // sweeps: 3 x 3 settles within as many
   for (int sweep = 0; sweep < enough; ++sweep)
     for (const auto& [p, q] : {std::pair{0, 1}, {0, 2}, {1, 2}}) {
       const double angle = 0.5 * std::atan2(2 * glm::dot(m[p], m[q]), glm::dot(m[p], m[p]) - glm::dot(m[q], m[q]));
@@ -122,21 +123,24 @@ std::size_t draw_out(WorkingScene& working) {
   const std::size_t asked = neighbours_asked + 1;  // the nearest is the copy itself
   if (copies.size() < asked) return 0;
   const auto nearest = neighbours::PointIndex(points, 3).nearest(points, asked);
-  std::size_t changed = 0;
-  for (std::size_t k = 0; k < copies.size(); ++k) {
-    const std::uint32_t row = copies[k];
-    Surroundings around;
-    for (std::size_t n = 0; n < neighbours_asked; ++n) {
-      const std::uint32_t other = copies[nearest[k * asked + n + 1].index];
-      around.before[n] = DVec3(working.mean_at_deform.get(other)) - DVec3(working.mean_at_deform.get(row));
-      around.now[n] = DVec3(working.cloud.mean.get(other)) - DVec3(working.cloud.mean.get(row));
+  std::vector<std::uint8_t> changed(copies.size(), 0);
+  constexpr std::size_t grain = 256;
+  parallel_for(copies.size(), grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) {
+      const std::uint32_t row = copies[k];
+      Surroundings around;
+      for (std::size_t n = 0; n < neighbours_asked; ++n) {
+        const std::uint32_t other = copies[nearest[k * asked + n + 1].index];
+        around.before[n] = DVec3(working.mean_at_deform.get(other)) - DVec3(working.mean_at_deform.get(row));
+        around.now[n] = DVec3(working.cloud.mean.get(other)) - DVec3(working.cloud.mean.get(row));
+      }
+      const DMat3 stretch = stretch_of(around);
+      if (stretch == DMat3(1.0)) continue;
+      stretch_row(working.cloud, row, stretch);
+      changed[k] = 1;
     }
-    const DMat3 stretch = stretch_of(around);
-    if (stretch == DMat3(1.0)) continue;
-    stretch_row(working.cloud, row, stretch);
-    ++changed;
-  }
-  return changed;
+  });
+  return std::size_t(std::count(changed.begin(), changed.end(), 1));
 }
 
 }  // namespace engine::edit

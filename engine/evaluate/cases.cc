@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -266,8 +267,8 @@ const std::vector<Known>& known_cases() {
   return all;
 }
 
-/// Row i of the cloud, a flat disc, drawn out with what it lies on: a surface that grows stays closed.
-///   low, high  of its extents are in its plane
+/// Row i of the cloud, a flat disc across its third axis, drawn out with what it lies on: a surface that grows stays
+/// closed. For motions that do not turn.
 void widen_row(scene::GaussianCloud& cloud, std::size_t i, const Motion& motion) {
   const DMat3 axes = glm::mat3_cast(glm::normalize(DQuat(cloud.rotation.get(i))));
   const DVec3 extent = glm::exp(DVec3(cloud.log_scale.get(i)));
@@ -284,6 +285,7 @@ void widen_row(scene::GaussianCloud& cloud, std::size_t i, const Motion& motion)
 
 /// Row i of the cloud, carried along by the motion.
 void move_row(scene::GaussianCloud& cloud, std::size_t i, const Motion& motion, const deform::ShRotation& sh) {
+  assert(motion.widen == 0 || motion.turn == DQuat(1, 0, 0, 0));
   if (motion.widen != 0) widen_row(cloud, i, motion);
   cloud.mean.set(i, Vec3(motion(DVec3(cloud.mean.get(i)))));
   if (motion.turn == DQuat(1, 0, 0, 0)) return;

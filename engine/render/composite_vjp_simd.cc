@@ -240,9 +240,7 @@ void WalkTile(const Splat* splats, const std::uint32_t* list, std::size_t count,
     Fill(splats, list + first, n, x0, y0, traced.batch);
     for (std::size_t k = first + n; k < HWY_MIN(first + n + Batch::size, count); ++k) hwy::Prefetch(&splats[list[k]]);
     FindReach(d, n, traced.batch);
-    traced.changeable = 0;
-    for (std::size_t k = 0; k < n; ++k)
-      traced.changeable |= std::uint64_t{pair_of_entry[first + k] != ForwardBuffers::no_pair} << k;
+    traced.changeable = Changeable(pair_of_entry + first, n);
     if (traced.changeable != 0) first_changeable = HWY_MIN(first_changeable, traced_batches);
     std::size_t vectors = 0;
     for (const std::uint64_t reach : traced.batch.reach) vectors += std::size_t(std::popcount(reach));

@@ -65,7 +65,6 @@ proto::Interpolation to_wire(edit::Interpolation interpolation) {
 
 edit::Params to_engine(const proto::Params& given, proto::Preset preset, const edit::Request& drag) {
   edit::Params params = preset_params(preset, drag);
-  if (given.intervals) params.intervals = *given.intervals;
   if (given.views) params.views = *given.views;
   if (given.exclude_views) params.exclude_views = *given.exclude_views;
   if (given.iterations) params.iterations = *given.iterations;
@@ -79,14 +78,32 @@ edit::Params to_engine(const proto::Params& given, proto::Preset preset, const e
   if (given.interpolation) params.interpolation = to_engine(*given.interpolation);
   if (given.rotate_sh) params.rotate_sh = *given.rotate_sh;
   if (given.seed) params.seed = *given.seed;
+  edit::Request settled = drag;
+  settled.params = params;
+  params.intervals = given.intervals.value_or(preset_intervals(preset, settled));
   return params;
 }
 
 }  // namespace
 
-edit::Params preset_params(proto::Preset preset, const edit::Request& drag) {
+int preset_intervals(proto::Preset preset, const edit::Request& drag) {
   // A part that is drawn out leaves its trail where its intervals end: as many as the length of the drag asks for.
+  constexpr int by_length = 0;
   const bool extends = drag.mode == edit::Mode::extend;
+  switch (preset) {
+    case proto::Preset::preview:
+      break;
+    case proto::Preset::draft:
+      return extends ? by_length : 1;
+    case proto::Preset::standard:
+      return extends ? by_length : edit::one_interval_is_exact(drag) ? 1 : 4;
+    case proto::Preset::paper:
+      return 5;
+  }
+  return by_length;
+}
+
+edit::Params preset_params(proto::Preset preset, const edit::Request& drag) {
   edit::Params params;
   if (preset != proto::Preset::paper) params.interpolation = edit::Interpolation::rigid;
   switch (preset) {
@@ -94,20 +111,21 @@ edit::Params preset_params(proto::Preset preset, const edit::Request& drag) {
       params.iterations = 0;
       break;
     case proto::Preset::draft:
-      params.intervals = extends ? 0 : 1;
       params.annealing_steps = 1, params.iterations = 200;
       params.views = 24, params.max_image_side = 384;
       break;
     case proto::Preset::standard:
-      params.intervals = extends ? 0 : edit::moves_as_one_piece(drag) ? 1 : 4;
       params.annealing_steps = 1, params.iterations = 500;
       params.views = 50, params.max_image_side = 512;
       break;
     case proto::Preset::paper:
-      params.intervals = 5, params.annealing_steps = 4, params.iterations = 500;
+      params.annealing_steps = 4, params.iterations = 500;
       params.views = 50, params.max_image_side = 512;
       break;
   }
+  edit::Request settled = drag;
+  settled.params = params;
+  params.intervals = preset_intervals(preset, settled);
   return params;
 }
 

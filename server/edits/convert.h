@@ -13,8 +13,10 @@
 namespace server::edits {
 
 /// What a preset stands for. How the numbers were found: docs/tradeoff.md.
-///   drag  its mode and handles, on which intervals depend; the rest of it does not count
+///   drag  its mode and handles, on which intervals depend; its parameters do not count
 [[nodiscard]] engine::edit::Params preset_params(proto::Preset preset, const engine::edit::Request& drag = {});
+/// The intervals of a preset, for a drag whose other parameters are settled.
+[[nodiscard]] int preset_intervals(proto::Preset preset, const engine::edit::Request& drag);
 
 /// The preset of a request: `standard` if it names none.
 [[nodiscard]] proto::Preset preset_of(const proto::EditRequest& request);

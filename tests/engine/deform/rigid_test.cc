@@ -62,6 +62,28 @@ TEST(FitRigid, PointsInARowTurnByTheLeastAngle) {
   EXPECT_LT(glm::distance(motion(DVec3(0, 0, 1)), DVec3(0, 0, 1)), 1e-9) << "nothing turns about the row";
 }
 
+TEST(TurnWholeGroups, APieceThatIsOnlyAlmostInARowIsNotTwisted) {
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    Rng rng(seed);
+    std::vector<DVec3> from, to;
+    const auto jitter = [&] { return 0.003 * double(rng.uniform(-1, 1)); };
+    for (int i = 0; i < 4; ++i) {
+      from.push_back({0.5 * i, jitter(), jitter()});
+      to.push_back(DVec3(0.5 * i, 1 + jitter(), jitter()));
+    }
+    const auto all = drags(from, to);
+    EXPECT_TRUE(moves_as_one_piece(all, 0)) << seed;
+    auto motions = handle_motions(all, Rotation::shortest_arc);
+    turn_whole_groups(all, motions);
+    EXPECT_LT(angle_of(motions[0].rotation), 0.1) << seed << ": it is a shift, by hand";
+  }
+}
+
+TEST(TurnWholeGroups, HandlesThatStayAreOnePiece) {
+  const std::vector<DVec3> points{DVec3(0.1, 0.2, 0.3), DVec3(0.7, 0.11, 0.13), DVec3(1e3, 0.3, 0.9)};
+  EXPECT_TRUE(moves_as_one_piece(drags(points, points), 0));
+}
+
 TEST(FitRigid, WhatOnlyShiftsDoesNotTurnAtAll) {
   const auto points = random_points(5, 3);
   EXPECT_EQ(fit_rigid(points, moved(points, DQuat(1, 0, 0, 0), DVec3(1e3, -7, 0.1))).turn, DQuat(1, 0, 0, 0));

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <optional>
 #include <string>
@@ -132,6 +133,54 @@ TEST(EditWithACorrector, GivesTheSameBytesForAnyNumberOfThreads) {
         else
           EXPECT_EQ(outcome.overlay, first->overlay) << threads;
       });
+  }
+}
+
+/// Standard deviations of the new Gaussians along their longest axes, on the mean.
+double mean_extent(const Outcome& outcome) {
+  double sum = 0;
+  for (std::size_t row = outcome.overlay.changed.size(); row < outcome.overlay.rows.size(); ++row) {
+    const Vec3 log_scale = outcome.overlay.rows.log_scale.get(row);
+    sum += std::exp(double(std::max({log_scale.x, log_scale.y, log_scale.z})));
+  }
+  return sum / double(outcome.overlay.added());
+}
+
+TEST(EditWithACorrector, WhatIsStretchedIsDrawnOutOncePerInterval) {
+  BlockScene block(0, Mode::move);
+  Handle left = block.request.handles[0], right = left;
+  left.source.x -= 0.1, right.source.x += 0.1;
+  left.target->x -= 0.2, right.target->x += 0.2;
+  block.request.handles = {left, right};
+  block.request.params.interpolation = Interpolation::rigid;
+  block.request.params.intervals = 2, block.request.params.iterations = 1;
+  const double stays = mean_extent(run_with(block, nullptr));
+  std::optional<Outcome> once;
+  for (const int steps : {1, 2}) {
+    block.request.params.annealing_steps = steps;
+    std::optional<Outcome> first;
+    for (const int threads : {1, 4})
+      WorkArena(threads).run([&] {
+        std::string checkpoint;
+        Observer observer;
+        observer.interval_done = [&](const IntervalDone& done) {
+          if (done.interval == 1) checkpoint = encode(done.checkpoint);
+          return Result<void>{};
+        };
+        Outcome outcome = run_with_scene_corrector(block, observer);
+        const auto resumed = decode(checkpoint);
+        ASSERT_TRUE(resumed) << resumed.error().message;
+        EXPECT_EQ(run_with_scene_corrector(block, {}, &*resumed).overlay, outcome.overlay) << "gone on with";
+        if (!first)
+          first = std::move(outcome);
+        else
+          EXPECT_EQ(outcome.overlay, first->overlay) << threads;
+      });
+    EXPECT_GT(mean_extent(*first), 1.2 * stays);
+    if (!once)
+      once = std::move(first);
+    else
+      EXPECT_NEAR(mean_extent(*first), mean_extent(*once), 0.03 * stays) << "not again by each correction";
   }
 }
 

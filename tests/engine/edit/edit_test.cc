@@ -160,15 +160,20 @@ TEST(Edit, InAnExtendAnIntervalReachesAsFarAsThePartIsWide) {
 
 TEST(Edit, AGroupWithoutAnchorsMayMoveAsOnePiece) {
   Request request;
-  EXPECT_FALSE(moves_as_one_piece(request));
+  request.params.interpolation = Interpolation::rigid;
+  EXPECT_FALSE(one_interval_is_exact(request));
   request.handles = {{DVec3(0), DVec3(0.3, 0, 0), 0.1, 1}, {DVec3(1), DVec3(1.3, 1, 1), 0.1, 1}};
-  EXPECT_TRUE(moves_as_one_piece(request)) << "0.3 and 1.3 - 1 differ in their last digits";
+  EXPECT_TRUE(one_interval_is_exact(request)) << "0.3 and 1.3 - 1 differ in their last digits";
   request.handles.push_back({DVec3(2), DVec3(2, 9, 2), 0.1, 2});
-  EXPECT_TRUE(moves_as_one_piece(request)) << "each group by itself";
+  EXPECT_TRUE(one_interval_is_exact(request)) << "each group by itself";
   request.handles.push_back({DVec3(3), std::nullopt, 0.1, 2});
-  EXPECT_FALSE(moves_as_one_piece(request)) << "an anchor holds what the other carries off";
+  EXPECT_FALSE(one_interval_is_exact(request)) << "an anchor holds what the other carries off";
   request.handles = {{DVec3(3), std::nullopt, 0.1, 0}};
-  EXPECT_TRUE(moves_as_one_piece(request));
+  EXPECT_TRUE(one_interval_is_exact(request));
+  request.params.interpolation = Interpolation::paper;
+  EXPECT_FALSE(one_interval_is_exact(request));
+  request.params.interpolation = Interpolation::rigid, request.params.rotation = Rotation::none;
+  EXPECT_FALSE(one_interval_is_exact(request));
 }
 
 TEST(Edit, WhatIsTurnedAsOnePieceKeepsItsShape) {
@@ -178,7 +183,7 @@ TEST(Edit, WhatIsTurnedAsOnePieceKeepsItsShape) {
   for (const DVec3& at : {DVec3(0.1, 0, 0), DVec3(0, 0.1, 0), DVec3(0, 0, 0.1), DVec3(-0.1, -0.1, 0.05)})
     request.handles.push_back({at, turn * at + DVec3(0.5, 0, 0), 0.3, 0});
   request.params.intervals = 1, request.params.interpolation = Interpolation::rigid;
-  ASSERT_TRUE(moves_as_one_piece(request));
+  ASSERT_TRUE(one_interval_is_exact(request));
   const Outcome outcome = run_well(scene, arc_of_cameras(1, 32), request);
   ASSERT_EQ(outcome.overlay.removed.size(), 100u);
   ASSERT_EQ(outcome.overlay.added(), 100u);

@@ -84,6 +84,8 @@ TEST(DrawOut, UndoingTheStretchUndoesIt) {
   WorkingScene working = sheet();
   move(working, [](Vec3 p) { return Vec3(1.3f * p.x, p.y, p.z); });
   draw_out(working);
+  for (std::size_t row = 0; row < working.cloud.size(); ++row)
+    ASSERT_GT(extent_along(working, row, {1, 0, 0}), 1.15 * double(disc.x)) << row;
   move(working, [](Vec3 p) { return Vec3(p.x / 1.3f, p.y, p.z); });
   draw_out(working);
   for (std::size_t row = 0; row < working.cloud.size(); ++row)

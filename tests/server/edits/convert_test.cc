@@ -166,6 +166,17 @@ TEST(Convert, StandardTakesOneIntervalForWhatMovesAsOnePiece) {
   EXPECT_EQ(preset_params(proto::Preset::standard, drag).intervals, 4);
 }
 
+TEST(Convert, WhatIsNotInterpolatedRigidlyTakesFourIntervalsInStandard) {
+  proto::EditRequest asked = full_request();
+  asked.preset = proto::Preset::standard;
+  asked.params = {};
+  EXPECT_EQ(value(to_engine(asked)).params.intervals, 1);
+  asked.params.interpolation = proto::Interpolation::paper;
+  EXPECT_EQ(value(to_engine(asked)).params.intervals, 4);
+  asked.params.intervals = 7;
+  EXPECT_EQ(value(to_engine(asked)).params.intervals, 7);
+}
+
 TEST(Convert, TheCorrectorIsTheGivenOneOrThatOfThePreset) {
   for (const auto preset : every_preset) {
     SCOPED_TRACE(proto::name_of(preset));
