@@ -9,7 +9,7 @@ namespace bench {
 namespace {
 
 constexpr double panel_width = 460, panel_height = 340, left = 70, right = 20, top = 40, bottom = 55;
-constexpr std::array colours{"#1f77b4", "#d62728", "#2ca02c", "#9467bd"};
+constexpr std::array colours{"#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#e07b00", "#17818f"};
 
 std::string number(double value) {
   char text[32];

@@ -191,7 +191,7 @@ void write_docs(const Bench& bench, const path& folder) {
       points.push_back(
           bench.measure("whole picture for a mask", "--small --preset draft --corrector scene --whole-picture"));
       page << row(points.back());
-    } else {
+    } else if (knob.name != "interpolation") {  // which has no scale
       by_knob.series.push_back(series(knob.name, points));
     }
     all.insert(all.end(), points.begin(), points.end());
