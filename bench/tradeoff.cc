@@ -132,6 +132,9 @@ std::string row(const Point& point) {
   return out.str();
 }
 
+constexpr const char* trip_head =
+    " | arrived, % | inside, dB | SSIM | outside, dB | s there |\n| --- | ---: | ---: | ---: | ---: | ---: |\n";
+
 constexpr const char* head =
     "| setting | edited, dB | SSIM | vacated, dB | outside, dB | s |\n| --- | ---: | ---: | ---: | ---: | ---: |\n";
 
@@ -206,13 +209,13 @@ void write_docs(const Bench& bench, const path& folder) {
                                                               intervals + " --interpolation " + interpolation));
   page << "\n## Intervals on a capture\n\nThe fox's ear, preset `draft`, corrector `scene`: there and back, judged at "
           "cameras between those of the\ncapture; `arrived` is the part of the drag that the half-way scene shows.\n\n"
-          "| intervals | arrived, % | inside, dB | SSIM | outside, dB | s there |\n"
-          "| --- | ---: | ---: | ---: | ---: | ---: |\n";
+          "| intervals"
+       << trip_head;
   for (const std::string intervals : {"1", "2", "5", "10", "20"})
     page << bench.trip(intervals, "--preset draft --corrector scene --intervals " + intervals);
   page << "\n### What each preset does there\n\n"
-          "| preset | arrived, % | inside, dB | SSIM | outside, dB | s there |\n"
-          "| --- | ---: | ---: | ---: | ---: | ---: |\n";
+          "| preset"
+       << trip_head;
   for (const std::string preset : {"preview", "draft", "standard"})
     page << bench.trip(preset, "--preset " + preset + " --corrector scene");
   const std::vector<Point> best = front(all);

@@ -4,6 +4,7 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 namespace engine::deform {
@@ -73,27 +74,23 @@ std::vector<int> groups_of(std::span<const Drag> drags) {
 
 DVec3 target_of(const Drag& drag) { return drag.anchor ? drag.source : drag.target; }
 
-double longest_way(std::span<const Drag> drags, int group) {
-  double longest = 0;
-  for (const Drag& drag : drags)
-    if (drag.group == group) longest = std::max(longest, glm::distance(drag.source, target_of(drag)));
-  return longest;
-}
-
-RigidMotion motion_of(std::span<const Drag> drags, int group) {
-  std::vector<DVec3> from, to;
-  for (const Drag& drag : drags)
-    if (drag.group == group) from.push_back(drag.source), to.push_back(target_of(drag));
-  return fit_rigid(from, to, one_piece * longest_way(drags, group));
-}
-
-bool explains(const RigidMotion& motion, std::span<const Drag> drags, int group) {
+/// How the group moves, if it does so as one piece.
+std::optional<RigidMotion> motion_of_piece(std::span<const Drag> drags, int group) {
   // Handles that all stay, or go no farther than coordinates are exact, are one piece too.
   constexpr double rounding = 1e-12;
-  double extent = 0;
-  for (const Drag& drag : drags)
-    if (drag.group == group) extent = std::max({extent, glm::length(drag.source), glm::length(target_of(drag))});
-  return motion.residual <= one_piece * longest_way(drags, group) + rounding * extent;
+  std::vector<DVec3> from, to;
+  double longest = 0, extent = 0;
+  for (const Drag& drag : drags) {
+    if (drag.group != group) continue;
+    const DVec3 target = target_of(drag);
+    from.push_back(drag.source), to.push_back(target);
+    longest = std::max(longest, glm::distance(drag.source, target));
+    extent = std::max({extent, glm::length(drag.source), glm::length(target)});
+  }
+  const double slack = one_piece * longest;
+  const RigidMotion motion = fit_rigid(from, to, slack);
+  if (motion.residual <= slack + rounding * extent) return motion;
+  return std::nullopt;
 }
 
 }  // namespace
@@ -125,17 +122,15 @@ RigidMotion fit_rigid(std::span<const DVec3> from, std::span<const DVec3> to, do
   return motion;
 }
 
-bool moves_as_one_piece(std::span<const Drag> drags, int group) {
-  return explains(motion_of(drags, group), drags, group);
-}
+bool moves_as_one_piece(std::span<const Drag> drags, int group) { return motion_of_piece(drags, group).has_value(); }
 
 void turn_whole_groups(std::span<const Drag> drags, std::span<HandleMotion> motions) {
   assert(drags.size() == motions.size());
   for (const int group : groups_of(drags)) {
-    const RigidMotion motion = motion_of(drags, group);
-    if (!explains(motion, drags, group)) continue;
+    const auto motion = motion_of_piece(drags, group);
+    if (!motion) continue;
     for (std::size_t i = 0; i < drags.size(); ++i)
-      if (drags[i].group == group && !drags[i].anchor) motions[i].rotation = motion.turn;
+      if (drags[i].group == group && !drags[i].anchor) motions[i].rotation = motion->turn;
   }
 }
 

@@ -5,6 +5,7 @@
 #include <limits>
 #include <vector>
 
+#include "engine/core/half_axes.h"
 #include "engine/scene/sh.h"
 
 namespace engine::edit {
@@ -22,9 +23,7 @@ struct Seed {
 
 /// Sides of an ellipse that covers the parallelogram of two vectors: singular vectors of [a b].
 void set_shape(scene::GaussianCloud& cloud, std::size_t row, DVec3 a, DVec3 b) {
-  const double aa = glm::dot(a, a), bb = glm::dot(b, b), ab = glm::dot(a, b);
-  const double turn = 0.5 * std::atan2(2 * ab, aa - bb);
-  const DVec3 u = std::cos(turn) * a + std::sin(turn) * b, v = -std::sin(turn) * a + std::cos(turn) * b;
+  const auto [u, v] = half_axes(a, b);
   const double lu = std::max(glm::length(u), 1e-12), lv = std::max(glm::length(v), 1e-12);
   const DVec3 first = u / lu;
   DVec3 normal = glm::cross(first, v / lv);

@@ -9,6 +9,7 @@
 #include <numeric>
 #include <utility>
 
+#include "engine/core/half_axes.h"
 #include "engine/core/rng.h"
 #include "engine/deform/rotate_sh.h"
 #include "engine/procedural/demo_scene.h"
@@ -274,10 +275,7 @@ void widen_row(scene::GaussianCloud& cloud, std::size_t i, const Motion& motion)
   const DVec3 extent = glm::exp(DVec3(cloud.log_scale.get(i)));
   const DVec3 middle(cloud.mean.get(i));
   const auto drawn = [&](int axis) { return motion(middle + extent[axis] * axes[axis]) - motion(middle); };
-  // The two half-axes are no longer at right angles: those of the same ellipse that are.
-  const DVec3 a = drawn(0), b = drawn(1);
-  const double angle = 0.5 * std::atan2(2 * glm::dot(a, b), glm::dot(a, a) - glm::dot(b, b));
-  const DVec3 longer = std::cos(angle) * a + std::sin(angle) * b, shorter = std::cos(angle) * b - std::sin(angle) * a;
+  const auto [longer, shorter] = half_axes(drawn(0), drawn(1));  // what was drawn out is no longer at right angles
   const DVec3 u = glm::normalize(longer), v = glm::normalize(shorter);
   cloud.rotation.set(i, Quat(glm::quat_cast(DMat3(u, v, glm::cross(u, v)))));
   cloud.log_scale.set(i, Vec3(glm::log(DVec3(glm::length(longer), glm::length(shorter), extent.z))));
