@@ -18,11 +18,11 @@ namespace HWY_NAMESPACE {
 /// Blends the batch into one block. False if all of the block's rays have ended.
 template <bool kColor, bool kDepth, bool kWeight>
 HWY_INLINE bool Blend(D d, const Batch& batch, std::size_t block, V lane_x, V lane_y, TilePixels& pixels) {
-  const V zero = hn::Zero(d), floor = hn::Set(d, float(min_transmittance)), half = hn::Set(d, 0.5f),
-          sign = hn::Set(d, -0.0f);
+  const V zero = hn::Zero(d), half = hn::Set(d, 0.5f);
   const std::size_t at = block * Blocks::lanes;
   V transmittance = hn::Load(d, pixels.transmittance + at);
-  if (hn::AllTrue(d, hn::Lt(transmittance, zero))) return false;
+  if (AllEnded(d, transmittance)) return false;
+  V left = hn::Load(d, pixels.left + at);
   const V px = hn::Add(lane_x, hn::Set(d, float(block % Blocks::columns * Blocks::width)));
   const V py = hn::Add(lane_y, hn::Set(d, float(block / Blocks::columns * Blocks::height)));
   V red = zero, green = zero, blue = zero, depth = zero, median_depth = zero, weight = zero;
@@ -37,9 +37,11 @@ HWY_INLINE bool Blend(D d, const Batch& batch, std::size_t block, V lane_x, V la
   for (std::uint64_t rest = batch.reach[block]; rest != 0; rest &= rest - 1) {
     const std::size_t k = hwy::Num0BitsBelowLS1Bit_Nonzero64(rest);
     const V alpha = AlphaAt(d, batch, k, px, py);
-    const V after = hn::NegMulAdd(transmittance, alpha, transmittance);
-    const auto going_on = hn::Ge(after, floor);  // never true of a ray that has ended: its transmittance is negative
-    const V w = hn::IfThenElseZero(going_on, hn::Mul(transmittance, alpha));
+    const V before = transmittance;
+    V after;
+    const auto going_on = Pass(d, alpha, transmittance, after);
+    const V w = hn::IfThenElseZero(going_on, hn::Mul(before, alpha));
+    left = hn::IfThenElse(going_on, after, left);
     if constexpr (kColor) {
       red = hn::MulAdd(w, hn::Set(d, batch.red[k]), red);
       green = hn::MulAdd(w, hn::Set(d, batch.green[k]), green);
@@ -48,14 +50,13 @@ HWY_INLINE bool Blend(D d, const Batch& batch, std::size_t block, V lane_x, V la
     if constexpr (kDepth) {
       const V z = hn::Set(d, batch.depth[k]);
       depth = hn::MulAdd(w, z, depth);
-      const auto crosses = hn::And(going_on, hn::And(hn::Ge(transmittance, half), hn::Lt(after, half)));
+      const auto crosses = hn::And(going_on, hn::And(hn::Ge(before, half), hn::Lt(after, half)));
       median_depth = hn::IfThenElse(crosses, z, median_depth);
     }
     if constexpr (kWeight) weight = hn::MulAdd(w, hn::Set(d, batch.weight[k]), weight);
-    transmittance = hn::IfThenElse(going_on, after, hn::Or(transmittance, sign));
   }
 
-  hn::Store(transmittance, d, pixels.transmittance + at);
+  hn::Store(transmittance, d, pixels.transmittance + at), hn::Store(left, d, pixels.left + at);
   if constexpr (kColor) {
     hn::Store(red, d, pixels.red + at), hn::Store(green, d, pixels.green + at), hn::Store(blue, d, pixels.blue + at);
   }
@@ -68,7 +69,7 @@ template <bool kColor, bool kDepth, bool kWeight>
 void BlendTile(const Splat* splats, const std::uint32_t* list, std::size_t count, int x0, int y0, TilePixels& pixels) {
   const D d;
   auto fill = [](float* plane, float value) { std::fill_n(plane, TilePixels::count, value); };
-  fill(pixels.transmittance, 1);
+  fill(pixels.transmittance, 1), fill(pixels.left, 1);
   if constexpr (kColor) fill(pixels.red, 0), fill(pixels.green, 0), fill(pixels.blue, 0);
   if constexpr (kDepth) fill(pixels.depth, 0), fill(pixels.median_depth, 0);
   if constexpr (kWeight) fill(pixels.weight, 0);
@@ -108,7 +109,7 @@ template <bool kColor>
 void Finish(Vec3 background, TilePixels& pixels) {
   const D d;
   for (std::size_t i = 0; i < TilePixels::count; i += Blocks::lanes) {
-    const V left = hn::Abs(hn::Load(d, pixels.transmittance + i));
+    const V left = hn::Load(d, pixels.left + i);
     hn::Store(hn::Sub(hn::Set(d, 1.0f), left), d, pixels.alpha + i);
     if constexpr (kColor) {
       hn::Store(hn::MulAdd(left, hn::Set(d, background.x), hn::Load(d, pixels.red + i)), d, pixels.red + i);

@@ -53,9 +53,8 @@ struct alignas(64) Places {
 HWY_INLINE bool Trace(D d, const Places& places, std::size_t block, float*& next, TracedBatch& traced,
                       float* transmittances) {
   const Batch& batch = traced.batch;
-  const V floor = hn::Set(d, float(min_transmittance)), sign = hn::Set(d, -0.0f);
   V transmittance = hn::Load(d, transmittances + block * Blocks::lanes);
-  if (hn::AllTrue(d, hn::Lt(transmittance, hn::Zero(d)))) {
+  if (AllEnded(d, transmittance)) {
     traced.batch.reach[block] = 0;
     return false;
   }
@@ -64,12 +63,12 @@ HWY_INLINE bool Trace(D d, const Places& places, std::size_t block, float*& next
   for (std::uint64_t rest = batch.reach[block]; rest != 0; rest &= rest - 1) {
     const std::size_t k = hwy::Num0BitsBelowLS1Bit_Nonzero64(rest);
     const V alpha = AlphaAt(d, batch, k, px, py);
-    const V after = hn::NegMulAdd(transmittance, alpha, transmittance);
-    const auto going_on = hn::Ge(after, floor);
+    const V before = transmittance;
+    V after;
+    const auto going_on = Pass(d, alpha, transmittance, after);
     hn::Store(hn::IfThenElseZero(going_on, alpha), d, step);
-    hn::Store(hn::IfThenElseZero(going_on, hn::Mul(transmittance, alpha)), d, step + Blocks::lanes);
+    hn::Store(hn::IfThenElseZero(going_on, hn::Mul(before, alpha)), d, step + Blocks::lanes);
     step += step_size;
-    transmittance = hn::IfThenElse(going_on, after, hn::Or(transmittance, sign));
   }
   next = step;
   traced.end[block] = std::uint32_t(step - traced.steps);

@@ -18,20 +18,19 @@ namespace HWY_NAMESPACE {
 ///   largest  [batch][lanes] raised
 HWY_INLINE bool WalkBlock(D d, const Batch& batch, std::size_t block, V lane_x, V lane_y, float* transmittances,
                           float* largest) {
-  const V zero = hn::Zero(d), floor = hn::Set(d, float(min_transmittance)), sign = hn::Set(d, -0.0f);
   V transmittance = hn::Load(d, transmittances + block * Blocks::lanes);
-  if (hn::AllTrue(d, hn::Lt(transmittance, zero))) return false;
+  if (AllEnded(d, transmittance)) return false;
   const V px = hn::Add(lane_x, hn::Set(d, float(block % Blocks::columns * Blocks::width)));
   const V py = hn::Add(lane_y, hn::Set(d, float(block / Blocks::columns * Blocks::height)));
   for (std::uint64_t rest = batch.reach[block]; rest != 0; rest &= rest - 1) {
     const std::size_t k = hwy::Num0BitsBelowLS1Bit_Nonzero64(rest);
     const V alpha = AlphaAt(d, batch, k, px, py);
-    const V after = hn::NegMulAdd(transmittance, alpha, transmittance);
-    const auto going_on = hn::Ge(after, floor);
-    const V w = hn::IfThenElseZero(going_on, hn::Mul(transmittance, alpha));
+    const V before = transmittance;
+    V after;
+    const auto going_on = Pass(d, alpha, transmittance, after);
+    const V w = hn::IfThenElseZero(going_on, hn::Mul(before, alpha));
     float* const so_far = largest + k * Blocks::lanes;
     hn::Store(hn::Max(w, hn::Load(d, so_far)), d, so_far);
-    transmittance = hn::IfThenElse(going_on, after, hn::Or(transmittance, sign));
   }
   hn::Store(transmittance, d, transmittances + block * Blocks::lanes);
   return true;
@@ -52,7 +51,7 @@ void LargestWeights(const Splat* splats, const std::uint32_t* list, std::size_t 
     const std::size_t block = i / Blocks::lanes, lane = i % Blocks::lanes;
     const float x = lanes_x[lane] + float(block % Blocks::columns * Blocks::width),
                 y = lanes_y[lane] + float(block / Blocks::columns * Blocks::height);
-    transmittances[i] = x < float(width) && y < float(height) ? 1.0f : -1.0f;
+    transmittances[i] = x < float(width) && y < float(height) ? 1.0f : ended_transmittance;
   }
   Batch batch;
   alignas(64) float largest[Batch::size * Blocks::lanes];

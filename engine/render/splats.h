@@ -129,7 +129,10 @@ struct Channels {
 /// The pixels of one tile, row-major 16 x 16 once composite_tile() is done.
 struct alignas(64) TilePixels {
   static constexpr std::size_t count = std::size_t(tile_size) * tile_size;
-  float transmittance[count];  ///< While blending; its sign is the ray's state: negative once the ray has ended.
+  // while blending
+  float transmittance[count];  ///< What reaches the next splat; less than min_transmittance once the ray has ended.
+  float left[count];           ///< What reaches the background.
+  // what a picture shows
   float alpha[count];
   float red[count], green[count], blue[count];
   float depth[count], median_depth[count];
