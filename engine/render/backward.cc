@@ -135,10 +135,8 @@ void walk_tiles(const ForwardBuffers& forward, const TileGrid& grid, const Upstr
         if (may_change(pair)) gradients[pair] = {};
       return;
     }
-    auto trace = work.traces.take();
     composite_tile_vjp(forward.splats.data(), list, pair_of_entry.data(), x0, y0, tile_upstream,
-                       upstream.depth != nullptr, *trace, gradients);
-    work.traces.give_back(std::move(trace));
+                       upstream.depth != nullptr, forward.ray_ends[tile], gradients);
   });
 }
 
@@ -175,6 +173,15 @@ void backward_simd(const Layers& layers, const scene::Camera& camera, const Back
   const auto* const slots = find_slots(
       forward, [&](std::uint32_t row) { return slot_of_row[row]; }, work.walk.slot_of_splat);
   bin(grid, forward, slots, rows.size());
+  const std::size_t tiles = forward.tile_begin.size() - 1;
+  RayEnds* const ends = forward.ray_ends.reserve(tiles);
+  parallel_for(tiles, 1, [&](std::size_t tile, std::size_t) {
+    const std::uint32_t first = forward.tile_begin[tile], last = forward.tile_begin[tile + 1];
+    const int x0 = int(tile) % grid.columns * tile_size, y0 = int(tile) / grid.columns * tile_size;
+    TilePixels pixels;
+    composite_tile(forward.splats.data(), {forward.entries.data() + first, last - first}, x0, y0, {}, {}, pixels,
+                   ends + tile);
+  });
 
   const UpstreamPlanes planes{.color = plane_or_none(upstream.color),
                               .depth = plane_or_none(upstream.depth),

@@ -34,46 +34,14 @@ struct alignas(64) TileUpstream {
   float transmittance[TilePixels::count];  ///< dL/dT behind all: background . color - alpha
 };
 
-/// Memory for what a tile's walk keeps from the way to the last blended splat to the way back: per batch of 64 splats a
-/// part, and an alpha and a weight per splat and pixel of the blocks it reaches. Kept from tile to tile.
-class TileTrace {
- public:
-  struct alignas(64) Part {
-    std::byte bytes[8 * 1024];
-  };
-  /// Forgets all alphas and weights; their memory is used again.
-  void clear() { slab_ = used_ = 0; }
-  /// The i-th part; parts are asked for in order, and stay where they are.
-  Part& part(std::size_t i) {
-    if (parts_.size() <= i) parts_.push_back(std::make_unique_for_overwrite<Part>());
-    return *parts_[i];
-  }
-  /// Room for n floats, at most slab_size; aligned for vectors where n always is a multiple of their lanes.
-  float* floats(std::size_t n) {
-    if (used_ + n > slab_size) ++slab_, used_ = 0;
-    if (slabs_.size() <= slab_) slabs_.push_back(std::make_unique_for_overwrite<Slab>());
-    float* const room = slabs_[slab_]->floats + used_;
-    used_ += n;
-    return room;
-  }
-  static constexpr std::size_t slab_size = std::size_t{64} * 1024;
-
- private:
-  struct alignas(64) Slab {
-    float floats[slab_size];
-  };
-  std::vector<std::unique_ptr<Part>> parts_;
-  std::vector<std::unique_ptr<Slab>> slabs_;
-  std::size_t slab_ = 0, used_ = 0;
-};
-
 /// Pulls back one tile.
 ///   list           splats that reach the tile, nearest first
 ///   pair_of_entry  [list.size()] number of the pair, or ForwardBuffers::no_pair if the splat's row may not change
 ///   with_depth     whether upstream.depth is anything but zero
+///   ends           as composite_tile() left them
 ///   pairs          those with a number are written
 void composite_tile_vjp(const Splat* splats, std::span<const std::uint32_t> list, const std::uint32_t* pair_of_entry,
-                        int x0, int y0, const TileUpstream& upstream, bool with_depth, TileTrace& trace,
+                        int x0, int y0, const TileUpstream& upstream, bool with_depth, const RayEnds& ends,
                         TileGradient* pairs);
 
 /// Where the gradients of the rows [R] that may change are: row by row, so that what a row needs lies side by side.
@@ -82,32 +50,10 @@ struct RowPairs {
   const TileGradient* pairs;
 };
 
-/// Memory of the tiles that are being walked: as many as there are threads at work. Which one a tile gets changes
-/// nothing.
-class TracePool {
- public:
-  std::unique_ptr<TileTrace> take() {
-    const std::lock_guard lock(mutex_);
-    if (free_.empty()) return std::make_unique<TileTrace>();
-    auto trace = std::move(free_.back());
-    free_.pop_back();
-    return trace;
-  }
-  void give_back(std::unique_ptr<TileTrace> trace) {
-    const std::lock_guard lock(mutex_);
-    free_.push_back(std::move(trace));
-  }
-
- private:
-  std::mutex mutex_;
-  std::vector<std::unique_ptr<TileTrace>> free_;
-};
-
 /// What walk_tiles() works in.
 struct WalkBuffers {
   Buffer<std::int32_t> slot_of_splat;  ///< [splats] Where a splat's row is in the list of those that may change, or -1.
   Buffer<TileGradient> pairs;          ///< As ForwardBuffers::first_pair numbers them.
-  TracePool traces;
 };
 
 /// Upstream by reference; null: zero.
@@ -128,7 +74,7 @@ const std::int32_t* find_slots(const ForwardBuffers& forward, SlotOfRow&& slot_o
 }
 
 /// Walks all tiles of `forward` back.
-///   forward  splats, entries, tile_begin and pair_of_entry are used
+///   forward  splats, entries, tile_begin, pair_of_entry and ray_ends are used
 ///   grid     pixels: the rectangle of the picture that `upstream` is of
 ///   pairs    there are, as pair_of_entry numbers them
 ///   work     all numbered pairs are written

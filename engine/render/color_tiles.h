@@ -20,11 +20,12 @@ inline TileGrid whole_grid(const scene::Camera& camera) {
 
 /// Blends a tile of the listed splats and copies it to a picture of `region`, which begins at a tile's edge and holds
 /// the tile as far as the whole picture does.
+///   ends  null: not needed
 inline void draw_tile(const Splat* splats, std::span<const std::uint32_t> list, std::uint32_t tile, int columns,
-                      Vec3 background, scene::Rect region, scene::Image& color) {
+                      Vec3 background, scene::Rect region, scene::Image& color, RayEnds* ends = nullptr) {
   TilePixels pixels;
   const int x0 = int(tile) % columns * tile_size, y0 = int(tile) / columns * tile_size;
-  composite_tile(splats, list, x0, y0, {.color = true}, background, pixels);
+  composite_tile(splats, list, x0, y0, {.color = true}, background, pixels, ends);
   const int width = std::min(x0 + tile_size, region.x1) - x0, height = std::min(y0 + tile_size, region.y1) - y0;
   int channel = 0;
   for (const float* from : {pixels.red, pixels.green, pixels.blue}) {

@@ -15,9 +15,18 @@ HWY_BEFORE_NAMESPACE();
 namespace engine::render {
 namespace HWY_NAMESPACE {
 
+/// Which sums Blend() keeps. kEnds: where rays end.
+template <bool kColor_, bool kDepth_, bool kWeight_, bool kEnds_>
+struct Kept {
+  static constexpr bool kColor = kColor_, kDepth = kDepth_, kWeight = kWeight_, kEnds = kEnds_;
+};
+
 /// Blends the batch into one block. False if all of the block's rays have ended.
-template <bool kColor, bool kDepth, bool kWeight>
-HWY_INLINE bool Blend(D d, const Batch& batch, std::size_t block, V lane_x, V lane_y, TilePixels& pixels) {
+///   first  number of the batch's first splat in the tile's list
+template <class K>
+HWY_INLINE bool Blend(D d, const Batch& batch, std::size_t first, std::size_t block, V lane_x, V lane_y,
+                      TilePixels& pixels, RayEnds* ends) {
+  const hn::RebindToSigned<D> di;
   const V zero = hn::Zero(d), half = hn::Set(d, 0.5f);
   const std::size_t at = block * Blocks::lanes;
   V transmittance = hn::Load(d, pixels.transmittance + at);
@@ -26,53 +35,68 @@ HWY_INLINE bool Blend(D d, const Batch& batch, std::size_t block, V lane_x, V la
   const V px = hn::Add(lane_x, hn::Set(d, float(block % Blocks::columns * Blocks::width)));
   const V py = hn::Add(lane_y, hn::Set(d, float(block / Blocks::columns * Blocks::height)));
   V red = zero, green = zero, blue = zero, depth = zero, median_depth = zero, weight = zero;
-  if constexpr (kColor) {
+  if constexpr (K::kColor) {
     red = hn::Load(d, pixels.red + at), green = hn::Load(d, pixels.green + at), blue = hn::Load(d, pixels.blue + at);
   }
-  if constexpr (kDepth) {
+  if constexpr (K::kDepth) {
     depth = hn::Load(d, pixels.depth + at), median_depth = hn::Load(d, pixels.median_depth + at);
   }
-  if constexpr (kWeight) weight = hn::Load(d, pixels.weight + at);
+  if constexpr (K::kWeight) weight = hn::Load(d, pixels.weight + at);
+  auto end = hn::Zero(di);
+  if constexpr (K::kEnds) end = hn::Load(di, ends->end + at);
 
-  for (std::uint64_t rest = batch.reach[block]; rest != 0; rest &= rest - 1) {
-    const std::size_t k = hwy::Num0BitsBelowLS1Bit_Nonzero64(rest);
-    const V alpha = AlphaAt(d, batch, k, px, py);
+  // A step ahead, so that a processor's window holds work that need not wait: the last splat is computed twice.
+  std::uint64_t rest = batch.reach[block];
+  V u, v;
+  std::size_t next = rest != 0 ? hwy::Num0BitsBelowLS1Bit_Nonzero64(rest) : 0;
+  V next_alpha = AlphaOf(d, PowerAt(d, batch, next, px, py, u, v));
+  while (rest != 0) {
+    const std::size_t k = next;
+    const V alpha = next_alpha;
+    rest &= rest - 1;
+    next = hwy::Num0BitsBelowLS1Bit_Nonzero64(rest | std::uint64_t{1} << 63);
+    next_alpha = AlphaOf(d, PowerAt(d, batch, next, px, py, u, v));
     const V before = transmittance;
     V after;
     const auto going_on = Pass(d, alpha, transmittance, after);
     const V w = hn::IfThenElseZero(going_on, hn::Mul(before, alpha));
     left = hn::IfThenElse(going_on, after, left);
-    if constexpr (kColor) {
+    if constexpr (K::kEnds)
+      end = hn::IfThenElse(hn::RebindMask(di, going_on), hn::Set(di, std::int32_t(first + k + 1)), end);
+    if constexpr (K::kColor) {
       red = hn::MulAdd(w, hn::Set(d, batch.red[k]), red);
       green = hn::MulAdd(w, hn::Set(d, batch.green[k]), green);
       blue = hn::MulAdd(w, hn::Set(d, batch.blue[k]), blue);
     }
-    if constexpr (kDepth) {
+    if constexpr (K::kDepth) {
       const V z = hn::Set(d, batch.depth[k]);
       depth = hn::MulAdd(w, z, depth);
       const auto crosses = hn::And(going_on, hn::And(hn::Ge(before, half), hn::Lt(after, half)));
       median_depth = hn::IfThenElse(crosses, z, median_depth);
     }
-    if constexpr (kWeight) weight = hn::MulAdd(w, hn::Set(d, batch.weight[k]), weight);
+    if constexpr (K::kWeight) weight = hn::MulAdd(w, hn::Set(d, batch.weight[k]), weight);
   }
 
   hn::Store(transmittance, d, pixels.transmittance + at), hn::Store(left, d, pixels.left + at);
-  if constexpr (kColor) {
+  if constexpr (K::kColor) {
     hn::Store(red, d, pixels.red + at), hn::Store(green, d, pixels.green + at), hn::Store(blue, d, pixels.blue + at);
   }
-  if constexpr (kDepth) hn::Store(depth, d, pixels.depth + at), hn::Store(median_depth, d, pixels.median_depth + at);
-  if constexpr (kWeight) hn::Store(weight, d, pixels.weight + at);
+  if constexpr (K::kDepth) hn::Store(depth, d, pixels.depth + at), hn::Store(median_depth, d, pixels.median_depth + at);
+  if constexpr (K::kWeight) hn::Store(weight, d, pixels.weight + at);
+  if constexpr (K::kEnds) hn::Store(end, di, ends->end + at);
   return true;
 }
 
-template <bool kColor, bool kDepth, bool kWeight>
-void BlendTile(const Splat* splats, const std::uint32_t* list, std::size_t count, int x0, int y0, TilePixels& pixels) {
+template <class K>
+void BlendTile(const Splat* splats, const std::uint32_t* list, std::size_t count, int x0, int y0, TilePixels& pixels,
+               RayEnds* ends) {
   const D d;
   auto fill = [](float* plane, float value) { std::fill_n(plane, TilePixels::count, value); };
   fill(pixels.transmittance, 1), fill(pixels.left, 1);
-  if constexpr (kColor) fill(pixels.red, 0), fill(pixels.green, 0), fill(pixels.blue, 0);
-  if constexpr (kDepth) fill(pixels.depth, 0), fill(pixels.median_depth, 0);
-  if constexpr (kWeight) fill(pixels.weight, 0);
+  if constexpr (K::kColor) fill(pixels.red, 0), fill(pixels.green, 0), fill(pixels.blue, 0);
+  if constexpr (K::kDepth) fill(pixels.depth, 0), fill(pixels.median_depth, 0);
+  if constexpr (K::kWeight) fill(pixels.weight, 0);
+  if constexpr (K::kEnds) std::fill_n(ends->end, RayEnds::count, 0);
   alignas(64) float lanes_x[Blocks::lanes], lanes_y[Blocks::lanes];
   for (std::size_t i = 0; i < Blocks::lanes; ++i) {
     lanes_x[i] = float(i % Blocks::width);
@@ -87,9 +111,10 @@ void BlendTile(const Splat* splats, const std::uint32_t* list, std::size_t count
     FindReach(d, n, batch);
     bool live = false;
     for (std::size_t block = 0; block < Blocks::count; ++block)
-      live |= Blend<kColor, kDepth, kWeight>(d, batch, block, lane_x, lane_y, pixels);
-    if (!live) return;
+      live |= Blend<K>(d, batch, first, block, lane_x, lane_y, pixels, ends);
+    if (!live) break;
   }
+  if constexpr (K::kEnds) std::copy_n(pixels.left, RayEnds::count, ends->transmittance);
 }
 
 /// From block order to rows, in place.
@@ -119,29 +144,39 @@ void Finish(Vec3 background, TilePixels& pixels) {
   }
 }
 
-template <bool kColor, bool kDepth, bool kWeight>
+template <class K>
 void Composite(const Splat* splats, const std::uint32_t* list, std::size_t count, int x0, int y0, Vec3 background,
-               TilePixels& tile) {
-  BlendTile<kColor, kDepth, kWeight>(splats, list, count, x0, y0, tile);
-  Finish<kColor>(background, tile);
+               TilePixels& tile, RayEnds* ends) {
+  BlendTile<K>(splats, list, count, x0, y0, tile, ends);
+  Finish<K::kColor>(background, tile);
   ToRows(tile.alpha);
-  if constexpr (kColor) ToRows(tile.red), ToRows(tile.green), ToRows(tile.blue);
-  if constexpr (kDepth) ToRows(tile.depth), ToRows(tile.median_depth);
-  if constexpr (kWeight) ToRows(tile.weight);
+  if constexpr (K::kColor) ToRows(tile.red), ToRows(tile.green), ToRows(tile.blue);
+  if constexpr (K::kDepth) ToRows(tile.depth), ToRows(tile.median_depth);
+  if constexpr (K::kWeight) ToRows(tile.weight);
+}
+
+template <bool kEnds>
+void CompositeTileTo(const Splat* splats, const std::uint32_t* list, std::size_t count, int x0, int y0,
+                     Channels channels, Vec3 background, TilePixels& tile, RayEnds* ends) {
+  const auto composite = [&](auto kept) {
+    Composite<decltype(kept)>(splats, list, count, x0, y0, background, tile, ends);
+  };
+  if (channels.depth) {
+    if (channels.weight) return composite(Kept<true, true, true, kEnds>());
+    return composite(Kept<true, true, false, kEnds>());
+  }
+  if (channels.weight) {
+    if (channels.color) return composite(Kept<true, false, true, kEnds>());
+    return composite(Kept<false, false, true, kEnds>());
+  }
+  if (channels.color) return composite(Kept<true, false, false, kEnds>());
+  return composite(Kept<false, false, false, kEnds>());
 }
 
 void CompositeTile(const Splat* splats, const std::uint32_t* list, std::size_t count, int x0, int y0, Channels channels,
-                   Vec3 background, TilePixels& tile) {
-  if (channels.depth) {
-    if (channels.weight) return Composite<true, true, true>(splats, list, count, x0, y0, background, tile);
-    return Composite<true, true, false>(splats, list, count, x0, y0, background, tile);
-  }
-  if (channels.weight) {
-    if (channels.color) return Composite<true, false, true>(splats, list, count, x0, y0, background, tile);
-    return Composite<false, false, true>(splats, list, count, x0, y0, background, tile);
-  }
-  if (channels.color) return Composite<true, false, false>(splats, list, count, x0, y0, background, tile);
-  return Composite<false, false, false>(splats, list, count, x0, y0, background, tile);
+                   Vec3 background, TilePixels& tile, RayEnds* ends) {
+  if (ends != nullptr) return CompositeTileTo<true>(splats, list, count, x0, y0, channels, background, tile, ends);
+  CompositeTileTo<false>(splats, list, count, x0, y0, channels, background, tile, ends);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -154,8 +189,9 @@ namespace engine::render {
 HWY_EXPORT(CompositeTile);
 
 void composite_tile(const Splat* splats, std::span<const std::uint32_t> list, int x0, int y0, Channels channels,
-                    Vec3 background, TilePixels& tile) {
-  HWY_DYNAMIC_DISPATCH(CompositeTile)(splats, list.data(), list.size(), x0, y0, channels, background, tile);
+                    Vec3 background, TilePixels& tile, RayEnds* ends) {
+  HWY_DYNAMIC_DISPATCH(CompositeTile)
+  (splats, list.data(), list.size(), x0, y0, channels, background, tile, ends);
 }
 
 }  // namespace engine::render

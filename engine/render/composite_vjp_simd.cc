@@ -1,4 +1,4 @@
-// Pulls back the blending of one tile, a vector of pixels at a time: there to find where each ray ends, then back.
+// Pulls back the blending of one tile, a vector of pixels at a time, from where its rays ended.
 #include <hwy/cache_control.h>
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "engine/render/composite_vjp_simd.cc"
@@ -8,7 +8,6 @@
 #include "engine/render/tile_blocks.inc"
 
 #include <algorithm>
-#include <bit>
 
 #include "engine/render/backward_stages.h"
 
@@ -16,22 +15,10 @@ HWY_BEFORE_NAMESPACE();
 namespace engine::render {
 namespace HWY_NAMESPACE {
 
-/// A batch on its way back: what Blend() found, so that neither exp2 nor the decisions of cuts are made twice.
-struct TracedBatch {
-  Batch batch;                       ///< reach: only of blocks that still had a ray.
-  std::uint64_t changeable;          ///< Bit k: splat k's row may change.
-  std::uint32_t end[Blocks::count];  ///< Where a block's steps end.
-  float* steps;  ///< Per set bit of reach, block by block: a vector of alphas and one of weights, zero where not
-                 ///< blended.
-};
-constexpr std::size_t step_size = 2 * Blocks::lanes;
-static_assert(sizeof(TracedBatch) <= sizeof(TileTrace::Part));
-static_assert(Batch::size * 2 * TilePixels::count <= TileTrace::slab_size);
-
-/// The rays of a tile, block by block.
+/// The rays of a tile on their way back, block by block.
 struct alignas(64) Rays {
-  float transmittance[TilePixels::count];  ///< On the way there, as TilePixels has it.
-  float beyond[TilePixels::count];  ///< On the way back: dL/dT of all that lies farther back, T being what reaches it.
+  float transmittance[TilePixels::count];  ///< What reached the splat that was come to last.
+  float beyond[TilePixels::count];         ///< dL/dT of that splat and all that lies farther back, T being what reached it.
 };
 
 /// Where the pixels of a tile are, block by block.
@@ -46,35 +33,6 @@ struct alignas(64) Places {
     }
   }
 };
-
-/// Blend() of composite_simd.cc, of which alphas, weights and transmittance are kept. False if all rays of the block
-/// had ended before.
-///   next  where the block's steps start; set to where they end
-HWY_INLINE bool Trace(D d, const Places& places, std::size_t block, float*& next, TracedBatch& traced,
-                      float* transmittances) {
-  const Batch& batch = traced.batch;
-  V transmittance = hn::Load(d, transmittances + block * Blocks::lanes);
-  if (AllEnded(d, transmittance)) {
-    traced.batch.reach[block] = 0;
-    return false;
-  }
-  const V px = hn::Load(d, places.x + block * Blocks::lanes), py = hn::Load(d, places.y + block * Blocks::lanes);
-  float* step = next;
-  for (std::uint64_t rest = batch.reach[block]; rest != 0; rest &= rest - 1) {
-    const std::size_t k = hwy::Num0BitsBelowLS1Bit_Nonzero64(rest);
-    const V alpha = AlphaAt(d, batch, k, px, py);
-    const V before = transmittance;
-    V after;
-    const auto going_on = Pass(d, alpha, transmittance, after);
-    hn::Store(hn::IfThenElseZero(going_on, alpha), d, step);
-    hn::Store(hn::IfThenElseZero(going_on, hn::Mul(before, alpha)), d, step + Blocks::lanes);
-    step += step_size;
-  }
-  next = step;
-  traced.end[block] = std::uint32_t(step - traced.steps);
-  hn::Store(transmittance, d, transmittances + block * Blocks::lanes);
-  return true;
-}
 
 /// Sums over the lanes of four vectors.
 HWY_INLINE void StoreSums(D d, V a, V b, V c, V e, float* to) {
@@ -136,68 +94,67 @@ HWY_INLINE void Transpose(const std::uint64_t* reach, BlockSet* out) {
 }
 
 /// Walks all rays back through a batch, splat by splat: a splat's sums stay in registers. The pullbacks are blend_vjp()
-/// and falloff_vjp() of blend.h in another form: with X = dL/dT of what lies beyond, per unit of transmittance,
+/// and falloff_vjp() of blend.h, one of them in another form: with X = dL/dT of what lies beyond, per unit of
+/// transmittance,
 ///   dL/dalpha = T (v_weight - X),   X <- X + alpha (v_weight - X),
-/// which needs no division, and T alpha is the weight.
-///   first  of the splats that are asked for: in front of it nothing may change
+/// and T alpha is the weight.
+///   first          number of the batch's first splat in the tile's list
+///   asked          bits of the splats that are asked for: in front of them nothing may change
+///   changeable     bits of the splats whose rows may change
 ///   pair_of_entry  [splats of the batch] see composite_tile_vjp()
 template <bool kDepth>
-HWY_INLINE void WalkBack(D d, const Places& places, std::size_t first, const TracedBatch& traced,
-                         const TileUpstream& upstream, Rays& rays, const std::uint32_t* pair_of_entry,
-                         TileGradient* pairs) {
-  const Batch& batch = traced.batch;
+HWY_INLINE void WalkBack(D d, const Places& places, std::size_t first, const Batch& batch, std::uint64_t asked,
+                         std::uint64_t changeable, const TileUpstream& upstream, const RayEnds& ends, Rays& rays,
+                         const std::uint32_t* pair_of_entry, TileGradient* pairs) {
+  const hn::RebindToSigned<D> di;
   BlockSet blocks[Batch::size];
   Transpose(batch.reach, blocks);
-  const float* ends[Blocks::count];
   std::uint64_t met = 0;
-  for (std::size_t block = 0; block < Blocks::count; ++block) {
-    ends[block] = traced.steps + traced.end[block];
-    met |= batch.reach[block];
-  }
-  const V zero = hn::Zero(d), ceiling = hn::Set(d, float(max_alpha));
-  for (std::uint64_t rest = (met | traced.changeable) >> first << first; rest != 0;) {
+  for (const std::uint64_t reach : batch.reach) met |= reach;
+  const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), ceiling = hn::Set(d, float(max_alpha));
+  for (std::uint64_t rest = (met | changeable) & asked; rest != 0;) {
     const std::size_t k = hwy::Num0BitsAboveMS1Bit_Nonzero64(rest) ^ 63;
     const std::uint64_t bit = std::uint64_t{1} << k;
     rest ^= bit;
     const V red = hn::Set(d, batch.red[k]), green = hn::Set(d, batch.green[k]), blue = hn::Set(d, batch.blue[k]),
             depth = hn::Set(d, batch.depth[k]);
+    const auto number = hn::Set(di, std::int32_t(first + k));
     const auto each_block = [&](auto&& use) {
       for (std::size_t word = 0; word < BlockSet::words; ++word)
         for (std::uint64_t left = blocks[k].bits[word]; left != 0; left &= left - 1)
-          use(64 * word + hwy::Num0BitsBelowLS1Bit_Nonzero64(left));
+          use((64 * word + hwy::Num0BitsBelowLS1Bit_Nonzero64(left)) * Blocks::lanes);
     };
-    /// v_weight - X.
-    const auto gain = [&](std::size_t at, V v_red, V v_green, V v_blue, V beyond) {
-      V sum = hn::MulAdd(red, v_red, hn::MulAdd(green, v_green, hn::MulSub(blue, v_blue, beyond)));
-      if constexpr (kDepth) sum = hn::MulAdd(depth, hn::Load(d, upstream.depth + at), sum);
-      return sum;
+    /// One step of the rays at `at`: alpha, zero where not blended, and v_weight - X; T and X come to be those before
+    /// the splat. T by division, which costs less than keeping each of them on the way there.
+    const auto step = [&](std::size_t at, V v_red, V v_green, V v_blue, V& transmittance, V& gain, V& u, V& v) {
+      const V alpha = hn::IfThenElseZero(
+          hn::RebindMask(d, hn::Lt(number, hn::Load(di, ends.end + at))),
+          AlphaOf(d, PowerAt(d, batch, k, hn::Load(d, places.x + at), hn::Load(d, places.y + at), u, v)));
+      transmittance = hn::Mul(hn::Load(d, rays.transmittance + at), hn::Div(one, hn::Sub(one, alpha)));
+      hn::Store(transmittance, d, rays.transmittance + at);
+      const V beyond = hn::Load(d, rays.beyond + at);
+      gain = hn::MulAdd(red, v_red, hn::MulAdd(green, v_green, hn::MulSub(blue, v_blue, beyond)));
+      if constexpr (kDepth) gain = hn::MulAdd(depth, hn::Load(d, upstream.depth + at), gain);
+      hn::Store(hn::MulAdd(alpha, gain, beyond), d, rays.beyond + at);
+      return alpha;
     };
-    if ((traced.changeable & bit) == 0) {
-      each_block([&](std::size_t block) {
-        const std::size_t at = block * Blocks::lanes;
-        const V alpha = hn::Load(d, ends[block] -= step_size), beyond = hn::Load(d, rays.beyond + at);
-        const V v = gain(at, hn::Load(d, upstream.red + at), hn::Load(d, upstream.green + at),
-                         hn::Load(d, upstream.blue + at), beyond);
-        hn::Store(hn::MulAdd(alpha, v, beyond), d, rays.beyond + at);
+    if ((changeable & bit) == 0) {
+      each_block([&](std::size_t at) {
+        V transmittance, gain, u, v;
+        step(at, hn::Load(d, upstream.red + at), hn::Load(d, upstream.green + at), hn::Load(d, upstream.blue + at),
+             transmittance, gain, u, v);
       });
       continue;
     }
-    const V l1 = hn::Set(d, batch.l1[k]), l2 = hn::Set(d, batch.l2[k]), l3 = hn::Set(d, batch.l3[k]),
-            u0 = hn::Set(d, batch.u0[k]), v0 = hn::Set(d, batch.v0[k]);
     V sum_g = zero, sum_u = zero, sum_v = zero, sum_uu = zero, sum_uv = zero, sum_vv = zero;
     V sum_red = zero, sum_green = zero, sum_blue = zero, sum_depth = zero;
-    each_block([&](std::size_t block) {
-      const std::size_t at = block * Blocks::lanes;
-      const float* const step = ends[block] -= step_size;
-      const V alpha = hn::Load(d, step), weight = hn::Load(d, step + Blocks::lanes);
-      const V beyond = hn::Load(d, rays.beyond + at);
+    each_block([&](std::size_t at) {
       const V v_red = hn::Load(d, upstream.red + at), v_green = hn::Load(d, upstream.green + at),
               v_blue = hn::Load(d, upstream.blue + at);
-      const V v_gain = gain(at, v_red, v_green, v_blue, beyond);
-      hn::Store(hn::MulAdd(alpha, v_gain, beyond), d, rays.beyond + at);
-      const V px = hn::Load(d, places.x + at), py = hn::Load(d, places.y + at);
-      const V u = hn::MulAdd(l1, px, hn::MulAdd(l2, py, u0)), v = hn::MulAdd(l3, py, v0);
-      const V g = hn::IfThenElseZero(hn::Lt(alpha, ceiling), hn::Mul(weight, v_gain));
+      V transmittance, gain, u, v;
+      const V alpha = step(at, v_red, v_green, v_blue, transmittance, gain, u, v);
+      const V weight = hn::Mul(transmittance, alpha);
+      const V g = hn::IfThenElseZero(hn::Lt(alpha, ceiling), hn::Mul(weight, gain));
       const V gu = hn::Mul(g, u), gv = hn::Mul(g, v);
       sum_g = hn::Add(sum_g, g), sum_u = hn::Add(sum_u, gu), sum_v = hn::Add(sum_v, gv);
       sum_uu = hn::MulAdd(gu, u, sum_uu), sum_uv = hn::MulAdd(gu, v, sum_uv), sum_vv = hn::MulAdd(gv, v, sum_vv);
@@ -223,58 +180,53 @@ HWY_INLINE void ToBlocks(const float* rows, float* blocks) {
 
 template <bool kDepth>
 void WalkTile(const Splat* splats, const std::uint32_t* list, std::size_t count, const std::uint32_t* pair_of_entry,
-              int x0, int y0, const TileUpstream& rows_upstream, TileTrace& trace, TileGradient* pairs) {
+              int x0, int y0, const TileUpstream& rows_upstream, const RayEnds& ends, TileGradient* pairs) {
   const D d;
-  const auto part = [&](std::size_t i) -> TracedBatch& { return *reinterpret_cast<TracedBatch*>(trace.part(i).bytes); };
-  const std::size_t batches = (count + Batch::size - 1) / Batch::size;
-  const Places places;
-
-  trace.clear();
-  Rays rays;
-  std::fill_n(rays.transmittance, TilePixels::count, 1.0f);
-  std::size_t traced_batches = 0, first_changeable = batches;
-  for (bool live = true; live && traced_batches < batches; ++traced_batches) {
-    const std::size_t first = traced_batches * Batch::size, n = HWY_MIN(Batch::size, count - first);
-    TracedBatch& traced = part(traced_batches);
-    Fill(splats, list + first, n, x0, y0, traced.batch);
-    for (std::size_t k = first + n; k < HWY_MIN(first + n + Batch::size, count); ++k) hwy::Prefetch(&splats[list[k]]);
-    FindReach(d, n, traced.batch);
-    traced.changeable = Changeable(pair_of_entry + first, n);
-    if (traced.changeable != 0) first_changeable = HWY_MIN(first_changeable, traced_batches);
-    std::size_t vectors = 0;
-    for (const std::uint64_t reach : traced.batch.reach) vectors += std::size_t(std::popcount(reach));
-    float* next = traced.steps = trace.floats(vectors * step_size);
-    live = false;
-    for (std::size_t block = 0; block < Blocks::count; ++block)
-      live |= Trace(d, places, block, next, traced, rays.transmittance);
-  }
+  const hn::RebindToSigned<D> di;
+  std::int32_t block_ends[Blocks::count];  // the farthest of its rays
+  for (std::size_t block = 0; block < Blocks::count; ++block)
+    block_ends[block] =
+        hn::GetLane(hn::MaxOfLanes(di, hn::Load(di, ends.end + block * Blocks::lanes)));
+  const auto passed = std::size_t(*std::max_element(block_ends, block_ends + Blocks::count));
   // What no ray got to.
-  for (std::size_t k = traced_batches * Batch::size; k < count; ++k)
+  for (std::size_t k = passed; k < count; ++k)
     if (pair_of_entry[k] != ForwardBuffers::no_pair) pairs[pair_of_entry[k]] = {};
+  // In front of the nearest splat that may change nothing is asked for.
+  std::size_t asked = 0;
+  while (asked < passed && pair_of_entry[asked] == ForwardBuffers::no_pair) ++asked;
+  if (asked == passed) return;
 
   TileUpstream upstream;
   ToBlocks(rows_upstream.red, upstream.red);
   ToBlocks(rows_upstream.green, upstream.green);
   ToBlocks(rows_upstream.blue, upstream.blue);
   ToBlocks(rows_upstream.depth, upstream.depth);
-  ToBlocks(rows_upstream.transmittance, upstream.transmittance);
-  std::copy_n(upstream.transmittance, TilePixels::count, rays.beyond);
-  // In front of the nearest splat that may change nothing is asked for.
-  for (std::size_t b = traced_batches; b-- > first_changeable;) {
-    const TracedBatch& traced = part(b);
-    const std::size_t first_asked =
-        b == first_changeable ? hwy::Num0BitsBelowLS1Bit_Nonzero64(traced.changeable) : std::size_t{0};
-    WalkBack<kDepth>(d, places, first_asked, traced, upstream, rays, pair_of_entry + b * Batch::size, pairs);
+  Rays rays;
+  ToBlocks(rows_upstream.transmittance, rays.beyond);
+  std::copy_n(ends.transmittance, TilePixels::count, rays.transmittance);
+  const Places places;
+  Batch batch;
+  for (std::size_t b = (passed + Batch::size - 1) / Batch::size; b-- > asked / Batch::size;) {
+    const std::size_t first = b * Batch::size, n = HWY_MIN(Batch::size, passed - first);
+    Fill(splats, list + first, n, x0, y0, batch);
+    if (b > 0)
+      for (std::size_t k = first - Batch::size; k < first; ++k) hwy::Prefetch(&splats[list[k]]);
+    FindReach(d, n, batch);
+    for (std::size_t block = 0; block < Blocks::count; ++block)
+      if (std::size_t(block_ends[block]) <= first) batch.reach[block] = 0;
+    const std::uint64_t bits_asked = asked > first ? ~std::uint64_t{0} << (asked - first) : ~std::uint64_t{0};
+    WalkBack<kDepth>(d, places, first, batch, bits_asked, Changeable(pair_of_entry + first, n), upstream, ends, rays,
+                     pair_of_entry + first, pairs);
   }
 }
 
 void CompositeTileVjp(const Splat* splats, const std::uint32_t* list, std::size_t count,
                       const std::uint32_t* pair_of_entry, int x0, int y0, const TileUpstream& upstream, bool with_depth,
-                      TileTrace& trace, TileGradient* pairs) {
+                      const RayEnds& ends, TileGradient* pairs) {
   if (with_depth) {
-    WalkTile<true>(splats, list, count, pair_of_entry, x0, y0, upstream, trace, pairs);
+    WalkTile<true>(splats, list, count, pair_of_entry, x0, y0, upstream, ends, pairs);
   } else {
-    WalkTile<false>(splats, list, count, pair_of_entry, x0, y0, upstream, trace, pairs);
+    WalkTile<false>(splats, list, count, pair_of_entry, x0, y0, upstream, ends, pairs);
   }
 }
 
@@ -288,10 +240,10 @@ namespace engine::render {
 HWY_EXPORT(CompositeTileVjp);
 
 void composite_tile_vjp(const Splat* splats, std::span<const std::uint32_t> list, const std::uint32_t* pair_of_entry,
-                        int x0, int y0, const TileUpstream& upstream, bool with_depth, TileTrace& trace,
+                        int x0, int y0, const TileUpstream& upstream, bool with_depth, const RayEnds& ends,
                         TileGradient* pairs) {
   HWY_DYNAMIC_DISPATCH(CompositeTileVjp)
-  (splats, list.data(), list.size(), pair_of_entry, x0, y0, upstream, with_depth, trace, pairs);
+  (splats, list.data(), list.size(), pair_of_entry, x0, y0, upstream, with_depth, ends, pairs);
 }
 
 }  // namespace engine::render

@@ -38,10 +38,12 @@ void Frame::forward(const scene::GaussianCloud& cloud, const scene::Camera& came
   const auto* const slots = find_slots(
       buffers, [](std::uint32_t row) { return std::int32_t(row); }, frame.walk.slot_of_splat);
   bin(frame.grid, buffers, slots, cloud.size());
-  parallel_for(buffers.tile_begin.size() - 1, 1, [&](std::size_t tile, std::size_t) {
+  const std::size_t tiles = buffers.tile_begin.size() - 1;
+  RayEnds* const ends = buffers.ray_ends.reserve(tiles);
+  parallel_for(tiles, 1, [&](std::size_t tile, std::size_t) {
     const std::uint32_t first = buffers.tile_begin[tile], last = buffers.tile_begin[tile + 1];
     draw_tile(buffers.splats.data(), {buffers.entries.data() + first, last - first}, std::uint32_t(tile),
-              frame.grid.columns, background, frame.grid.pixels, color);
+              frame.grid.columns, background, frame.grid.pixels, color, ends + tile);
   });
 }
 

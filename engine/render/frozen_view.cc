@@ -239,11 +239,12 @@ std::size_t LocalFrame::entries() const {
 void LocalFrame::forward(const FrozenView& frozen, scene::Image& color) {
   const FrozenView::Impl& view = *frozen.impl_;
   assert(color.width == view.region.width() && color.height == view.region.height() && color.channels == 3);
-  const ForwardBuffers& merged = impl_->merged;
+  ForwardBuffers& merged = impl_->merged;
+  RayEnds* const ends = merged.ray_ends.reserve(merged.tile_begin.size() - 1);
   parallel_for(impl_->tiles.size(), 1, [&](std::size_t i, std::size_t) {
     const std::uint32_t tile = impl_->tiles[i], first = merged.tile_begin[tile], last = merged.tile_begin[tile + 1];
     draw_tile(merged.splats.data(), {merged.entries.data() + first, last - first}, tile, view.columns, view.background,
-              view.region, color);
+              view.region, color, ends + tile);
   });
 }
 

@@ -83,7 +83,7 @@ class LocalFrame {
   ///   color  [3] picture of the region, elsewhere as FrozenView::color() has it
   void forward(const FrozenView& frozen, scene::Image& color);
 
-  /// Adds dL/d(row) of all rows of `changeable` to out, as backward() does.
+  /// Adds dL/d(row) of all rows of `changeable` to out, as backward() does. Comes after forward().
   ///   v_color  [3] dL/dcolor, of the region; counts in those tiles
   ///   out      of changeable.size() rows and its degree
   void backward(const FrozenView& frozen, const scene::GaussianCloud& changeable, const scene::Image& v_color,

@@ -63,6 +63,13 @@ struct TileGrid {
   std::vector<std::uint8_t> wanted;  ///< [rows * columns], or empty: all those that `pixels` meets.
 };
 
+/// Where the rays of a tile ended, in the order in which kernels store pixels: what blending leaves for the way back.
+struct alignas(64) RayEnds {
+  static constexpr std::size_t count = std::size_t(tile_size) * tile_size;
+  float transmittance[count];  ///< What reaches the background.
+  std::int32_t end[count];     ///< How many splats of the tile's list the ray passed.
+};
+
 /// What a forward pass works in. The stages fill it from top to bottom.
 struct ForwardBuffers {
   // project: block b of the rows, the base's blocks before those on top, writes its survivors from b * project_block on
@@ -91,6 +98,8 @@ struct ForwardBuffers {
   Buffer<std::uint32_t> pair_of_entry;  ///< Number of an entry, or no_pair if its row may not change.
   Buffer<std::uint32_t> first_pair;     ///< [rows that may change + 1] The first number of a row.
   static constexpr std::uint32_t no_pair = 0xffffffff;
+  // composite, if it is to be walked back
+  Buffer<RayEnds> ray_ends;  ///< [tiles]
 };
 
 struct Workspace::Impl {
@@ -141,8 +150,9 @@ struct alignas(64) TilePixels {
 
 /// Blends the listed splats, nearest first, into the tile whose first pixel is (x0, y0), and the background behind
 /// them. Only the planes that `channels` names, and alpha, are written.
+///   ends  null: not needed
 void composite_tile(const Splat* splats, std::span<const std::uint32_t> list, int x0, int y0, Channels channels,
-                    Vec3 background, TilePixels& tile);
+                    Vec3 background, TilePixels& tile, RayEnds* ends = nullptr);
 
 /// The largest blending weight of each listed splat over the pixels of a tile; see composite_tile().
 ///   width, height  pixels of the picture from (x0, y0) on: those beyond count for nothing

@@ -91,6 +91,8 @@ TEST(FrozenView, GivesTheGradientsOfAllLayers) {
   const scene::Image upstream = noise(scene.camera.width, scene.camera.height);
   Gradients local, expected;
   for (Gradients* gradients : {&local, &expected}) gradients->reset(scene.changeable.size(), 1);
+  scene::Image picture = frozen.color();
+  frame.forward(frozen, picture);
   frame.backward(frozen, scene.changeable, part(upstream, region), local);
 
   std::vector<std::uint32_t> rows(scene.changeable.size());
