@@ -162,7 +162,7 @@ Plan pole() {
 }
 
 Plan arm() {
-  constexpr float length = 0.5f, thick = 0.11f;
+  constexpr float length = 0.5f, thick = 0.17f;
   Plan plan{.what = "A jointed arm that lies on a table, raised at the shoulder and bent at the elbow."};
   plan.surroundings = furnished_room();
   const Vec3 shoulder = at(-0.75f, 0.5f * thick, -0.15f);
@@ -186,13 +186,13 @@ Plan arm() {
   std::vector<edit::Handle> handles;
   for (const double along : {0.0, 0.17, 0.34}) {
     const DVec3 point = from + DVec3(along + 0.08, 0, 0);
-    handles.push_back(handle(point, upper(point), 0.125, 1));
+    handles.push_back(handle(point, upper(point), 0.19, 1));
   }
   for (const double along : {0.5, 0.67, 0.84}) {
     const DVec3 point = from + DVec3(along + 0.08, 0, 0);
-    handles.push_back(handle(point, lower(point), 0.125, 2));
+    handles.push_back(handle(point, lower(point), 0.19, 2));
   }
-  plan.request = drag(std::move(handles), edit::Region{from + dat(0.5, 0.004, 0), {1.002, double(thick), 0.118}});
+  plan.request = drag(std::move(handles), edit::Region{from + dat(0.5, 0.004, 0), {1.002, double(thick), double(thick) + 0.008}});
   return plan;
 }
 
