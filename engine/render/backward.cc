@@ -1,6 +1,7 @@
 #include "engine/render/backward.h"
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
 
 #include "engine/core/parallel.h"
@@ -85,30 +86,38 @@ namespace {
 /// Reads dL/d(pictures) of the tile whose first pixel is (x0, y0), and what they make of the ray's end. False if all is
 /// zero.
 bool load_tile(const UpstreamPlanes& upstream, scene::Rect area, Vec3 background, int x0, int y0, TileUpstream& tile) {
-  tile = {};
   const int first_x = std::max(x0, area.x0), last_x = std::min(x0 + tile_size, area.x1);
   const int first_y = std::max(y0, area.y0), last_y = std::min(y0 + tile_size, area.y1);
   if (first_x >= last_x || first_y >= last_y) return false;
+  const bool whole = last_x - first_x == tile_size && last_y - first_y == tile_size;
+  std::uint32_t bits = 0;  // of all values but their signs, so that NaN is something and -0 is nothing
   const auto load = [&](const scene::Image* image, int channel, float* to) {
+    if (image == nullptr || !whole) std::fill_n(to, TilePixels::count, 0.0f);
     if (image == nullptr) return;
     const float* const plane = image->plane(channel).data();
     for (int y = first_y; y < last_y; ++y)
       std::copy_n(plane + std::ptrdiff_t(y - area.y0) * image->width + (first_x - area.x0), last_x - first_x,
                   to + (y - y0) * tile_size + (first_x - x0));
+    for (std::size_t i = 0; i < TilePixels::count; ++i) bits |= std::bit_cast<std::uint32_t>(to[i]) << 1;
   };
   load(upstream.color, 0, tile.red);
   load(upstream.color, 1, tile.green);
   load(upstream.color, 2, tile.blue);
   load(upstream.depth, 0, tile.depth);
-  alignas(64) float v_alpha[TilePixels::count] = {};
-  load(upstream.alpha, 0, v_alpha);
-  bool any = false;
-  for (std::size_t i = 0; i < TilePixels::count; ++i) {
-    tile.transmittance[i] =
-        background.x * tile.red[i] + background.y * tile.green[i] + background.z * tile.blue[i] - v_alpha[i];
-    any |= tile.red[i] != 0 || tile.green[i] != 0 || tile.blue[i] != 0 || tile.depth[i] != 0 || v_alpha[i] != 0;
-  }
-  return any;
+  load(upstream.alpha, 0, tile.transmittance);
+  for (std::size_t i = 0; i < TilePixels::count; ++i)
+    tile.transmittance[i] = background.x * tile.red[i] + background.y * tile.green[i] + background.z * tile.blue[i] -
+                            tile.transmittance[i];
+  return bits != 0;
+}
+
+/// fetch_tile() of the colours that load_tile() reads.
+void fetch_upstream(const UpstreamPlanes& upstream, scene::Rect area, int x0, int y0) {
+  if (upstream.color == nullptr || x0 < area.x0 || x0 >= area.x1 || y0 < area.y0) return;
+  const int width = std::min(tile_size, area.x1 - x0), height = std::min(tile_size, area.y1 - y0);
+  for (int channel = 0; channel < 3; ++channel)
+    fetch_tile(upstream.color->plane(channel).data() + std::ptrdiff_t(y0 - area.y0) * area.width() + (x0 - area.x0),
+               area.width(), width, height);
 }
 
 }  // namespace
@@ -130,6 +139,7 @@ void walk_tiles(const ForwardBuffers& forward, const TileGrid& grid, const Upstr
     if (std::none_of(pair_of_entry.begin(), pair_of_entry.end(), may_change)) return;
     const int x0 = int(tile) % grid.columns * tile_size, y0 = int(tile) / grid.columns * tile_size;
     TileUpstream tile_upstream;
+    fetch_upstream(upstream, grid.pixels, x0 + tile_size, y0);  // of the next tile
     if (!load_tile(upstream, grid.pixels, background, x0, y0, tile_upstream)) {
       for (const std::uint32_t pair : pair_of_entry)
         if (may_change(pair)) gradients[pair] = {};

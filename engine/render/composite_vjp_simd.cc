@@ -200,11 +200,11 @@ void WalkTile(const Splat* splats, const std::uint32_t* list, std::size_t count,
   ToBlocks(rows_upstream.red, upstream.red);
   ToBlocks(rows_upstream.green, upstream.green);
   ToBlocks(rows_upstream.blue, upstream.blue);
-  ToBlocks(rows_upstream.depth, upstream.depth);
+  if constexpr (kDepth) ToBlocks(rows_upstream.depth, upstream.depth);
   Rays rays;
   ToBlocks(rows_upstream.transmittance, rays.beyond);
   std::copy_n(ends.transmittance, TilePixels::count, rays.transmittance);
-  const Places places;
+  static const Places places;
   Batch batch;
   for (std::size_t b = (passed + Batch::size - 1) / Batch::size; b-- > asked / Batch::size;) {
     const std::size_t first = b * Batch::size, n = HWY_MIN(Batch::size, passed - first);

@@ -1,6 +1,8 @@
 // What the stages of the SIMD forward pass hand to each other: project -> sort -> bin -> composite.
 #pragma once
 
+#include <hwy/cache_control.h>
+
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -147,6 +149,17 @@ struct alignas(64) TilePixels {
   float depth[count], median_depth[count];
   float weight[count];
 };
+
+/// Asks for the pixels of a picture that a tile is to be copied from, or to, while there is other work to do: its rows
+/// lie far apart, and each would be waited for.
+///   at      first pixel of the tile's first row
+///   stride  floats from row to row
+inline void fetch_tile(const float* at, std::ptrdiff_t stride, int width, int height) {
+  for (int y = 0; y < height; ++y, at += stride) {
+    hwy::Prefetch(at);
+    hwy::Prefetch(at + width - 1);
+  }
+}
 
 /// Blends the listed splats, nearest first, into the tile whose first pixel is (x0, y0), and the background behind
 /// them. Only the planes that `channels` names, and alpha, are written.
