@@ -45,20 +45,13 @@ HWY_INLINE bool Blend(D d, const Batch& batch, std::size_t first, std::size_t bl
   auto end = hn::Zero(di);
   if constexpr (K::kEnds) end = hn::Load(di, ends->end + at);
 
-  // A step ahead, so that a processor's window holds work that need not wait: the last splat is computed twice.
-  std::uint64_t rest = batch.reach[block];
-  V u, v;
-  std::size_t next = rest != 0 ? hwy::Num0BitsBelowLS1Bit_Nonzero64(rest) : 0;
-  V next_alpha = AlphaOf(d, PowerAt(d, batch, next, px, py, u, v));
-  while (rest != 0) {
-    const std::size_t k = next;
-    const V alpha = next_alpha;
-    rest &= rest - 1;
-    next = hwy::Num0BitsBelowLS1Bit_Nonzero64(rest | std::uint64_t{1} << 63);
-    next_alpha = AlphaOf(d, PowerAt(d, batch, next, px, py, u, v));
+  for (std::uint64_t rest = batch.reach[block]; rest != 0; rest &= rest - 1) {
+    const std::size_t k = hwy::Num0BitsBelowLS1Bit_Nonzero64(rest);
+    const V alpha = AlphaAt(d, batch, k, px, py);
     const V before = transmittance;
     V after;
     const auto going_on = Pass(d, alpha, transmittance, after);
+    if (hn::AllFalse(d, going_on)) break;
     const V w = hn::IfThenElseZero(going_on, hn::Mul(before, alpha));
     left = hn::IfThenElse(going_on, after, left);
     if constexpr (K::kEnds)

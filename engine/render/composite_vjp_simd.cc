@@ -67,6 +67,11 @@ HWY_INLINE std::uint64_t Changeable(const std::uint32_t* pair_of_entry, std::siz
   return bits;
 }
 
+/// The n lowest bits of 64.
+HWY_INLINE std::uint64_t FirstBits(std::int64_t n) {
+  return n <= 0 ? 0 : n >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << n) - 1;
+}
+
 /// A set of blocks.
 struct BlockSet {
   static constexpr std::size_t words = (Blocks::count + 63) / 64;
@@ -213,7 +218,7 @@ void WalkTile(const Splat* splats, const std::uint32_t* list, std::size_t count,
       for (std::size_t k = first - Batch::size; k < first; ++k) hwy::Prefetch(&splats[list[k]]);
     FindReach(d, n, batch);
     for (std::size_t block = 0; block < Blocks::count; ++block)
-      if (std::size_t(block_ends[block]) <= first) batch.reach[block] = 0;
+      batch.reach[block] &= FirstBits(block_ends[block] - std::int64_t(first));
     const std::uint64_t bits_asked = asked > first ? ~std::uint64_t{0} << (asked - first) : ~std::uint64_t{0};
     WalkBack<kDepth>(d, places, first, batch, bits_asked, Changeable(pair_of_entry + first, n), upstream, ends, rays,
                      pair_of_entry + first, pairs);
