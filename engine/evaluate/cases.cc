@@ -192,7 +192,8 @@ Plan arm() {
     const DVec3 point = from + DVec3(along + 0.08, 0, 0);
     handles.push_back(handle(point, lower(point), 0.19, 2));
   }
-  plan.request = drag(std::move(handles), edit::Region{from + dat(0.5, 0.004, 0), {1.002, double(thick), double(thick) + 0.008}});
+  plan.request =
+      drag(std::move(handles), edit::Region{from + dat(0.5, 0.004, 0), {1.002, double(thick), double(thick) + 0.008}});
   return plan;
 }
 

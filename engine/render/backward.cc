@@ -106,8 +106,8 @@ bool load_tile(const UpstreamPlanes& upstream, scene::Rect area, Vec3 background
   load(upstream.depth, 0, tile.depth);
   load(upstream.alpha, 0, tile.transmittance);
   for (std::size_t i = 0; i < TilePixels::count; ++i)
-    tile.transmittance[i] = background.x * tile.red[i] + background.y * tile.green[i] + background.z * tile.blue[i] -
-                            tile.transmittance[i];
+    tile.transmittance[i] =
+        background.x * tile.red[i] + background.y * tile.green[i] + background.z * tile.blue[i] - tile.transmittance[i];
   return bits != 0;
 }
 
@@ -118,6 +118,13 @@ void fetch_upstream(const UpstreamPlanes& upstream, scene::Rect area, int x0, in
   for (int channel = 0; channel < 3; ++channel)
     fetch_tile(upstream.color->plane(channel).data() + std::ptrdiff_t(y0 - area.y0) * area.width() + (x0 - area.x0),
                area.width(), width, height);
+}
+
+/// May a row of the tile's list change?
+bool any_changeable(const ForwardBuffers& forward, std::size_t tile) {
+  return std::any_of(forward.pair_of_entry.data() + forward.tile_begin[tile],
+                     forward.pair_of_entry.data() + forward.tile_begin[tile + 1],
+                     [](std::uint32_t pair) { return pair != ForwardBuffers::no_pair; });
 }
 
 }  // namespace
@@ -136,7 +143,7 @@ void walk_tiles(const ForwardBuffers& forward, const TileGrid& grid, const Upstr
     const std::span list(forward.entries.data() + first, last - first);
     const std::span pair_of_entry(forward.pair_of_entry.data() + first, last - first);
     const auto may_change = [](std::uint32_t pair) { return pair != ForwardBuffers::no_pair; };
-    if (std::none_of(pair_of_entry.begin(), pair_of_entry.end(), may_change)) return;
+    if (!any_changeable(forward, tile)) return;
     const int x0 = int(tile) % grid.columns * tile_size, y0 = int(tile) / grid.columns * tile_size;
     TileUpstream tile_upstream;
     fetch_upstream(upstream, grid.pixels, x0 + tile_size, y0);  // of the next tile
@@ -151,6 +158,20 @@ void walk_tiles(const ForwardBuffers& forward, const TileGrid& grid, const Upstr
 }
 
 namespace {
+
+/// What a forward pass would have left: of the tiles that will be walked.
+void find_ray_ends(ForwardBuffers& forward, int columns) {
+  const std::size_t tiles = forward.tile_begin.size() - 1;
+  RayEnds* const ends = forward.ray_ends.reserve(tiles);
+  parallel_for(tiles, 1, [&](std::size_t tile, std::size_t) {
+    if (!any_changeable(forward, tile)) return;
+    const std::uint32_t first = forward.tile_begin[tile], last = forward.tile_begin[tile + 1];
+    const int x0 = int(tile) % columns * tile_size, y0 = int(tile) / columns * tile_size;
+    TilePixels pixels;
+    composite_tile(forward.splats.data(), {forward.entries.data() + first, last - first}, x0, y0, {}, {}, pixels,
+                   ends + tile);
+  });
+}
 
 const scene::Image* plane_or_none(const scene::Image& image) { return image.channels != 0 ? &image : nullptr; }
 
@@ -183,15 +204,7 @@ void backward_simd(const Layers& layers, const scene::Camera& camera, const Back
   const auto* const slots = find_slots(
       forward, [&](std::uint32_t row) { return slot_of_row[row]; }, work.walk.slot_of_splat);
   bin(grid, forward, slots, rows.size());
-  const std::size_t tiles = forward.tile_begin.size() - 1;
-  RayEnds* const ends = forward.ray_ends.reserve(tiles);
-  parallel_for(tiles, 1, [&](std::size_t tile, std::size_t) {
-    const std::uint32_t first = forward.tile_begin[tile], last = forward.tile_begin[tile + 1];
-    const int x0 = int(tile) % grid.columns * tile_size, y0 = int(tile) / grid.columns * tile_size;
-    TilePixels pixels;
-    composite_tile(forward.splats.data(), {forward.entries.data() + first, last - first}, x0, y0, {}, {}, pixels,
-                   ends + tile);
-  });
+  find_ray_ends(forward, grid.columns);
 
   const UpstreamPlanes planes{.color = plane_or_none(upstream.color),
                               .depth = plane_or_none(upstream.depth),

@@ -34,8 +34,7 @@ inline void draw_tile(const Splat* splats, std::span<const std::uint32_t> list, 
   int channel = 0;
   for (const float* from : {pixels.red, pixels.green, pixels.blue}) {
     float* const to = place(channel++);
-    for (int y = 0; y < height; ++y)
-      std::copy_n(from + y * tile_size, width, to + std::ptrdiff_t(y) * color.width);
+    for (int y = 0; y < height; ++y) std::copy_n(from + y * tile_size, width, to + std::ptrdiff_t(y) * color.width);
   }
 }
 

@@ -18,7 +18,7 @@ namespace HWY_NAMESPACE {
 /// The rays of a tile on their way back, block by block.
 struct alignas(64) Rays {
   float transmittance[TilePixels::count];  ///< What reached the splat that was come to last.
-  float beyond[TilePixels::count];         ///< dL/dT of that splat and all that lies farther back, T being what reached it.
+  float beyond[TilePixels::count];  ///< dL/dT of that splat and all that lies farther back, T being what reached it.
 };
 
 /// Where the pixels of a tile are, block by block.
@@ -190,8 +190,7 @@ void WalkTile(const Splat* splats, const std::uint32_t* list, std::size_t count,
   const hn::RebindToSigned<D> di;
   std::int32_t block_ends[Blocks::count];  // the farthest of its rays
   for (std::size_t block = 0; block < Blocks::count; ++block)
-    block_ends[block] =
-        hn::GetLane(hn::MaxOfLanes(di, hn::Load(di, ends.end + block * Blocks::lanes)));
+    block_ends[block] = hn::GetLane(hn::MaxOfLanes(di, hn::Load(di, ends.end + block * Blocks::lanes)));
   const auto passed = std::size_t(*std::max_element(block_ends, block_ends + Blocks::count));
   // What no ray got to.
   for (std::size_t k = passed; k < count; ++k)

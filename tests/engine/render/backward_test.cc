@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 
@@ -329,6 +330,26 @@ TEST(Backward, ListsLongerThanManyBatchesAndRaysThatEndEarlyAgreeWithTheReferenc
   const auto upstream = random_upstream(30, 20, 16);
   expect_close(gradients_of(cloud, camera, on(Backend::simd), upstream),
                gradients_of(cloud, camera, on(Backend::reference), upstream), 2e-3);
+}
+
+TEST(Backward, ARayThroughAThousandFaintSplatsKeepsItsDigitsOnTheWayBack) {
+  // The way back divides its way through them all. Transmittance falls to 2e-4: no ray ends.
+  auto cloud = cloud_in_view(1400, 19, 0);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    cloud.mean.set(i, {0, 0, 2 + 0.001f * float(i)});
+    cloud.log_scale.set(i, Vec3(1.5f));
+    cloud.opacity_logit[i] = -5.1f;  // alpha 0.006
+  }
+  const auto camera = scene::look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 0.3, 20, 20);
+  const Upstream upstream = random_upstream(20, 20, 21);
+  const BackwardOptions options = on(Backend::reference);
+  for (const int count : forward_reference<double>(cloud, camera, options.forward, {}).contributions)
+    ASSERT_EQ(count, 1400) << "some splat is cut";
+  const auto v = backward_reference<double>(cloud, camera, options, planes_of(upstream), all_rows(cloud));
+  const std::vector<float> expected(v.opacity_logit.begin(), v.opacity_logit.end());
+  const std::vector<double> differences =
+      row_differences(gradients_of(cloud, camera, on(Backend::simd), upstream).opacity_logit, expected);
+  EXPECT_LE(*std::max_element(differences.begin(), differences.end()), 1e-4);
 }
 
 TEST(Backward, TilesWithoutUpstreamAndTilesThatNoRowReachesChangeNothing) {
