@@ -116,15 +116,9 @@ void fetch_upstream(const UpstreamPlanes& upstream, scene::Rect area, int x0, in
   if (upstream.color == nullptr || x0 < area.x0 || x0 >= area.x1 || y0 < area.y0) return;
   const int width = std::min(tile_size, area.x1 - x0), height = std::min(tile_size, area.y1 - y0);
   for (int channel = 0; channel < 3; ++channel)
-    fetch_tile(upstream.color->plane(channel).data() + std::ptrdiff_t(y0 - area.y0) * area.width() + (x0 - area.x0),
-               area.width(), width, height);
-}
-
-/// May a row of the tile's list change?
-bool any_changeable(const ForwardBuffers& forward, std::size_t tile) {
-  return std::any_of(forward.pair_of_entry.data() + forward.tile_begin[tile],
-                     forward.pair_of_entry.data() + forward.tile_begin[tile + 1],
-                     [](std::uint32_t pair) { return pair != ForwardBuffers::no_pair; });
+    fetch_tile(
+        upstream.color->plane(channel).data() + std::ptrdiff_t(y0 - area.y0) * upstream.color->width + (x0 - area.x0),
+        upstream.color->width, width, height);
 }
 
 }  // namespace
@@ -134,8 +128,8 @@ void clear_mean2d(Gradients& out) {
   std::fill(out.mean2d_y_px.begin(), out.mean2d_y_px.end(), 0.0f);
 }
 
-void walk_tiles(const ForwardBuffers& forward, const TileGrid& grid, const UpstreamPlanes& upstream, Vec3 background,
-                std::size_t pairs, WalkBuffers& work) {
+void walk_tiles(const ForwardBuffers& forward, const RayEnds* ends, const TileGrid& grid,
+                const UpstreamPlanes& upstream, Vec3 background, std::size_t pairs, WalkBuffers& work) {
   const std::size_t tiles = std::size_t(grid.columns) * std::size_t(grid.rows);
   TileGradient* const gradients = work.pairs.reserve(pairs);
   parallel_for(tiles, 1, [&](std::size_t tile, std::size_t) {
@@ -143,35 +137,26 @@ void walk_tiles(const ForwardBuffers& forward, const TileGrid& grid, const Upstr
     const std::span list(forward.entries.data() + first, last - first);
     const std::span pair_of_entry(forward.pair_of_entry.data() + first, last - first);
     const auto may_change = [](std::uint32_t pair) { return pair != ForwardBuffers::no_pair; };
-    if (!any_changeable(forward, tile)) return;
-    const int x0 = int(tile) % grid.columns * tile_size, y0 = int(tile) / grid.columns * tile_size;
+    if (std::none_of(pair_of_entry.begin(), pair_of_entry.end(), may_change)) return;
+    const TilePlace place = place_of(tile, grid.columns, grid.pixels);
     TileUpstream tile_upstream;
-    fetch_upstream(upstream, grid.pixels, x0 + tile_size, y0);  // of the next tile
-    if (!load_tile(upstream, grid.pixels, background, x0, y0, tile_upstream)) {
+    fetch_upstream(upstream, grid.pixels, place.x0 + tile_size, place.y0);  // of the next tile
+    if (!load_tile(upstream, grid.pixels, background, place.x0, place.y0, tile_upstream)) {
       for (const std::uint32_t pair : pair_of_entry)
         if (may_change(pair)) gradients[pair] = {};
       return;
     }
-    composite_tile_vjp(forward.splats.data(), list, pair_of_entry.data(), x0, y0, tile_upstream,
-                       upstream.depth != nullptr, forward.ray_ends[tile], gradients);
+    RayEnds anew;
+    if (ends == nullptr) {
+      TilePixels pixels;
+      composite_tile(forward.splats.data(), list, place, {}, {}, pixels, &anew);
+    }
+    composite_tile_vjp(forward.splats.data(), list, pair_of_entry.data(), place.x0, place.y0, tile_upstream,
+                       upstream.depth != nullptr, ends != nullptr ? ends[tile] : anew, gradients);
   });
 }
 
 namespace {
-
-/// What a forward pass would have left: of the tiles that will be walked.
-void find_ray_ends(ForwardBuffers& forward, int columns) {
-  const std::size_t tiles = forward.tile_begin.size() - 1;
-  RayEnds* const ends = forward.ray_ends.reserve(tiles);
-  parallel_for(tiles, 1, [&](std::size_t tile, std::size_t) {
-    if (!any_changeable(forward, tile)) return;
-    const std::uint32_t first = forward.tile_begin[tile], last = forward.tile_begin[tile + 1];
-    const int x0 = int(tile) % columns * tile_size, y0 = int(tile) / columns * tile_size;
-    TilePixels pixels;
-    composite_tile(forward.splats.data(), {forward.entries.data() + first, last - first}, x0, y0, {}, {}, pixels,
-                   ends + tile);
-  });
-}
 
 const scene::Image* plane_or_none(const scene::Image& image) { return image.channels != 0 ? &image : nullptr; }
 
@@ -204,12 +189,11 @@ void backward_simd(const Layers& layers, const scene::Camera& camera, const Back
   const auto* const slots = find_slots(
       forward, [&](std::uint32_t row) { return slot_of_row[row]; }, work.walk.slot_of_splat);
   bin(grid, forward, slots, rows.size());
-  find_ray_ends(forward, grid.columns);
 
   const UpstreamPlanes planes{.color = plane_or_none(upstream.color),
                               .depth = plane_or_none(upstream.depth),
                               .alpha = plane_or_none(upstream.alpha)};
-  walk_tiles(forward, grid, planes, options.forward.background, forward.first_pair[rows.size()], work.walk);
+  walk_tiles(forward, nullptr, grid, planes, options.forward.background, forward.first_pair[rows.size()], work.walk);
   const RowPairs row_pairs{.first_pair = forward.first_pair.data(), .pairs = work.walk.pairs.data()};
   const std::size_t base_rows = layers.base->size();
   const auto of_base = std::size_t(std::lower_bound(rows.begin(), rows.end(), base_rows) - rows.begin());

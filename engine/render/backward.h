@@ -77,9 +77,9 @@ class BackwardWorkspace {
 /// Kinks: what is skipped (alpha below 1/255, splats at which a ray ends and all behind, at or before the near plane,
 /// tiles that tile16_stop does not reach) has no gradient, and that it might come in has none either: depth order,
 /// tiles and cuts are taken as they are. At the edge of a clamp the derivative is the one from inside, but for that of
-/// alpha at 0.99, where it is zero. Costs projecting, sorting and blending once more (nothing of the forward pass is
-/// kept: it is cheap) in the tiles that rows and upstream touch, and about twice that for walking back. Memory: 40
-/// bytes per splat and tile it reaches. Precondition: that of forward(); semantics other than dense_stop and
+/// alpha at 0.99, where it is zero. Costs projecting, sorting and, in the tiles that rows and upstream touch, blending
+/// once more, for nothing of the forward pass is kept (Frame and LocalFrame keep it), and about twice that for walking
+/// back. Memory: 48 bytes per row that may change and tile it reaches. Precondition: that of forward(); semantics other than dense_stop and
 /// straight_through need Backend::reference.
 void backward(const Layers& layers, const scene::Camera& camera, const BackwardOptions& options,
               const Upstream& upstream, std::span<const std::uint32_t> rows, BackwardWorkspace& workspace,

@@ -4,11 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
-#include <mutex>
 #include <span>
-#include <utility>
-#include <vector>
 
 #include "engine/core/parallel.h"
 #include "engine/render/backward.h"
@@ -22,7 +18,7 @@ struct TileGradient {
   float g, along, across;
   float along_along, along_across, across_across;
   float red, green, blue, depth;
-  float padding[2];  ///< To whole vectors of four. Zero.
+  float padding[2];  ///< To whole vectors of four. Anything.
   static constexpr std::size_t sums = 10;
 };
 static_assert(sizeof(TileGradient) == 12 * sizeof(float));
@@ -74,12 +70,13 @@ const std::int32_t* find_slots(const ForwardBuffers& forward, SlotOfRow&& slot_o
 }
 
 /// Walks all tiles of `forward` back.
-///   forward  splats, entries, tile_begin, pair_of_entry and ray_ends are used
+///   forward  splats, entries, tile_begin and pair_of_entry are used
+///   ends     [tiles] as the forward pass of the same picture left them; null: found anew
 ///   grid     pixels: the rectangle of the picture that `upstream` is of
 ///   pairs    there are, as pair_of_entry numbers them
 ///   work     all numbered pairs are written
-void walk_tiles(const ForwardBuffers& forward, const TileGrid& grid, const UpstreamPlanes& upstream, Vec3 background,
-                std::size_t pairs, WalkBuffers& work);
+void walk_tiles(const ForwardBuffers& forward, const RayEnds* ends, const TileGrid& grid,
+                const UpstreamPlanes& upstream, Vec3 background, std::size_t pairs, WalkBuffers& work);
 
 void clear_mean2d(Gradients& out);
 

@@ -82,7 +82,7 @@ struct RayBackward {
 /// One step towards the eye: the pullback of blending a splat with weight = T alpha, T <- T (1 - alpha).
 ///   v_weight  dL/dweight: color . v_color + depth * v_depth
 ///   returns   dL/dalpha; needs alpha < 1
-/// Recovers T by division, so the forward pass stores one number per pixel.
+/// Recovers T by division: of a ray, only its end is kept.
 template <std::floating_point Real>
 Real blend_vjp(Real alpha, Real v_weight, RayBackward<Real>& ray) {
   const Real keep = 1 - alpha;

@@ -23,18 +23,18 @@ inline TileGrid whole_grid(const scene::Camera& camera) {
 ///   ends  null: not needed
 inline void draw_tile(const Splat* splats, std::span<const std::uint32_t> list, std::uint32_t tile, int columns,
                       Vec3 background, scene::Rect region, scene::Image& color, RayEnds* ends = nullptr) {
-  const int x0 = int(tile) % columns * tile_size, y0 = int(tile) / columns * tile_size;
-  const int width = std::min(x0 + tile_size, region.x1) - x0, height = std::min(y0 + tile_size, region.y1) - y0;
-  const auto place = [&](int channel) {
-    return color.plane(channel).data() + std::ptrdiff_t(y0 - region.y0) * color.width + (x0 - region.x0);
+  const TilePlace place = place_of(tile, columns, region);
+  const auto pixels_of = [&](int channel) {
+    return color.plane(channel).data() + std::ptrdiff_t(place.y0 - region.y0) * color.width + (place.x0 - region.x0);
   };
-  for (int channel = 0; channel < 3; ++channel) fetch_tile(place(channel), color.width, width, height);
+  for (int channel = 0; channel < 3; ++channel) fetch_tile(pixels_of(channel), color.width, place.width, place.height);
   TilePixels pixels;
-  composite_tile(splats, list, x0, y0, {.color = true}, background, pixels, ends);
+  composite_tile(splats, list, place, {.color = true}, background, pixels, ends);
   int channel = 0;
   for (const float* from : {pixels.red, pixels.green, pixels.blue}) {
-    float* const to = place(channel++);
-    for (int y = 0; y < height; ++y) std::copy_n(from + y * tile_size, width, to + std::ptrdiff_t(y) * color.width);
+    float* const to = pixels_of(channel++);
+    for (int y = 0; y < place.height; ++y)
+      std::copy_n(from + y * tile_size, place.width, to + std::ptrdiff_t(y) * color.width);
   }
 }
 

@@ -8,6 +8,7 @@
 #include "engine/render/tile_blocks.inc"
 
 #include <algorithm>
+#include <cassert>
 
 #include "engine/render/splats.h"
 
@@ -24,16 +25,15 @@ struct Kept {
 /// Blends the batch into one block. False if all of the block's rays have ended.
 ///   first  number of the batch's first splat in the tile's list
 template <class K>
-HWY_INLINE bool Blend(D d, const Batch& batch, std::size_t first, std::size_t block, V lane_x, V lane_y,
-                      TilePixels& pixels, RayEnds* ends) {
+HWY_INLINE bool Blend(D d, const Batch& batch, std::size_t first, std::size_t block, TilePixels& pixels,
+                      RayEnds* ends) {
   const hn::RebindToSigned<D> di;
   const V zero = hn::Zero(d), half = hn::Set(d, 0.5f);
   const std::size_t at = block * Blocks::lanes;
   V transmittance = hn::Load(d, pixels.transmittance + at);
   if (AllEnded(d, transmittance)) return false;
   V left = hn::Load(d, pixels.left + at);
-  const V px = hn::Add(lane_x, hn::Set(d, float(block % Blocks::columns * Blocks::width)));
-  const V py = hn::Add(lane_y, hn::Set(d, float(block / Blocks::columns * Blocks::height)));
+  const V px = hn::Load(d, places.x + at), py = hn::Load(d, places.y + at);
   V red = zero, green = zero, blue = zero, depth = zero, median_depth = zero, weight = zero;
   if constexpr (K::kColor) {
     red = hn::Load(d, pixels.red + at), green = hn::Load(d, pixels.green + at), blue = hn::Load(d, pixels.blue + at);
@@ -81,30 +81,24 @@ HWY_INLINE bool Blend(D d, const Batch& batch, std::size_t first, std::size_t bl
 }
 
 template <class K>
-void BlendTile(const Splat* splats, const std::uint32_t* list, std::size_t count, int x0, int y0, TilePixels& pixels,
+void BlendTile(const Splat* splats, const std::uint32_t* list, std::size_t count, TilePlace place, TilePixels& pixels,
                RayEnds* ends) {
   const D d;
   auto fill = [](float* plane, float value) { std::fill_n(plane, TilePixels::count, value); };
-  fill(pixels.transmittance, 1), fill(pixels.left, 1);
+  BeginRays(place, pixels.transmittance);
+  fill(pixels.left, 1);
   if constexpr (K::kColor) fill(pixels.red, 0), fill(pixels.green, 0), fill(pixels.blue, 0);
   if constexpr (K::kDepth) fill(pixels.depth, 0), fill(pixels.median_depth, 0);
   if constexpr (K::kWeight) fill(pixels.weight, 0);
   if constexpr (K::kEnds) std::fill_n(ends->end, RayEnds::count, 0);
-  alignas(64) float lanes_x[Blocks::lanes], lanes_y[Blocks::lanes];
-  for (std::size_t i = 0; i < Blocks::lanes; ++i) {
-    lanes_x[i] = float(i % Blocks::width);
-    lanes_y[i] = float(i / Blocks::width);
-  }
-  const V lane_x = hn::Load(d, lanes_x), lane_y = hn::Load(d, lanes_y);
   Batch batch;
   for (std::size_t first = 0; first < count; first += Batch::size) {
     const std::size_t n = HWY_MIN(Batch::size, count - first);
-    Fill(splats, list + first, n, x0, y0, batch);
+    Fill(splats, list + first, n, place.x0, place.y0, batch);
     for (std::size_t k = first + n; k < HWY_MIN(first + n + Batch::size, count); ++k) hwy::Prefetch(&splats[list[k]]);
     FindReach(d, n, batch);
     bool live = false;
-    for (std::size_t block = 0; block < Blocks::count; ++block)
-      live |= Blend<K>(d, batch, first, block, lane_x, lane_y, pixels, ends);
+    for (std::size_t block = 0; block < Blocks::count; ++block) live |= Blend<K>(d, batch, first, block, pixels, ends);
     if (!live) break;
   }
   if constexpr (K::kEnds) std::copy_n(pixels.left, RayEnds::count, ends->transmittance);
@@ -138,9 +132,9 @@ void Finish(Vec3 background, TilePixels& pixels) {
 }
 
 template <class K>
-void Composite(const Splat* splats, const std::uint32_t* list, std::size_t count, int x0, int y0, Vec3 background,
+void Composite(const Splat* splats, const std::uint32_t* list, std::size_t count, TilePlace place, Vec3 background,
                TilePixels& tile, RayEnds* ends) {
-  BlendTile<K>(splats, list, count, x0, y0, tile, ends);
+  BlendTile<K>(splats, list, count, place, tile, ends);
   Finish<K::kColor>(background, tile);
   ToRows(tile.alpha);
   if constexpr (K::kColor) ToRows(tile.red), ToRows(tile.green), ToRows(tile.blue);
@@ -148,28 +142,26 @@ void Composite(const Splat* splats, const std::uint32_t* list, std::size_t count
   if constexpr (K::kWeight) ToRows(tile.weight);
 }
 
-template <bool kEnds>
-void CompositeTileTo(const Splat* splats, const std::uint32_t* list, std::size_t count, int x0, int y0,
-                     Channels channels, Vec3 background, TilePixels& tile, RayEnds* ends) {
+void CompositeTile(const Splat* splats, const std::uint32_t* list, std::size_t count, TilePlace place,
+                   Channels channels, Vec3 background, TilePixels& tile, RayEnds* ends) {
   const auto composite = [&](auto kept) {
-    Composite<decltype(kept)>(splats, list, count, x0, y0, background, tile, ends);
+    Composite<decltype(kept)>(splats, list, count, place, background, tile, ends);
   };
+  if (ends != nullptr) {
+    assert(!channels.depth && !channels.weight);
+    if (channels.color) return composite(Kept<true, false, false, true>());
+    return composite(Kept<false, false, false, true>());
+  }
   if (channels.depth) {
-    if (channels.weight) return composite(Kept<true, true, true, kEnds>());
-    return composite(Kept<true, true, false, kEnds>());
+    if (channels.weight) return composite(Kept<true, true, true, false>());
+    return composite(Kept<true, true, false, false>());
   }
   if (channels.weight) {
-    if (channels.color) return composite(Kept<true, false, true, kEnds>());
-    return composite(Kept<false, false, true, kEnds>());
+    if (channels.color) return composite(Kept<true, false, true, false>());
+    return composite(Kept<false, false, true, false>());
   }
-  if (channels.color) return composite(Kept<true, false, false, kEnds>());
-  return composite(Kept<false, false, false, kEnds>());
-}
-
-void CompositeTile(const Splat* splats, const std::uint32_t* list, std::size_t count, int x0, int y0, Channels channels,
-                   Vec3 background, TilePixels& tile, RayEnds* ends) {
-  if (ends != nullptr) return CompositeTileTo<true>(splats, list, count, x0, y0, channels, background, tile, ends);
-  CompositeTileTo<false>(splats, list, count, x0, y0, channels, background, tile, ends);
+  if (channels.color) return composite(Kept<true, false, false, false>());
+  return composite(Kept<false, false, false, false>());
 }
 
 }  // namespace HWY_NAMESPACE
@@ -181,10 +173,10 @@ namespace engine::render {
 
 HWY_EXPORT(CompositeTile);
 
-void composite_tile(const Splat* splats, std::span<const std::uint32_t> list, int x0, int y0, Channels channels,
+void composite_tile(const Splat* splats, std::span<const std::uint32_t> list, TilePlace place, Channels channels,
                     Vec3 background, TilePixels& tile, RayEnds* ends) {
   HWY_DYNAMIC_DISPATCH(CompositeTile)
-  (splats, list.data(), list.size(), x0, y0, channels, background, tile, ends);
+  (splats, list.data(), list.size(), place, channels, background, tile, ends);
 }
 
 }  // namespace engine::render

@@ -8,6 +8,7 @@
 #include "engine/render/tile_blocks.inc"
 
 #include <algorithm>
+#include <cassert>
 
 #include "engine/render/backward_stages.h"
 
@@ -15,45 +16,69 @@ HWY_BEFORE_NAMESPACE();
 namespace engine::render {
 namespace HWY_NAMESPACE {
 
+/// dL/d(pictures) of a tile, block by block.
+struct alignas(64) BlockUpstream {
+  float red[TilePixels::count], green[TilePixels::count], blue[TilePixels::count];
+  float depth[TilePixels::count];  ///< Read only if there is any.
+};
+
 /// The rays of a tile on their way back, block by block.
 struct alignas(64) Rays {
   float transmittance[TilePixels::count];  ///< What reached the splat that was come to last.
   float beyond[TilePixels::count];  ///< dL/dT of that splat and all that lies farther back, T being what reached it.
 };
 
-/// Where the pixels of a tile are, block by block.
-struct alignas(64) Places {
-  float x[TilePixels::count], y[TilePixels::count];
-
-  Places() {
-    for (std::size_t i = 0; i < TilePixels::count; ++i) {
-      const std::size_t block = i / Blocks::lanes, lane = i % Blocks::lanes;
-      x[i] = float(block % Blocks::columns * Blocks::width + lane % Blocks::width);
-      y[i] = float(block / Blocks::columns * Blocks::height + lane / Blocks::width);
-    }
-  }
+/// A splat's sums over pixels, one lane each.
+struct Sums {
+  V g, along, across, along_along, along_across, across_across, red, green, blue, depth;
 };
 
-/// Sums over the lanes of four vectors.
-HWY_INLINE void StoreSums(D d, V a, V b, V c, V e, float* to) {
 #if HWY_TARGET == HWY_SCALAR
-  for (const V sum : {a, b, c, e}) *to++ = hn::GetLane(sum);
-  (void)d;
+HWY_INLINE void StoreGradient(D /*d*/, const Sums& sums, TileGradient& to) {
+  to = {.g = hn::GetLane(sums.g),
+        .along = hn::GetLane(sums.along),
+        .across = hn::GetLane(sums.across),
+        .along_along = hn::GetLane(sums.along_along),
+        .along_across = hn::GetLane(sums.along_across),
+        .across_across = hn::GetLane(sums.across_across),
+        .red = hn::GetLane(sums.red),
+        .green = hn::GetLane(sums.green),
+        .blue = hn::GetLane(sums.blue),
+        .depth = hn::GetLane(sums.depth),
+        .padding = {}};
+}
 #else
+/// Per four lanes, the sums of a, b, c and e over them.
+HWY_INLINE V SumFours(D d, V a, V b, V c, V e) {
   static_assert(Blocks::lanes >= 4);
-  // Per four lanes: (a0 + a2, b0 + b2, a1 + a3, b1 + b3), then the sums of all four, then those of the next four.
   const hn::Repartition<double, D> d64;
   const auto ab = hn::BitCast(d64, hn::Add(hn::InterleaveLower(d, a, b), hn::InterleaveUpper(d, a, b)));
   const auto ce = hn::BitCast(d64, hn::Add(hn::InterleaveLower(d, c, e), hn::InterleaveUpper(d, c, e)));
-  alignas(64) float sums[Blocks::lanes];
-  hn::Store(hn::Add(hn::BitCast(d, hn::InterleaveLower(d64, ab, ce)), hn::BitCast(d, hn::InterleaveUpper(d64, ab, ce))),
-            d, sums);
-  const hn::FixedTag<float, 4> d4;
-  auto sum = hn::Load(d4, sums);
-  for (std::size_t i = 4; i < Blocks::lanes; i += 4) sum = hn::Add(sum, hn::Load(d4, sums + i));
-  hn::StoreU(sum, d4, to);
-#endif
+  return hn::Add(hn::BitCast(d, hn::InterleaveLower(d64, ab, ce)), hn::BitCast(d, hn::InterleaveUpper(d64, ab, ce)));
 }
+
+/// Sums over all fours of lanes.
+template <class AnyD>
+HWY_INLINE hn::Vec<hn::FixedTag<float, 4> > SumBlocks(AnyD d, hn::Vec<AnyD> v) {
+  if constexpr (hn::MaxLanes(AnyD()) == 4) {
+    return v;
+  } else {
+    const hn::Half<AnyD> half;
+    return SumBlocks(half, hn::Add(hn::LowerHalf(half, v), hn::UpperHalf(half, v)));
+  }
+}
+
+/// Sums over the lanes; all of them together, since shuffles are what this costs.
+HWY_INLINE void StoreGradient(D d, const Sums& sums, TileGradient& to) {
+  const hn::FixedTag<float, 4> d4;
+  float* const floats = &to.g;  // the members of TileGradient, in order
+  hn::StoreU(SumBlocks(d, SumFours(d, sums.g, sums.along, sums.across, sums.along_along)), d4, floats);
+  hn::StoreU(SumBlocks(d, SumFours(d, sums.along_across, sums.across_across, sums.red, sums.green)), d4, floats + 4);
+  const auto twos = SumBlocks(
+      d, hn::Add(hn::InterleaveLower(d, sums.blue, sums.depth), hn::InterleaveUpper(d, sums.blue, sums.depth)));
+  hn::StoreU(hn::Add(twos, hn::Shuffle1032(twos)), d4, floats + 8);  // and once more, over the padding
+}
+#endif
 
 /// Bit k: entry k of the n has a number.
 HWY_INLINE std::uint64_t Changeable(const std::uint32_t* pair_of_entry, std::size_t n) {
@@ -108,8 +133,8 @@ HWY_INLINE void Transpose(const std::uint64_t* reach, BlockSet* out) {
 ///   changeable     bits of the splats whose rows may change
 ///   pair_of_entry  [splats of the batch] see composite_tile_vjp()
 template <bool kDepth>
-HWY_INLINE void WalkBack(D d, const Places& places, std::size_t first, const Batch& batch, std::uint64_t asked,
-                         std::uint64_t changeable, const TileUpstream& upstream, const RayEnds& ends, Rays& rays,
+HWY_INLINE void WalkBack(D d, std::size_t first, const Batch& batch, std::uint64_t asked, std::uint64_t changeable,
+                         const BlockUpstream& upstream, const RayEnds& ends, Rays& rays,
                          const std::uint32_t* pair_of_entry, TileGradient* pairs) {
   const hn::RebindToSigned<D> di;
   BlockSet blocks[Batch::size];
@@ -151,8 +176,7 @@ HWY_INLINE void WalkBack(D d, const Places& places, std::size_t first, const Bat
       });
       continue;
     }
-    V sum_g = zero, sum_u = zero, sum_v = zero, sum_uu = zero, sum_uv = zero, sum_vv = zero;
-    V sum_red = zero, sum_green = zero, sum_blue = zero, sum_depth = zero;
+    Sums sums{zero, zero, zero, zero, zero, zero, zero, zero, zero, zero};
     each_block([&](std::size_t at) {
       const V v_red = hn::Load(d, upstream.red + at), v_green = hn::Load(d, upstream.green + at),
               v_blue = hn::Load(d, upstream.blue + at);
@@ -161,16 +185,15 @@ HWY_INLINE void WalkBack(D d, const Places& places, std::size_t first, const Bat
       const V weight = hn::Mul(transmittance, alpha);
       const V g = hn::IfThenElseZero(hn::Lt(alpha, ceiling), hn::Mul(weight, gain));
       const V gu = hn::Mul(g, u), gv = hn::Mul(g, v);
-      sum_g = hn::Add(sum_g, g), sum_u = hn::Add(sum_u, gu), sum_v = hn::Add(sum_v, gv);
-      sum_uu = hn::MulAdd(gu, u, sum_uu), sum_uv = hn::MulAdd(gu, v, sum_uv), sum_vv = hn::MulAdd(gv, v, sum_vv);
-      sum_red = hn::MulAdd(weight, v_red, sum_red), sum_green = hn::MulAdd(weight, v_green, sum_green);
-      sum_blue = hn::MulAdd(weight, v_blue, sum_blue);
-      if constexpr (kDepth) sum_depth = hn::MulAdd(weight, hn::Load(d, upstream.depth + at), sum_depth);
+      sums.g = hn::Add(sums.g, g), sums.along = hn::Add(sums.along, gu), sums.across = hn::Add(sums.across, gv);
+      sums.along_along = hn::MulAdd(gu, u, sums.along_along);
+      sums.along_across = hn::MulAdd(gu, v, sums.along_across);
+      sums.across_across = hn::MulAdd(gv, v, sums.across_across);
+      sums.red = hn::MulAdd(weight, v_red, sums.red), sums.green = hn::MulAdd(weight, v_green, sums.green);
+      sums.blue = hn::MulAdd(weight, v_blue, sums.blue);
+      if constexpr (kDepth) sums.depth = hn::MulAdd(weight, hn::Load(d, upstream.depth + at), sums.depth);
     });
-    auto* const to = reinterpret_cast<float*>(pairs + pair_of_entry[k]);  // the members of TileGradient, in order
-    StoreSums(d, sum_g, sum_u, sum_v, sum_uu, to);
-    StoreSums(d, sum_uv, sum_vv, sum_red, sum_green, to + 4);
-    StoreSums(d, sum_blue, sum_depth, zero, zero, to + 8);
+    StoreGradient(d, sums, pairs[pair_of_entry[k]]);
   }
 }
 
@@ -192,6 +215,7 @@ void WalkTile(const Splat* splats, const std::uint32_t* list, std::size_t count,
   for (std::size_t block = 0; block < Blocks::count; ++block)
     block_ends[block] = hn::GetLane(hn::MaxOfLanes(di, hn::Load(di, ends.end + block * Blocks::lanes)));
   const auto passed = std::size_t(*std::max_element(block_ends, block_ends + Blocks::count));
+  assert(passed <= count);  // or the ends are of another picture
   // What no ray got to.
   for (std::size_t k = passed; k < count; ++k)
     if (pair_of_entry[k] != ForwardBuffers::no_pair) pairs[pair_of_entry[k]] = {};
@@ -200,7 +224,7 @@ void WalkTile(const Splat* splats, const std::uint32_t* list, std::size_t count,
   while (asked < passed && pair_of_entry[asked] == ForwardBuffers::no_pair) ++asked;
   if (asked == passed) return;
 
-  TileUpstream upstream;
+  BlockUpstream upstream;
   ToBlocks(rows_upstream.red, upstream.red);
   ToBlocks(rows_upstream.green, upstream.green);
   ToBlocks(rows_upstream.blue, upstream.blue);
@@ -208,18 +232,17 @@ void WalkTile(const Splat* splats, const std::uint32_t* list, std::size_t count,
   Rays rays;
   ToBlocks(rows_upstream.transmittance, rays.beyond);
   std::copy_n(ends.transmittance, TilePixels::count, rays.transmittance);
-  static const Places places;
   Batch batch;
   for (std::size_t b = (passed + Batch::size - 1) / Batch::size; b-- > asked / Batch::size;) {
     const std::size_t first = b * Batch::size, n = HWY_MIN(Batch::size, passed - first);
     Fill(splats, list + first, n, x0, y0, batch);
-    if (b > 0)
+    if (b > asked / Batch::size)
       for (std::size_t k = first - Batch::size; k < first; ++k) hwy::Prefetch(&splats[list[k]]);
     FindReach(d, n, batch);
     for (std::size_t block = 0; block < Blocks::count; ++block)
       batch.reach[block] &= FirstBits(block_ends[block] - std::int64_t(first));
     const std::uint64_t bits_asked = asked > first ? ~std::uint64_t{0} << (asked - first) : ~std::uint64_t{0};
-    WalkBack<kDepth>(d, places, first, batch, bits_asked, Changeable(pair_of_entry + first, n), upstream, ends, rays,
+    WalkBack<kDepth>(d, first, batch, bits_asked, Changeable(pair_of_entry + first, n), upstream, ends, rays,
                      pair_of_entry + first, pairs);
   }
 }

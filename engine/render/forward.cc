@@ -87,11 +87,11 @@ void forward_simd(const Layers& layers, const scene::Camera& camera, const Forwa
     TilePixels pixels;
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t tile = tiles[i];
-      const int x0 = int(tile) % grid.columns * tile_size, y0 = int(tile) / grid.columns * tile_size;
       const std::uint32_t first = buffers.tile_begin[tile], last = buffers.tile_begin[tile + 1];
-      composite_tile(buffers.splats.data(), {buffers.entries.data() + first, last - first}, x0, y0, channels,
+      const TilePlace place = place_of(tile, grid.columns, grid.pixels);
+      composite_tile(buffers.splats.data(), {buffers.entries.data() + first, last - first}, place, channels,
                      options.background, pixels);
-      store_tile(pixels, x0, y0, grid.pixels, out);
+      store_tile(pixels, place.x0, place.y0, grid.pixels, out);
     }
   });
 }

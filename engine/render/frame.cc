@@ -55,8 +55,8 @@ void Frame::backward(const scene::GaussianCloud& cloud, const scene::Image& v_co
   std::iota(frame.rows.begin(), frame.rows.end(), 0u);
   const auto params = view_params<float>(frame.camera);
   clear_mean2d(out);
-  walk_tiles(frame.buffers, frame.grid, {.color = &v_color}, frame.background, frame.buffers.first_pair[cloud.size()],
-             frame.walk);
+  walk_tiles(frame.buffers, frame.buffers.ray_ends.data(), frame.grid, {.color = &v_color}, frame.background,
+             frame.buffers.first_pair[cloud.size()], frame.walk);
   const RowPairs row_pairs{.first_pair = frame.buffers.first_pair.data(), .pairs = frame.walk.pairs.data()};
   parallel_for(cloud.size(), project_vjp_block, [&](std::size_t begin, std::size_t end) {
     project_rows_vjp(cloud, 0, params, cloud.sh_degree, frame.rows, row_pairs, begin, end, out);

@@ -120,13 +120,14 @@ std::size_t FrozenView::memory_bytes() const {
 
 struct LocalFrame::Impl {
   ForwardBuffers changeable;        ///< Of the changeable Gaussians alone.
-  ForwardBuffers merged;            ///< splats, count, entries and tile_begin: of both.
+  ForwardBuffers merged;            ///< splats, count, entries, tile_begin, pair_of_entry and ray_ends: of both.
   Buffer<std::uint32_t> of_frozen;  ///< [frozen splats] Number among the merged.
   Buffer<std::uint32_t> of_change;  ///< [changeable splats]
   scene::Rect reach;
   std::vector<std::uint32_t> tiles;  ///< Reached.
   std::vector<std::uint32_t> rows;   ///< 0, 1, 2, ...
   WalkBuffers walk;
+  bool drawn = false;  ///< Since merge(): ray_ends are those of `merged`.
 };
 
 LocalFrame::LocalFrame() : impl_(std::make_unique<Impl>()) {}
@@ -163,6 +164,7 @@ void LocalFrame::merge(const FrozenView& frozen) {
   const ForwardBuffers& top = frame.changeable;
   ForwardBuffers& merged = frame.merged;
   assert(!frozen.is_let_go());
+  frame.drawn = false;
   assert(top.tile_begin.size() == view.tile_begin.size() && contains(view.region, frame.reach));
 
   // By depth; a frozen splat comes before a changeable one of the same depth, as rows of a base do.
@@ -239,6 +241,7 @@ std::size_t LocalFrame::entries() const {
 void LocalFrame::forward(const FrozenView& frozen, scene::Image& color) {
   const FrozenView::Impl& view = *frozen.impl_;
   assert(color.width == view.region.width() && color.height == view.region.height() && color.channels == 3);
+  impl_->drawn = true;
   ForwardBuffers& merged = impl_->merged;
   RayEnds* const ends = merged.ray_ends.reserve(merged.tile_begin.size() - 1);
   parallel_for(impl_->tiles.size(), 1, [&](std::size_t i, std::size_t) {
@@ -261,7 +264,9 @@ void LocalFrame::backward(const FrozenView& frozen, const scene::GaussianCloud& 
   const UpstreamPlanes upstream{.color = &v_color};
   clear_mean2d(out);
   const ForwardBuffers& top = impl_->changeable;
-  walk_tiles(impl_->merged, grid, upstream, view.background, top.first_pair[rows.size()], impl_->walk);
+  assert(impl_->drawn);
+  walk_tiles(impl_->merged, impl_->merged.ray_ends.data(), grid, upstream, view.background, top.first_pair[rows.size()],
+             impl_->walk);
   const RowPairs row_pairs{.first_pair = top.first_pair.data(), .pairs = impl_->walk.pairs.data()};
   const auto params = view_params<float>(view.camera);
   parallel_for(rows.size(), project_vjp_block, [&](std::size_t begin, std::size_t end) {

@@ -23,10 +23,9 @@ void raise_to_largest_weights(const Layers& layers, const scene::Camera& camera,
     std::vector<float> largest;
     for (std::size_t tile = begin; tile < end; ++tile) {
       const std::uint32_t first = buffers.tile_begin[tile], count = buffers.tile_begin[tile + 1] - first;
-      const int x0 = int(tile) % grid.columns * tile_size, y0 = int(tile) / grid.columns * tile_size;
       largest.resize(count);
-      largest_tile_weights(buffers.splats.data(), {buffers.entries.data() + first, count}, x0, y0, camera.width - x0,
-                           camera.height - y0, largest.data());
+      largest_tile_weights(buffers.splats.data(), {buffers.entries.data() + first, count},
+                           place_of(tile, grid.columns, grid.pixels), largest.data());
       for (std::size_t k = 0; k < count; ++k) {
         // Several tiles may raise the same row; the largest of them is the same in any order.
         std::atomic_ref<float> row(out[buffers.splats[buffers.entries[first + k]].row]);

@@ -16,18 +16,17 @@ namespace HWY_NAMESPACE {
 
 /// Walks the batch through one block. False if all of the block's rays have ended.
 ///   largest  [batch][lanes] raised
-HWY_INLINE bool WalkBlock(D d, const Batch& batch, std::size_t block, V lane_x, V lane_y, float* transmittances,
-                          float* largest) {
+HWY_INLINE bool WalkBlock(D d, const Batch& batch, std::size_t block, float* transmittances, float* largest) {
   V transmittance = hn::Load(d, transmittances + block * Blocks::lanes);
   if (AllEnded(d, transmittance)) return false;
-  const V px = hn::Add(lane_x, hn::Set(d, float(block % Blocks::columns * Blocks::width)));
-  const V py = hn::Add(lane_y, hn::Set(d, float(block / Blocks::columns * Blocks::height)));
+  const V px = hn::Load(d, places.x + block * Blocks::lanes), py = hn::Load(d, places.y + block * Blocks::lanes);
   for (std::uint64_t rest = batch.reach[block]; rest != 0; rest &= rest - 1) {
     const std::size_t k = hwy::Num0BitsBelowLS1Bit_Nonzero64(rest);
     const V alpha = AlphaAt(d, batch, k, px, py);
     const V before = transmittance;
     V after;
     const auto going_on = Pass(d, alpha, transmittance, after);
+    if (hn::AllFalse(d, going_on)) break;
     const V w = hn::IfThenElseZero(going_on, hn::Mul(before, alpha));
     float* const so_far = largest + k * Blocks::lanes;
     hn::Store(hn::Max(w, hn::Load(d, so_far)), d, so_far);
@@ -36,34 +35,21 @@ HWY_INLINE bool WalkBlock(D d, const Batch& batch, std::size_t block, V lane_x, 
   return true;
 }
 
-void LargestWeights(const Splat* splats, const std::uint32_t* list, std::size_t count, int x0, int y0, int width,
-                    int height, float* out) {
+void LargestWeights(const Splat* splats, const std::uint32_t* list, std::size_t count, TilePlace place, float* out) {
   const D d;
-  alignas(64) float lanes_x[Blocks::lanes], lanes_y[Blocks::lanes];
-  for (std::size_t i = 0; i < Blocks::lanes; ++i) {
-    lanes_x[i] = float(i % Blocks::width);
-    lanes_y[i] = float(i / Blocks::width);
-  }
-  const V lane_x = hn::Load(d, lanes_x), lane_y = hn::Load(d, lanes_y);
-  // Beyond the picture's edge nothing is shown: those rays have ended before they begin.
   alignas(64) float transmittances[TilePixels::count];
-  for (std::size_t i = 0; i < TilePixels::count; ++i) {
-    const std::size_t block = i / Blocks::lanes, lane = i % Blocks::lanes;
-    const float x = lanes_x[lane] + float(block % Blocks::columns * Blocks::width),
-                y = lanes_y[lane] + float(block / Blocks::columns * Blocks::height);
-    transmittances[i] = x < float(width) && y < float(height) ? 1.0f : ended_transmittance;
-  }
+  BeginRays(place, transmittances);
   Batch batch;
   alignas(64) float largest[Batch::size * Blocks::lanes];
   std::fill_n(out, count, 0.0f);
   for (std::size_t first = 0; first < count; first += Batch::size) {
     const std::size_t n = HWY_MIN(Batch::size, count - first);
-    Fill(splats, list + first, n, x0, y0, batch);
+    Fill(splats, list + first, n, place.x0, place.y0, batch);
     FindReach(d, n, batch);
     std::fill_n(largest, n * Blocks::lanes, 0.0f);
     bool live = false;
     for (std::size_t block = 0; block < Blocks::count; ++block)
-      live |= WalkBlock(d, batch, block, lane_x, lane_y, transmittances, largest);
+      live |= WalkBlock(d, batch, block, transmittances, largest);
     for (std::size_t k = 0; k < n; ++k)
       out[first + k] = *std::max_element(largest + k * Blocks::lanes, largest + (k + 1) * Blocks::lanes);
     if (!live) return;
@@ -79,9 +65,8 @@ namespace engine::render {
 
 HWY_EXPORT(LargestWeights);
 
-void largest_tile_weights(const Splat* splats, std::span<const std::uint32_t> list, int x0, int y0, int width,
-                          int height, float* out) {
-  HWY_DYNAMIC_DISPATCH(LargestWeights)(splats, list.data(), list.size(), x0, y0, width, height, out);
+void largest_tile_weights(const Splat* splats, std::span<const std::uint32_t> list, TilePlace place, float* out) {
+  HWY_DYNAMIC_DISPATCH(LargestWeights)(splats, list.data(), list.size(), place, out);
 }
 
 }  // namespace engine::render

@@ -3,6 +3,7 @@
 
 #include <hwy/cache_control.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -65,11 +66,12 @@ struct TileGrid {
   std::vector<std::uint8_t> wanted;  ///< [rows * columns], or empty: all those that `pixels` meets.
 };
 
-/// Where the rays of a tile ended, in the order in which kernels store pixels: what blending leaves for the way back.
+/// Where the rays of a tile ended, in the order in which kernels of the instruction set in use store pixels: what
+/// blending leaves for the way back.
 struct alignas(64) RayEnds {
   static constexpr std::size_t count = std::size_t(tile_size) * tile_size;
   float transmittance[count];  ///< What reaches the background.
-  std::int32_t end[count];     ///< How many splats of the tile's list the ray passed.
+  std::int32_t end[count];     ///< One past the last listed splat that its block met and that did not end it. 0: none.
 };
 
 /// What a forward pass works in. The stages fill it from top to bottom.
@@ -132,6 +134,19 @@ std::size_t project_rows(const ProjectedLayer& layer, const ViewParams<float>& v
 /// Most rows project_rows() takes at once.
 constexpr std::size_t project_block = 1024;
 
+/// A tile of a picture: its first pixel, and how many pixels from there on are shown.
+struct TilePlace {
+  int x0, y0;
+  int width, height;  ///< At most tile_size.
+};
+
+///   columns  tiles across the whole picture
+///   shown    pixels of it
+inline TilePlace place_of(std::size_t tile, int columns, scene::Rect shown) {
+  const int x0 = int(tile) % columns * tile_size, y0 = int(tile) / columns * tile_size;
+  return {x0, y0, std::min(tile_size, shown.x1 - x0), std::min(tile_size, shown.y1 - y0)};
+}
+
 /// Which sums composite_tile() keeps.
 struct Channels {
   bool color = false, depth = false, weight = false;
@@ -155,23 +170,22 @@ struct alignas(64) TilePixels {
 ///   at      first pixel of the tile's first row
 ///   stride  floats from row to row
 inline void fetch_tile(const float* at, std::ptrdiff_t stride, int width, int height) {
-  for (int y = 0; y < height; ++y, at += stride) {
-    hwy::Prefetch(at);
-    hwy::Prefetch(at + width - 1);
+  for (int y = 0; y < height; ++y) {
+    hwy::Prefetch(at + y * stride);
+    hwy::Prefetch(at + y * stride + width - 1);
   }
 }
 
-/// Blends the listed splats, nearest first, into the tile whose first pixel is (x0, y0), and the background behind
-/// them. Only the planes that `channels` names, and alpha, are written.
-///   ends  null: not needed
-void composite_tile(const Splat* splats, std::span<const std::uint32_t> list, int x0, int y0, Channels channels,
+/// Blends the listed splats, nearest first, into the tile, and the background behind them. Only the planes that
+/// `channels` names, and alpha, are written, and of those only the pixels that are shown mean something.
+///   ends  null: not needed. Else channels are colour or none.
+void composite_tile(const Splat* splats, std::span<const std::uint32_t> list, TilePlace place, Channels channels,
                     Vec3 background, TilePixels& tile, RayEnds* ends = nullptr);
 
 /// The largest blending weight of each listed splat over the pixels of a tile; see composite_tile().
-///   width, height  pixels of the picture from (x0, y0) on: those beyond count for nothing
-///   out            [list.size()]
-void largest_tile_weights(const Splat* splats, std::span<const std::uint32_t> list, int x0, int y0, int width,
-                          int height, float* out);
+/// Pixels that are not shown count for nothing.
+///   out  [list.size()]
+void largest_tile_weights(const Splat* splats, std::span<const std::uint32_t> list, TilePlace place, float* out);
 
 /// Projects all layers into the buffers.
 ///   weight  [layers.size()] or empty

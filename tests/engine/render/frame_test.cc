@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <numeric>
+#include <string>
 #include <vector>
 
 #include "engine/core/parallel.h"
@@ -46,7 +47,7 @@ void expect_equal(const Gradients& a, const Gradients& b) {
   EXPECT_EQ(a.mean2d_y_px, b.mean2d_y_px);
 }
 
-TEST(Frame, GivesTheBytesOfForwardAndBackward) {
+void expect_bytes_of_forward_and_backward() {
   const Vec3 background(0.2f, 0.5f, 0.1f);
   for (const int degree : {0, 3}) {
     const scene::GaussianCloud cloud = cloud_in_view(2000, 1, degree);
@@ -63,6 +64,16 @@ TEST(Frame, GivesTheBytesOfForwardAndBackward) {
              expected);
     expect_equal(found.gradients, expected);
   }
+}
+
+TEST(Frame, GivesTheBytesOfForwardAndBackwardWithEveryInstructionSet) {
+  const std::string best = simd_target();
+  for (const std::string& target : simd_targets()) {
+    SCOPED_TRACE(target);
+    ASSERT_TRUE(pin_simd_target(target));
+    expect_bytes_of_forward_and_backward();
+  }
+  ASSERT_TRUE(pin_simd_target(best));
 }
 
 TEST(Frame, GivesTheSameBytesForAnyNumberOfThreads) {

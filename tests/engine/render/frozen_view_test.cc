@@ -82,23 +82,17 @@ TEST(FrozenView, GivesThePictureOfAllLayers) {
   }
 }
 
-TEST(FrozenView, GivesTheGradientsOfAllLayers) {
-  const Scene scene;
-  LocalFrame frame;
-  const scene::Rect region = frame.project(scene.changeable, scene.camera);
-  const FrozenView frozen(scene.only_frozen(), scene.camera, region, Vec3(0.3f));
-  frame.merge(frozen);
+/// backward() of a frame that has drawn the scene against that of all layers.
+void expect_gradients_of_all_layers(const Scene& scene, const FrozenView& frozen, LocalFrame& frame, Vec3 background) {
   const scene::Image upstream = noise(scene.camera.width, scene.camera.height);
   Gradients local, expected;
   for (Gradients* gradients : {&local, &expected}) gradients->reset(scene.changeable.size(), 1);
-  scene::Image picture = frozen.color();
-  frame.forward(frozen, picture);
-  frame.backward(frozen, scene.changeable, part(upstream, region), local);
+  frame.backward(frozen, scene.changeable, part(upstream, frozen.region()), local);
 
   std::vector<std::uint32_t> rows(scene.changeable.size());
   std::iota(rows.begin(), rows.end(), std::uint32_t(scene.frozen.size()));
   BackwardOptions options;
-  options.forward.background = Vec3(0.3f);
+  options.forward.background = background;
   BackwardWorkspace workspace;
   backward(scene.layers(), scene.camera, options, {.color = upstream}, rows, workspace, expected);
   EXPECT_TRUE(local.mean == expected.mean);
@@ -109,6 +103,17 @@ TEST(FrozenView, GivesTheGradientsOfAllLayers) {
   EXPECT_TRUE(local.mean2d_x_px == expected.mean2d_x_px);
   EXPECT_TRUE(local.mean2d_y_px == expected.mean2d_y_px);
   EXPECT_NE(local.opacity_logit, std::vector<float>(local.size(), 0.0f));
+}
+
+TEST(FrozenView, GivesTheGradientsOfAllLayers) {
+  const Scene scene;
+  LocalFrame frame;
+  const scene::Rect region = frame.project(scene.changeable, scene.camera);
+  const FrozenView frozen(scene.only_frozen(), scene.camera, region, Vec3(0.3f));
+  frame.merge(frozen);
+  scene::Image picture = frozen.color();
+  frame.forward(frozen, picture);
+  expect_gradients_of_all_layers(scene, frozen, frame, Vec3(0.3f));
 }
 
 TEST(FrozenView, ServesOnePictureAfterAnother) {
@@ -123,6 +128,7 @@ TEST(FrozenView, ServesOnePictureAfterAnother) {
     scene::Image picture = frozen.color();
     reused.forward(frozen, picture);
     EXPECT_TRUE(picture == forward(scene.layers(), scene.camera).color) << move;
+    expect_gradients_of_all_layers(scene, frozen, reused, Vec3(0.0f));
   }
 }
 
