@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 
 #include "engine/edit/footprint.h"
 #include "engine/edit/seed.h"
@@ -68,16 +69,16 @@ DVec3 bilinear(const scene::Image& image, DVec2 pixel) {
   return color;
 }
 
-std::size_t nearest_other(std::span<const scene::Camera> views, std::size_t v) {
-  std::size_t best = v;
-  double least = 1e300;
-  for (std::size_t w = 0; w < views.size(); ++w)
-    if (const double far = glm::distance(views[v].centre(), views[w].centre()); w != v && far < least)
-      least = far, best = w;
-  return best;
-}
-
 }  // namespace
+
+std::size_t nearest_view(std::span<const scene::Camera> views, std::size_t v) {
+  std::size_t nearest = v;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t w = 0; w < views.size(); ++w)
+    if (const double far = glm::distance(views[v].centre(), views[w].centre()); far > 0 && far < least)
+      least = far, nearest = w;
+  return nearest;
+}
 
 void LikenessSum::add(const scene::Image& result, const scene::Image& truth, const scene::Mask& counts) {
   const std::size_t area = counts.area();
@@ -147,7 +148,7 @@ Agreement agreement(const Case& the_case, std::span<const scene::Camera> views,
   Agreement out;
   double squares = 0;
   for (std::size_t v = 0; v < views.size(); ++v) {
-    const std::size_t w = nearest_other(views, v);
+    const std::size_t w = nearest_view(views, v);
     const scene::Camera &from = views[v], &to = views[w];
     const scene::Mask vacated = kinds_of(the_case, from).vacated;
     for (int y = 0; y < from.height; ++y)

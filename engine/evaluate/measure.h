@@ -35,6 +35,9 @@ class LikenessSum {
 [[nodiscard]] scene::Image picture(const scene::GaussianCloud& cloud, const scene::Camera& camera);
 [[nodiscard]] scene::Mask complement(scene::Mask mask);
 
+/// The view that was taken nearest to view v from another place; v if there is none.
+[[nodiscard]] std::size_t nearest_view(std::span<const scene::Camera> views, std::size_t v);
+
 struct Quality {
   Likeness edited;   ///< What the part dominates before or after, and 4 pixels (at 360 of height) around it.
   Likeness vacated;  ///< What it dominates before, and not after.

@@ -95,12 +95,7 @@ std::vector<scene::Camera> cameras_between(std::span<const scene::Camera> views)
   std::vector<scene::Camera> out;
   std::vector<std::pair<std::size_t, std::size_t>> pairs;
   for (std::size_t v = 0; v < views.size(); ++v) {
-    std::size_t nearest = v;
-    double distance = 0;
-    for (std::size_t w = 0; w < views.size(); ++w) {
-      const double d = glm::distance(views[v].centre(), views[w].centre());
-      if (w != v && d > 0 && (nearest == v || d < distance)) nearest = w, distance = d;
-    }
+    const std::size_t nearest = nearest_view(views, v);
     const std::pair<std::size_t, std::size_t> pair = std::minmax(v, nearest);
     if (nearest == v || std::find(pairs.begin(), pairs.end(), pair) != pairs.end()) continue;
     pairs.push_back(pair);
