@@ -206,7 +206,7 @@ Crowded measure_crowds(const Sample& sample) {
   scene::append_rows(held, sample.cloud, rows);
   engine::render::LocalFrame frame;
   const scene::Rect region =
-      train::region_around(train::united(engine::mask::bounding_box(mask), frame.project(held, camera)), camera);
+      train::region_around(train::united(scene::bounding_box(mask), frame.project(held, camera)), camera);
   std::vector<std::unique_ptr<Training>> trainings;
   for (const int times : crowds) {
     scene::GaussianCloud cloud = sample.cloud;

@@ -28,17 +28,6 @@ scene::Rect padded(scene::Rect box, const scene::Image& picture) {
           std::min(box.y1 + by, picture.height)};
 }
 
-scene::Rect bounding_box(const scene::Mask& mask) {
-  scene::Rect box{mask.width, mask.height, 0, 0};
-  for (int y = 0; y < mask.height; ++y)
-    for (int x = 0; x < mask.width; ++x)
-      if (mask.at(x, y) != 0) {
-        box.x0 = std::min(box.x0, x), box.x1 = std::max(box.x1, x + 1);
-        box.y0 = std::min(box.y0, y), box.y1 = std::max(box.y1, y + 1);
-      }
-  return box;
-}
-
 /// The pictures that patches are taken from, at one scale.
 struct SourceScale {
   std::vector<Partial> pictures;

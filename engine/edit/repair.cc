@@ -246,7 +246,7 @@ void Repair::note_vacated(const Rows& rows, std::span<const scene::Mask> masks) 
     const scene::Image share = footprint(original_, rows.gone, views_[v], workspace_);
     vacated_[v] = mask::dilate(mask::mask2d(share), std::max(1, views_[v].height / 128));
     buffer_[v].excluded = mask::mask2d(share, trace);
-    buffer_[v].box = mask::bounding_box(masks[v]);
+    buffer_[v].box = scene::bounding_box(masks[v]);
   }
 }
 

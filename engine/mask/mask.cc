@@ -89,15 +89,4 @@ void unite(scene::Mask& into, const scene::Mask& other) {
   for (std::size_t i = 0; i < into.data.size(); ++i) into.data[i] |= other.data[i];
 }
 
-scene::Rect bounding_box(const scene::Mask& mask) {
-  scene::Rect box{mask.width, mask.height, 0, 0};
-  for (int y = 0; y < mask.height; ++y)
-    for (int x = 0; x < mask.width; ++x)
-      if (mask.at(x, y)) {
-        box.x0 = std::min(box.x0, x), box.x1 = std::max(box.x1, x + 1);
-        box.y0 = std::min(box.y0, y), box.y1 = y + 1;
-      }
-  return box.empty() ? scene::Rect{} : box;
-}
-
 }  // namespace engine::mask

@@ -21,7 +21,4 @@ namespace engine::mask {
 /// into |= other. Both have the same size (asserted).
 void unite(scene::Mask& into, const scene::Mask& other);
 
-/// The smallest rectangle that holds all set pixels; an empty one (all zero) if there are none.
-[[nodiscard]] scene::Rect bounding_box(const scene::Mask& mask);
-
 }  // namespace engine::mask

@@ -9,9 +9,7 @@
 
 namespace engine::scene {
 
-std::size_t Mask::area() const {
-  return std::accumulate(data.begin(), data.end(), std::size_t{0});
-}
+std::size_t Mask::area() const { return std::accumulate(data.begin(), data.end(), std::size_t{0}); }
 
 Image cut_out(const Image& image, Rect part) {
   assert(part.x0 >= 0 && part.y0 >= 0 && part.x1 <= image.width && part.y1 <= image.height);
@@ -39,6 +37,17 @@ Mask cut_out(const Mask& mask, Rect part) {
     std::copy_n(mask.data.begin() + std::ptrdiff_t(part.y0 + y) * mask.width + part.x0, out.width,
                 out.data.begin() + std::ptrdiff_t(y) * out.width);
   return out;
+}
+
+Rect bounding_box(const Mask& mask) {
+  Rect box{mask.width, mask.height, 0, 0};
+  for (int y = 0; y < mask.height; ++y)
+    for (int x = 0; x < mask.width; ++x)
+      if (mask.at(x, y) != 0) {
+        box.x0 = std::min(box.x0, x), box.x1 = std::max(box.x1, x + 1);
+        box.y0 = std::min(box.y0, y), box.y1 = y + 1;
+      }
+  return box.empty() ? Rect{} : box;
 }
 
 double psnr(const Image& a, const Image& b) {

@@ -20,7 +20,9 @@ struct Image {
 
   [[nodiscard]] std::size_t pixels() const { return std::size_t(width) * std::size_t(height); }
   [[nodiscard]] std::span<float> plane(int c) { return {data.data() + pixels() * std::size_t(c), pixels()}; }
-  [[nodiscard]] std::span<const float> plane(int c) const { return {data.data() + pixels() * std::size_t(c), pixels()}; }
+  [[nodiscard]] std::span<const float> plane(int c) const {
+    return {data.data() + pixels() * std::size_t(c), pixels()};
+  }
   [[nodiscard]] float& at(int x, int y, int c = 0) { return data[index(x, y, c)]; }
   [[nodiscard]] float at(int x, int y, int c = 0) const { return data[index(x, y, c)]; }
   bool operator==(const Image&) const = default;
@@ -40,7 +42,9 @@ struct Mask {
   Mask(int w, int h) : width(w), height(h), data(std::size_t(w) * std::size_t(h), 0) {}
 
   [[nodiscard]] std::uint8_t& at(int x, int y) { return data[std::size_t(y) * std::size_t(width) + std::size_t(x)]; }
-  [[nodiscard]] std::uint8_t at(int x, int y) const { return data[std::size_t(y) * std::size_t(width) + std::size_t(x)]; }
+  [[nodiscard]] std::uint8_t at(int x, int y) const {
+    return data[std::size_t(y) * std::size_t(width) + std::size_t(x)];
+  }
   [[nodiscard]] std::size_t area() const;  ///< Pixels that are set.
   bool operator==(const Mask&) const = default;
 };
@@ -53,6 +57,9 @@ struct Rect {
   [[nodiscard]] bool empty() const { return x1 <= x0 || y1 <= y0; }
   bool operator==(const Rect&) const = default;
 };
+
+/// The smallest rectangle that holds all set pixels; an empty one (all zero) if there are none.
+[[nodiscard]] Rect bounding_box(const Mask& mask);
 
 /// A part of a picture. Precondition: it lies inside.
 [[nodiscard]] Image cut_out(const Image& image, Rect part);

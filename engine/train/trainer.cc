@@ -78,7 +78,7 @@ Trainer::Trainer(Frozen frozen, Changeable changeable, double scene_extent, cons
 
 bool Trainer::add_view(const scene::Camera& camera, const scene::Mask& mask, const scene::GaussianCloud& original) {
   assert(mask.width == camera.width && mask.height == camera.height);
-  const scene::Rect box = mask::bounding_box(mask);
+  const scene::Rect box = scene::bounding_box(mask);
   if (box.empty()) return false;
   scene::Rect reach = united(box, frame_.project(cloud_, camera));
   reach = united(reach, frame_.project(original, camera));

@@ -151,7 +151,7 @@ TEST(Repair, TheBufferIsTheUneditedSceneWithoutTheBlockInItsPlace) {
   for (std::size_t v = 0; v < moved.corrector.buffer.size(); ++v) {
     const correct::Example& example = moved.corrector.buffer[v];
     EXPECT_EQ(example.picture, render::forward(moved.original, moved.block.cameras[v]).color);
-    EXPECT_EQ(example.box, mask::bounding_box(moved.masks[v]));
+    EXPECT_EQ(example.box, scene::bounding_box(moved.masks[v]));
     for (std::size_t i = 0; i < example.excluded.data.size(); ++i)
       if (example.excluded.data[i] == 0) {
         EXPECT_LT(example.picture.plane(0)[i], 0.35f) << v << ": no red that may be learned from";

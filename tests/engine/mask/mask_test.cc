@@ -95,17 +95,5 @@ TEST(Unite, KeepsWhatEitherHolds) {
   EXPECT_EQ(a.data, (std::vector<std::uint8_t>{1, 0, 0, 1}));
 }
 
-TEST(BoundingBox, HoldsExactlyTheSetPixels) {
-  Mask mask(10, 8);
-  EXPECT_TRUE(bounding_box(mask).empty());
-  EXPECT_EQ(bounding_box(mask), Rect{});
-  mask.at(7, 3) = 1;
-  EXPECT_EQ(bounding_box(mask), (Rect{7, 3, 8, 4}));
-  mask.at(2, 6) = 1;
-  EXPECT_EQ(bounding_box(mask), (Rect{2, 3, 8, 7}));
-  mask.at(0, 0) = mask.at(9, 7) = 1;
-  EXPECT_EQ(bounding_box(mask), (Rect{0, 0, 10, 8}));
-}
-
 }  // namespace
 }  // namespace engine::mask

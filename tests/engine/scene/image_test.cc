@@ -20,6 +20,18 @@ TEST(Mask, AreaCountsSetPixels) {
   EXPECT_EQ(mask.area(), 2u);
 }
 
+TEST(Mask, ItsBoundingBoxHoldsExactlyTheSetPixels) {
+  Mask mask(10, 8);
+  EXPECT_TRUE(bounding_box(mask).empty());
+  EXPECT_EQ(bounding_box(mask), Rect{});
+  mask.at(7, 3) = 1;
+  EXPECT_EQ(bounding_box(mask), (Rect{7, 3, 8, 4}));
+  mask.at(2, 6) = 1;
+  EXPECT_EQ(bounding_box(mask), (Rect{2, 3, 8, 7}));
+  mask.at(0, 0) = mask.at(9, 7) = 1;
+  EXPECT_EQ(bounding_box(mask), (Rect{0, 0, 10, 8}));
+}
+
 Image counted(int width, int height, int channels) {
   Image image(width, height, channels);
   for (std::size_t i = 0; i < image.data.size(); ++i) image.data[i] = float(i);
