@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <new>
+#include <numeric>
 #include <utility>
 
 #include "engine/core/parallel.h"
@@ -44,59 +45,6 @@ Keyed* radix_sort(Keyed* from, Keyed* to, std::size_t n) {
   return from;
 }
 
-/// The ellipse q <= q_max of a splat, for asking where it lies within a band of pixel rows.
-class Ellipse {
- public:
-  explicit Ellipse(const Splat& splat) : x_(splat.x), y_(splat.y) {
-    // u = l1 dx + l2 dy and v = l3 dy run over a disc of this radius. The margin covers rounding here and in the blend.
-    const float radius = std::sqrt(std::max(0.0f, splat.log2_opacity + log2_255 + 1e-3f));
-    const float inverse_l1 = 1 / splat.l1;
-    slope_ = -splat.l2 * inverse_l1;
-    half_y_ = radius / splat.l3;
-    inverse_half_y_ = splat.l3 / radius;
-    radius_over_l1_ = radius * inverse_l1;
-    const float tilt = splat.l2 / splat.l3;
-    rightmost_dy_ = -tilt / std::sqrt(1 + tilt * tilt) * half_y_;
-    margin_ = 0.01f + 1e-5f * (radius_over_l1_ + std::abs(slope_) * half_y_);
-  }
-  struct Extent {
-    float left, right;
-  };
-  /// Smallest and largest x of the ellipse over the pixel rows [row0, row1].
-  [[nodiscard]] Extent over_rows(float row0, float row1) const {
-    const float low = std::clamp(row0 - y_, -half_y_, half_y_), high = std::clamp(row1 - y_, -half_y_, half_y_);
-    return {x_ - reach(std::clamp(rightmost_dy_, -high, -low)), x_ + reach(std::clamp(rightmost_dy_, low, high))};
-  }
-
- private:
-  /// x of the right edge at height dy, relative to the mean; concave in dy. The left edge is its point reflection.
-  [[nodiscard]] float reach(float dy) const {
-    const float t = dy * inverse_half_y_;
-    return slope_ * dy + radius_over_l1_ * std::sqrt(std::max(0.0f, 1 - t * t)) + margin_;
-  }
-  float x_, y_, slope_, half_y_, inverse_half_y_, radius_over_l1_, rightmost_dy_, margin_;
-};
-
-/// Calls visit(tile) for every tile that holds a pixel within reach of the splat (and rarely for one that just misses).
-template <class Visit>
-void visit_tiles(const Splat& splat, TileBox box, int columns, Visit&& visit) {
-  if (box.first_column == box.last_column || box.first_row == box.last_row) {  // here the bounding box is tight
-    for (int ty = box.first_row; ty <= box.last_row; ++ty)
-      for (int tx = box.first_column; tx <= box.last_column; ++tx) visit(std::uint32_t(ty * columns + tx));
-    return;
-  }
-  const Ellipse ellipse(splat);
-  for (int ty = box.first_row; ty <= box.last_row; ++ty) {
-    const auto extent = ellipse.over_rows(float(ty * tile_size), float(ty * tile_size + tile_size - 1));
-    // Tile tx holds the pixel centres 16 tx to 16 tx + 15. Clamped before conversion: a splat may reach past any int.
-    const float low = std::max(extent.left, float(box.first_column * tile_size));
-    const float high = std::min(extent.right, float(box.last_column * tile_size + tile_size - 1));
-    if (!(low <= high)) continue;
-    const int first = (int(low) + (float(int(low)) < low ? 1 : 0)) / tile_size, last = int(high) / tile_size;
-    for (int tx = first; tx <= last; ++tx) visit(std::uint32_t(ty * columns + tx));
-  }
-}
-
 }  // namespace
 
 void sort_by_depth(ForwardBuffers& buffers) {
@@ -126,6 +74,18 @@ void sort_by_depth(ForwardBuffers& buffers) {
 
 namespace {
 
+/// Drops the tiles that are not wanted from the lists of splats. Returns their end.
+std::uint32_t* keep_wanted(const TileGrid& grid, std::span<std::uint32_t> reached, std::uint32_t* tiles) {
+  std::uint32_t* kept = tiles;
+  for (std::uint32_t& count : reached) {
+    std::uint32_t* const before = kept;
+    for (const std::uint32_t* const end = tiles + count; tiles != end; ++tiles)
+      if (grid.wanted[*tiles] != 0) *kept++ = *tiles;
+    count = std::uint32_t(kept - before);
+  }
+  return kept;
+}
+
 /// Counts the entries of each tile and says where they go; place_entries() puts them there.
 /// Calls reached_tiles(i, n) for each splat: in how many tiles it is listed.
 template <class Reached>
@@ -143,34 +103,34 @@ void count_entries(const TileGrid& grid, ForwardBuffers& buffers, Reached&& reac
       const TileBox& box = buffers.boxes[i];
       at_most += std::size_t(box.last_column - box.first_column + 1) * std::size_t(box.last_row - box.first_row + 1);
     }
-    std::uint32_t* next = block.tiles.reserve(at_most);
-    std::uint32_t* reached = block.reached.reserve(last - first);
-    for (std::size_t i = first; i < last; ++i) {
-      const std::uint32_t* const before = next;
-      visit_tiles(buffers.splats[i], buffers.boxes[i], grid.columns, [&](std::uint32_t tile) {
-        if (!grid.wanted.empty() && grid.wanted[tile] == 0) return;
-        *next++ = tile;
-        ++block.position[tile];
-      });
-      *reached++ = std::uint32_t(next - before);
-      reached_tiles(i, std::uint32_t(next - before));
-    }
+    std::uint32_t* const listed = block.tiles.reserve(at_most + reached_tiles_slack);
+    std::uint32_t* const reached = block.reached.reserve(last - first);
+    const std::uint32_t* listed_end =
+        list_reached_tiles({buffers.splats.data() + first, last - first}, buffers.boxes.data() + first, grid.columns,
+                           block.work, listed, reached);
+    if (!grid.wanted.empty()) listed_end = keep_wanted(grid, {reached, last - first}, listed);
+    block.listed = std::size_t(listed_end - listed);
+    for (const std::uint32_t* tile = listed; tile != listed_end; ++tile) ++block.position[*tile];
+    for (std::size_t i = first; i < last; ++i) reached_tiles(i, reached[i - first]);
   });
 
-  buffers.tile_begin.resize(tiles + 1);
   // Entries are numbered in 32 bits. More would need 16 GiB for the list alone: out of memory, said before it happens.
   std::uint64_t total = 0;
-  for (std::size_t b = 0; b < blocks; ++b)
-    for (const std::uint32_t count : buffers.bin_blocks[b].position) total += count;
+  for (std::size_t b = 0; b < blocks; ++b) total += buffers.bin_blocks[b].listed;
   if (total > std::numeric_limits<std::uint32_t>::max()) throw std::bad_alloc();
-  std::uint32_t sum = 0;
-  for (std::size_t tile = 0; tile < tiles; ++tile) {
-    buffers.tile_begin[tile] = sum;
-    for (std::size_t b = 0; b < blocks; ++b) sum += std::exchange(buffers.bin_blocks[b].position[tile], sum);
+  // A block's entries follow, within a tile, those of the blocks before it.
+  std::vector<std::uint32_t>& begin = buffers.tile_begin;
+  begin.assign(tiles + 1, 0);
+  for (std::size_t b = 0; b < blocks; ++b) {
+    std::uint32_t* const position = buffers.bin_blocks[b].position.data();
+    for (std::size_t tile = 0; tile < tiles; ++tile) {
+      const std::uint32_t count = position[tile];
+      position[tile] = begin[tile];
+      begin[tile] += count;
+    }
   }
-  buffers.tile_begin[tiles] = sum;
-
-  buffers.entries.reserve(sum);
+  std::exclusive_scan(begin.begin(), begin.end(), begin.begin(), 0u);
+  buffers.entries.reserve(begin[tiles]);
 }
 
 /// Lists the splats in their tiles. placing(i) returns what is told of each entry of splat i, in the order of tiles.
@@ -182,6 +142,7 @@ void place_entries(ForwardBuffers& buffers, Placing&& placing) {
     const std::uint32_t* tile = block.tiles.data();
     const std::uint32_t* const reached = block.reached.data();
     std::uint32_t* const position = block.position.data();
+    for (std::size_t t = 0; t < block.position.size(); ++t) position[t] += buffers.tile_begin[t];
     for (std::size_t i = first; i < last; ++i) {
       auto placed = placing(i);
       for (const std::uint32_t* const tiles_end = tile + reached[i - first]; tile != tiles_end; ++tile) {

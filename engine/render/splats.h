@@ -93,6 +93,8 @@ struct ForwardBuffers {
   struct BinBlock {
     Buffer<std::uint32_t> tiles;          ///< Those reached, splat by splat.
     Buffer<std::uint32_t> reached;        ///< How many tiles each splat reaches.
+    Buffer<std::int32_t> work;            ///< Of list_reached_tiles().
+    std::size_t listed = 0;               ///< All of them.
     std::vector<std::uint32_t> position;  ///< Per tile: count, then where the block's next entry goes.
   };
   std::vector<BinBlock> bin_blocks;
@@ -191,6 +193,17 @@ void largest_tile_weights(const Splat* splats, std::span<const std::uint32_t> li
 ///   weight  [layers.size()] or empty
 void project(const Layers& layers, const ViewParams<float>& view, int sh_degree, std::span<const float> weight,
              Culling culling, scene::Rect pixels, ForwardBuffers& buffers);
+
+/// Lists the tiles that hold a pixel within reach of a splat (and rarely one that just misses), splat by splat and, of
+/// each, row by row.
+///   boxes    [splats.size()]
+///   columns  tiles across the picture
+///   tiles    room for all tiles of the boxes, and reached_tiles_slack more
+///   reached  [splats.size()] how many are listed for each
+///   returns  the end of what is listed
+std::uint32_t* list_reached_tiles(std::span<const Splat> splats, const TileBox* boxes, int columns,
+                                  Buffer<std::int32_t>& work, std::uint32_t* tiles, std::uint32_t* reached);
+constexpr std::size_t reached_tiles_slack = 8;  // a vector is written where a tile may do
 
 /// The stages between projection and blending.
 void sort_by_depth(ForwardBuffers& buffers);

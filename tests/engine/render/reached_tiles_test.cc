@@ -1,0 +1,100 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "engine/core/rng.h"
+#include "engine/render/forward.h"
+#include "engine/render/splats.h"
+
+namespace engine::render {
+namespace {
+
+constexpr int columns = 20, rows = 12;
+
+/// Of any size, shape and direction; half of them needles, some with their mean far outside the picture.
+std::vector<Splat> random_splats(std::size_t n) {
+  Rng rng(3);
+  std::vector<Splat> splats(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const double angle = rng.uniform(0.0f, 3.15f), major = std::exp(rng.uniform(-0.6f, 5.5f));
+    const double minor = i % 2 == 0 ? 0.55 : major * rng.uniform(0.2f, 1.0f);
+    const double c = std::cos(angle), s = std::sin(angle), a = major * major, b = minor * minor;
+    const double xy = (a - b) * c * s, yy = a * s * s + b * c * c;  // of the covariance
+    const double to_sigmas = 0.84932180028801904;                   // see Splat
+    Splat& splat = splats[i];
+    splat.x = rng.uniform(-60.0f, columns * tile_size + 60.0f), splat.y = rng.uniform(-60.0f, rows * tile_size + 60.0f);
+    splat.l1 = float(std::sqrt(yy / (a * b)) * to_sigmas), splat.l3 = float(to_sigmas / std::sqrt(yy));
+    splat.l2 = float(-std::sqrt(yy / (a * b)) * to_sigmas * xy / yy);
+    splat.log2_opacity = rng.uniform(-7.9f, -0.01f);
+  }
+  return splats;
+}
+
+/// Tiles that hold a pixel at which the splat has an alpha of 1/255, by trying all pixels.
+std::set<std::uint32_t> tiles_by_pixels(const Splat& splat) {
+  std::set<std::uint32_t> tiles;
+  for (int y = 0; y < rows * tile_size; ++y)
+    for (int x = 0; x < columns * tile_size; ++x) {
+      const double dx = x - double(splat.x), dy = y - double(splat.y);
+      const double u = double(splat.l1) * dx + double(splat.l2) * dy, v = double(splat.l3) * dy;
+      if (splat.log2_opacity - u * u - v * v >= -log2_255)
+        tiles.insert(std::uint32_t(y / tile_size * columns + x / tile_size));
+    }
+  return tiles;
+}
+
+/// Two tiles wider than need be on every side: what is listed is to be told by the ellipse.
+TileBox wide_box(const std::set<std::uint32_t>& tiles) {
+  int first_column = columns - 1, last_column = 0, first_row = rows - 1, last_row = 0;
+  for (const std::uint32_t tile : tiles) {
+    const int column = int(tile) % columns, row = int(tile) / columns;
+    first_column = std::min(first_column, column), last_column = std::max(last_column, column);
+    first_row = std::min(first_row, row), last_row = std::max(last_row, row);
+  }
+  return {std::uint16_t(std::max(first_column - 2, 0)), std::uint16_t(std::min(last_column + 2, columns - 1)),
+          std::uint16_t(std::max(first_row - 2, 0)), std::uint16_t(std::min(last_row + 2, rows - 1))};
+}
+
+TEST(ListReachedTiles, ListsEveryTileThatHoldsAPixelWithinReachAndHardlyAnyOther) {
+  std::vector<Splat> splats;
+  std::vector<std::set<std::uint32_t>> expected;
+  std::vector<TileBox> boxes;
+  std::size_t room = reached_tiles_slack, needed = 0;
+  for (const Splat& splat : random_splats(1000)) {
+    auto tiles = tiles_by_pixels(splat);
+    if (tiles.empty()) continue;  // projection drops it
+    const TileBox box = wide_box(tiles);
+    room += std::size_t(box.last_column - box.first_column + 1) * std::size_t(box.last_row - box.first_row + 1);
+    needed += tiles.size();
+    splats.push_back(splat), boxes.push_back(box), expected.push_back(std::move(tiles));
+  }
+  ASSERT_GT(splats.size(), 500u);
+
+  const std::string best = simd_target();
+  for (const std::string& target : simd_targets()) {
+    SCOPED_TRACE(target);
+    ASSERT_TRUE(pin_simd_target(target));
+    std::vector<std::uint32_t> tiles(room), reached(splats.size());
+    Buffer<std::int32_t> work;
+    const std::uint32_t* const end =
+        list_reached_tiles(splats, boxes.data(), columns, work, tiles.data(), reached.data());
+    const std::uint32_t* next = tiles.data();
+    for (std::size_t i = 0; i < splats.size(); ++i) {
+      const std::set<std::uint32_t> listed(next, next + reached[i]);
+      ASSERT_EQ(listed.size(), reached[i]) << "splat " << i << " is listed twice in a tile";
+      ASSERT_TRUE(std::is_sorted(next, next + reached[i])) << i;
+      for (const std::uint32_t tile : expected[i]) ASSERT_TRUE(listed.contains(tile)) << "splat " << i;
+      next += reached[i];
+    }
+    EXPECT_EQ(next, end);
+    EXPECT_LT(double(end - tiles.data()), 1.1 * double(needed)) << "but for ends of needles between pixel centres";
+  }
+  ASSERT_TRUE(pin_simd_target(best));
+}
+
+}  // namespace
+}  // namespace engine::render
