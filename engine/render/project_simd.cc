@@ -7,6 +7,8 @@
 // After highway.h: the math functions are compiled once per instruction set.
 #include <hwy/contrib/math/math-inl.h>
 
+#include "engine/render/shade_rows.inc"
+
 #include <algorithm>
 
 #include "engine/render/splats.h"
@@ -193,70 +195,75 @@ void ProjectVector(D d, const scene::GaussianCloud& cloud, const ViewParams<floa
   out.count += count;
 }
 
-/// Dot products of the three channels' coefficients with the basis, four coefficients at a time: every band's count but
-/// that of degrees 0 and 2 is a multiple of four, and a row need not be aligned.
-HWY_INLINE void ShadeRow(const float* sh, std::size_t stored, std::size_t used, const float* basis, Splat& splat) {
-  const hn::CappedTag<float, 4> d4;
-  const std::size_t lanes = hn::Lanes(d4);
-  float rgb[3];
-  for (std::size_t c = 0; c < 3; ++c, sh += stored) {
-    float sum = 0.5f;
-    std::size_t k = 0;
-    if (used >= lanes) {
-      auto sums = hn::Zero(d4);
-      for (; k + lanes <= used; k += lanes) sums = hn::MulAdd(hn::LoadU(d4, sh + k), hn::Load(d4, basis + k), sums);
-      sum += hn::GetLane(hn::SumOfLanes(d4, sums));
-    }
-    for (; k < used; ++k) sum += sh[k] * basis[k];
-    rgb[c] = sum > 0.0f ? (sum < float(max_color) ? sum : float(max_color)) : 0.0f;  // NaN becomes 0
-  }
-  splat.red = rgb[0], splat.green = rgb[1], splat.blue = rgb[2];
-}
-
 /// Coefficients are most of what a frame reads, and this is its first sight of them.
 constexpr std::size_t fetch_ahead = 16;  // rows
 HWY_INLINE void FetchRow(const float* sh, std::size_t stride) {
   for (std::size_t k = 0; k < stride; k += 16) hwy::Prefetch(sh + k);
 }
 
-std::size_t ProjectRows(const ProjectedLayer& layer, const ViewParams<float>& view, int sh_degree, Culling culling,
-                        scene::Rect pixels, std::size_t begin, std::size_t end, Splat* out, TileBox* boxes) {
-  const D d;
+/// Writes the survivors that are not hidden, with their colours.
+///   kDegree  bands used, -1 for none: black
+template <int kDegree>
+std::size_t WriteSplats(const ProjectedLayer& layer, std::size_t begin, const Survivors& found, Splat* out,
+                        TileBox* boxes) {
   const scene::GaussianCloud& cloud = layer.cloud;
-  Survivors found;
-  for (std::size_t i = begin; i < end; i += hn::Lanes(d))
-    ProjectVector(d, cloud, view, culling, pixels, i, HWY_MIN(hn::Lanes(d), end - i), found);
-  const std::size_t stored = scene::sh_coefficients(cloud.sh_degree), used = scene::sh_coefficients(sh_degree);
+  const std::size_t stored = scene::sh_coefficients(cloud.sh_degree), stride = cloud.sh_stride();
+  const auto sh = [&](std::size_t k) { return cloud.sh.data() + std::size_t(found.row[k]) * stride; };
   const std::uint32_t* hidden = std::lower_bound(layer.hidden.data(), layer.hidden.data() + layer.hidden.size(), begin);
   const std::uint32_t* const last_hidden = layer.hidden.data() + layer.hidden.size();
+  constexpr std::size_t at_once = 128;  // whose bases stay in the first cache
+  alignas(64) Basis basis[at_once];
   std::size_t written = 0;
   for (std::size_t k = 0; k < found.count; ++k) {
+    if constexpr (kDegree >= 0) {
+      if (k % at_once == 0)
+        EachBasis<kDegree>(found.to_x + k, found.to_y + k, found.to_z + k, HWY_MIN(at_once, found.count - k), basis);
+      FetchRow(sh(HWY_MIN(k + fetch_ahead, found.count - 1)), stride);
+    }
     const auto row = std::size_t(found.row[k]);
     while (hidden != last_hidden && *hidden < row) ++hidden;
     if (hidden != last_hidden && *hidden == row) continue;
-    Splat& splat = out[written];
-    splat = {.x = found.x[k],
-             .y = found.y[k],
-             .l1 = found.l1[k],
-             .l2 = found.l2[k],
-             .l3 = found.l3[k],
-             .log2_opacity = found.log2_opacity[k],
-             .red = 0,
-             .green = 0,
-             .blue = 0,
-             .depth = found.depth[k],
-             .weight = layer.weight != nullptr ? layer.weight[row] : 0.0f,
-             .row = std::uint32_t(layer.first_row + row)};
+    float color[3] = {};
+    if constexpr (kDegree >= 0) {
+      ShadeRow<kDegree>(sh(k), stored, basis[k % at_once], color);
+      for (float& c : color) c = c > 0.0f ? (c < float(max_color) ? c : float(max_color)) : 0.0f;  // NaN becomes 0
+    }
+    out[written] = {.x = found.x[k],
+                    .y = found.y[k],
+                    .l1 = found.l1[k],
+                    .l2 = found.l2[k],
+                    .l3 = found.l3[k],
+                    .log2_opacity = found.log2_opacity[k],
+                    .red = color[0],
+                    .green = color[1],
+                    .blue = color[2],
+                    .depth = found.depth[k],
+                    .weight = layer.weight != nullptr ? layer.weight[row] : 0.0f,
+                    .row = std::uint32_t(layer.first_row + row)};
     boxes[written++] = {std::uint16_t(found.columns[k] & 0xffff), std::uint16_t(found.columns[k] >> 16),
                         std::uint16_t(found.rows[k] & 0xffff), std::uint16_t(found.rows[k] >> 16)};
-    if (sh_degree < 0) continue;
-    FetchRow(cloud.sh.data() + std::size_t(found.row[HWY_MIN(k + fetch_ahead, found.count - 1)]) * cloud.sh_stride(),
-             cloud.sh_stride());
-    alignas(16) float basis[16];
-    scene::sh_basis(sh_degree, found.to_x[k], found.to_y[k], found.to_z[k], basis);
-    ShadeRow(cloud.sh.data() + row * cloud.sh_stride(), stored, used, basis, splat);
   }
   return written;
+}
+
+std::size_t ProjectRows(const ProjectedLayer& layer, const ViewParams<float>& view, int sh_degree, Culling culling,
+                        scene::Rect pixels, std::size_t begin, std::size_t end, Splat* out, TileBox* boxes) {
+  const D d;
+  Survivors found;
+  for (std::size_t i = begin; i < end; i += hn::Lanes(d))
+    ProjectVector(d, layer.cloud, view, culling, pixels, i, HWY_MIN(hn::Lanes(d), end - i), found);
+  switch (sh_degree) {
+    case -1:
+      return WriteSplats<-1>(layer, begin, found, out, boxes);
+    case 0:
+      return WriteSplats<0>(layer, begin, found, out, boxes);
+    case 1:
+      return WriteSplats<1>(layer, begin, found, out, boxes);
+    case 2:
+      return WriteSplats<2>(layer, begin, found, out, boxes);
+    default:
+      return WriteSplats<3>(layer, begin, found, out, boxes);
+  }
 }
 
 }  // namespace HWY_NAMESPACE
