@@ -123,11 +123,6 @@ void fetch_upstream(const UpstreamPlanes& upstream, scene::Rect area, int x0, in
 
 }  // namespace
 
-void clear_mean2d(Gradients& out) {
-  std::fill(out.mean2d_x_px.begin(), out.mean2d_x_px.end(), 0.0f);
-  std::fill(out.mean2d_y_px.begin(), out.mean2d_y_px.end(), 0.0f);
-}
-
 void walk_tiles(const ForwardBuffers& forward, const RayEnds* ends, const TileGrid& grid,
                 const UpstreamPlanes& upstream, Vec3 background, std::size_t pairs, WalkBuffers& work) {
   const std::size_t tiles = std::size_t(grid.columns) * std::size_t(grid.rows);
@@ -170,7 +165,6 @@ struct BackwardBuffers {
 void backward_simd(const Layers& layers, const scene::Camera& camera, const BackwardOptions& options,
                    const Upstream& upstream, std::span<const std::uint32_t> rows, BackwardBuffers& work,
                    Gradients& out) {
-  clear_mean2d(out);
   if (rows.empty()) return;
   const Wanted wanted(options.forward, camera);
   const auto view = view_params<float>(camera);

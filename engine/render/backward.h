@@ -68,10 +68,10 @@ class BackwardWorkspace {
 ///   layers, camera  what was rendered
 ///   rows      [R], ascending rows of the layers, none of them hidden: row rows[r] has its gradient at r
 ///   upstream  pictures of the size that forward() gave them: the camera's, or that of options.forward.rect
-///   out       of R rows and the layers' degree (Gradients::reset()); added to, so that views sum; mean2d is
-///   overwritten values    finite for every finite cloud, valid camera and upstream of ordinary size, unless SH
-///   coefficients near the
-///             end of float cancel
+///   out       of R rows and the layers' degree (Gradients::reset()); added to, so that views sum, but for mean2d,
+///             which is overwritten
+///   values    finite for every finite cloud, valid camera and upstream of ordinary size, unless SH coefficients near
+///             the end of float cancel
 ///   bytes     the same for any number of threads; they may differ between backends and instruction sets
 ///   throws    std::bad_alloc, as forward() does
 /// Kinks: what is skipped (alpha below 1/255, splats at which a ray ends and all behind, at or before the near plane,
@@ -79,8 +79,8 @@ class BackwardWorkspace {
 /// tiles and cuts are taken as they are. At the edge of a clamp the derivative is the one from inside, but for that of
 /// alpha at 0.99, where it is zero. Costs projecting, sorting and, in the tiles that rows and upstream touch, blending
 /// once more, for nothing of the forward pass is kept (Frame and LocalFrame keep it), and about twice that for walking
-/// back. Memory: 48 bytes per row that may change and tile it reaches. Precondition: that of forward(); semantics other than dense_stop and
-/// straight_through need Backend::reference.
+/// back. Memory: 48 bytes per row that may change and tile it reaches. Precondition: that of forward(); semantics other
+/// than dense_stop and straight_through need Backend::reference.
 void backward(const Layers& layers, const scene::Camera& camera, const BackwardOptions& options,
               const Upstream& upstream, std::span<const std::uint32_t> rows, BackwardWorkspace& workspace,
               Gradients& out);

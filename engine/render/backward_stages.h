@@ -18,7 +18,7 @@ struct TileGradient {
   float g, along, across;
   float along_along, along_across, across_across;
   float red, green, blue, depth;
-  float padding[2];  ///< To whole vectors of four. Anything.
+  float padding[2];  ///< To whole vectors of four. Zero where all sums are.
   static constexpr std::size_t sums = 10;
 };
 static_assert(sizeof(TileGradient) == 12 * sizeof(float));
@@ -78,10 +78,8 @@ const std::int32_t* find_slots(const ForwardBuffers& forward, SlotOfRow&& slot_o
 void walk_tiles(const ForwardBuffers& forward, const RayEnds* ends, const TileGrid& grid,
                 const UpstreamPlanes& upstream, Vec3 background, std::size_t pairs, WalkBuffers& work);
 
-void clear_mean2d(Gradients& out);
-
 /// Sums each row's gradients over tiles, in their order, and pulls back projection and colour, for the rows [begin,
-/// end) of those that may change. Adds to `out`.
+/// end) of those that may change. Adds to `out`, but writes mean2d.
 ///   cloud      that holds these rows: cloud row of rows[r] is rows[r] - first_row
 ///   sh_degree  bands used
 void project_rows_vjp(const scene::GaussianCloud& cloud, std::size_t first_row, const ViewParams<float>& view,

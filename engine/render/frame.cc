@@ -54,7 +54,6 @@ void Frame::backward(const scene::GaussianCloud& cloud, const scene::Image& v_co
   frame.rows.resize(cloud.size());
   std::iota(frame.rows.begin(), frame.rows.end(), 0u);
   const auto params = view_params<float>(frame.camera);
-  clear_mean2d(out);
   walk_tiles(frame.buffers, frame.buffers.ray_ends.data(), frame.grid, {.color = &v_color}, frame.background,
              frame.buffers.first_pair[cloud.size()], frame.walk);
   const RowPairs row_pairs{.first_pair = frame.buffers.first_pair.data(), .pairs = frame.walk.pairs.data()};

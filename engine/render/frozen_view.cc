@@ -262,7 +262,6 @@ void LocalFrame::backward(const FrozenView& frozen, const scene::GaussianCloud& 
   TileGrid grid = whole_grid(view.camera);
   grid.pixels = view.region;
   const UpstreamPlanes upstream{.color = &v_color};
-  clear_mean2d(out);
   const ForwardBuffers& top = impl_->changeable;
   assert(impl_->drawn);
   walk_tiles(impl_->merged, impl_->merged.ray_ends.data(), grid, upstream, view.background, top.first_pair[rows.size()],

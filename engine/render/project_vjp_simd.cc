@@ -7,6 +7,8 @@
 // After highway.h: the math functions are compiled once per instruction set.
 #include <hwy/contrib/math/math-inl.h>
 
+#include "engine/render/shade_rows.inc"
+
 #include "engine/render/backward_stages.h"
 #include "engine/render/project_vjp.h"
 
@@ -19,16 +21,17 @@ namespace hn = hwy::HWY_NAMESPACE;
 using VjpD = hn::ScalableTag<float>;
 using VjpV = hn::Vec<VjpD>;
 
-/// Rows of a block that some tile has, one array per value, and what becomes of them.
-struct SeenRows {
+/// A block of the rows that may change, one array per value, and what becomes of them: all zero for rows that no tile
+/// has or that change nothing.
+struct VjpRows {
   static constexpr std::size_t room = project_vjp_block + 64;  // whole vectors are loaded and stored
+  std::size_t count = 0;
   alignas(64) float mean[3][room], log_scale[3][room], rotation[4][room], logit[room];
   alignas(64) float sums[TileGradient::sums][room];
+  alignas(64) std::int32_t seen[room];  // not 0: some sum is not
   // out
   alignas(64) float v_mean[3][room], v_log_scale[3][room], v_rotation[4][room], v_logit[room], v_x[room], v_y[room];
   alignas(64) float to[3][room], inverse_distance[room];  // unit direction from the camera centre
-  std::uint32_t slot[room];                               // in the list of rows that may change
-  std::size_t count = 0;
 };
 
 /// Three components.
@@ -44,8 +47,12 @@ HWY_INLINE V3 Cross(const V3& a, const V3& b) {
 HWY_INLINE V3 Scaled(const V3& a, VjpV s) { return {hn::Mul(a.x, s), hn::Mul(a.y, s), hn::Mul(a.z, s)}; }
 HWY_INLINE V3 Sum(const V3& a, const V3& b) { return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)}; }
 
-/// project_vjp() and opacity_logit_gradient() for the seen rows [i, i + lanes). All of them are visible.
-HWY_INLINE void ProjectVjpVector(VjpD d, const ViewParams<float>& view, std::size_t i, SeenRows& rows) {
+/// project_vjp() and opacity_logit_gradient() for the rows [i, i + lanes). Those that are seen are visible; of all
+/// others anything may come, infinities too, and is dropped.
+HWY_INLINE void ProjectVjpVector(VjpD d, const ViewParams<float>& view, std::size_t i, VjpRows& rows) {
+  const hn::RebindToSigned<VjpD> di;
+  const auto seen = hn::RebindMask(d, hn::Ne(hn::Load(di, rows.seen + i), hn::Zero(di)));
+  const auto store = [&](VjpV v, float* to) { hn::Store(hn::IfThenElseZero(seen, v), d, to + i); };
   const auto set = [&](double value) { return hn::Set(d, float(value)); };
   const auto load = [&](const float* from) { return hn::Load(d, from + i); };
   const VjpV zero = hn::Zero(d), one = set(1), two = set(2);
@@ -145,7 +152,7 @@ HWY_INLINE void ProjectVjpVector(VjpD d, const ViewParams<float>& view, std::siz
     v_size = hn::MulAdd(v_u[j], u[j], hn::MulAdd(v_v[j], v[j], v_size));
     const V3 v_axis{v_axis_x, v_axis_y, hn::Neg(hn::MulAdd(tx, v_axis_x, hn::Mul(ty, v_axis_y)))};
     const auto inside = hn::Le(hn::Abs(load(rows.log_scale[j])), set(max_log_scale));
-    hn::Store(hn::IfThenElseZero(inside, Dot(v_axis, axes[j])), d, rows.v_log_scale[j] + i);
+    store(hn::IfThenElseZero(inside, Dot(v_axis, axes[j])), rows.v_log_scale[j]);
     v_columns[j] = Scaled(rotated_back(v_axis), sigma[j]);
   }
 
@@ -162,7 +169,7 @@ HWY_INLINE void ProjectVjpVector(VjpD d, const ViewParams<float>& view, std::siz
   const VjpV q_scale = hn::Mul(two, inverse_length);
   for (std::size_t k = 0; k < 4; ++k) {
     const VjpV tangent = hn::Mul(hn::Mul(hn::NegMulAdd(along_q, q[k], v_q[k]), q_scale), inverse_largest);
-    hn::Store(hn::IfThenElseZero(has_direction, tangent), d, rows.v_rotation[k] + i);
+    store(hn::IfThenElseZero(has_direction, tangent), rows.v_rotation[k]);
   }
 
   const VjpV v_x_over_z = hn::MulAdd(set(view.fx), v_x, hn::IfThenElseZero(hn::Eq(tx, x_over_z), v_tx));
@@ -170,40 +177,32 @@ HWY_INLINE void ProjectVjpVector(VjpD d, const ViewParams<float>& view, std::siz
   const VjpV shrinking = hn::MulAdd(v_x_over_z, x_over_z, hn::MulAdd(v_y_over_z, y_over_z, v_size));
   const V3 v_mean = rotated_back({hn::Mul(v_x_over_z, inverse_z), hn::Mul(v_y_over_z, inverse_z),
                                   hn::NegMulAdd(shrinking, inverse_z, load(rows.sums[9]))});
-  hn::Store(v_mean.x, d, rows.v_mean[0] + i);
-  hn::Store(v_mean.y, d, rows.v_mean[1] + i);
-  hn::Store(v_mean.z, d, rows.v_mean[2] + i);
-  hn::Store(v_x, d, rows.v_x + i);
-  hn::Store(v_y, d, rows.v_y + i);
+  store(v_mean.x, rows.v_mean[0]);
+  store(v_mean.y, rows.v_mean[1]);
+  store(v_mean.z, rows.v_mean[2]);
+  store(v_x, rows.v_x);
+  store(v_y, rows.v_y);
 
   const VjpV logit = load(rows.logit), bound = set(max_opacity_logit);
   const VjpV clear = hn::Div(one, hn::Add(one, hn::Exp(d, hn::Clamp(logit, hn::Neg(bound), bound))));  // 1 - opacity
-  hn::Store(hn::IfThenElseZero(hn::Le(hn::Abs(logit), bound), hn::Mul(load(rows.sums[0]), clear)), d, rows.v_logit + i);
+  store(hn::IfThenElseZero(hn::Le(hn::Abs(logit), bound), hn::Mul(load(rows.sums[0]), clear)), rows.v_logit);
 
   const VjpV inverse_distance = hn::Div(one, hn::Sqrt(Dot(from_camera, from_camera)));
   const V3 to = Scaled(from_camera, inverse_distance);
-  hn::Store(to.x, d, rows.to[0] + i);
-  hn::Store(to.y, d, rows.to[1] + i);
-  hn::Store(to.z, d, rows.to[2] + i);
-  hn::Store(inverse_distance, d, rows.inverse_distance + i);
+  store(to.x, rows.to[0]);
+  store(to.y, rows.to[1]);
+  store(to.z, rows.to[2]);
+  store(inverse_distance, rows.inverse_distance);
 }
 
-/// Bases of the seen rows' directions, row by row, and what they become: dL/dbasis.
+/// Bases of the rows' directions, and what they become: dL/dbasis.
 struct Bases {
-  static constexpr std::size_t size = scene::sh_coefficients(scene::max_sh_degree);
-  alignas(64) float basis[project_vjp_block][size], v_basis[project_vjp_block][size];
+  alignas(64) Basis basis[project_vjp_block], v_basis[project_vjp_block];
 };
-
-/// All rows at once: the compiler makes vectors of the loops, since the degree is a constant.
-template <int kDegree>
-HWY_INLINE void EachBasis(const SeenRows& rows, Bases& bases) {
-  for (std::size_t i = 0; i < rows.count; ++i)
-    scene::sh_basis(kDegree, rows.to[0][i], rows.to[1][i], rows.to[2][i], bases.basis[i]);
-}
 
 /// Adds to the rows' v_mean what their direction gets from v_basis.
 template <int kDegree>
-HWY_INLINE void EachBasisVjp(const Bases& bases, SeenRows& rows) {
+HWY_INLINE void EachBasisVjp(const Bases& bases, VjpRows& rows) {
   for (std::size_t i = 0; i < rows.count; ++i) {
     const float to[3] = {rows.to[0][i], rows.to[1][i], rows.to[2][i]};
     const auto v_to = scene::sh_basis_vjp(kDegree, to[0], to[1], to[2], bases.v_basis[i]);
@@ -213,60 +212,59 @@ HWY_INLINE void EachBasisVjp(const Bases& bases, SeenRows& rows) {
   }
 }
 
-/// color_vjp() for the seen row i, up to the basis: adds to v_sh and writes v_basis.
-template <class AnyD>
-HWY_INLINE void ColorVjpRow(AnyD d, const float* sh, std::size_t stored, std::size_t used, std::size_t i,
-                            const SeenRows& rows, Bases& bases, float* v_sh) {
-  const std::size_t lanes = hn::Lanes(d);
+/// color_vjp() for row i, which is seen, up to the basis: adds to v_sh and writes v_basis.
+///   sh, v_sh  [3 * stored]
+template <int kDegree>
+HWY_INLINE void ColorVjpRow(const float* sh, std::size_t stored, std::size_t i, const VjpRows& rows, Bases& bases,
+                            float* v_sh) {
+  const CoefficientD<kDegree> d;
+  constexpr std::size_t used = scene::sh_coefficients(kDegree);
   const float* const basis = bases.basis[i];
   float* const v_basis = bases.v_basis[i];
-  std::fill_n(v_basis, Bases::size, 0.0f);
-  for (std::size_t c = 0; c < 3; ++c, sh += stored, v_sh += stored) {
-    const float v_color = rows.sums[6 + c][i];
-    if (v_color == 0) continue;
-    float sum = 0.5f;
-    std::size_t k = 0;
-    if (used >= lanes) {
-      auto sums = hn::Zero(d);
-      for (; k + lanes <= used; k += lanes) sums = hn::MulAdd(hn::LoadU(d, sh + k), hn::Load(d, basis + k), sums);
-      sum += hn::GetLane(hn::SumOfLanes(d, sums));
+  float color[3], v_color[3];
+  ShadeRow<kDegree>(sh, stored, basis, color);
+  for (std::size_t c = 0; c < 3; ++c)
+    v_color[c] = color[c] >= 0 && color[c] <= float(max_color) ? rows.sums[6 + c][i] : 0.0f;  // nothing for NaN
+  const auto each = [&](auto any, std::size_t k) {
+    const auto b = hn::Load(any, basis + k);
+    auto v_b = hn::Zero(any);
+    for (std::size_t c = 0; c < 3; ++c) {
+      if (v_color[c] == 0) continue;  // nor may its coefficients matter
+      const auto v = hn::Set(any, v_color[c]);
+      hn::StoreU(hn::MulAdd(v, b, hn::LoadU(any, v_sh + c * stored + k)), any, v_sh + c * stored + k);
+      v_b = hn::MulAdd(v, hn::LoadU(any, sh + c * stored + k), v_b);
     }
-    for (; k < used; ++k) sum += sh[k] * basis[k];
-    if (!(sum >= 0 && sum <= float(max_color))) continue;  // also when it is NaN
-    const auto v = hn::Set(d, v_color);
-    for (k = 0; k + lanes <= used; k += lanes) {
-      hn::StoreU(hn::MulAdd(v, hn::Load(d, basis + k), hn::LoadU(d, v_sh + k)), d, v_sh + k);
-      hn::Store(hn::MulAdd(v, hn::LoadU(d, sh + k), hn::Load(d, v_basis + k)), d, v_basis + k);
-    }
-    for (; k < used; ++k) {
-      v_sh[k] += v_color * basis[k];
-      v_basis[k] += v_color * sh[k];
-    }
-  }
+    hn::Store(v_b, any, v_basis + k);
+  };
+  std::size_t k = 0;
+  for (; k + hn::Lanes(d) <= used; k += hn::Lanes(d)) each(d, k);
+  for (; k < used; ++k) each(hn::CappedTag<float, 1>(), k);
 }
 
-/// color_vjp() for the seen rows, whose directions are known: adds to their v_mean, and to out.sh.
+/// color_vjp() for all rows, whose directions are known: adds to their v_mean, and to out.sh.
+///   row_of  [rows.count] in the cloud
 template <int kDegree>
-void ColorVjp(const scene::GaussianCloud& cloud, std::size_t first_row, const std::uint32_t* row_of_slot,
-              SeenRows& rows, Gradients& out) {
-  constexpr std::size_t used = scene::sh_coefficients(kDegree);
-  constexpr std::size_t lanes = used == 16 ? 16 : used >= 4 ? 4 : 1;
-  const hn::CappedTag<float, lanes> d;
+void ColorVjp(const scene::GaussianCloud& cloud, std::size_t first_row, const std::uint32_t* row_of, std::size_t begin,
+              VjpRows& rows, Gradients& out) {
   const std::size_t stored = scene::sh_coefficients(cloud.sh_degree), stride = cloud.sh_stride();
   Bases bases;
-  EachBasis<kDegree>(rows, bases);
-  const auto sh = [&](std::size_t i) { return cloud.sh.data() + (row_of_slot[rows.slot[i]] - first_row) * stride; };
-  const auto v_sh = [&](std::size_t i) { return out.sh.data() + rows.slot[i] * stride; };
+  EachBasis<kDegree>(rows.to[0], rows.to[1], rows.to[2], rows.count, bases.basis);
+  const auto sh = [&](std::size_t i) { return cloud.sh.data() + (row_of[i] - first_row) * stride; };
+  const auto v_sh = [&](std::size_t i) { return out.sh.data() + (begin + i) * stride; };
   for (std::size_t i = 0; i < rows.count; ++i) {
     const std::size_t coming = HWY_MIN(i + 8, rows.count - 1);
-    for (std::size_t k = 0; k < stride; k += 16) hwy::Prefetch(sh(coming) + k), hwy::Prefetch(v_sh(coming) + k);
-    ColorVjpRow(d, sh(i), stored, used, i, rows, bases, v_sh(i));
+    if (rows.seen[coming] != 0)
+      for (std::size_t k = 0; k < stride; k += 16) hwy::Prefetch(sh(coming) + k), hwy::Prefetch(v_sh(coming) + k);
+    if (rows.seen[i] != 0)
+      ColorVjpRow<kDegree>(sh(i), stored, i, rows, bases, v_sh(i));
+    else
+      std::fill_n(bases.v_basis[i], basis_size, 0.0f);
   }
   EachBasisVjp<kDegree>(bases, rows);
 }
 
-/// Sums a row's gradients over its tiles, in their order and in double, into the seen row i. False if all are zero.
-HWY_INLINE bool SumOverTiles(const TileGradient* first, const TileGradient* last, std::size_t i, SeenRows& rows) {
+/// Sums a row's gradients over its tiles, in their order and in double, into row i. False if all are zero.
+HWY_INLINE bool SumOverTiles(const TileGradient* first, const TileGradient* last, std::size_t i, VjpRows& rows) {
   constexpr std::size_t size = sizeof(TileGradient) / sizeof(float);
   const hn::CappedTag<double, 4> d64;
   const hn::Rebind<float, decltype(d64)> d32;
@@ -281,69 +279,83 @@ HWY_INLINE bool SumOverTiles(const TileGradient* first, const TileGradient* last
       total[p] = hn::Add(total[p], hn::PromoteTo(d64, hn::LoadU(d32, values + p * lanes)));
   }
   alignas(32) float sums[size];
-  for (std::size_t p = 0; p < parts; ++p) hn::Store(hn::DemoteTo(d32, total[p]), d32, sums + p * lanes);
   bool any = false;
-  for (std::size_t k = 0; k < TileGradient::sums; ++k) {
-    rows.sums[k][i] = sums[k];
-    any |= sums[k] != 0;
+  for (std::size_t p = 0; p < parts; ++p) {
+    const auto part = hn::DemoteTo(d32, total[p]);
+    hn::Store(part, d32, sums + p * lanes);
+    any |= !hn::AllTrue(d32, hn::Eq(part, hn::Zero(d32)));
   }
+  for (std::size_t k = 0; k < TileGradient::sums; ++k) rows.sums[k][i] = sums[k];
   return any;
 }
 
+/// What is stored of the rows.
+///   row_of  [rows.count] in the layers, ascending
+HWY_INLINE void LoadRows(const scene::GaussianCloud& cloud, std::size_t first_row, const std::uint32_t* row_of,
+                         VjpRows& rows) {
+  const bool side_by_side = row_of[rows.count - 1] - row_of[0] == rows.count - 1;
+  const auto load = [&](const std::vector<float>& from, float* to) {
+    if (side_by_side)
+      std::copy_n(from.data() + (row_of[0] - first_row), rows.count, to);
+    else
+      for (std::size_t i = 0; i < rows.count; ++i) to[i] = from[row_of[i] - first_row];
+  };
+  load(cloud.mean.x, rows.mean[0]), load(cloud.mean.y, rows.mean[1]), load(cloud.mean.z, rows.mean[2]);
+  load(cloud.log_scale.x, rows.log_scale[0]), load(cloud.log_scale.y, rows.log_scale[1]);
+  load(cloud.log_scale.z, rows.log_scale[2]);
+  load(cloud.rotation.w, rows.rotation[0]), load(cloud.rotation.x, rows.rotation[1]);
+  load(cloud.rotation.y, rows.rotation[2]), load(cloud.rotation.z, rows.rotation[3]);
+  load(cloud.opacity_logit, rows.logit);
+}
+
+/// What fills up the last vector: rows that are not seen.
+HWY_INLINE void FillUp(VjpD d, VjpRows& rows) {
+  for (std::size_t i = rows.count; i % hn::Lanes(d) != 0; ++i) {
+    for (auto& column : rows.mean) column[i] = 0;
+    for (auto& column : rows.log_scale) column[i] = 0;
+    for (auto& column : rows.rotation) column[i] = 0;
+    for (auto& column : rows.sums) column[i] = 0;
+    rows.logit[i] = 0, rows.seen[i] = 0;
+  }
+}
+
 void ProjectRowsVjp(const scene::GaussianCloud& cloud, std::size_t first_row, const ViewParams<float>& view,
-                    int sh_degree, const std::uint32_t* rows, const RowPairs& v_rows, std::size_t begin,
+                    int sh_degree, const std::uint32_t* row_of, const RowPairs& v_rows, std::size_t begin,
                     std::size_t end, Gradients& out) {
   const VjpD d;
-  SeenRows seen;
-  for (std::size_t r = begin; r < end; ++r) {
-    const TileGradient *const first = v_rows.pairs + v_rows.first_pair[r], *const last =
-                                                                               v_rows.pairs + v_rows.first_pair[r + 1];
-    const std::size_t i = seen.count;
-    if (!SumOverTiles(first, last, i, seen)) continue;
-    ++seen.count;
-    const std::size_t row = rows[r] - first_row;
-    seen.slot[i] = std::uint32_t(r);
-    seen.mean[0][i] = cloud.mean.x[row], seen.mean[1][i] = cloud.mean.y[row], seen.mean[2][i] = cloud.mean.z[row];
-    seen.log_scale[0][i] = cloud.log_scale.x[row], seen.log_scale[1][i] = cloud.log_scale.y[row];
-    seen.log_scale[2][i] = cloud.log_scale.z[row];
-    seen.rotation[0][i] = cloud.rotation.w[row], seen.rotation[1][i] = cloud.rotation.x[row];
-    seen.rotation[2][i] = cloud.rotation.y[row], seen.rotation[3][i] = cloud.rotation.z[row];
-    seen.logit[i] = cloud.opacity_logit[row];
+  VjpRows rows;
+  rows.count = end - begin;
+  row_of += begin;
+  bool any = false;
+  for (std::size_t i = 0; i < rows.count; ++i) {
+    const std::uint32_t* const first_pair = v_rows.first_pair + begin + i;
+    const bool seen = SumOverTiles(v_rows.pairs + first_pair[0], v_rows.pairs + first_pair[1], i, rows);
+    rows.seen[i] = seen ? 1 : 0;
+    any |= seen;
   }
-  if (seen.count == 0) return;
-  // What fills up the last vector: the last row once more.
-  const std::size_t last = seen.count - 1;
-  for (std::size_t i = seen.count; i % hn::Lanes(d) != 0; ++i) {
-    for (auto& column : seen.mean) column[i] = column[last];
-    for (auto& column : seen.log_scale) column[i] = column[last];
-    for (auto& column : seen.rotation) column[i] = column[last];
-    for (auto& column : seen.sums) column[i] = column[last];
-    seen.logit[i] = seen.logit[last];
-  }
-  for (std::size_t i = 0; i < seen.count; i += hn::Lanes(d)) ProjectVjpVector(d, view, i, seen);
-
-  switch (sh_degree) {
-    case 0:
-      ColorVjp<0>(cloud, first_row, rows, seen, out);
-      break;
-    case 1:
-      ColorVjp<1>(cloud, first_row, rows, seen, out);
-      break;
-    case 2:
-      ColorVjp<2>(cloud, first_row, rows, seen, out);
-      break;
-    default:
-      ColorVjp<3>(cloud, first_row, rows, seen, out);
-  }
-  for (std::size_t i = 0; i < seen.count; ++i) {
-    const std::size_t r = seen.slot[i];
-    out.mean.x[r] += seen.v_mean[0][i], out.mean.y[r] += seen.v_mean[1][i], out.mean.z[r] += seen.v_mean[2][i];
-    out.log_scale.x[r] += seen.v_log_scale[0][i], out.log_scale.y[r] += seen.v_log_scale[1][i];
-    out.log_scale.z[r] += seen.v_log_scale[2][i];
-    out.rotation.w[r] += seen.v_rotation[0][i], out.rotation.x[r] += seen.v_rotation[1][i];
-    out.rotation.y[r] += seen.v_rotation[2][i], out.rotation.z[r] += seen.v_rotation[3][i];
-    out.opacity_logit[r] += seen.v_logit[i];
-    out.mean2d_x_px[r] = seen.v_x[i], out.mean2d_y_px[r] = seen.v_y[i];
+  if (!any) {
+    std::fill_n(out.mean2d_x_px.data() + begin, rows.count, 0.0f);
+    std::fill_n(out.mean2d_y_px.data() + begin, rows.count, 0.0f);
+  } else {
+    LoadRows(cloud, first_row, row_of, rows);
+    FillUp(d, rows);
+    for (std::size_t i = 0; i < rows.count; i += hn::Lanes(d)) ProjectVjpVector(d, view, i, rows);
+    const auto color_vjp = sh_degree == 0   ? ColorVjp<0>
+                           : sh_degree == 1 ? ColorVjp<1>
+                           : sh_degree == 2 ? ColorVjp<2>
+                                            : ColorVjp<3>;
+    color_vjp(cloud, first_row, row_of, begin, rows, out);
+    const auto add = [&](const float* from, std::vector<float>& to) {
+      for (std::size_t i = 0; i < rows.count; ++i) to[begin + i] += from[i];
+    };
+    add(rows.v_mean[0], out.mean.x), add(rows.v_mean[1], out.mean.y), add(rows.v_mean[2], out.mean.z);
+    add(rows.v_log_scale[0], out.log_scale.x), add(rows.v_log_scale[1], out.log_scale.y);
+    add(rows.v_log_scale[2], out.log_scale.z);
+    add(rows.v_rotation[0], out.rotation.w), add(rows.v_rotation[1], out.rotation.x);
+    add(rows.v_rotation[2], out.rotation.y), add(rows.v_rotation[3], out.rotation.z);
+    add(rows.v_logit, out.opacity_logit);
+    std::copy_n(rows.v_x, rows.count, out.mean2d_x_px.data() + begin);
+    std::copy_n(rows.v_y, rows.count, out.mean2d_y_px.data() + begin);
   }
 }
 

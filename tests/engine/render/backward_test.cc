@@ -211,6 +211,37 @@ TEST_P(BackwardTest, ARectangleOrTilesHaveTheGradientsOfTheWholePictureWithNothi
                1e-6);
 }
 
+TEST_P(BackwardTest, RowsThatAViewShowsNothingOfHaveNoGradientBesideThoseItShows) {
+  // At the very camera, behind it, beside the picture, and too faint to show: among rows that are seen, so that a
+  // vector of rows holds both.
+  auto cloud = cloud_in_view(40, 35);
+  const auto camera = off_centre_camera();
+  for (std::size_t i = 0; i < cloud.size(); i += 2) {
+    const std::size_t kind = i / 2 % 4;
+    if (kind == 0) cloud.mean.set(i, {0, 0, 0});
+    if (kind == 1) cloud.mean.set(i, {0, 0, -1});
+    if (kind == 2) cloud.mean.set(i, {50, 0, 2}), cloud.log_scale.set(i, Vec3(-4.0f));
+    if (kind == 3) cloud.opacity_logit[i] = -7;
+  }
+  Gradients gradients;
+  gradients.reset(cloud.size(), cloud.sh_degree);
+  gradients.mean2d_x_px.assign(cloud.size(), 5.0f), gradients.mean2d_y_px.assign(cloud.size(), 5.0f);
+  std::vector<std::uint32_t> rows(cloud.size());
+  std::iota(rows.begin(), rows.end(), 0u);
+  BackwardWorkspace workspace;
+  backward(cloud, camera, on(GetParam()), random_upstream(camera.width, camera.height, 36), rows, workspace, gradients);
+  expect_finite(gradients);
+  for (const auto& column : columns_of(gradients)) {
+    const std::size_t stride = column.values.size() / cloud.size();
+    for (std::size_t i = 0; i < cloud.size(); i += 2)
+      for (std::size_t k = 0; k < stride; ++k)
+        ASSERT_EQ(column.values[i * stride + k], 0.0f) << column.name << " " << i;
+  }
+  std::size_t moved = 0;
+  for (std::size_t i = 1; i < cloud.size(); i += 2) moved += gradients.mean.x[i] != 0;
+  EXPECT_GT(moved, cloud.size() / 4);
+}
+
 TEST_P(BackwardTest, TheGradientOfARotationHasNoComponentAlongTheQuaternion) {
   const auto cloud = cloud_in_view(300, 8);
   const auto camera = off_centre_camera();
