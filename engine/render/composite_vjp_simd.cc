@@ -5,10 +5,12 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 // After highway.h: compiled once per instruction set.
+#include "engine/render/lane_sums.inc"
 #include "engine/render/tile_blocks.inc"
 
 #include <algorithm>
 #include <cassert>
+#include <type_traits>
 
 #include "engine/render/backward_stages.h"
 
@@ -16,16 +18,14 @@ HWY_BEFORE_NAMESPACE();
 namespace engine::render {
 namespace HWY_NAMESPACE {
 
-/// dL/d(pictures) of a tile, block by block.
-struct alignas(64) BlockUpstream {
-  float red[TilePixels::count], green[TilePixels::count], blue[TilePixels::count];
-  float depth[TilePixels::count];  ///< Read only if there is any.
-};
-
-/// The rays of a tile on their way back, block by block.
-struct alignas(64) Rays {
-  float transmittance[TilePixels::count];  ///< What reached the splat that was come to last.
-  float beyond[TilePixels::count];  ///< dL/dT of that splat and all that lies farther back, T being what reached it.
+/// A block of a tile while its rays go back. What a step needs lies side by side.
+struct alignas(64) WalkedBlock {
+  float x[Blocks::lanes], y[Blocks::lanes];                             ///< Of its pixels, from the tile's first.
+  std::int32_t end[Blocks::lanes];                                      ///< See RayEnds.
+  float red[Blocks::lanes], green[Blocks::lanes], blue[Blocks::lanes];  ///< dL/d(pictures)
+  float depth[Blocks::lanes];                                           ///< The same. Read only if there is any.
+  float transmittance[Blocks::lanes];  ///< What reached the splat that was come to last.
+  float beyond[Blocks::lanes];         ///< dL/dT of that splat and all that lies farther back, T being what reached it.
 };
 
 /// A splat's sums over pixels, one lane each.
@@ -48,26 +48,6 @@ HWY_INLINE void StoreGradient(D /*d*/, const Sums& sums, TileGradient& to) {
         .padding = {}};
 }
 #else
-/// Per four lanes, the sums of a, b, c and e over them.
-HWY_INLINE V SumFours(D d, V a, V b, V c, V e) {
-  static_assert(Blocks::lanes >= 4);
-  const hn::Repartition<double, D> d64;
-  const auto ab = hn::BitCast(d64, hn::Add(hn::InterleaveLower(d, a, b), hn::InterleaveUpper(d, a, b)));
-  const auto ce = hn::BitCast(d64, hn::Add(hn::InterleaveLower(d, c, e), hn::InterleaveUpper(d, c, e)));
-  return hn::Add(hn::BitCast(d, hn::InterleaveLower(d64, ab, ce)), hn::BitCast(d, hn::InterleaveUpper(d64, ab, ce)));
-}
-
-/// Sums over all fours of lanes.
-template <class AnyD>
-HWY_INLINE hn::Vec<hn::FixedTag<float, 4> > SumBlocks(AnyD d, hn::Vec<AnyD> v) {
-  if constexpr (hn::MaxLanes(AnyD()) == 4) {
-    return v;
-  } else {
-    const hn::Half<AnyD> half;
-    return SumBlocks(half, hn::Add(hn::LowerHalf(half, v), hn::UpperHalf(half, v)));
-  }
-}
-
 /// Sums over the lanes; all of them together, since shuffles are what this costs.
 HWY_INLINE void StoreGradient(D d, const Sums& sums, TileGradient& to) {
   const hn::FixedTag<float, 4> d4;
@@ -92,34 +72,36 @@ HWY_INLINE std::uint64_t Changeable(const std::uint32_t* pair_of_entry, std::siz
   return bits;
 }
 
-/// The n lowest bits of 64.
-HWY_INLINE std::uint64_t FirstBits(std::int64_t n) {
-  return n <= 0 ? 0 : n >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << n) - 1;
-}
-
-/// A set of blocks.
-struct BlockSet {
-  static constexpr std::size_t words = (Blocks::count + 63) / 64;
-  std::uint64_t bits[words];
+/// The blocks that each splat of a batch reaches, less those whose rays have all ended before it.
+struct ReachedBlocks {
+  static constexpr std::size_t words = (Blocks::count + 31) / 32;
+  alignas(64) std::uint32_t bits[words][Batch::size];
+  std::uint64_t met;  ///< Bit k: splat k has any.
 };
 
-/// From the splats that reach each block to the blocks that each splat reaches.
-///   out  [Batch::size]
-HWY_INLINE void Transpose(const std::uint64_t* reach, BlockSet* out) {
+/// Finds them for a batch of n splats.
+///   ends  [Blocks::count] the farthest of each block's rays, counted from the batch's first splat
+HWY_INLINE void FindReachedBlocks(D d, std::size_t n, const Batch& batch, const std::int32_t* ends,
+                                  ReachedBlocks& out) {
   const hn::RebindToUnsigned<D> du;
-  std::fill_n(out, Batch::size, BlockSet{});
-  for (std::size_t block = 0; block < Blocks::count; block += Blocks::lanes) {
-    alignas(64) std::uint32_t lower[Blocks::lanes], upper[Blocks::lanes];
-    for (std::size_t i = 0; i < Blocks::lanes; ++i) {
-      lower[i] = std::uint32_t(reach[block + i]);
-      upper[i] = std::uint32_t(reach[block + i] >> 32);
+  const hn::RebindToSigned<D> di;
+  out.met = 0;
+  for (std::size_t k = 0; k < n; k += Blocks::lanes) {
+    const auto number = hn::Iota(di, std::int32_t(k));
+    hn::Vec<decltype(du)> words[ReachedBlocks::words];
+    for (auto& word : words) word = hn::Zero(du);
+    EachReach(d, batch, k, [&](std::size_t block, hn::Mask<D> reaches) {
+      const auto before_end = hn::RebindMask(du, hn::Lt(number, hn::Set(di, ends[block])));
+      auto& word = words[block / 32];
+      word = hn::IfThenElse(hn::And(hn::RebindMask(du, reaches), before_end),
+                            hn::Or(word, hn::Set(du, std::uint32_t{1} << block % 32)), word);
+    });
+    auto any = hn::Zero(du);
+    for (std::size_t w = 0; w < ReachedBlocks::words; ++w) {
+      hn::Store(words[w], du, out.bits[w] + k);
+      any = hn::Or(any, words[w]);
     }
-    const auto low = hn::Load(du, lower), high = hn::Load(du, upper);
-    for (std::size_t k = 0; k < 32; ++k) {
-      const auto bit = hn::Set(du, std::uint32_t{1} << k);
-      out[k].bits[block / 64] |= Bits(du, hn::TestBit(low, bit)) << block % 64;
-      out[k + 32].bits[block / 64] |= Bits(du, hn::TestBit(high, bit)) << block % 64;
-    }
+    out.met |= Bits(du, hn::Ne(any, hn::Zero(du))) << k;
   }
 }
 
@@ -131,18 +113,17 @@ HWY_INLINE void Transpose(const std::uint64_t* reach, BlockSet* out) {
 ///   first          number of the batch's first splat in the tile's list
 ///   asked          bits of the splats that are asked for: in front of them nothing may change
 ///   changeable     bits of the splats whose rows may change
+///   walked         [Blocks::count]
 ///   pair_of_entry  [splats of the batch] see composite_tile_vjp()
 template <bool kDepth>
-HWY_INLINE void WalkBack(D d, std::size_t first, const Batch& batch, std::uint64_t asked, std::uint64_t changeable,
-                         const BlockUpstream& upstream, const RayEnds& ends, Rays& rays,
-                         const std::uint32_t* pair_of_entry, TileGradient* pairs) {
+HWY_INLINE void WalkBack(D d, std::size_t first, const Batch& batch, const ReachedBlocks& reached, std::uint64_t asked,
+                         std::uint64_t changeable, WalkedBlock* walked, const std::uint32_t* pair_of_entry,
+                         TileGradient* pairs) {
   const hn::RebindToSigned<D> di;
-  BlockSet blocks[Batch::size];
-  Transpose(batch.reach, blocks);
-  std::uint64_t met = 0;
-  for (const std::uint64_t reach : batch.reach) met |= reach;
+  for (std::uint64_t rest = changeable & asked & ~reached.met; rest != 0; rest &= rest - 1)
+    pairs[pair_of_entry[hwy::Num0BitsBelowLS1Bit_Nonzero64(rest)]] = {};
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), ceiling = hn::Set(d, float(max_alpha));
-  for (std::uint64_t rest = (met | changeable) & asked; rest != 0;) {
+  for (std::uint64_t rest = reached.met & asked; rest != 0;) {
     const std::size_t k = hwy::Num0BitsAboveMS1Bit_Nonzero64(rest) ^ 63;
     const std::uint64_t bit = std::uint64_t{1} << k;
     rest ^= bit;
@@ -150,59 +131,66 @@ HWY_INLINE void WalkBack(D d, std::size_t first, const Batch& batch, std::uint64
             depth = hn::Set(d, batch.depth[k]);
     const auto number = hn::Set(di, std::int32_t(first + k));
     const auto each_block = [&](auto&& use) {
-      for (std::size_t word = 0; word < BlockSet::words; ++word)
-        for (std::uint64_t left = blocks[k].bits[word]; left != 0; left &= left - 1)
-          use((64 * word + hwy::Num0BitsBelowLS1Bit_Nonzero64(left)) * Blocks::lanes);
+      for (std::size_t word = 0; word < ReachedBlocks::words; ++word)
+        for (std::uint32_t left = reached.bits[word][k]; left != 0; left &= left - 1)
+          use(walked[32 * word + hwy::Num0BitsBelowLS1Bit_Nonzero32(left)]);
     };
-    /// One step of the rays at `at`: alpha, zero where not blended, and v_weight - X; T and X come to be those before
+    /// One step of the block's rays: alpha, zero where not blended, and v_weight - X; T and X come to be those before
     /// the splat. T by division, which costs less than keeping each of them on the way there.
-    const auto step = [&](std::size_t at, V v_red, V v_green, V v_blue, V& transmittance, V& gain, V& u, V& v) {
-      const V alpha = hn::IfThenElseZero(
-          hn::RebindMask(d, hn::Lt(number, hn::Load(di, ends.end + at))),
-          AlphaOf(d, PowerAt(d, batch, k, hn::Load(d, places.x + at), hn::Load(d, places.y + at), u, v)));
-      transmittance = hn::Mul(hn::Load(d, rays.transmittance + at), hn::Div(one, hn::Sub(one, alpha)));
-      hn::Store(transmittance, d, rays.transmittance + at);
-      const V beyond = hn::Load(d, rays.beyond + at);
+    const auto step = [&](auto clamped, WalkedBlock& block, V v_red, V v_green, V v_blue, V& transmittance, V& gain,
+                          V& u, V& v) {
+      const V power = PowerAt(d, batch, k, hn::Load(d, block.x), hn::Load(d, block.y), u, v);
+      const V alpha = AlphaOf<clamped>(d, power, hn::RebindMask(d, hn::Lt(number, hn::Load(di, block.end))));
+      transmittance = hn::Div(hn::Load(d, block.transmittance), hn::Sub(one, alpha));
+      hn::Store(transmittance, d, block.transmittance);
+      const V beyond = hn::Load(d, block.beyond);
       gain = hn::MulAdd(red, v_red, hn::MulAdd(green, v_green, hn::MulSub(blue, v_blue, beyond)));
-      if constexpr (kDepth) gain = hn::MulAdd(depth, hn::Load(d, upstream.depth + at), gain);
-      hn::Store(hn::MulAdd(alpha, gain, beyond), d, rays.beyond + at);
+      if constexpr (kDepth) gain = hn::MulAdd(depth, hn::Load(d, block.depth), gain);
+      hn::Store(hn::MulAdd(alpha, gain, beyond), d, block.beyond);
       return alpha;
     };
     if ((changeable & bit) == 0) {
-      each_block([&](std::size_t at) {
+      each_block([&](WalkedBlock& block) {
         V transmittance, gain, u, v;
-        step(at, hn::Load(d, upstream.red + at), hn::Load(d, upstream.green + at), hn::Load(d, upstream.blue + at),
+        step(std::true_type(), block, hn::Load(d, block.red), hn::Load(d, block.green), hn::Load(d, block.blue),
              transmittance, gain, u, v);
       });
       continue;
     }
     Sums sums{zero, zero, zero, zero, zero, zero, zero, zero, zero, zero};
-    each_block([&](std::size_t at) {
-      const V v_red = hn::Load(d, upstream.red + at), v_green = hn::Load(d, upstream.green + at),
-              v_blue = hn::Load(d, upstream.blue + at);
-      V transmittance, gain, u, v;
-      const V alpha = step(at, v_red, v_green, v_blue, transmittance, gain, u, v);
-      const V weight = hn::Mul(transmittance, alpha);
-      const V g = hn::IfThenElseZero(hn::Lt(alpha, ceiling), hn::Mul(weight, gain));
-      const V gu = hn::Mul(g, u), gv = hn::Mul(g, v);
-      sums.g = hn::Add(sums.g, g), sums.along = hn::Add(sums.along, gu), sums.across = hn::Add(sums.across, gv);
-      sums.along_along = hn::MulAdd(gu, u, sums.along_along);
-      sums.along_across = hn::MulAdd(gu, v, sums.along_across);
-      sums.across_across = hn::MulAdd(gv, v, sums.across_across);
-      sums.red = hn::MulAdd(weight, v_red, sums.red), sums.green = hn::MulAdd(weight, v_green, sums.green);
-      sums.blue = hn::MulAdd(weight, v_blue, sums.blue);
-      if constexpr (kDepth) sums.depth = hn::MulAdd(weight, hn::Load(d, upstream.depth + at), sums.depth);
-    });
+    const auto pull_back = [&](auto clamped) {
+      each_block([&](WalkedBlock& block) {
+        const V v_red = hn::Load(d, block.red), v_green = hn::Load(d, block.green), v_blue = hn::Load(d, block.blue);
+        V transmittance, gain, u, v;
+        const V alpha = step(clamped, block, v_red, v_green, v_blue, transmittance, gain, u, v);
+        const V weight = hn::Mul(transmittance, alpha);
+        V g = hn::Mul(weight, gain);
+        if constexpr (clamped) g = hn::IfThenElseZero(hn::Lt(alpha, ceiling), g);
+        const V gu = hn::Mul(g, u), gv = hn::Mul(g, v);
+        sums.g = hn::Add(sums.g, g), sums.along = hn::Add(sums.along, gu), sums.across = hn::Add(sums.across, gv);
+        sums.along_along = hn::MulAdd(gu, u, sums.along_along);
+        sums.along_across = hn::MulAdd(gu, v, sums.along_across);
+        sums.across_across = hn::MulAdd(gv, v, sums.across_across);
+        sums.red = hn::MulAdd(weight, v_red, sums.red), sums.green = hn::MulAdd(weight, v_green, sums.green);
+        sums.blue = hn::MulAdd(weight, v_blue, sums.blue);
+        if constexpr (kDepth) sums.depth = hn::MulAdd(weight, hn::Load(d, block.depth), sums.depth);
+      });
+    };
+    if (batch.log2_opacity[k] > unclamped_log2_opacity) {
+      pull_back(std::true_type());
+    } else {
+      pull_back(std::false_type());
+    }
     StoreGradient(d, sums, pairs[pair_of_entry[k]]);
   }
 }
 
-/// From rows to block order.
-HWY_INLINE void ToBlocks(const float* rows, float* blocks) {
+/// A tile's plane, row by row, to its blocks.
+HWY_INLINE void ToBlocks(const float* rows, float (WalkedBlock::*plane)[Blocks::lanes], WalkedBlock* walked) {
   for (std::size_t b = 0; b < Blocks::count; ++b) {
     const float* from = rows + b / Blocks::columns * Blocks::height * tile_size + b % Blocks::columns * Blocks::width;
     for (std::size_t y = 0; y < Blocks::height; ++y)
-      std::copy_n(from + y * tile_size, Blocks::width, blocks + b * Blocks::lanes + y * Blocks::width);
+      std::copy_n(from + y * tile_size, Blocks::width, walked[b].*plane + y * Blocks::width);
   }
 }
 
@@ -224,25 +212,30 @@ void WalkTile(const Splat* splats, const std::uint32_t* list, std::size_t count,
   while (asked < passed && pair_of_entry[asked] == ForwardBuffers::no_pair) ++asked;
   if (asked == passed) return;
 
-  BlockUpstream upstream;
-  ToBlocks(rows_upstream.red, upstream.red);
-  ToBlocks(rows_upstream.green, upstream.green);
-  ToBlocks(rows_upstream.blue, upstream.blue);
-  if constexpr (kDepth) ToBlocks(rows_upstream.depth, upstream.depth);
-  Rays rays;
-  ToBlocks(rows_upstream.transmittance, rays.beyond);
-  std::copy_n(ends.transmittance, TilePixels::count, rays.transmittance);
+  WalkedBlock walked[Blocks::count];
+  for (std::size_t b = 0, at = 0; b < Blocks::count; ++b, at += Blocks::lanes) {
+    std::copy_n(places.x + at, Blocks::lanes, walked[b].x);
+    std::copy_n(places.y + at, Blocks::lanes, walked[b].y);
+    std::copy_n(ends.end + at, Blocks::lanes, walked[b].end);
+    std::copy_n(ends.transmittance + at, Blocks::lanes, walked[b].transmittance);
+  }
+  ToBlocks(rows_upstream.red, &WalkedBlock::red, walked);
+  ToBlocks(rows_upstream.green, &WalkedBlock::green, walked);
+  ToBlocks(rows_upstream.blue, &WalkedBlock::blue, walked);
+  if constexpr (kDepth) ToBlocks(rows_upstream.depth, &WalkedBlock::depth, walked);
+  ToBlocks(rows_upstream.transmittance, &WalkedBlock::beyond, walked);
   Batch batch;
+  ReachedBlocks reached;
   for (std::size_t b = (passed + Batch::size - 1) / Batch::size; b-- > asked / Batch::size;) {
     const std::size_t first = b * Batch::size, n = HWY_MIN(Batch::size, passed - first);
     Fill(splats, list + first, n, x0, y0, batch);
     if (b > asked / Batch::size)
       for (std::size_t k = first - Batch::size; k < first; ++k) hwy::Prefetch(&splats[list[k]]);
-    FindReach(d, n, batch);
-    for (std::size_t block = 0; block < Blocks::count; ++block)
-      batch.reach[block] &= FirstBits(block_ends[block] - std::int64_t(first));
+    std::int32_t ends_from_here[Blocks::count];
+    for (std::size_t i = 0; i < Blocks::count; ++i) ends_from_here[i] = block_ends[i] - std::int32_t(first);
+    FindReachedBlocks(d, n, batch, ends_from_here, reached);
     const std::uint64_t bits_asked = asked > first ? ~std::uint64_t{0} << (asked - first) : ~std::uint64_t{0};
-    WalkBack<kDepth>(d, first, batch, bits_asked, Changeable(pair_of_entry + first, n), upstream, ends, rays,
+    WalkBack<kDepth>(d, first, batch, reached, bits_asked, Changeable(pair_of_entry + first, n), walked,
                      pair_of_entry + first, pairs);
   }
 }
