@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cassert>
+#include <functional>
 
 #include "engine/core/parallel.h"
 #include "engine/render/backward_stages.h"
@@ -214,7 +215,8 @@ void backward(const Layers& layers, const scene::Camera& camera, const BackwardO
               Gradients& out) {
   assert(scene::validate(camera));
   assert(options.forward.tiles.empty() || !options.forward.rect);
-  assert(std::is_sorted(rows.begin(), rows.end()) && (rows.empty() || rows.back() < layers.size()));
+  assert(std::adjacent_find(rows.begin(), rows.end(), std::greater_equal<>()) == rows.end());
+  assert(rows.empty() || rows.back() < layers.size());
   assert(out.size() == rows.size() && out.sh_degree == layers.base->sh_degree);
   assert(options.forward.backend == Backend::reference ||
          (options.forward.semantics == Semantics::dense_stop && options.alpha_clamp == AlphaClamp::exact));

@@ -66,7 +66,7 @@ class BackwardWorkspace {
 
 /// Adds dL/d(row) to out, for the rows that may change; all others only shape what is in front of and behind them.
 ///   layers, camera  what was rendered
-///   rows      [R], ascending rows of the layers, none of them hidden: row rows[r] has its gradient at r
+///   rows      [R], rows of the layers, each once and ascending, none of them hidden: row rows[r] has its gradient at r
 ///   upstream  pictures of the size that forward() gave them: the camera's, or that of options.forward.rect
 ///   out       of R rows and the layers' degree (Gradients::reset()); added to, so that views sum, but for mean2d,
 ///             which is overwritten

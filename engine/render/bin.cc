@@ -1,7 +1,6 @@
 // Depth order, and which splats reach which tiles.
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <limits>
 #include <new>
 #include <numeric>
@@ -86,7 +85,7 @@ std::uint32_t* keep_wanted(const TileGrid& grid, std::span<std::uint32_t> reache
   return kept;
 }
 
-/// Counts the entries of each tile and says where they go; place_entries() puts them there.
+/// Counts the entries of each tile, and what of them is before those of each block; place_entries() puts them there.
 /// Calls reached_tiles(i, n) for each splat: in how many tiles it is listed.
 template <class Reached>
 void count_entries(const TileGrid& grid, ForwardBuffers& buffers, Reached&& reached_tiles) {

@@ -140,7 +140,8 @@ HWY_INLINE void WalkBack(D d, std::size_t first, const Batch& batch, const Reach
     const auto step = [&](auto clamped, WalkedBlock& block, V v_red, V v_green, V v_blue, V& transmittance, V& gain,
                           V& u, V& v) {
       const V power = PowerAt(d, batch, k, hn::Load(d, block.x), hn::Load(d, block.y), u, v);
-      const V alpha = AlphaOf<clamped>(d, power, hn::RebindMask(d, hn::Lt(number, hn::Load(di, block.end))));
+      const auto before_end = hn::RebindMask(d, hn::Lt(number, hn::Load(di, block.end)));
+      const V alpha = AlphaOf<clamped>(d, power, PassesCut(d, power, before_end));
       transmittance = hn::Div(hn::Load(d, block.transmittance), hn::Sub(one, alpha));
       hn::Store(transmittance, d, block.transmittance);
       const V beyond = hn::Load(d, block.beyond);

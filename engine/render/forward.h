@@ -21,6 +21,8 @@ namespace engine::render {
 
 /// Side of a screen tile, pixels. Tile number t covers column t % tile_columns(), row t / tile_columns().
 constexpr int tile_size = 16;
+constexpr int log2_tile_size = 4;
+static_assert(1 << log2_tile_size == tile_size);
 constexpr int tile_columns(int width) { return (width + tile_size - 1) / tile_size; }
 constexpr int tile_rows(int height) { return (height + tile_size - 1) / tile_size; }
 

@@ -76,8 +76,7 @@ void FrozenView::restore(const Layers& frozen) {
   grid.wanted.assign(std::size_t(grid.columns) * std::size_t(grid.rows), 0);
   for (const std::uint32_t tile : tiles_of(view.region, grid.columns)) grid.wanted[tile] = 1;
   ForwardBuffers buffers;
-  // Within all of the picture: what a splat's box is cut to decides which tiles it is listed in, and the lists are to
-  // be those of a picture that was not cut.
+  // Within all of the picture: the lists are to be those of a picture that was not cut.
   project(frozen, view_params<float>(view.camera), frozen.base->sh_degree, {}, Culling::exact, grid.pixels, buffers);
   sort_by_depth(buffers);
   bin(grid, buffers);

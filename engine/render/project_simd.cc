@@ -155,11 +155,9 @@ void ProjectVector(D d, const scene::GaussianCloud& cloud, const ViewParams<floa
   const V last_y = hn::Floor(hn::Min(hn::Add(y, half_y), set(pixels.y1 - 1)));
   alive = hn::And(alive, hn::And(hn::Le(first_x, last_x), hn::Le(first_y, last_y)));
   if (hn::AllFalse(d, alive)) return;
-  constexpr int log2_tile = 4;
-  static_assert(1 << log2_tile == tile_size);
   auto tile_range = [&](V first, V last) {
-    return hn::Or(hn::ShiftRight<log2_tile>(hn::ConvertTo(di, first)),
-                  hn::ShiftLeft<16>(hn::ShiftRight<log2_tile>(hn::ConvertTo(di, last))));
+    return hn::Or(hn::ShiftRight<log2_tile_size>(hn::ConvertTo(di, first)),
+                  hn::ShiftLeft<16>(hn::ShiftRight<log2_tile_size>(hn::ConvertTo(di, last))));
   };
 
   const V inverse_length = hn::Div(set(1), hn::Sqrt(hn::MulAdd(dx, dx, hn::MulAdd(dy, dy, hn::Mul(dz, dz)))));
@@ -195,11 +193,8 @@ void ProjectVector(D d, const scene::GaussianCloud& cloud, const ViewParams<floa
   out.count += count;
 }
 
-/// Coefficients are most of what a frame reads, and this is its first sight of them.
-constexpr std::size_t fetch_ahead = 16;  // rows
-HWY_INLINE void FetchRow(const float* sh, std::size_t stride) {
-  for (std::size_t k = 0; k < stride; k += 16) hwy::Prefetch(sh + k);
-}
+/// Rows whose coefficients are asked for before they are needed: it is a frame's first sight of them.
+constexpr std::size_t fetch_ahead = 16;
 
 /// Writes the survivors that are not hidden, with their colours.
 ///   kDegree  bands used, -1 for none: black
@@ -252,18 +247,8 @@ std::size_t ProjectRows(const ProjectedLayer& layer, const ViewParams<float>& vi
   Survivors found;
   for (std::size_t i = begin; i < end; i += hn::Lanes(d))
     ProjectVector(d, layer.cloud, view, culling, pixels, i, HWY_MIN(hn::Lanes(d), end - i), found);
-  switch (sh_degree) {
-    case -1:
-      return WriteSplats<-1>(layer, begin, found, out, boxes);
-    case 0:
-      return WriteSplats<0>(layer, begin, found, out, boxes);
-    case 1:
-      return WriteSplats<1>(layer, begin, found, out, boxes);
-    case 2:
-      return WriteSplats<2>(layer, begin, found, out, boxes);
-    default:
-      return WriteSplats<3>(layer, begin, found, out, boxes);
-  }
+  if (sh_degree < 0) return WriteSplats<-1>(layer, begin, found, out, boxes);
+  return WithDegree(sh_degree, [&](auto degree) { return WriteSplats<degree>(layer, begin, found, out, boxes); });
 }
 
 }  // namespace HWY_NAMESPACE

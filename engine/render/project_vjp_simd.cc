@@ -45,7 +45,6 @@ HWY_INLINE V3 Cross(const V3& a, const V3& b) {
           hn::MulSub(a.x, b.y, hn::Mul(a.y, b.x))};
 }
 HWY_INLINE V3 Scaled(const V3& a, VjpV s) { return {hn::Mul(a.x, s), hn::Mul(a.y, s), hn::Mul(a.z, s)}; }
-HWY_INLINE V3 Sum(const V3& a, const V3& b) { return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)}; }
 
 /// project_vjp() and opacity_logit_gradient() for the rows [i, i + lanes). Those that are seen are visible; of all
 /// others anything may come, infinities too, and is dropped.
@@ -242,7 +241,7 @@ HWY_INLINE void ColorVjpRow(const float* sh, std::size_t stored, std::size_t i, 
 }
 
 /// color_vjp() for all rows, whose directions are known: adds to their v_mean, and to out.sh.
-///   row_of  [rows.count] in the cloud
+///   row_of  [rows.count] in the layers, ascending
 template <int kDegree>
 void ColorVjp(const scene::GaussianCloud& cloud, std::size_t first_row, const std::uint32_t* row_of, std::size_t begin,
               VjpRows& rows, Gradients& out) {
@@ -253,8 +252,7 @@ void ColorVjp(const scene::GaussianCloud& cloud, std::size_t first_row, const st
   const auto v_sh = [&](std::size_t i) { return out.sh.data() + (begin + i) * stride; };
   for (std::size_t i = 0; i < rows.count; ++i) {
     const std::size_t coming = HWY_MIN(i + 8, rows.count - 1);
-    if (rows.seen[coming] != 0)
-      for (std::size_t k = 0; k < stride; k += 16) hwy::Prefetch(sh(coming) + k), hwy::Prefetch(v_sh(coming) + k);
+    if (rows.seen[coming] != 0) FetchRow(sh(coming), stride), FetchRow(v_sh(coming), stride);
     if (rows.seen[i] != 0)
       ColorVjpRow<kDegree>(sh(i), stored, i, rows, bases, v_sh(i));
     else
@@ -336,27 +334,23 @@ void ProjectRowsVjp(const scene::GaussianCloud& cloud, std::size_t first_row, co
   if (!any) {
     std::fill_n(out.mean2d_x_px.data() + begin, rows.count, 0.0f);
     std::fill_n(out.mean2d_y_px.data() + begin, rows.count, 0.0f);
-  } else {
-    LoadRows(cloud, first_row, row_of, rows);
-    FillUp(d, rows);
-    for (std::size_t i = 0; i < rows.count; i += hn::Lanes(d)) ProjectVjpVector(d, view, i, rows);
-    const auto color_vjp = sh_degree == 0   ? ColorVjp<0>
-                           : sh_degree == 1 ? ColorVjp<1>
-                           : sh_degree == 2 ? ColorVjp<2>
-                                            : ColorVjp<3>;
-    color_vjp(cloud, first_row, row_of, begin, rows, out);
-    const auto add = [&](const float* from, std::vector<float>& to) {
-      for (std::size_t i = 0; i < rows.count; ++i) to[begin + i] += from[i];
-    };
-    add(rows.v_mean[0], out.mean.x), add(rows.v_mean[1], out.mean.y), add(rows.v_mean[2], out.mean.z);
-    add(rows.v_log_scale[0], out.log_scale.x), add(rows.v_log_scale[1], out.log_scale.y);
-    add(rows.v_log_scale[2], out.log_scale.z);
-    add(rows.v_rotation[0], out.rotation.w), add(rows.v_rotation[1], out.rotation.x);
-    add(rows.v_rotation[2], out.rotation.y), add(rows.v_rotation[3], out.rotation.z);
-    add(rows.v_logit, out.opacity_logit);
-    std::copy_n(rows.v_x, rows.count, out.mean2d_x_px.data() + begin);
-    std::copy_n(rows.v_y, rows.count, out.mean2d_y_px.data() + begin);
+    return;
   }
+  LoadRows(cloud, first_row, row_of, rows);
+  FillUp(d, rows);
+  for (std::size_t i = 0; i < rows.count; i += hn::Lanes(d)) ProjectVjpVector(d, view, i, rows);
+  WithDegree(sh_degree, [&](auto degree) { ColorVjp<degree>(cloud, first_row, row_of, begin, rows, out); });
+  const auto add = [&](const float* from, std::vector<float>& to) {
+    for (std::size_t i = 0; i < rows.count; ++i) to[begin + i] += from[i];
+  };
+  add(rows.v_mean[0], out.mean.x), add(rows.v_mean[1], out.mean.y), add(rows.v_mean[2], out.mean.z);
+  add(rows.v_log_scale[0], out.log_scale.x), add(rows.v_log_scale[1], out.log_scale.y);
+  add(rows.v_log_scale[2], out.log_scale.z);
+  add(rows.v_rotation[0], out.rotation.w), add(rows.v_rotation[1], out.rotation.x);
+  add(rows.v_rotation[2], out.rotation.y), add(rows.v_rotation[3], out.rotation.z);
+  add(rows.v_logit, out.opacity_logit);
+  std::copy_n(rows.v_x, rows.count, out.mean2d_x_px.data() + begin);
+  std::copy_n(rows.v_y, rows.count, out.mean2d_y_px.data() + begin);
 }
 
 }  // namespace HWY_NAMESPACE

@@ -21,7 +21,8 @@ using TileV = hn::Vec<TileD>;
 struct Ellipses {
   TileV x, y, slope, half_y, inverse_half_y, radius_over_l1, rightmost_dy, margin;
 
-  HWY_INLINE Ellipses(TileD d, TileV x_, TileV y_, TileV l1, TileV l2, TileV l3, TileV log2_opacity) : x(x_), y(y_) {
+  HWY_INLINE Ellipses(TileD d, TileV mean_x, TileV mean_y, TileV l1, TileV l2, TileV l3, TileV log2_opacity)
+      : x(mean_x), y(mean_y) {
     const TileV one = hn::Set(d, 1.0f);
     // u = l1 dx + l2 dy and v = l3 dy run over a disc of this radius. A little more is let in, for rounding here and in
     // the blend.
@@ -80,8 +81,6 @@ std::uint32_t* ListReachedTiles(const Splat* splats, const TileBox* boxes, std::
   const hn::CappedTag<std::uint32_t, reached_tiles_slack> d_tiles;
   const std::size_t lanes = hn::Lanes(d);
   const auto side_by_side = hn::Iota(d_tiles, 0);
-  constexpr int log2_tile = 4;
-  static_assert(1 << log2_tile == tile_size);
   BoxedSplats boxed;
   for (std::size_t i = 0; i < n; i += lanes) {
     const std::size_t here = HWY_MIN(lanes, n - i);
@@ -99,11 +98,12 @@ std::uint32_t* ListReachedTiles(const Splat* splats, const TileBox* boxes, std::
       const TileV top = hn::Mul(hn::ConvertTo(d, tile_row), hn::Set(d, float(tile_size)));
       TileV left, right;
       ellipses.OverRows(d, top, hn::Add(top, hn::Set(d, float(tile_size - 1))), left, right);
-      // Tile tx holds the pixel centres 16 tx to 16 tx + 15. Clamped before conversion: a splat may reach past any int.
+      // Tile tx holds the pixel centres 16 tx to 16 tx + 15. What lies beyond any int is beyond the box, too: there is
+      // none, and what it is converted to does not matter.
       left = hn::Max(left, box_left), right = hn::Min(right, box_right);
       const auto any = hn::And(hn::Lt(hn::Set(di, row), rows), hn::RebindMask(di, hn::Le(left, right)));
-      const auto begin = hn::ShiftRight<log2_tile>(hn::ConvertTo(di, hn::Ceil(left)));
-      const auto end = hn::Add(hn::ShiftRight<log2_tile>(hn::ConvertTo(di, right)), hn::Set(di, 1));
+      const auto begin = hn::ShiftRight<log2_tile_size>(hn::ConvertTo(di, hn::Ceil(left)));
+      const auto end = hn::Add(hn::ShiftRight<log2_tile_size>(hn::ConvertTo(di, right)), hn::Set(di, 1));
       const std::size_t at = std::size_t(row) * lanes;
       hn::StoreU(hn::Add(hn::Mul(tile_row, hn::Set(di, columns)), begin), di, first + at);
       hn::StoreU(hn::IfThenElseZero(any, hn::Sub(end, begin)), di, count + at);

@@ -91,11 +91,13 @@ struct ForwardBuffers {
   std::size_t count = 0;  ///< Of splats.
   // bin: for each tile the splats that reach it, in their order
   struct BinBlock {
-    Buffer<std::uint32_t> tiles;          ///< Those reached, splat by splat.
-    Buffer<std::uint32_t> reached;        ///< How many tiles each splat reaches.
-    Buffer<std::int32_t> work;            ///< Of list_reached_tiles().
-    std::size_t listed = 0;               ///< All of them.
-    std::vector<std::uint32_t> position;  ///< Per tile: count, then where the block's next entry goes.
+    Buffer<std::uint32_t> tiles;    ///< Those reached, splat by splat.
+    Buffer<std::uint32_t> reached;  ///< How many tiles each splat reaches.
+    Buffer<std::int32_t> work;      ///< Of list_reached_tiles().
+    std::size_t listed = 0;         ///< All of them.
+    /// Per tile: the block's count of entries, then how many of blocks before it there are, then where its next one
+    /// goes.
+    std::vector<std::uint32_t> position;
   };
   std::vector<BinBlock> bin_blocks;
   Buffer<std::uint32_t> entries;          ///< Indices into splats.
@@ -194,16 +196,17 @@ void largest_tile_weights(const Splat* splats, std::span<const std::uint32_t> li
 void project(const Layers& layers, const ViewParams<float>& view, int sh_degree, std::span<const float> weight,
              Culling culling, scene::Rect pixels, ForwardBuffers& buffers);
 
-/// Lists the tiles that hold a pixel within reach of a splat (and rarely one that just misses), splat by splat and, of
-/// each, row by row.
+/// Lists the tiles of a splat's box that hold a pixel within its reach (and rarely one that just misses), splat by
+/// splat and, of each, row by row.
 ///   boxes    [splats.size()]
 ///   columns  tiles across the picture
+///   work     scratch
 ///   tiles    room for all tiles of the boxes, and reached_tiles_slack more
 ///   reached  [splats.size()] how many are listed for each
 ///   returns  the end of what is listed
 std::uint32_t* list_reached_tiles(std::span<const Splat> splats, const TileBox* boxes, int columns,
                                   Buffer<std::int32_t>& work, std::uint32_t* tiles, std::uint32_t* reached);
-constexpr std::size_t reached_tiles_slack = 8;  // a vector is written where a tile may do
+constexpr std::size_t reached_tiles_slack = 8;  ///< So many past the end may be written: whole vectors are.
 
 /// The stages between projection and blending.
 void sort_by_depth(ForwardBuffers& buffers);

@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <string>
 
 #include "engine/core/finite.h"
 #include "engine/core/parallel.h"
 #include "engine/core/rng.h"
+#include "engine/render/frame.h"
 #include "engine/render/reference.h"
 #include "engine/render/reference_backward.h"
 #include "tests/engine/render/gradients.h"
@@ -357,17 +359,92 @@ TEST(Backward, BackendsAgreeOnACrowdedSceneButForRareFlipsAtACut) {
 TEST(Backward, BackendsAgreeForEveryDegreeThatACloudStoresAndEveryDegreeThatIsUsed) {
   const auto camera = off_centre_camera();
   const auto upstream = random_upstream(camera.width, camera.height, 23);
-  for (int stored = 0; stored <= scene::max_sh_degree; ++stored) {
-    const auto cloud = cloud_in_view(300, 22, stored);
-    for (int used = 0; used <= stored; ++used) {
-      SCOPED_TRACE(testing::Message() << "degree " << used << " of " << stored);
-      BackwardOptions simd = on(Backend::simd), reference = on(Backend::reference);
-      simd.forward.max_sh_degree = reference.forward.max_sh_degree = used;
-      const Gradients seen = gradients_of(cloud, camera, simd, upstream);
-      expect_close(seen, gradients_of(cloud, camera, reference, upstream), 2e-3);
-      EXPECT_EQ(seen.sh.size(), cloud.sh.size());
+  const std::string best = simd_target();
+  for (const std::string& target : simd_targets())
+    for (int stored = 0; stored <= scene::max_sh_degree; ++stored) {
+      const auto cloud = cloud_in_view(300, 22, stored);
+      for (int used = 0; used <= stored; ++used) {
+        SCOPED_TRACE(testing::Message() << target << ", degree " << used << " of " << stored);
+        ASSERT_TRUE(pin_simd_target(target));
+        BackwardOptions simd = on(Backend::simd), reference = on(Backend::reference);
+        simd.forward.max_sh_degree = reference.forward.max_sh_degree = used;
+        const Gradients seen = gradients_of(cloud, camera, simd, upstream);
+        expect_close(seen, gradients_of(cloud, camera, reference, upstream), 2e-3);
+        EXPECT_EQ(seen.sh.size(), cloud.sh.size());
+      }
+    }
+  ASSERT_TRUE(pin_simd_target(best));
+}
+
+TEST(Backward, ThePlaceInThePictureIsOverwrittenAlsoForBlocksOfRowsOfWhichNothingIsSeen) {
+  auto cloud = cloud_in_view(800, 37, 0);
+  for (std::size_t i = 0; i < 600; ++i) cloud.mean.z[i] = -2;
+  const auto camera = off_centre_camera();
+  Gradients gradients;
+  gradients.reset(cloud.size(), 0);
+  gradients.mean2d_x_px.assign(cloud.size(), 5.0f), gradients.mean2d_y_px.assign(cloud.size(), 5.0f);
+  Frame frame;
+  scene::Image color(camera.width, camera.height, 3);
+  frame.forward(cloud, camera, {}, color);
+  frame.backward(cloud, random_upstream(camera.width, camera.height, 38).color, gradients);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    ASSERT_TRUE(i >= 600 || gradients.mean2d_x_px[i] == 0) << i;
+    ASSERT_TRUE(i >= 600 || gradients.mean2d_y_px[i] == 0) << i;
+    ASSERT_NE(gradients.mean2d_x_px[i], 5.0f) << i;
+  }
+}
+
+TEST(Backward, NoNumberUpstreamIsNoNumberInTheRowsThatReachThePixelAndNothingInAllOthers) {
+  // Two groups that no tile shares.
+  scene::GaussianCloud cloud;
+  cloud.sh_degree = 3;
+  for (int i = 0; i < 20; ++i) {
+    add_on_axis(cloud, 2, 0.5f, 0.6f, -4.0f);
+    cloud.mean.x[std::size_t(i)] = (i % 2 == 0 ? -0.9f : 0.9f) + 0.01f * float(i);
+  }
+  const auto camera = off_centre_camera();
+  const Upstream good = random_upstream(camera.width, camera.height, 39);
+  const std::string best = simd_target();
+  for (const std::string& target : simd_targets()) {
+    SCOPED_TRACE(target);
+    ASSERT_TRUE(pin_simd_target(target));
+    const auto expected = gradients_of(cloud, camera, on(Backend::simd), good);
+    Upstream bad = good;  // all that the left group reaches
+    for (int y = 0; y < camera.height; ++y)
+      for (int x = 0; x < camera.width / 2; ++x) bad.color.at(x, y, 0) = std::numeric_limits<float>::quiet_NaN();
+    const auto seen = gradients_of(cloud, camera, on(Backend::simd), bad);
+    for (std::size_t i = 0; i < cloud.size(); ++i) {
+      ASSERT_NE(expected.mean.x[i], 0.0f) << i;
+      if (i % 2 == 0) {
+        EXPECT_TRUE(std::isnan(seen.mean.x[i]) && std::isnan(seen.opacity_logit[i])) << i;
+      } else {
+        EXPECT_EQ(seen.mean.x[i], expected.mean.x[i]) << i;
+      }
     }
   }
+  ASSERT_TRUE(pin_simd_target(best));
+}
+
+TEST(Backward, ARowThatHoldsNoNumbersHasNoGradientAndChangesNoOther) {
+  const auto camera = off_centre_camera();
+  const auto upstream = random_upstream(camera.width, camera.height, 40);
+  const float none = std::numeric_limits<float>::quiet_NaN();
+  auto cloud = cloud_in_view(60, 41), hidden = cloud;
+  const std::string best = simd_target();
+  for (const std::string& target : simd_targets()) {
+    SCOPED_TRACE(target);
+    ASSERT_TRUE(pin_simd_target(target));
+    for (std::size_t i = 0; i < cloud.size(); i += 3) {
+      hidden.mean.set(i, {0, 0, -1});
+      cloud.mean.set(i, Vec3(none)), cloud.log_scale.set(i, Vec3(none)),
+          cloud.rotation.set(i, {none, none, none, none});
+      cloud.opacity_logit[i] = none;
+      for (float& value : cloud.sh_row(i)) value = none;
+    }
+    expect_same_bytes(gradients_of(cloud, camera, on(Backend::simd), upstream),
+                      gradients_of(hidden, camera, on(Backend::simd), upstream));
+  }
+  ASSERT_TRUE(pin_simd_target(best));
 }
 
 TEST(Backward, ListsLongerThanManyBatchesAndRaysThatEndEarlyAgreeWithTheReference) {

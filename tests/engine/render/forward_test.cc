@@ -267,6 +267,23 @@ TEST(Forward, BackendsAgreeOnDepthsOfRaysThatEndWithinABatch) {
   EXPECT_LE(others, seen.depth.data.size() / 500) << "median depths differ where half is passed to rounding";
 }
 
+TEST(Forward, AlphaKeepsItsDigitsFromTheCutToTheClampWithEveryInstructionSet) {
+  const std::string best = simd_target();
+  for (const std::string& target : simd_targets()) {
+    SCOPED_TRACE(target);
+    ASSERT_TRUE(pin_simd_target(target));
+    // One pixel in the middle of one splat: alpha is the opacity. All 32nds of an octave, and between.
+    for (float logit = -5.53f; logit < 4.5f; logit += 0.0037f) {
+      scene::GaussianCloud cloud;
+      add_on_axis(cloud, 2, logit, 0.5f);
+      const double opacity = std::min(0.99, 1 / (1 + std::exp(-double(logit))));
+      ASSERT_NEAR(forward(cloud, one_pixel_camera(), everything()).alpha.at(0, 0), opacity, 5e-7 * opacity + 6e-8)
+          << logit;
+    }
+  }
+  ASSERT_TRUE(pin_simd_target(best));
+}
+
 TEST(Forward, IsTheSameToTheBitForAnyNumberOfThreads) {
   const auto cloud = cloud_in_view(5000, 13);
   const std::vector<float> weight(cloud.size(), 0.3f);

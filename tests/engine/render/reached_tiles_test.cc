@@ -96,5 +96,49 @@ TEST(ListReachedTiles, ListsEveryTileThatHoldsAPixelWithinReachAndHardlyAnyOther
   ASSERT_TRUE(pin_simd_target(best));
 }
 
+/// All tiles of the box, when the splat covers them and more.
+std::vector<std::uint32_t> tiles_of(const TileBox& box) {
+  std::vector<std::uint32_t> tiles;
+  for (int row = box.first_row; row <= box.last_row; ++row)
+    for (int column = box.first_column; column <= box.last_column; ++column)
+      tiles.push_back(std::uint32_t(row * columns + column));
+  return tiles;
+}
+
+TEST(ListReachedTiles, NeverLeavesTheBoxNorTheRoomThatIsPromised) {
+  // Splats that reach past any int fill their boxes: one tile, a row, a column, all, and what fills a vector to the
+  // end.
+  const std::vector<TileBox> boxes_of_all_kinds = {{7, 7, 5, 5},  {0, columns - 1, 3, 3},        {4, 4, 0, rows - 1},
+                                                   {2, 9, 0, 10}, {0, columns - 1, 0, rows - 1}, {18, 19, 10, 11}};
+  Splat wide{};
+  wide.l1 = 1e-12f, wide.l2 = 3e-13f, wide.l3 = 1e-12f;
+  const std::string best = simd_target();
+  for (const std::string& target : simd_targets()) {
+    SCOPED_TRACE(target);
+    ASSERT_TRUE(pin_simd_target(target));
+    for (std::size_t n = 1; n <= 40; ++n) {
+      const std::vector<Splat> splats(n, wide);
+      std::vector<TileBox> boxes;
+      std::vector<std::uint32_t> expected;
+      for (std::size_t i = 0; i < n; ++i) {
+        boxes.push_back(boxes_of_all_kinds[(i + n) % boxes_of_all_kinds.size()]);
+        const auto all = tiles_of(boxes.back());
+        expected.insert(expected.end(), all.begin(), all.end());
+      }
+      constexpr std::uint32_t untouched = 0xabcdef01;
+      std::vector<std::uint32_t> tiles(expected.size() + reached_tiles_slack + 16, untouched),
+          reached(n + 1, untouched);
+      Buffer<std::int32_t> work;
+      const std::uint32_t* const end =
+          list_reached_tiles(splats, boxes.data(), columns, work, tiles.data(), reached.data());
+      ASSERT_EQ(std::vector<std::uint32_t>(tiles.data(), tiles.data() + (end - tiles.data())), expected) << n;
+      for (std::size_t i = 0; i < n; ++i) ASSERT_EQ(reached[i], tiles_of(boxes[i]).size());
+      ASSERT_EQ(reached[n], untouched);
+      for (std::size_t i = expected.size() + reached_tiles_slack; i < tiles.size(); ++i) ASSERT_EQ(tiles[i], untouched);
+    }
+  }
+  ASSERT_TRUE(pin_simd_target(best));
+}
+
 }  // namespace
 }  // namespace engine::render
