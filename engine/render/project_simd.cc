@@ -32,7 +32,10 @@ struct Survivors {
 };
 
 HWY_INLINE V Load(D d, const float* from, std::size_t n) {
-  return n >= hn::Lanes(d) ? hn::LoadU(d, from) : hn::MaskedLoad(hn::FirstN(d, n), d, from);
+  if (n >= hn::Lanes(d)) return hn::LoadU(d, from);
+  alignas(64) float padded[hn::MaxLanes(D())] = {};  // not MaskedLoad(): with SSE it reads the whole vector
+  std::copy_n(from, n, padded);
+  return hn::Load(d, padded);
 }
 
 struct Axes {
