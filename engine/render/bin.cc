@@ -16,17 +16,34 @@ constexpr std::size_t bin_block = 2048;  // splats per unit of parallel work
 
 using Keyed = ForwardBuffers::Keyed;
 
-/// Stable radix sort by key, 11 bits at a time, least significant first. Returns whichever buffer holds the result.
-/// Each pass counts the digits of fixed blocks side by side, and then each block moves its elements to the places that
-/// the blocks before it leave.
+/// The least and the largest key; {0, 0} if there is none.
+std::pair<std::uint32_t, std::uint32_t> range_of_keys(const Keyed* keys, std::size_t n) {
+  constexpr std::size_t block = 8192;
+  if (n == 0) return {0, 0};
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> ranges(chunk_count(n, block));
+  parallel_for(n, block, [&](std::size_t begin, std::size_t end) {
+    const auto [least, largest] = std::ranges::minmax(std::span(keys + begin, end - begin), {}, &Keyed::key);
+    ranges[begin / block] = {least.key, largest.key};
+  });
+  auto whole = ranges.front();
+  for (const auto& [least, largest] : ranges) whole = {std::min(whole.first, least), std::max(whole.second, largest)};
+  return whole;
+}
+
+/// Stable radix sort by key, of the bits that differ at most 11 at a time, least significant first. Returns whichever
+/// buffer holds the result. Each pass counts the digits of fixed blocks side by side, and then each block moves its
+/// elements to the places that the blocks before it leave.
 Keyed* radix_sort(Keyed* from, Keyed* to, std::size_t n) {
-  constexpr std::size_t block = 32768;
-  constexpr int bits = 11;
-  constexpr std::size_t buckets = std::size_t{1} << bits;
+  const std::size_t block = std::max(std::size_t{8192}, (n + 31) / 32);  // few: their counts are added up by one thread
+  constexpr int most_bits = 11;
   const std::size_t blocks = chunk_count(n, block);
+  const auto [least, largest] = range_of_keys(from, n);
+  const int width = std::bit_width(largest - least);
+  const int passes = (width + most_bits - 1) / most_bits, bits = passes > 0 ? (width + passes - 1) / passes : 0;
+  const std::size_t buckets = std::size_t{1} << bits;
   std::vector<std::uint32_t> places(blocks * buckets);
-  for (int shift = 0; shift < 31; shift += bits) {  // the sign bit is never set
-    const auto digit = [shift](const Keyed& keyed) { return keyed.key >> shift & (buckets - 1); };
+  for (int shift = 0; shift < width; shift += bits) {
+    const auto digit = [=, least = least](const Keyed& keyed) { return (keyed.key - least) >> shift & (buckets - 1); };
     parallel_for(n, block, [&](std::size_t begin, std::size_t end) {
       std::uint32_t* count = places.data() + begin / block * buckets;
       std::fill_n(count, buckets, 0u);
