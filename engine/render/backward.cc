@@ -97,8 +97,8 @@ bool load_tile(const UpstreamPlanes& upstream, scene::Rect area, Vec3 background
     if (image == nullptr) return;
     const float* const plane = image->plane(channel).data();
     for (int y = first_y; y < last_y; ++y)
-      std::copy_n(plane + std::ptrdiff_t(y - area.y0) * image->width + (first_x - area.x0), last_x - first_x,
-                  to + (y - y0) * tile_size + (first_x - x0));
+      copy_tile_row(plane + std::ptrdiff_t(y - area.y0) * image->width + (first_x - area.x0), last_x - first_x,
+                    to + (y - y0) * tile_size + (first_x - x0));
     for (std::size_t i = 0; i < TilePixels::count; ++i) bits |= std::bit_cast<std::uint32_t>(to[i]) << 1;
   };
   load(upstream.color, 0, tile.red);
@@ -125,30 +125,36 @@ void fetch_upstream(const UpstreamPlanes& upstream, scene::Rect area, int x0, in
 }  // namespace
 
 void walk_tiles(const ForwardBuffers& forward, const RayEnds* ends, const TileGrid& grid,
-                const UpstreamPlanes& upstream, Vec3 background, std::size_t pairs, WalkBuffers& work) {
-  const std::size_t tiles = std::size_t(grid.columns) * std::size_t(grid.rows);
-  TileGradient* const gradients = work.pairs.reserve(pairs);
-  parallel_for(tiles, 1, [&](std::size_t tile, std::size_t) {
+                const UpstreamPlanes& upstream, Vec3 background, std::size_t pairs, Buffer<GroupGradient>& gradients) {
+  GroupGradient* const sums = gradients.reserve(pairs);
+  parallel_for(pairs, 4096,
+               [&](std::size_t begin, std::size_t end) { std::fill(sums + begin, sums + end, GroupGradient{}); });
+  const auto walk_tile = [&](int column, int row) {
+    const auto tile = std::size_t(row * grid.columns + column);
     const std::uint32_t first = forward.tile_begin[tile], last = forward.tile_begin[tile + 1];
     const std::span list(forward.entries.data() + first, last - first);
-    const std::span pair_of_entry(forward.pair_of_entry.data() + first, last - first);
-    const auto may_change = [](std::uint32_t pair) { return pair != ForwardBuffers::no_pair; };
-    if (std::none_of(pair_of_entry.begin(), pair_of_entry.end(), may_change)) return;
+    const auto may_change = [&](std::uint32_t splat) { return forward.pairs_of_splat[splat].any(); };
+    if (std::none_of(list.begin(), list.end(), may_change)) return;
     const TilePlace place = place_of(tile, grid.columns, grid.pixels);
     TileUpstream tile_upstream;
     fetch_upstream(upstream, grid.pixels, place.x0 + tile_size, place.y0);  // of the next tile
-    if (!load_tile(upstream, grid.pixels, background, place.x0, place.y0, tile_upstream)) {
-      for (const std::uint32_t pair : pair_of_entry)
-        if (may_change(pair)) gradients[pair] = {};
-      return;
-    }
+    if (!load_tile(upstream, grid.pixels, background, place.x0, place.y0, tile_upstream)) return;
     RayEnds anew;
     if (ends == nullptr) {
       TilePixels pixels;
       composite_tile(forward.splats.data(), list, place, {}, {}, pixels, &anew);
     }
-    composite_tile_vjp(forward.splats.data(), list, pair_of_entry.data(), place.x0, place.y0, tile_upstream,
-                       upstream.depth != nullptr, ends != nullptr ? ends[tile] : anew, gradients);
+    composite_tile_vjp(forward.splats.data(), forward.pairs_of_splat.data(), list, place.x0, place.y0, tile_upstream,
+                       upstream.depth != nullptr, ends != nullptr ? ends[tile] : anew, sums);
+  };
+  // A group's tiles follow each other on one thread, since they add to the same sums.
+  const auto groups = [](int tiles) { return (tiles + tile_group - 1) / tile_group; };
+  parallel_for(std::size_t(groups(grid.columns) * groups(grid.rows)), 1, [&](std::size_t group, std::size_t) {
+    const int column0 = int(group) % groups(grid.columns) * tile_group,
+              row0 = int(group) / groups(grid.columns) * tile_group;
+    for (int row = row0; row < std::min(row0 + tile_group, grid.rows); ++row)
+      for (int column = column0; column < std::min(column0 + tile_group, grid.columns); ++column)
+        walk_tile(column, row);
   });
 }
 
@@ -160,7 +166,7 @@ const scene::Image* plane_or_none(const scene::Image& image) { return image.chan
 struct BackwardBuffers {
   ForwardBuffers forward;
   Buffer<std::int32_t> slot_of_row;  ///< [layers.size()] Where a row is in the list of those that may change, or -1.
-  WalkBuffers walk;
+  Buffer<GroupGradient> pairs;
 };
 
 void backward_simd(const Layers& layers, const scene::Camera& camera, const BackwardOptions& options,
@@ -181,15 +187,13 @@ void backward_simd(const Layers& layers, const scene::Camera& camera, const Back
   std::int32_t* const slot_of_row = work.slot_of_row.reserve(layers.size());
   std::fill_n(slot_of_row, layers.size(), -1);
   for (std::size_t r = 0; r < rows.size(); ++r) slot_of_row[rows[r]] = std::int32_t(r);
-  const auto* const slots = find_slots(
-      forward, [&](std::uint32_t row) { return slot_of_row[row]; }, work.walk.slot_of_splat);
-  bin(grid, forward, slots, rows.size());
+  bin(grid, forward, slot_of_row, rows.size());
 
   const UpstreamPlanes planes{.color = plane_or_none(upstream.color),
                               .depth = plane_or_none(upstream.depth),
                               .alpha = plane_or_none(upstream.alpha)};
-  walk_tiles(forward, nullptr, grid, planes, options.forward.background, forward.first_pair[rows.size()], work.walk);
-  const RowPairs row_pairs{.first_pair = forward.first_pair.data(), .pairs = work.walk.pairs.data()};
+  walk_tiles(forward, nullptr, grid, planes, options.forward.background, forward.first_pair[rows.size()], work.pairs);
+  const RowPairs row_pairs{.first_pair = forward.first_pair.data(), .pairs = work.pairs.data()};
   const std::size_t base_rows = layers.base->size();
   const auto of_base = std::size_t(std::lower_bound(rows.begin(), rows.end(), base_rows) - rows.begin());
   parallel_for(rows.size(), project_vjp_block, [&](std::size_t begin, std::size_t end) {

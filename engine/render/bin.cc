@@ -90,6 +90,17 @@ void sort_by_depth(ForwardBuffers& buffers) {
 
 namespace {
 
+/// The groups of tiles that a box meets.
+struct TileGroups {
+  std::uint32_t first_column, first_row, columns, rows;
+
+  explicit TileGroups(const TileBox& box)
+      : first_column(box.first_column / tile_group),
+        first_row(box.first_row / tile_group),
+        columns(box.last_column / tile_group - first_column + 1),
+        rows(box.last_row / tile_group - first_row + 1) {}
+};
+
 /// Drops the tiles that are not wanted from the lists of splats. Returns their end.
 std::uint32_t* keep_wanted(const TileGrid& grid, std::span<std::uint32_t> reached, std::uint32_t* tiles) {
   std::uint32_t* kept = tiles;
@@ -149,9 +160,8 @@ void count_entries(const TileGrid& grid, ForwardBuffers& buffers, Reached&& reac
   buffers.entries.reserve(begin[tiles]);
 }
 
-/// Lists the splats in their tiles. placing(i) returns what is told of each entry of splat i, in the order of tiles.
-template <class Placing>
-void place_entries(ForwardBuffers& buffers, Placing&& placing) {
+/// Lists the splats in their tiles.
+void place_entries(ForwardBuffers& buffers) {
   std::uint32_t* const entries = buffers.entries.data();
   parallel_for(buffers.count, bin_block, [&](std::size_t first, std::size_t last) {
     auto& block = buffers.bin_blocks[first / bin_block];
@@ -160,12 +170,8 @@ void place_entries(ForwardBuffers& buffers, Placing&& placing) {
     std::uint32_t* const position = block.position.data();
     for (std::size_t t = 0; t < block.position.size(); ++t) position[t] += buffers.tile_begin[t];
     for (std::size_t i = first; i < last; ++i) {
-      auto placed = placing(i);
-      for (const std::uint32_t* const tiles_end = tile + reached[i - first]; tile != tiles_end; ++tile) {
-        const std::uint32_t at = position[*tile]++;
-        entries[at] = std::uint32_t(i);
-        placed(at);
-      }
+      const std::uint32_t* const tiles_end = tile + reached[i - first];
+      for (; tile != tiles_end; ++tile) entries[position[*tile]++] = std::uint32_t(i);
     }
   });
 }
@@ -174,26 +180,33 @@ void place_entries(ForwardBuffers& buffers, Placing&& placing) {
 
 void bin(const TileGrid& grid, ForwardBuffers& buffers) {
   count_entries(grid, buffers, [](std::size_t, std::uint32_t) {});
-  place_entries(buffers, [](std::size_t) { return [](std::uint32_t) {}; });
+  place_entries(buffers);
 }
 
-void bin(const TileGrid& grid, ForwardBuffers& buffers, const std::int32_t* slot_of_splat, std::size_t rows) {
+void bin(const TileGrid& grid, ForwardBuffers& buffers, const std::int32_t* slot_of_row, std::size_t rows) {
   std::uint32_t* const first_pair = buffers.first_pair.reserve(rows + 1);
   std::fill_n(first_pair, rows + 1, 0u);
+  PairsOfSplat* const pairs_of_splat = buffers.pairs_of_splat.reserve(buffers.count);
   count_entries(grid, buffers, [&](std::size_t i, std::uint32_t tiles) {
-    if (slot_of_splat[i] >= 0) first_pair[slot_of_splat[i]] = tiles;
+    const std::uint32_t row = buffers.splats[i].row;
+    const std::int32_t slot = slot_of_row != nullptr ? slot_of_row[row] : std::int32_t(row);
+    pairs_of_splat[i] = {};
+    if (slot < 0 || tiles == 0) return;
+    const TileGroups groups(buffers.boxes[i]);
+    first_pair[slot] = groups.columns * groups.rows;
+    pairs_of_splat[i] = {.first = std::uint32_t(slot), .columns = groups.columns};  // until slots have their numbers
   });
-  std::uint32_t sum = 0;
-  for (std::size_t r = 0; r <= rows; ++r) sum += std::exchange(first_pair[r], sum);
-  std::uint32_t* const pair_of_entry = buffers.pair_of_entry.reserve(buffers.tile_begin.back());
-  place_entries(buffers, [&](std::size_t i) {
-    const bool changeable = slot_of_splat[i] >= 0;
-    const std::uint32_t step = changeable ? 1 : 0;
-    std::uint32_t pair = changeable ? first_pair[slot_of_splat[i]] : ForwardBuffers::no_pair;
-    return [pair_of_entry, pair, step](std::uint32_t at) mutable {
-      pair_of_entry[at] = pair;
-      pair += step;
-    };
+  place_entries(buffers);
+  std::uint64_t sum = 0;
+  for (std::size_t r = 0; r <= rows; ++r) sum += std::exchange(first_pair[r], std::uint32_t(sum));
+  if (sum > std::numeric_limits<std::uint32_t>::max()) throw std::bad_alloc();  // pairs are numbered in 32 bits, too
+  parallel_for(buffers.count, bin_block, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      PairsOfSplat& pairs = pairs_of_splat[i];
+      if (!pairs.any()) continue;
+      const TileGroups groups(buffers.boxes[i]);
+      pairs.first = first_pair[pairs.first] - groups.first_row * groups.columns - groups.first_column;
+    }
   });
 }
 

@@ -34,7 +34,7 @@ inline void draw_tile(const Splat* splats, std::span<const std::uint32_t> list, 
   for (const float* from : {pixels.red, pixels.green, pixels.blue}) {
     float* const to = pixels_of(channel++);
     for (int y = 0; y < place.height; ++y)
-      std::copy_n(from + y * tile_size, place.width, to + std::ptrdiff_t(y) * color.width);
+      copy_tile_row(from + y * tile_size, place.width, to + std::ptrdiff_t(y) * color.width);
   }
 }
 

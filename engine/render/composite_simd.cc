@@ -57,12 +57,12 @@ HWY_INLINE bool Blend(D d, const Batch& batch, std::size_t first, std::size_t bl
     if constexpr (K::kEnds)
       end = hn::IfThenElse(hn::RebindMask(di, going_on), hn::Set(di, std::int32_t(first + k + 1)), end);
     if constexpr (K::kColor) {
-      red = hn::MulAdd(w, hn::Set(d, batch.red[k]), red);
-      green = hn::MulAdd(w, hn::Set(d, batch.green[k]), green);
-      blue = hn::MulAdd(w, hn::Set(d, batch.blue[k]), blue);
+      red = hn::MulAdd(w, hn::Set(d, batch.shade[k].red), red);
+      green = hn::MulAdd(w, hn::Set(d, batch.shade[k].green), green);
+      blue = hn::MulAdd(w, hn::Set(d, batch.shade[k].blue), blue);
     }
     if constexpr (K::kDepth) {
-      const V z = hn::Set(d, batch.depth[k]);
+      const V z = hn::Set(d, batch.shade[k].depth);
       depth = hn::MulAdd(w, z, depth);
       const auto crosses = hn::And(going_on, hn::And(hn::Ge(before, half), hn::Lt(after, half)));
       median_depth = hn::IfThenElse(crosses, z, median_depth);

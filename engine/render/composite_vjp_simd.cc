@@ -34,42 +34,48 @@ struct Sums {
 };
 
 #if HWY_TARGET == HWY_SCALAR
-HWY_INLINE void StoreGradient(D /*d*/, const Sums& sums, TileGradient& to) {
-  to = {.g = hn::GetLane(sums.g),
-        .along = hn::GetLane(sums.along),
-        .across = hn::GetLane(sums.across),
-        .along_along = hn::GetLane(sums.along_along),
-        .along_across = hn::GetLane(sums.along_across),
-        .across_across = hn::GetLane(sums.across_across),
-        .red = hn::GetLane(sums.red),
-        .green = hn::GetLane(sums.green),
-        .blue = hn::GetLane(sums.blue),
-        .depth = hn::GetLane(sums.depth),
-        .padding = {}};
+HWY_INLINE void AddGradient(D /*d*/, const Sums& sums, GroupGradient& to) {
+  to.g += hn::GetLane(sums.g);
+  to.along += hn::GetLane(sums.along), to.across += hn::GetLane(sums.across);
+  to.along_along += hn::GetLane(sums.along_along);
+  to.along_across += hn::GetLane(sums.along_across);
+  to.across_across += hn::GetLane(sums.across_across);
+  to.red += hn::GetLane(sums.red), to.green += hn::GetLane(sums.green), to.blue += hn::GetLane(sums.blue);
+  to.depth += hn::GetLane(sums.depth);
 }
 #else
 /// Sums over the lanes; all of them together, since shuffles are what this costs.
-HWY_INLINE void StoreGradient(D d, const Sums& sums, TileGradient& to) {
+HWY_INLINE void AddGradient(D d, const Sums& sums, GroupGradient& to) {
   const hn::FixedTag<float, 4> d4;
-  float* const floats = &to.g;  // the members of TileGradient, in order
-  hn::StoreU(SumBlocks(d, SumFours(d, sums.g, sums.along, sums.across, sums.along_along)), d4, floats);
-  hn::StoreU(SumBlocks(d, SumFours(d, sums.along_across, sums.across_across, sums.red, sums.green)), d4, floats + 4);
+  float* const floats = &to.g;  // the members of GroupGradient, in order
+  const auto add = [&](auto fours, float* at) { hn::StoreU(hn::Add(hn::LoadU(d4, at), fours), d4, at); };
+  add(SumBlocks(d, SumFours(d, sums.g, sums.along, sums.across, sums.along_along)), floats);
+  add(SumBlocks(d, SumFours(d, sums.along_across, sums.across_across, sums.red, sums.green)), floats + 4);
   const auto twos = SumBlocks(
       d, hn::Add(hn::InterleaveLower(d, sums.blue, sums.depth), hn::InterleaveUpper(d, sums.blue, sums.depth)));
-  hn::StoreU(hn::Add(twos, hn::Shuffle1032(twos)), d4, floats + 8);  // and once more, over the padding
+  add(hn::Add(twos, hn::Shuffle1032(twos)), floats + 8);  // and once more, over the padding
 }
 #endif
 
-/// Bit k: entry k of the n has a number.
-HWY_INLINE std::uint64_t Changeable(const std::uint32_t* pair_of_entry, std::size_t n) {
-  const hn::RebindToUnsigned<D> du;
-  const auto no_pair = hn::Set(du, ForwardBuffers::no_pair);
-  std::uint64_t bits = 0;
-  std::size_t k = 0;
-  for (; k + Blocks::lanes <= n; k += Blocks::lanes)
-    bits |= Bits(du, hn::Ne(hn::LoadU(du, pair_of_entry + k), no_pair)) << k;
-  for (; k < n; ++k) bits |= std::uint64_t{pair_of_entry[k] != ForwardBuffers::no_pair} << k;
-  return bits;
+/// Where the gradients of a batch's splats go.
+struct BatchPairs {
+  std::uint32_t number[Batch::size];  ///< Of those that may change.
+  std::uint64_t changeable;           ///< Bit k: splat k may change.
+};
+
+/// Finds them for a batch of n splats, and asks for them.
+HWY_INLINE void FindPairs(const PairsOfSplat* pairs_of_splat, const std::uint32_t* list, std::size_t n,
+                          std::uint32_t group_column, std::uint32_t group_row, const GroupGradient* pairs,
+                          BatchPairs& out) {
+  out.changeable = 0;
+  for (std::size_t k = 0; k < n; ++k) {
+    const PairsOfSplat of = pairs_of_splat[list[k]];
+    if (!of.any()) continue;
+    out.changeable |= std::uint64_t{1} << k;
+    out.number[k] = of.number(group_column, group_row);
+    const GroupGradient& pair = pairs[out.number[k]];
+    hwy::Prefetch(&pair.g), hwy::Prefetch(&pair.padding[1]);  // often in two lines
+  }
 }
 
 /// The blocks that each splat of a batch reaches, less those whose rays have all ended before it.
@@ -105,84 +111,131 @@ HWY_INLINE void FindReachedBlocks(D d, std::size_t n, const Batch& batch, const 
   }
 }
 
-/// Walks all rays back through a batch, splat by splat: a splat's sums stay in registers. The pullbacks are blend_vjp()
-/// and falloff_vjp() of blend.h, one of them in another form: with X = dL/dT of what lies beyond, per unit of
-/// transmittance,
+/// The blocks that splat k of a batch reaches, one after the other.
+class BlocksOf {
+ public:
+  HWY_INLINE BlocksOf(const ReachedBlocks& reached, std::size_t k)
+      : reached_(&reached), k_(k), bits_(reached.bits[0][k]) {
+    ToNextWord();
+  }
+  [[nodiscard]] HWY_INLINE bool Any() const { return bits_ != 0; }
+  /// The next one; there is one.
+  HWY_INLINE std::size_t Next() {
+    const std::size_t block = 32 * word_ + hwy::Num0BitsBelowLS1Bit_Nonzero32(bits_);
+    bits_ &= bits_ - 1;
+    ToNextWord();
+    return block;
+  }
+
+ private:
+  HWY_INLINE void ToNextWord() {
+    if constexpr (ReachedBlocks::words > 1)
+      while (bits_ == 0 && word_ + 1 < ReachedBlocks::words) bits_ = reached_->bits[++word_][k_];
+  }
+
+  const ReachedBlocks* reached_;
+  std::size_t k_, word_ = 0;
+  std::uint32_t bits_;  ///< Left of the word.
+};
+
+/// A splat where a block's rays meet it.
+struct Meeting {
+  WalkedBlock* block;
+  V alpha;  ///< Zero where it is not blended.
+  V u, v;   ///< See Batch.
+};
+
+///   number  of the splat in the tile's list; k: in the batch
+template <bool kClamped>
+HWY_INLINE Meeting Meet(D d, const Batch& batch, std::size_t k, std::size_t number, WalkedBlock& block) {
+  const hn::RebindToSigned<D> di;
+  Meeting at{.block = &block, .alpha = {}, .u = {}, .v = {}};
+  const V power = PowerAt(d, batch, k, hn::Load(d, block.x), hn::Load(d, block.y), at.u, at.v);
+  const auto before_end = hn::RebindMask(d, hn::Lt(hn::Set(di, std::int32_t(number)), hn::Load(di, block.end)));
+  at.alpha = AlphaOf<kClamped>(d, power, PassesCut(d, power, before_end));
+  return at;
+}
+
+/// What a splat looks like, in all lanes.
+struct ShadeOfAll {
+  V red, green, blue, depth;
+};
+
+/// Takes the rays back to before the splat. The pullbacks are blend_vjp() and falloff_vjp() of blend.h, one of them in
+/// another form: with X = dL/dT of what lies beyond, per unit of transmittance,
 ///   dL/dalpha = T (v_weight - X),   X <- X + alpha (v_weight - X),
-/// and T alpha is the weight.
-///   first          number of the batch's first splat in the tile's list
-///   asked          bits of the splats that are asked for: in front of them nothing may change
-///   changeable     bits of the splats whose rows may change
-///   walked         [Blocks::count]
-///   pair_of_entry  [splats of the batch] see composite_tile_vjp()
+/// and T alpha is the weight. T comes by division, which costs less than keeping each of them on the way there.
+///   kChanges  false: nothing is summed
+template <bool kDepth, bool kChanges, bool kClamped>
+HWY_INLINE void StepBack(D d, const Meeting& at, const ShadeOfAll& shade, Sums& sums) {
+  WalkedBlock& block = *at.block;
+  const V one = hn::Set(d, 1.0f), ceiling = hn::Set(d, float(max_alpha));
+  const V v_red = hn::Load(d, block.red), v_green = hn::Load(d, block.green), v_blue = hn::Load(d, block.blue);
+  const V transmittance = hn::Div(hn::Load(d, block.transmittance), hn::Sub(one, at.alpha));
+  hn::Store(transmittance, d, block.transmittance);
+  const V beyond = hn::Load(d, block.beyond);
+  V gain = hn::MulAdd(shade.red, v_red, hn::MulAdd(shade.green, v_green, hn::MulSub(shade.blue, v_blue, beyond)));
+  if constexpr (kDepth) gain = hn::MulAdd(shade.depth, hn::Load(d, block.depth), gain);
+  hn::Store(hn::MulAdd(at.alpha, gain, beyond), d, block.beyond);
+  if constexpr (!kChanges) return;
+  const V weight = hn::Mul(transmittance, at.alpha);
+  V g = hn::Mul(weight, gain);
+  if constexpr (kClamped) g = hn::IfThenElseZero(hn::Lt(at.alpha, ceiling), g);
+  const V gu = hn::Mul(g, at.u), gv = hn::Mul(g, at.v);
+  sums.g = hn::Add(sums.g, g), sums.along = hn::Add(sums.along, gu), sums.across = hn::Add(sums.across, gv);
+  sums.along_along = hn::MulAdd(gu, at.u, sums.along_along);
+  sums.along_across = hn::MulAdd(gu, at.v, sums.along_across);
+  sums.across_across = hn::MulAdd(gv, at.v, sums.across_across);
+  sums.red = hn::MulAdd(weight, v_red, sums.red), sums.green = hn::MulAdd(weight, v_green, sums.green);
+  sums.blue = hn::MulAdd(weight, v_blue, sums.blue);
+  if constexpr (kDepth) sums.depth = hn::MulAdd(weight, hn::Load(d, block.depth), sums.depth);
+}
+
+/// Walks all rays back through a batch, splat by splat: a splat's sums stay in registers. Each step finds where the
+/// next one is to be, of the next splat if need be, before it is taken: one depends on the other in nothing, so that
+/// the processor has two chains to follow.
+///   first    number of the batch's first splat in the tile's list
+///   asked    bits of the splats that are asked for: in front of them nothing may change
+///   walked   [Blocks::count]
 template <bool kDepth>
 HWY_INLINE void WalkBack(D d, std::size_t first, const Batch& batch, const ReachedBlocks& reached, std::uint64_t asked,
-                         std::uint64_t changeable, WalkedBlock* walked, const std::uint32_t* pair_of_entry,
-                         TileGradient* pairs) {
-  const hn::RebindToSigned<D> di;
-  for (std::uint64_t rest = changeable & asked & ~reached.met; rest != 0; rest &= rest - 1)
-    pairs[pair_of_entry[hwy::Num0BitsBelowLS1Bit_Nonzero64(rest)]] = {};
-  const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), ceiling = hn::Set(d, float(max_alpha));
-  for (std::uint64_t rest = reached.met & asked; rest != 0;) {
-    const std::size_t k = hwy::Num0BitsAboveMS1Bit_Nonzero64(rest) ^ 63;
+                         const BatchPairs& numbers, WalkedBlock* walked, GroupGradient* pairs) {
+  std::uint64_t rest = reached.met & asked;
+  if (rest == 0) return;
+  const auto farthest = [](std::uint64_t bits) { return hwy::Num0BitsAboveMS1Bit_Nonzero64(bits) ^ 63; };
+  const V zero = hn::Zero(d);
+  std::size_t k = farthest(rest);
+  BlocksOf blocks(reached, k);
+  Meeting at = Meet<true>(d, batch, k, first + k, walked[blocks.Next()]);
+  while (rest != 0) {
     const std::uint64_t bit = std::uint64_t{1} << k;
     rest ^= bit;
-    const V red = hn::Set(d, batch.red[k]), green = hn::Set(d, batch.green[k]), blue = hn::Set(d, batch.blue[k]),
-            depth = hn::Set(d, batch.depth[k]);
-    const auto number = hn::Set(di, std::int32_t(first + k));
-    const auto each_block = [&](auto&& use) {
-      for (std::size_t word = 0; word < ReachedBlocks::words; ++word)
-        for (std::uint32_t left = reached.bits[word][k]; left != 0; left &= left - 1)
-          use(walked[32 * word + hwy::Num0BitsBelowLS1Bit_Nonzero32(left)]);
-    };
-    /// One step of the block's rays: alpha, zero where not blended, and v_weight - X; T and X come to be those before
-    /// the splat. T by division, which costs less than keeping each of them on the way there.
-    const auto step = [&](auto clamped, WalkedBlock& block, V v_red, V v_green, V v_blue, V& transmittance, V& gain,
-                          V& u, V& v) {
-      const V power = PowerAt(d, batch, k, hn::Load(d, block.x), hn::Load(d, block.y), u, v);
-      const auto before_end = hn::RebindMask(d, hn::Lt(number, hn::Load(di, block.end)));
-      const V alpha = AlphaOf<clamped>(d, power, PassesCut(d, power, before_end));
-      transmittance = hn::Div(hn::Load(d, block.transmittance), hn::Sub(one, alpha));
-      hn::Store(transmittance, d, block.transmittance);
-      const V beyond = hn::Load(d, block.beyond);
-      gain = hn::MulAdd(red, v_red, hn::MulAdd(green, v_green, hn::MulSub(blue, v_blue, beyond)));
-      if constexpr (kDepth) gain = hn::MulAdd(depth, hn::Load(d, block.depth), gain);
-      hn::Store(hn::MulAdd(alpha, gain, beyond), d, block.beyond);
-      return alpha;
-    };
-    if ((changeable & bit) == 0) {
-      each_block([&](WalkedBlock& block) {
-        V transmittance, gain, u, v;
-        step(std::true_type(), block, hn::Load(d, block.red), hn::Load(d, block.green), hn::Load(d, block.blue),
-             transmittance, gain, u, v);
-      });
-      continue;
-    }
+    const std::size_t next_k = rest != 0 ? farthest(rest) : k;  // at the end once more, for nothing
+    BlocksOf next_blocks(reached, next_k);
+    const Shade& one = batch.shade[k];
+    const ShadeOfAll shade{hn::Set(d, one.red), hn::Set(d, one.green), hn::Set(d, one.blue), hn::Set(d, one.depth)};
     Sums sums{zero, zero, zero, zero, zero, zero, zero, zero, zero, zero};
-    const auto pull_back = [&](auto clamped) {
-      each_block([&](WalkedBlock& block) {
-        const V v_red = hn::Load(d, block.red), v_green = hn::Load(d, block.green), v_blue = hn::Load(d, block.blue);
-        V transmittance, gain, u, v;
-        const V alpha = step(clamped, block, v_red, v_green, v_blue, transmittance, gain, u, v);
-        const V weight = hn::Mul(transmittance, alpha);
-        V g = hn::Mul(weight, gain);
-        if constexpr (clamped) g = hn::IfThenElseZero(hn::Lt(alpha, ceiling), g);
-        const V gu = hn::Mul(g, u), gv = hn::Mul(g, v);
-        sums.g = hn::Add(sums.g, g), sums.along = hn::Add(sums.along, gu), sums.across = hn::Add(sums.across, gv);
-        sums.along_along = hn::MulAdd(gu, u, sums.along_along);
-        sums.along_across = hn::MulAdd(gu, v, sums.along_across);
-        sums.across_across = hn::MulAdd(gv, v, sums.across_across);
-        sums.red = hn::MulAdd(weight, v_red, sums.red), sums.green = hn::MulAdd(weight, v_green, sums.green);
-        sums.blue = hn::MulAdd(weight, v_blue, sums.blue);
-        if constexpr (kDepth) sums.depth = hn::MulAdd(weight, hn::Load(d, block.depth), sums.depth);
-      });
+    const auto walk = [&](auto changes, auto clamped) {
+      while (blocks.Any()) {
+        const Meeting next = Meet<clamped>(d, batch, k, first + k, walked[blocks.Next()]);
+        StepBack<kDepth, changes, clamped>(d, at, shade, sums);
+        at = next;
+      }
+      const Meeting next = Meet<true>(d, batch, next_k, first + next_k, walked[next_blocks.Next()]);
+      StepBack<kDepth, changes, clamped>(d, at, shade, sums);
+      at = next;
     };
-    if (batch.log2_opacity[k] > unclamped_log2_opacity) {
-      pull_back(std::true_type());
+    if ((numbers.changeable & bit) == 0) {
+      walk(std::false_type(), std::true_type());
     } else {
-      pull_back(std::false_type());
+      if (batch.log2_opacity[k] > unclamped_log2_opacity) {
+        walk(std::true_type(), std::true_type());
+      } else {
+        walk(std::true_type(), std::false_type());
+      }
+      AddGradient(d, sums, pairs[numbers.number[k]]);
     }
-    StoreGradient(d, sums, pairs[pair_of_entry[k]]);
+    k = next_k, blocks = next_blocks;
   }
 }
 
@@ -196,21 +249,18 @@ HWY_INLINE void ToBlocks(const float* rows, float (WalkedBlock::*plane)[Blocks::
 }
 
 template <bool kDepth>
-void WalkTile(const Splat* splats, const std::uint32_t* list, std::size_t count, const std::uint32_t* pair_of_entry,
-              int x0, int y0, const TileUpstream& rows_upstream, const RayEnds& ends, TileGradient* pairs) {
+void WalkTile(const Splat* splats, const PairsOfSplat* pairs_of_splat, const std::uint32_t* list, std::size_t count,
+              int x0, int y0, const TileUpstream& rows_upstream, const RayEnds& ends, GroupGradient* pairs) {
   const D d;
   const hn::RebindToSigned<D> di;
   std::int32_t block_ends[Blocks::count];  // the farthest of its rays
   for (std::size_t block = 0; block < Blocks::count; ++block)
     block_ends[block] = hn::GetLane(hn::MaxOfLanes(di, hn::Load(di, ends.end + block * Blocks::lanes)));
   const auto passed = std::size_t(*std::max_element(block_ends, block_ends + Blocks::count));
-  assert(passed <= count);  // or the ends are of another picture
-  // What no ray got to.
-  for (std::size_t k = passed; k < count; ++k)
-    if (pair_of_entry[k] != ForwardBuffers::no_pair) pairs[pair_of_entry[k]] = {};
+  assert(passed <= count), (void)count;  // or the ends are of another picture
   // In front of the nearest splat that may change nothing is asked for.
   std::size_t asked = 0;
-  while (asked < passed && pair_of_entry[asked] == ForwardBuffers::no_pair) ++asked;
+  while (asked < passed && !pairs_of_splat[list[asked]].any()) ++asked;
   if (asked == passed) return;
 
   WalkedBlock walked[Blocks::count];
@@ -227,27 +277,29 @@ void WalkTile(const Splat* splats, const std::uint32_t* list, std::size_t count,
   ToBlocks(rows_upstream.transmittance, &WalkedBlock::beyond, walked);
   Batch batch;
   ReachedBlocks reached;
+  BatchPairs numbers;
+  const auto group_of = [](int pixel) { return std::uint32_t(pixel / (tile_size * tile_group)); };
   for (std::size_t b = (passed + Batch::size - 1) / Batch::size; b-- > asked / Batch::size;) {
     const std::size_t first = b * Batch::size, n = HWY_MIN(Batch::size, passed - first);
     Fill(splats, list + first, n, x0, y0, batch);
     if (b > asked / Batch::size)
       for (std::size_t k = first - Batch::size; k < first; ++k) hwy::Prefetch(&splats[list[k]]);
+    FindPairs(pairs_of_splat, list + first, n, group_of(x0), group_of(y0), pairs, numbers);
     std::int32_t ends_from_here[Blocks::count];
     for (std::size_t i = 0; i < Blocks::count; ++i) ends_from_here[i] = block_ends[i] - std::int32_t(first);
     FindReachedBlocks(d, n, batch, ends_from_here, reached);
     const std::uint64_t bits_asked = asked > first ? ~std::uint64_t{0} << (asked - first) : ~std::uint64_t{0};
-    WalkBack<kDepth>(d, first, batch, reached, bits_asked, Changeable(pair_of_entry + first, n), walked,
-                     pair_of_entry + first, pairs);
+    WalkBack<kDepth>(d, first, batch, reached, bits_asked, numbers, walked, pairs);
   }
 }
 
-void CompositeTileVjp(const Splat* splats, const std::uint32_t* list, std::size_t count,
-                      const std::uint32_t* pair_of_entry, int x0, int y0, const TileUpstream& upstream, bool with_depth,
-                      const RayEnds& ends, TileGradient* pairs) {
+void CompositeTileVjp(const Splat* splats, const PairsOfSplat* pairs_of_splat, const std::uint32_t* list,
+                      std::size_t count, int x0, int y0, const TileUpstream& upstream, bool with_depth,
+                      const RayEnds& ends, GroupGradient* pairs) {
   if (with_depth) {
-    WalkTile<true>(splats, list, count, pair_of_entry, x0, y0, upstream, ends, pairs);
+    WalkTile<true>(splats, pairs_of_splat, list, count, x0, y0, upstream, ends, pairs);
   } else {
-    WalkTile<false>(splats, list, count, pair_of_entry, x0, y0, upstream, ends, pairs);
+    WalkTile<false>(splats, pairs_of_splat, list, count, x0, y0, upstream, ends, pairs);
   }
 }
 
@@ -260,11 +312,11 @@ namespace engine::render {
 
 HWY_EXPORT(CompositeTileVjp);
 
-void composite_tile_vjp(const Splat* splats, std::span<const std::uint32_t> list, const std::uint32_t* pair_of_entry,
+void composite_tile_vjp(const Splat* splats, const PairsOfSplat* pairs_of_splat, std::span<const std::uint32_t> list,
                         int x0, int y0, const TileUpstream& upstream, bool with_depth, const RayEnds& ends,
-                        TileGradient* pairs) {
+                        GroupGradient* pairs) {
   HWY_DYNAMIC_DISPATCH(CompositeTileVjp)
-  (splats, list.data(), list.size(), pair_of_entry, x0, y0, upstream, with_depth, ends, pairs);
+  (splats, pairs_of_splat, list.data(), list.size(), x0, y0, upstream, with_depth, ends, pairs);
 }
 
 }  // namespace engine::render

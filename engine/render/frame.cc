@@ -16,7 +16,7 @@ struct Frame::Impl {
   Vec3 background{0.0f};
   TileGrid grid;
   ForwardBuffers buffers;
-  WalkBuffers walk;
+  Buffer<GroupGradient> pairs;
   std::vector<std::uint32_t> rows;  ///< 0, 1, 2, ...
 };
 
@@ -35,9 +35,7 @@ void Frame::forward(const scene::GaussianCloud& cloud, const scene::Camera& came
   ForwardBuffers& buffers = frame.buffers;
   project(cloud, view_params<float>(camera), cloud.sh_degree, {}, Culling::exact, frame.grid.pixels, buffers);
   sort_by_depth(buffers);
-  const auto* const slots = find_slots(
-      buffers, [](std::uint32_t row) { return std::int32_t(row); }, frame.walk.slot_of_splat);
-  bin(frame.grid, buffers, slots, cloud.size());
+  bin(frame.grid, buffers, nullptr, cloud.size());
   const std::size_t tiles = buffers.tile_begin.size() - 1;
   RayEnds* const ends = buffers.ray_ends.reserve(tiles);
   parallel_for(tiles, 1, [&](std::size_t tile, std::size_t) {
@@ -55,8 +53,8 @@ void Frame::backward(const scene::GaussianCloud& cloud, const scene::Image& v_co
   std::iota(frame.rows.begin(), frame.rows.end(), 0u);
   const auto params = view_params<float>(frame.camera);
   walk_tiles(frame.buffers, frame.buffers.ray_ends.data(), frame.grid, {.color = &v_color}, frame.background,
-             frame.buffers.first_pair[cloud.size()], frame.walk);
-  const RowPairs row_pairs{.first_pair = frame.buffers.first_pair.data(), .pairs = frame.walk.pairs.data()};
+             frame.buffers.first_pair[cloud.size()], frame.pairs);
+  const RowPairs row_pairs{.first_pair = frame.buffers.first_pair.data(), .pairs = frame.pairs.data()};
   parallel_for(cloud.size(), project_vjp_block, [&](std::size_t begin, std::size_t end) {
     project_rows_vjp(cloud, 0, params, cloud.sh_degree, frame.rows, row_pairs, begin, end, out);
   });

@@ -12,7 +12,8 @@
 
 namespace engine::render {
 
-/// Its memory, among it 8 bytes per pixel, is used again from picture to picture. Not for two threads at once. backward() comes after forward().
+/// Its memory, among it 8 bytes per pixel, is used again from picture to picture. Not for two threads at once.
+/// backward() comes after forward().
 class Frame {
  public:
   Frame();

@@ -119,13 +119,13 @@ std::size_t FrozenView::memory_bytes() const {
 
 struct LocalFrame::Impl {
   ForwardBuffers changeable;        ///< Of the changeable Gaussians alone.
-  ForwardBuffers merged;            ///< splats, count, entries, tile_begin, pair_of_entry and ray_ends: of both.
+  ForwardBuffers merged;            ///< splats, count, entries, tile_begin, pairs_of_splat and ray_ends: of both.
   Buffer<std::uint32_t> of_frozen;  ///< [frozen splats] Number among the merged.
   Buffer<std::uint32_t> of_change;  ///< [changeable splats]
   scene::Rect reach;
   std::vector<std::uint32_t> tiles;  ///< Reached.
   std::vector<std::uint32_t> rows;   ///< 0, 1, 2, ...
-  WalkBuffers walk;
+  Buffer<GroupGradient> pairs;
   bool drawn = false;  ///< Since merge(): ray_ends are those of `merged`.
 };
 
@@ -141,9 +141,7 @@ scene::Rect LocalFrame::project(const scene::GaussianCloud& changeable, const sc
   render::project(changeable, view_params<float>(camera), changeable.sh_degree, {}, Culling::exact, grid.pixels,
                   buffers);
   sort_by_depth(buffers);
-  const auto* const slots = find_slots(
-      buffers, [](std::uint32_t row) { return std::int32_t(row); }, impl_->walk.slot_of_splat);
-  bin(grid, buffers, slots, changeable.size());
+  bin(grid, buffers, nullptr, changeable.size());
 
   impl_->tiles.clear();
   scene::Rect reach;
@@ -171,6 +169,7 @@ void LocalFrame::merge(const FrozenView& frozen) {
   // Entries are numbered in 32 bits, and so are splats.
   if (merged.count > std::numeric_limits<std::int32_t>::max()) throw std::bad_alloc();
   Splat* const splats = merged.splats.reserve(merged.count);
+  PairsOfSplat* const pairs_of_splat = merged.pairs_of_splat.reserve(merged.count);
   std::uint32_t* const of_frozen = frame.of_frozen.reserve(view.splats.size());
   std::uint32_t* const of_change = frame.of_change.reserve(top.count);
   std::size_t at = 0, f = 0;
@@ -181,10 +180,12 @@ void LocalFrame::merge(const FrozenView& frozen) {
     else
       while (f < view.splats.size() && view.splats[f].depth <= top.splats[t].depth) ++f;
     std::copy_n(view.splats.data() + first, f - first, splats + at);
+    std::fill_n(pairs_of_splat + at, f - first, PairsOfSplat{});
     std::iota(of_frozen + first, of_frozen + f, std::uint32_t(at));
     at += f - first;
     if (t == top.count) break;
     splats[at] = top.splats[t];
+    pairs_of_splat[at] = top.pairs_of_splat[t];
     of_change[t] = std::uint32_t(at++);
   }
 
@@ -204,25 +205,17 @@ void LocalFrame::merge(const FrozenView& frozen) {
   }
   merged.tile_begin[all_tiles] = std::uint32_t(total);
   std::uint32_t* const entries = merged.entries.reserve(std::size_t(total));
-  std::uint32_t* const pair_of_entry = merged.pair_of_entry.reserve(std::size_t(total));
   parallel_for(frame.tiles.size(), 4, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t tile = frame.tiles[i];
       const std::span<const std::uint32_t> below = view.list(tile), above = list_of_change(tile);
       std::uint32_t* to = entries + merged.tile_begin[tile];
-      std::uint32_t* pair = pair_of_entry + merged.tile_begin[tile];
-      const std::uint32_t* const pair_above = top.pair_of_entry.data() + top.tile_begin[tile];
       std::size_t a = 0;
-      for (std::size_t c = 0; c < above.size(); ++c) {
-        const std::uint32_t number = of_change[above[c]];
-        for (; a < below.size() && of_frozen[below[a]] < number; ++a) {
-          *to++ = of_frozen[below[a]];
-          *pair++ = ForwardBuffers::no_pair;
-        }
+      for (const std::uint32_t change : above) {
+        const std::uint32_t number = of_change[change];
+        for (; a < below.size() && of_frozen[below[a]] < number; ++a) *to++ = of_frozen[below[a]];
         *to++ = number;
-        *pair++ = pair_above[c];
       }
-      std::fill_n(pair, below.size() - a, ForwardBuffers::no_pair);
       for (; a < below.size(); ++a) *to++ = of_frozen[below[a]];
     }
   });
@@ -264,8 +257,8 @@ void LocalFrame::backward(const FrozenView& frozen, const scene::GaussianCloud& 
   const ForwardBuffers& top = impl_->changeable;
   assert(impl_->drawn);
   walk_tiles(impl_->merged, impl_->merged.ray_ends.data(), grid, upstream, view.background, top.first_pair[rows.size()],
-             impl_->walk);
-  const RowPairs row_pairs{.first_pair = top.first_pair.data(), .pairs = impl_->walk.pairs.data()};
+             impl_->pairs);
+  const RowPairs row_pairs{.first_pair = top.first_pair.data(), .pairs = impl_->pairs.data()};
   const auto params = view_params<float>(view.camera);
   parallel_for(rows.size(), project_vjp_block, [&](std::size_t begin, std::size_t end) {
     project_rows_vjp(changeable, 0, params, changeable.sh_degree, rows, row_pairs, begin, end, out);

@@ -232,12 +232,12 @@ std::size_t WriteSplats(const ProjectedLayer& layer, std::size_t begin, const Su
                     .l2 = found.l2[k],
                     .l3 = found.l3[k],
                     .log2_opacity = found.log2_opacity[k],
+                    .weight = layer.weight != nullptr ? layer.weight[row] : 0.0f,
+                    .row = std::uint32_t(layer.first_row + row),
                     .red = color[0],
                     .green = color[1],
                     .blue = color[2],
-                    .depth = found.depth[k],
-                    .weight = layer.weight != nullptr ? layer.weight[row] : 0.0f,
-                    .row = std::uint32_t(layer.first_row + row)};
+                    .depth = found.depth[k]};
     boxes[written++] = {std::uint16_t(found.columns[k] & 0xffff), std::uint16_t(found.columns[k] >> 16),
                         std::uint16_t(found.rows[k] & 0xffff), std::uint16_t(found.rows[k] >> 16)};
   }

@@ -27,7 +27,7 @@ struct VjpRows {
   static constexpr std::size_t room = project_vjp_block + 64;  // whole vectors are loaded and stored
   std::size_t count = 0;
   alignas(64) float mean[3][room], log_scale[3][room], rotation[4][room], logit[room];
-  alignas(64) float sums[TileGradient::sums][room];
+  alignas(64) float sums[GroupGradient::sums][room];
   alignas(64) std::int32_t seen[room];  // not 0: some sum is not
   // out
   alignas(64) float v_mean[3][room], v_log_scale[3][room], v_rotation[4][room], v_logit[room], v_x[room], v_y[room];
@@ -262,8 +262,8 @@ void ColorVjp(const scene::GaussianCloud& cloud, std::size_t first_row, const st
 }
 
 /// Sums a row's gradients over its tiles, in their order and in double, into row i. False if all are zero.
-HWY_INLINE bool SumOverTiles(const TileGradient* first, const TileGradient* last, std::size_t i, VjpRows& rows) {
-  constexpr std::size_t size = sizeof(TileGradient) / sizeof(float);
+HWY_INLINE bool SumOverGroups(const GroupGradient* first, const GroupGradient* last, std::size_t i, VjpRows& rows) {
+  constexpr std::size_t size = sizeof(GroupGradient) / sizeof(float);
   const hn::CappedTag<double, 4> d64;
   const hn::Rebind<float, decltype(d64)> d32;
   constexpr std::size_t lanes = hn::MaxLanes(d64), parts = size / lanes;
@@ -283,7 +283,7 @@ HWY_INLINE bool SumOverTiles(const TileGradient* first, const TileGradient* last
     hn::Store(part, d32, sums + p * lanes);
     any |= !hn::AllTrue(d32, hn::Eq(part, hn::Zero(d32)));
   }
-  for (std::size_t k = 0; k < TileGradient::sums; ++k) rows.sums[k][i] = sums[k];
+  for (std::size_t k = 0; k < GroupGradient::sums; ++k) rows.sums[k][i] = sums[k];
   return any;
 }
 
@@ -327,7 +327,7 @@ void ProjectRowsVjp(const scene::GaussianCloud& cloud, std::size_t first_row, co
   bool any = false;
   for (std::size_t i = 0; i < rows.count; ++i) {
     const std::uint32_t* const first_pair = v_rows.first_pair + begin + i;
-    const bool seen = SumOverTiles(v_rows.pairs + first_pair[0], v_rows.pairs + first_pair[1], i, rows);
+    const bool seen = SumOverGroups(v_rows.pairs + first_pair[0], v_rows.pairs + first_pair[1], i, rows);
     rows.seen[i] = seen ? 1 : 0;
     any |= seen;
   }

@@ -23,10 +23,10 @@ struct Splat {
   float x, y;  ///< Mean, pixel-index units.
   float l1, l2, l3;
   float log2_opacity;
-  float red, green, blue;
-  float depth;  ///< World units along the optical axis.
   float weight;
   std::uint32_t row;  ///< Of the Gaussian in its layers.
+  float red, green, blue;
+  float depth;  ///< World units along the optical axis.
 };
 static_assert(sizeof(Splat) == 48);
 
@@ -57,6 +57,21 @@ class Buffer {
  private:
   std::unique_ptr<T[]> data_;
   std::size_t capacity_ = 0;
+};
+
+/// Tiles are walked back in square groups of so many on a side. A splat's gradients are summed over a group, so that
+/// they take a pair (splat, group) of memory each, not one for each tile.
+constexpr int tile_group = 4;
+
+/// Numbers of the pairs of a splat: the groups that its box meets, row by row.
+struct PairsOfSplat {
+  std::uint32_t first = 0;    ///< What group (0, 0) of the picture would have, modulo 2^32.
+  std::uint32_t columns = 0;  ///< Groups that the box meets in a row. 0: the splat may not change.
+
+  [[nodiscard]] bool any() const { return columns != 0; }
+  [[nodiscard]] std::uint32_t number(std::uint32_t group_column, std::uint32_t group_row) const {
+    return first + group_row * columns + group_column;
+  }
 };
 
 /// Which tiles of a picture are wanted, and the pixels that they can reach.
@@ -102,10 +117,9 @@ struct ForwardBuffers {
   std::vector<BinBlock> bin_blocks;
   Buffer<std::uint32_t> entries;          ///< Indices into splats.
   std::vector<std::uint32_t> tile_begin;  ///< [tiles + 1] into entries.
-  // bin, if told which rows may change: their entries numbered row by row, those of a row in the order of tiles
-  Buffer<std::uint32_t> pair_of_entry;  ///< Number of an entry, or no_pair if its row may not change.
+  // bin, if told which rows may change: their pairs with groups of tiles, numbered row by row
+  Buffer<PairsOfSplat> pairs_of_splat;  ///< [count]
   Buffer<std::uint32_t> first_pair;     ///< [rows that may change + 1] The first number of a row.
-  static constexpr std::uint32_t no_pair = 0xffffffff;
   // composite, if it is to be walked back
   Buffer<RayEnds> ray_ends;  ///< [tiles]
 };
@@ -180,6 +194,15 @@ inline void fetch_tile(const float* at, std::ptrdiff_t stride, int width, int he
   }
 }
 
+/// Copies a row of a tile. Most are whole, which a few instructions copy; a call for each shows in a frame's time.
+inline void copy_tile_row(const float* from, int width, float* to) {
+  if (width == tile_size) {
+    std::copy_n(from, tile_size, to);
+  } else {
+    std::copy_n(from, width, to);
+  }
+}
+
 /// Blends the listed splats, nearest first, into the tile, and the background behind them. Only the planes that
 /// `channels` names, and alpha, are written, and of those only the pixels that are shown mean something.
 ///   ends  null: not needed. Else channels are colour or none.
@@ -211,8 +234,8 @@ constexpr std::size_t reached_tiles_slack = 8;  ///< So many past the end may be
 /// The stages between projection and blending.
 void sort_by_depth(ForwardBuffers& buffers);
 void bin(const TileGrid& grid, ForwardBuffers& buffers);
-/// The same, and numbers the entries of the rows [R] that may change.
-///   slot_of_splat  [count] where a splat's row is in their list, or -1
-void bin(const TileGrid& grid, ForwardBuffers& buffers, const std::int32_t* slot_of_splat, std::size_t rows);
+/// The same, and numbers the pairs of the rows [R] that may change.
+///   slot_of_row  where a row is in their list, or -1. Null: all rows may change, and each is where it is
+void bin(const TileGrid& grid, ForwardBuffers& buffers, const std::int32_t* slot_of_row, std::size_t rows);
 
 }  // namespace engine::render

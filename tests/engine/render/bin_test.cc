@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <numeric>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "engine/core/rng.h"
 #include "engine/render/splats.h"
+#include "tests/engine/render/test_scenes.h"
 
 namespace engine::render {
 namespace {
@@ -58,6 +61,78 @@ TEST(SortByDepth, OrdersByDepthAndEqualDepthsByRowWhateverTheirRange) {
       for (std::size_t i = 0; i < n; ++i) depths[i] = depth(i);
       ASSERT_EQ(sorted_rows(depths), expected_rows(depths));
     }
+}
+
+/// 19 x 13 tiles: groups at the right and the lower edge are not whole.
+scene::Camera wide_camera() { return off_centre_camera(300, 200); }
+
+/// Binned with every third row changeable.
+struct Binned {
+  std::size_t rows = 0;                   ///< That may change.
+  std::vector<std::int32_t> slot_of_row;  ///< Of all.
+  TileGrid grid;
+  ForwardBuffers buffers;
+
+  explicit Binned(const std::vector<std::uint8_t>& wanted = {}) {
+    const auto cloud = cloud_in_view(600, 8);
+    const auto camera = wide_camera();
+    for (std::size_t row = 0; row < cloud.size(); ++row)
+      slot_of_row.push_back(row % 3 == 0 ? std::int32_t(rows++) : -1);
+    grid = {.columns = tile_columns(camera.width),
+            .rows = tile_rows(camera.height),
+            .pixels = {0, 0, camera.width, camera.height},
+            .wanted = wanted};
+    project(cloud, view_params<float>(camera), -1, {}, Culling::exact, grid.pixels, buffers);
+    sort_by_depth(buffers);
+    bin(grid, buffers, slot_of_row.data(), rows);
+  }
+};
+
+/// Every splat's pair with every group that it is listed in has a number of its own among those of its row.
+void expect_numbered(const Binned& binned) {
+  const ForwardBuffers& buffers = binned.buffers;
+  std::map<std::uint32_t, std::pair<std::uint32_t, int>> owner;  // of a number: splat and group
+  std::size_t listed = 0;
+  for (int tile = 0; tile < binned.grid.columns * binned.grid.rows; ++tile) {
+    const int column = tile % binned.grid.columns / tile_group, row = tile / binned.grid.columns / tile_group;
+    for (std::uint32_t e = buffers.tile_begin[std::size_t(tile)]; e < buffers.tile_begin[std::size_t(tile) + 1]; ++e) {
+      const std::uint32_t splat = buffers.entries[e];
+      const PairsOfSplat& of = buffers.pairs_of_splat[splat];
+      const std::int32_t slot = binned.slot_of_row[buffers.splats[splat].row];
+      ASSERT_EQ(of.any(), slot >= 0);
+      if (!of.any()) continue;
+      ++listed;
+      const std::uint32_t number = of.number(std::uint32_t(column), std::uint32_t(row));
+      ASSERT_GE(number, buffers.first_pair[std::size_t(slot)]);
+      ASSERT_LT(number, buffers.first_pair[std::size_t(slot) + 1]);
+      const std::pair here{splat, row * 1000 + column};
+      ASSERT_EQ(owner.try_emplace(number, here).first->second, here) << "two pairs have one number";
+    }
+  }
+  EXPECT_GT(listed, 100u);
+  EXPECT_GE(buffers.first_pair[binned.rows], owner.size());
+}
+
+TEST(Bin, NumbersThePairsOfSplatsAndGroupsRowByRow) {
+  const Binned binned;
+  expect_numbered(binned);
+  EXPECT_LT(binned.buffers.first_pair[binned.rows], binned.buffers.tile_begin.back() / 3)
+      << "what reaches several tiles has fewer pairs than tiles";
+}
+
+TEST(Bin, NumbersThePairsOfWantedTilesAlike) {
+  std::vector<std::uint8_t> wanted(19 * 13, 0);
+  for (const int tile : {0, 5, 6, 18, 60, 61, 62, 80, 81, 100, 101, 119, 120, 121, 140, 246})
+    wanted[std::size_t(tile)] = 1;
+  expect_numbered(Binned(wanted));
+}
+
+TEST(Bin, WithoutSlotsAllRowsMayChange) {
+  Binned some;
+  bin(some.grid, some.buffers, nullptr, some.slot_of_row.size());
+  for (std::size_t row = 0; row < some.slot_of_row.size(); ++row) some.slot_of_row[row] = std::int32_t(row);
+  some.rows = some.slot_of_row.size();
+  expect_numbered(some);
 }
 
 }  // namespace
