@@ -265,10 +265,10 @@ void WalkTile(const Splat* splats, const PairsOfSplat* pairs_of_splat, const std
 
   WalkedBlock walked[Blocks::count];
   for (std::size_t b = 0, at = 0; b < Blocks::count; ++b, at += Blocks::lanes) {
-    std::copy_n(places.x + at, Blocks::lanes, walked[b].x);
-    std::copy_n(places.y + at, Blocks::lanes, walked[b].y);
-    std::copy_n(ends.end + at, Blocks::lanes, walked[b].end);
-    std::copy_n(ends.transmittance + at, Blocks::lanes, walked[b].transmittance);
+    hn::Store(hn::Load(d, places.x + at), d, walked[b].x);
+    hn::Store(hn::Load(d, places.y + at), d, walked[b].y);
+    hn::Store(hn::Load(di, ends.end + at), di, walked[b].end);
+    hn::Store(hn::Load(d, ends.transmittance + at), d, walked[b].transmittance);
   }
   ToBlocks(rows_upstream.red, &WalkedBlock::red, walked);
   ToBlocks(rows_upstream.green, &WalkedBlock::green, walked);
