@@ -134,27 +134,31 @@ void walk_tiles(const ForwardBuffers& forward, const RayEnds* ends, const TileGr
     const std::uint32_t first = forward.tile_begin[tile], last = forward.tile_begin[tile + 1];
     const std::span list(forward.entries.data() + first, last - first);
     const auto may_change = [&](std::uint32_t splat) { return forward.pairs_of_splat[splat].any(); };
-    if (std::none_of(list.begin(), list.end(), may_change)) return;
+    const auto asked = std::find_if(list.begin(), list.end(), may_change);
+    if (asked == list.end()) return;
     const TilePlace place = place_of(tile, grid.columns, grid.pixels);
     TileUpstream tile_upstream;
-    fetch_upstream(upstream, grid.pixels, place.x0 + tile_size, place.y0);  // of the next tile
     if (!load_tile(upstream, grid.pixels, background, place.x0, place.y0, tile_upstream)) return;
     RayEnds anew;
     if (ends == nullptr) {
       TilePixels pixels;
       composite_tile(forward.splats.data(), list, place, {}, {}, pixels, &anew);
     }
-    composite_tile_vjp(forward.splats.data(), forward.pairs_of_splat.data(), list, place.x0, place.y0, tile_upstream,
-                       upstream.depth != nullptr, ends != nullptr ? ends[tile] : anew, sums);
+    composite_tile_vjp(forward.splats.data(), forward.pairs_of_splat.data(), list, std::size_t(asked - list.begin()),
+                       place.x0, place.y0, tile_upstream, upstream.depth != nullptr,
+                       ends != nullptr ? ends[tile] : anew, sums);
   };
   // A group's tiles follow each other on one thread, since they add to the same sums.
   const auto groups = [](int tiles) { return (tiles + tile_group - 1) / tile_group; };
   parallel_for(std::size_t(groups(grid.columns) * groups(grid.rows)), 1, [&](std::size_t group, std::size_t) {
     const int column0 = int(group) % groups(grid.columns) * tile_group,
               row0 = int(group) / groups(grid.columns) * tile_group;
-    for (int row = row0; row < std::min(row0 + tile_group, grid.rows); ++row)
-      for (int column = column0; column < std::min(column0 + tile_group, grid.columns); ++column)
-        walk_tile(column, row);
+    const int columns = std::min(tile_group, grid.columns - column0), rows = std::min(tile_group, grid.rows - row0);
+    for (int i = 0; i < columns * rows; ++i) {
+      fetch_upstream(upstream, grid.pixels, (column0 + (i + 1) % columns) * tile_size,
+                     (row0 + (i + 1) / columns) * tile_size);  // of the next tile
+      walk_tile(column0 + i % columns, row0 + i / columns);
+    }
   });
 }
 

@@ -73,14 +73,14 @@ class BackwardWorkspace {
 ///   values    finite for every finite cloud, valid camera and upstream of ordinary size, unless SH coefficients near
 ///             the end of float cancel
 ///   bytes     the same for any number of threads; they may differ between backends and instruction sets
-///   throws    std::bad_alloc, as forward() does
+///   throws    std::bad_alloc, as forward() does; also beyond 2^32 of what memory is taken for
 /// Kinks: what is skipped (alpha below 1/255, splats at which a ray ends and all behind, at or before the near plane,
 /// tiles that tile16_stop does not reach) has no gradient, and that it might come in has none either: depth order,
 /// tiles and cuts are taken as they are. At the edge of a clamp the derivative is the one from inside, but for that of
 /// alpha at 0.99, where it is zero. Costs projecting, sorting and, in the tiles that rows and upstream touch, blending
 /// once more, for nothing of the forward pass is kept (Frame and LocalFrame keep it), and about twice that for walking
-/// back. Memory: 48 bytes per row that may change and tile it reaches. Precondition: that of forward(); semantics other
-/// than dense_stop and straight_through need Backend::reference.
+/// back. Memory: 48 bytes per row that may change and group of 3 x 3 tiles that its box meets, wanted or not.
+/// Precondition: that of forward(); semantics other than dense_stop and straight_through need Backend::reference.
 void backward(const Layers& layers, const scene::Camera& camera, const BackwardOptions& options,
               const Upstream& upstream, std::span<const std::uint32_t> rows, BackwardWorkspace& workspace,
               Gradients& out);

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <span>
 
-#include "engine/core/parallel.h"
 #include "engine/render/backward.h"
 #include "engine/render/splats.h"
 
@@ -33,12 +32,13 @@ struct alignas(64) TileUpstream {
 /// Pulls back one tile, whose first pixel is (x0, y0).
 ///   pairs_of_splat  as bin() numbers them
 ///   list            splats that reach the tile, nearest first
+///   asked           in front of this one of the list nothing may change
 ///   with_depth      whether upstream.depth is anything but zero
 ///   ends            as composite_tile() left them
 ///   pairs           what the tile makes of splats that may change is added to those of its group
 void composite_tile_vjp(const Splat* splats, const PairsOfSplat* pairs_of_splat, std::span<const std::uint32_t> list,
-                        int x0, int y0, const TileUpstream& upstream, bool with_depth, const RayEnds& ends,
-                        GroupGradient* pairs);
+                        std::size_t asked, int x0, int y0, const TileUpstream& upstream, bool with_depth,
+                        const RayEnds& ends, GroupGradient* pairs);
 
 /// Where the gradients of the rows [R] that may change are: row by row, so that what a row needs lies side by side.
 struct RowPairs {

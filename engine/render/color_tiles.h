@@ -1,7 +1,6 @@
 // Tiles of pictures that hold nothing but colour: what passes that are differentiated have in common.
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>

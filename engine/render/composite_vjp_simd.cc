@@ -194,12 +194,13 @@ HWY_INLINE void StepBack(D d, const Meeting& at, const ShadeOfAll& shade, Sums& 
 /// Walks all rays back through a batch, splat by splat: a splat's sums stay in registers. Each step finds where the
 /// next one is to be, of the next splat if need be, before it is taken: one depends on the other in nothing, so that
 /// the processor has two chains to follow.
-///   first    number of the batch's first splat in the tile's list
-///   asked    bits of the splats that are asked for: in front of them nothing may change
-///   walked   [Blocks::count]
+///   first        number of the batch's first splat in the tile's list
+///   asked        bits of the splats that are asked for: in front of them nothing may change
+///   batch_pairs  where in `pairs` their gradients go
+///   walked       [Blocks::count]
 template <bool kDepth>
 HWY_INLINE void WalkBack(D d, std::size_t first, const Batch& batch, const ReachedBlocks& reached, std::uint64_t asked,
-                         const BatchPairs& numbers, WalkedBlock* walked, GroupGradient* pairs) {
+                         const BatchPairs& batch_pairs, WalkedBlock* walked, GroupGradient* pairs) {
   std::uint64_t rest = reached.met & asked;
   if (rest == 0) return;
   const auto farthest = [](std::uint64_t bits) { return hwy::Num0BitsAboveMS1Bit_Nonzero64(bits) ^ 63; };
@@ -225,7 +226,7 @@ HWY_INLINE void WalkBack(D d, std::size_t first, const Batch& batch, const Reach
       StepBack<kDepth, changes, clamped>(d, at, shade, sums);
       at = next;
     };
-    if ((numbers.changeable & bit) == 0) {
+    if ((batch_pairs.changeable & bit) == 0) {
       walk(std::false_type(), std::true_type());
     } else {
       if (batch.log2_opacity[k] > unclamped_log2_opacity) {
@@ -233,7 +234,7 @@ HWY_INLINE void WalkBack(D d, std::size_t first, const Batch& batch, const Reach
       } else {
         walk(std::true_type(), std::false_type());
       }
-      AddGradient(d, sums, pairs[numbers.number[k]]);
+      AddGradient(d, sums, pairs[batch_pairs.number[k]]);
     }
     k = next_k, blocks = next_blocks;
   }
@@ -249,19 +250,17 @@ HWY_INLINE void ToBlocks(const float* rows, float (WalkedBlock::*plane)[Blocks::
 }
 
 template <bool kDepth>
-void WalkTile(const Splat* splats, const PairsOfSplat* pairs_of_splat, const std::uint32_t* list, std::size_t count,
-              int x0, int y0, const TileUpstream& rows_upstream, const RayEnds& ends, GroupGradient* pairs) {
+void WalkTile(const Splat* splats, const PairsOfSplat* pairs_of_splat, const std::uint32_t* list,
+              [[maybe_unused]] std::size_t count, std::size_t asked, int x0, int y0, const TileUpstream& rows_upstream,
+              const RayEnds& ends, GroupGradient* pairs) {
   const D d;
   const hn::RebindToSigned<D> di;
   std::int32_t block_ends[Blocks::count];  // the farthest of its rays
   for (std::size_t block = 0; block < Blocks::count; ++block)
     block_ends[block] = hn::GetLane(hn::MaxOfLanes(di, hn::Load(di, ends.end + block * Blocks::lanes)));
   const auto passed = std::size_t(*std::max_element(block_ends, block_ends + Blocks::count));
-  assert(passed <= count), (void)count;  // or the ends are of another picture
-  // In front of the nearest splat that may change nothing is asked for.
-  std::size_t asked = 0;
-  while (asked < passed && !pairs_of_splat[list[asked]].any()) ++asked;
-  if (asked == passed) return;
+  assert(passed <= count);  // or the ends are of another picture
+  if (asked >= passed) return;
 
   WalkedBlock walked[Blocks::count];
   for (std::size_t b = 0, at = 0; b < Blocks::count; ++b, at += Blocks::lanes) {
@@ -277,29 +276,29 @@ void WalkTile(const Splat* splats, const PairsOfSplat* pairs_of_splat, const std
   ToBlocks(rows_upstream.transmittance, &WalkedBlock::beyond, walked);
   Batch batch;
   ReachedBlocks reached;
-  BatchPairs numbers;
+  BatchPairs batch_pairs;
   const auto group_of = [](int pixel) { return std::uint32_t(pixel / (tile_size * tile_group)); };
   for (std::size_t b = (passed + Batch::size - 1) / Batch::size; b-- > asked / Batch::size;) {
     const std::size_t first = b * Batch::size, n = HWY_MIN(Batch::size, passed - first);
     Fill(splats, list + first, n, x0, y0, batch);
     if (b > asked / Batch::size)
       for (std::size_t k = first - Batch::size; k < first; ++k) hwy::Prefetch(&splats[list[k]]);
-    FindPairs(pairs_of_splat, list + first, n, group_of(x0), group_of(y0), pairs, numbers);
+    FindPairs(pairs_of_splat, list + first, n, group_of(x0), group_of(y0), pairs, batch_pairs);
     std::int32_t ends_from_here[Blocks::count];
     for (std::size_t i = 0; i < Blocks::count; ++i) ends_from_here[i] = block_ends[i] - std::int32_t(first);
     FindReachedBlocks(d, n, batch, ends_from_here, reached);
     const std::uint64_t bits_asked = asked > first ? ~std::uint64_t{0} << (asked - first) : ~std::uint64_t{0};
-    WalkBack<kDepth>(d, first, batch, reached, bits_asked, numbers, walked, pairs);
+    WalkBack<kDepth>(d, first, batch, reached, bits_asked, batch_pairs, walked, pairs);
   }
 }
 
 void CompositeTileVjp(const Splat* splats, const PairsOfSplat* pairs_of_splat, const std::uint32_t* list,
-                      std::size_t count, int x0, int y0, const TileUpstream& upstream, bool with_depth,
-                      const RayEnds& ends, GroupGradient* pairs) {
+                      std::size_t count, std::size_t asked, int x0, int y0, const TileUpstream& upstream,
+                      bool with_depth, const RayEnds& ends, GroupGradient* pairs) {
   if (with_depth) {
-    WalkTile<true>(splats, pairs_of_splat, list, count, x0, y0, upstream, ends, pairs);
+    WalkTile<true>(splats, pairs_of_splat, list, count, asked, x0, y0, upstream, ends, pairs);
   } else {
-    WalkTile<false>(splats, pairs_of_splat, list, count, x0, y0, upstream, ends, pairs);
+    WalkTile<false>(splats, pairs_of_splat, list, count, asked, x0, y0, upstream, ends, pairs);
   }
 }
 
@@ -313,10 +312,10 @@ namespace engine::render {
 HWY_EXPORT(CompositeTileVjp);
 
 void composite_tile_vjp(const Splat* splats, const PairsOfSplat* pairs_of_splat, std::span<const std::uint32_t> list,
-                        int x0, int y0, const TileUpstream& upstream, bool with_depth, const RayEnds& ends,
-                        GroupGradient* pairs) {
+                        std::size_t asked, int x0, int y0, const TileUpstream& upstream, bool with_depth,
+                        const RayEnds& ends, GroupGradient* pairs) {
   HWY_DYNAMIC_DISPATCH(CompositeTileVjp)
-  (splats, pairs_of_splat, list.data(), list.size(), x0, y0, upstream, with_depth, ends, pairs);
+  (splats, pairs_of_splat, list.data(), list.size(), asked, x0, y0, upstream, with_depth, ends, pairs);
 }
 
 }  // namespace engine::render

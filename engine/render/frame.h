@@ -23,7 +23,7 @@ class Frame {
 
   /// Overwrites `color`, [3] and of the camera's size, with the bytes of render::forward().
   ///   background  colour behind everything, display-referred
-  ///   throws      std::bad_alloc, as forward() does
+  ///   throws      std::bad_alloc, as render::backward() does
   void forward(const scene::GaussianCloud& cloud, const scene::Camera& camera, Vec3 background, scene::Image& color);
 
   /// Adds dL/d(row) of all rows to out, with the bytes of render::backward().

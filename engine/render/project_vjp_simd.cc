@@ -261,7 +261,7 @@ void ColorVjp(const scene::GaussianCloud& cloud, std::size_t first_row, const st
   EachBasisVjp<kDegree>(bases, rows);
 }
 
-/// Sums a row's gradients over its tiles, in their order and in double, into row i. False if all are zero.
+/// Sums a row's gradients over its groups of tiles, in their order and in double, into row i. False if all are zero.
 HWY_INLINE bool SumOverGroups(const GroupGradient* first, const GroupGradient* last, std::size_t i, VjpRows& rows) {
   constexpr std::size_t size = sizeof(GroupGradient) / sizeof(float);
   const hn::CappedTag<double, 4> d64;

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <memory>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "engine/render/forward.h"
@@ -26,10 +27,12 @@ struct Splat {
   float log2_opacity;
   float weight;
   std::uint32_t row;  ///< Of the Gaussian in its layers.
+  // What it looks like, in a four of its own: blending copies these as they lie.
   float red, green, blue;
   float depth;  ///< World units along the optical axis.
 };
 static_assert(sizeof(Splat) == 48);
+static_assert(offsetof(Splat, l3) == 4 * sizeof(float) && offsetof(Splat, red) == 8 * sizeof(float));
 
 /// The tiles that a splat's bounding box meets; the ranges include their ends.
 struct TileBox {
@@ -43,6 +46,8 @@ constexpr float log2_255 = 7.99435343685886f;
 /// in fresh pages each frame costs as much as a stage.
 template <class T>
 class Buffer {
+  static_assert(std::is_trivially_default_constructible_v<T>);  // or they would not
+
  public:
   /// Room for n elements; what was in it is lost.
   T* reserve(std::size_t n) {
@@ -60,14 +65,14 @@ class Buffer {
   std::size_t capacity_ = 0;
 };
 
-/// Tiles are walked back in square groups of so many on a side. A splat's gradients are summed over a group, so that
-/// they take a pair (splat, group) of memory each, not one for each tile.
-constexpr int tile_group = 4;
+/// Tiles are walked back in square groups of so many on a side, and a splat's gradients are summed over a group before
+/// they are stored.
+constexpr int tile_group = 3;
 
 /// Numbers of the pairs of a splat: the groups that its box meets, row by row.
 struct PairsOfSplat {
-  std::uint32_t first = 0;    ///< What group (0, 0) of the picture would have, modulo 2^32.
-  std::uint32_t columns = 0;  ///< Groups that the box meets in a row. 0: the splat may not change.
+  std::uint32_t first;    ///< What group (0, 0) of the picture would have, modulo 2^32.
+  std::uint32_t columns;  ///< Groups that the box meets in a row. 0: the splat may not change, or no tile lists it.
 
   [[nodiscard]] bool any() const { return columns != 0; }
   [[nodiscard]] std::uint32_t number(std::uint32_t group_column, std::uint32_t group_row) const {
@@ -195,10 +200,13 @@ inline void fetch_tile(const float* at, std::ptrdiff_t stride, int width, int he
   }
 }
 
-/// Copies a row of a tile. Most are whole: a length that the compiler knows spares a call each, which shows in a frame's
-/// time.
+/// Copies a row of a tile. Most are whole: a length that the compiler knows spares a call each.
 inline void copy_tile_row(const float* from, int width, float* to) {
-  std::memcpy(to, from, width == tile_size ? tile_size * sizeof(float) : std::size_t(width) * sizeof(float));
+  if (width == tile_size) {
+    std::memcpy(to, from, tile_size * sizeof(float));
+  } else {
+    std::copy_n(from, width, to);
+  }
 }
 
 /// Blends the listed splats, nearest first, into the tile, and the background behind them. Only the planes that

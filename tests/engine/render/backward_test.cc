@@ -482,6 +482,31 @@ TEST(Backward, ARayThroughAThousandFaintSplatsKeepsItsDigitsOnTheWayBack) {
   ASSERT_TRUE(pin_simd_target(best));
 }
 
+TEST(Backward, SplatsThatReachManyGroupsOfTilesAgreeWithTheReferenceAmongOthersThatMayNotChange) {
+  const auto camera = off_centre_camera(210, 150);  // 14 x 10 tiles: the last groups of rows and columns are not whole
+  auto cloud = cloud_in_view(250, 31);
+  std::vector<std::uint32_t> rows;
+  for (std::uint32_t i = 0; i < cloud.size(); i += 3) {
+    cloud.log_scale.set(i, cloud.log_scale.get(i) + Vec3(1.0f));
+    rows.push_back(i);
+  }
+  const auto upstream = random_upstream(camera.width, camera.height, 32);
+  std::vector<std::uint32_t> some_tiles;
+  for (std::uint32_t tile = 0; tile < 14 * 10; ++tile)
+    if (tile % 5 == 0 || tile / 14 == 6) some_tiles.push_back(tile);
+  const std::string best = simd_target();
+  for (const std::string& target : simd_targets())
+    for (const auto& tiles : {std::vector<std::uint32_t>(), some_tiles}) {
+      SCOPED_TRACE(testing::Message() << target << ", " << tiles.size() << " tiles wanted, 0 for all");
+      ASSERT_TRUE(pin_simd_target(target));
+      BackwardOptions simd = on(Backend::simd), reference = on(Backend::reference);
+      simd.forward.tiles = reference.forward.tiles = tiles;
+      expect_close(gradients_of(cloud, camera, simd, upstream, rows),
+                   gradients_of(cloud, camera, reference, upstream, rows), 2e-3);
+    }
+  ASSERT_TRUE(pin_simd_target(best));
+}
+
 TEST(Backward, TilesWithoutUpstreamAndTilesThatNoRowReachesChangeNothing) {
   // The rows are those on the left; upstream is on the left half. Nothing of the right half may be missing or double.
   const auto cloud = cloud_in_view(800, 17);
