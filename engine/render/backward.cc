@@ -129,6 +129,7 @@ void walk_tiles(const ForwardBuffers& forward, const RayEnds* ends, const TileGr
   GroupGradient* const sums = gradients.reserve(pairs);
   parallel_for(pairs, 4096,
                [&](std::size_t begin, std::size_t end) { std::fill(sums + begin, sums + end, GroupGradient{}); });
+  const int side = forward.tile_group;
   const auto walk_tile = [&](int column, int row) {
     const auto tile = std::size_t(row * grid.columns + column);
     const std::uint32_t first = forward.tile_begin[tile], last = forward.tile_begin[tile + 1];
@@ -144,19 +145,22 @@ void walk_tiles(const ForwardBuffers& forward, const RayEnds* ends, const TileGr
       TilePixels pixels;
       composite_tile(forward.splats.data(), list, place, {}, {}, pixels, &anew);
     }
-    composite_tile_vjp(forward.splats.data(), forward.pairs_of_splat.data(), list, std::size_t(asked - list.begin()),
-                       place.x0, place.y0, tile_upstream, upstream.depth != nullptr,
-                       ends != nullptr ? ends[tile] : anew, sums);
+    const TilePairs tile_pairs{.of_splat = forward.pairs_of_splat.data(),
+                               .group_column = std::uint32_t(column / side),
+                               .group_row = std::uint32_t(row / side),
+                               .sums = sums};
+    composite_tile_vjp(forward.splats.data(), list, std::size_t(asked - list.begin()), place.x0, place.y0,
+                       tile_upstream, upstream.depth != nullptr, ends != nullptr ? ends[tile] : anew, tile_pairs);
   };
   // A group's tiles follow each other on one thread, since they add to the same sums.
-  const auto groups = [](int tiles) { return (tiles + tile_group - 1) / tile_group; };
+  const auto groups = [side](int tiles) { return (tiles + side - 1) / side; };
   parallel_for(std::size_t(groups(grid.columns) * groups(grid.rows)), 1, [&](std::size_t group, std::size_t) {
-    const int column0 = int(group) % groups(grid.columns) * tile_group,
-              row0 = int(group) / groups(grid.columns) * tile_group;
-    const int columns = std::min(tile_group, grid.columns - column0), rows = std::min(tile_group, grid.rows - row0);
+    const int column0 = int(group) % groups(grid.columns) * side, row0 = int(group) / groups(grid.columns) * side;
+    const int columns = std::min(side, grid.columns - column0), rows = std::min(side, grid.rows - row0);
     for (int i = 0; i < columns * rows; ++i) {
-      fetch_upstream(upstream, grid.pixels, (column0 + (i + 1) % columns) * tile_size,
-                     (row0 + (i + 1) / columns) * tile_size);  // of the next tile
+      const bool last = i + 1 == columns * rows;  // then the next group's first is mostly the next tile
+      fetch_upstream(upstream, grid.pixels, (column0 + (last ? side : (i + 1) % columns)) * tile_size,
+                     (row0 + (last ? 0 : (i + 1) / columns)) * tile_size);
       walk_tile(column0 + i % columns, row0 + i / columns);
     }
   });

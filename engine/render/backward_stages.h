@@ -29,16 +29,21 @@ struct alignas(64) TileUpstream {
   float transmittance[TilePixels::count];  ///< dL/dT behind all: background . color - alpha
 };
 
+/// Where the gradients of a tile's splats are summed.
+struct TilePairs {
+  const PairsOfSplat* of_splat;           ///< As bin() numbers them.
+  std::uint32_t group_column, group_row;  ///< The tile's.
+  GroupGradient* sums;
+};
+
 /// Pulls back one tile, whose first pixel is (x0, y0).
-///   pairs_of_splat  as bin() numbers them
-///   list            splats that reach the tile, nearest first
-///   asked           in front of this one of the list nothing may change
-///   with_depth      whether upstream.depth is anything but zero
-///   ends            as composite_tile() left them
-///   pairs           what the tile makes of splats that may change is added to those of its group
-void composite_tile_vjp(const Splat* splats, const PairsOfSplat* pairs_of_splat, std::span<const std::uint32_t> list,
-                        std::size_t asked, int x0, int y0, const TileUpstream& upstream, bool with_depth,
-                        const RayEnds& ends, GroupGradient* pairs);
+///   list        splats that reach the tile, nearest first
+///   asked       in front of this one of the list nothing may change
+///   with_depth  whether upstream.depth is anything but zero
+///   ends        as composite_tile() left them
+///   pairs       of splats that may change are added to
+void composite_tile_vjp(const Splat* splats, std::span<const std::uint32_t> list, std::size_t asked, int x0, int y0,
+                        const TileUpstream& upstream, bool with_depth, const RayEnds& ends, const TilePairs& pairs);
 
 /// Where the gradients of the rows [R] that may change are: row by row, so that what a row needs lies side by side.
 struct RowPairs {
@@ -54,7 +59,7 @@ struct UpstreamPlanes {
 };
 
 /// Walks all tiles of `forward` back.
-///   forward    splats, entries, tile_begin and pairs_of_splat are used
+///   forward    splats, entries, tile_begin, tile_group and pairs_of_splat are used
 ///   ends       [tiles] as the forward pass of the same picture left them; null: found anew
 ///   grid       pixels: the rectangle of the picture that `upstream` is of
 ///   pairs      there are, as pairs_of_splat numbers them

@@ -94,11 +94,11 @@ namespace {
 struct TileGroups {
   std::uint32_t first_column, first_row, columns, rows;
 
-  explicit TileGroups(const TileBox& box)
-      : first_column(box.first_column / tile_group),
-        first_row(box.first_row / tile_group),
-        columns(box.last_column / tile_group - first_column + 1),
-        rows(box.last_row / tile_group - first_row + 1) {}
+  TileGroups(const TileBox& box, std::uint32_t side)
+      : first_column(box.first_column / side),
+        first_row(box.first_row / side),
+        columns(box.last_column / side - first_column + 1),
+        rows(box.last_row / side - first_row + 1) {}
 };
 
 /// Drops the tiles that are not wanted from the lists of splats. Returns their end.
@@ -184,6 +184,8 @@ void bin(const TileGrid& grid, ForwardBuffers& buffers) {
 }
 
 void bin(const TileGrid& grid, ForwardBuffers& buffers, const std::int32_t* slot_of_row, std::size_t rows) {
+  buffers.tile_group = tile_group_side(rows);
+  const auto side = std::uint32_t(buffers.tile_group);
   std::uint32_t* const first_pair = buffers.first_pair.reserve(rows + 1);
   std::fill_n(first_pair, rows + 1, 0u);
   PairsOfSplat* const pairs_of_splat = buffers.pairs_of_splat.reserve(buffers.count);
@@ -192,7 +194,7 @@ void bin(const TileGrid& grid, ForwardBuffers& buffers, const std::int32_t* slot
     const std::int32_t slot = slot_of_row != nullptr ? slot_of_row[row] : std::int32_t(row);
     pairs_of_splat[i] = {};
     if (slot < 0 || tiles == 0) return;
-    const TileGroups groups(buffers.boxes[i]);
+    const TileGroups groups(buffers.boxes[i], side);
     first_pair[slot] = groups.columns * groups.rows;
     pairs_of_splat[i] = {.first = std::uint32_t(slot), .columns = groups.columns};  // until slots have their numbers
   });
@@ -204,7 +206,7 @@ void bin(const TileGrid& grid, ForwardBuffers& buffers, const std::int32_t* slot
     for (std::size_t i = first; i < last; ++i) {
       PairsOfSplat& pairs = pairs_of_splat[i];
       if (!pairs.any()) continue;
-      const TileGroups groups(buffers.boxes[i]);
+      const TileGroups groups(buffers.boxes[i], side);
       pairs.first = first_pair[pairs.first] - groups.first_row * groups.columns - groups.first_column;
     }
   });

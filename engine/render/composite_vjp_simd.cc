@@ -64,16 +64,14 @@ struct BatchPairs {
 };
 
 /// Finds them for a batch of n splats, and asks for them.
-HWY_INLINE void FindPairs(const PairsOfSplat* pairs_of_splat, const std::uint32_t* list, std::size_t n,
-                          std::uint32_t group_column, std::uint32_t group_row, const GroupGradient* pairs,
-                          BatchPairs& out) {
+HWY_INLINE void FindPairs(const TilePairs& pairs, const std::uint32_t* list, std::size_t n, BatchPairs& out) {
   out.changeable = 0;
   for (std::size_t k = 0; k < n; ++k) {
-    const PairsOfSplat of = pairs_of_splat[list[k]];
+    const PairsOfSplat of = pairs.of_splat[list[k]];
     if (!of.any()) continue;
     out.changeable |= std::uint64_t{1} << k;
-    out.number[k] = of.number(group_column, group_row);
-    const GroupGradient& pair = pairs[out.number[k]];
+    out.number[k] = of.number(pairs.group_column, pairs.group_row);
+    const GroupGradient& pair = pairs.sums[out.number[k]];
     hwy::Prefetch(&pair.g), hwy::Prefetch(&pair.padding[1]);  // often in two lines
   }
 }
@@ -196,11 +194,11 @@ HWY_INLINE void StepBack(D d, const Meeting& at, const ShadeOfAll& shade, Sums& 
 /// the processor has two chains to follow.
 ///   first        number of the batch's first splat in the tile's list
 ///   asked        bits of the splats that are asked for: in front of them nothing may change
-///   batch_pairs  where in `pairs` their gradients go
+///   batch_pairs  where in sums_of_pairs their gradients go
 ///   walked       [Blocks::count]
 template <bool kDepth>
 HWY_INLINE void WalkBack(D d, std::size_t first, const Batch& batch, const ReachedBlocks& reached, std::uint64_t asked,
-                         const BatchPairs& batch_pairs, WalkedBlock* walked, GroupGradient* pairs) {
+                         const BatchPairs& batch_pairs, WalkedBlock* walked, GroupGradient* sums_of_pairs) {
   std::uint64_t rest = reached.met & asked;
   if (rest == 0) return;
   const auto farthest = [](std::uint64_t bits) { return hwy::Num0BitsAboveMS1Bit_Nonzero64(bits) ^ 63; };
@@ -234,7 +232,7 @@ HWY_INLINE void WalkBack(D d, std::size_t first, const Batch& batch, const Reach
       } else {
         walk(std::true_type(), std::false_type());
       }
-      AddGradient(d, sums, pairs[batch_pairs.number[k]]);
+      AddGradient(d, sums, sums_of_pairs[batch_pairs.number[k]]);
     }
     k = next_k, blocks = next_blocks;
   }
@@ -250,9 +248,8 @@ HWY_INLINE void ToBlocks(const float* rows, float (WalkedBlock::*plane)[Blocks::
 }
 
 template <bool kDepth>
-void WalkTile(const Splat* splats, const PairsOfSplat* pairs_of_splat, const std::uint32_t* list,
-              [[maybe_unused]] std::size_t count, std::size_t asked, int x0, int y0, const TileUpstream& rows_upstream,
-              const RayEnds& ends, GroupGradient* pairs) {
+void WalkTile(const Splat* splats, const std::uint32_t* list, [[maybe_unused]] std::size_t count, std::size_t asked,
+              int x0, int y0, const TileUpstream& rows_upstream, const RayEnds& ends, const TilePairs& pairs) {
   const D d;
   const hn::RebindToSigned<D> di;
   std::int32_t block_ends[Blocks::count];  // the farthest of its rays
@@ -277,28 +274,27 @@ void WalkTile(const Splat* splats, const PairsOfSplat* pairs_of_splat, const std
   Batch batch;
   ReachedBlocks reached;
   BatchPairs batch_pairs;
-  const auto group_of = [](int pixel) { return std::uint32_t(pixel / (tile_size * tile_group)); };
   for (std::size_t b = (passed + Batch::size - 1) / Batch::size; b-- > asked / Batch::size;) {
     const std::size_t first = b * Batch::size, n = HWY_MIN(Batch::size, passed - first);
     Fill(splats, list + first, n, x0, y0, batch);
     if (b > asked / Batch::size)
       for (std::size_t k = first - Batch::size; k < first; ++k) hwy::Prefetch(&splats[list[k]]);
-    FindPairs(pairs_of_splat, list + first, n, group_of(x0), group_of(y0), pairs, batch_pairs);
+    FindPairs(pairs, list + first, n, batch_pairs);
     std::int32_t ends_from_here[Blocks::count];
     for (std::size_t i = 0; i < Blocks::count; ++i) ends_from_here[i] = block_ends[i] - std::int32_t(first);
     FindReachedBlocks(d, n, batch, ends_from_here, reached);
     const std::uint64_t bits_asked = asked > first ? ~std::uint64_t{0} << (asked - first) : ~std::uint64_t{0};
-    WalkBack<kDepth>(d, first, batch, reached, bits_asked, batch_pairs, walked, pairs);
+    WalkBack<kDepth>(d, first, batch, reached, bits_asked, batch_pairs, walked, pairs.sums);
   }
 }
 
-void CompositeTileVjp(const Splat* splats, const PairsOfSplat* pairs_of_splat, const std::uint32_t* list,
-                      std::size_t count, std::size_t asked, int x0, int y0, const TileUpstream& upstream,
-                      bool with_depth, const RayEnds& ends, GroupGradient* pairs) {
+void CompositeTileVjp(const Splat* splats, const std::uint32_t* list, std::size_t count, std::size_t asked, int x0,
+                      int y0, const TileUpstream& upstream, bool with_depth, const RayEnds& ends,
+                      const TilePairs& pairs) {
   if (with_depth) {
-    WalkTile<true>(splats, pairs_of_splat, list, count, asked, x0, y0, upstream, ends, pairs);
+    WalkTile<true>(splats, list, count, asked, x0, y0, upstream, ends, pairs);
   } else {
-    WalkTile<false>(splats, pairs_of_splat, list, count, asked, x0, y0, upstream, ends, pairs);
+    WalkTile<false>(splats, list, count, asked, x0, y0, upstream, ends, pairs);
   }
 }
 
@@ -311,11 +307,10 @@ namespace engine::render {
 
 HWY_EXPORT(CompositeTileVjp);
 
-void composite_tile_vjp(const Splat* splats, const PairsOfSplat* pairs_of_splat, std::span<const std::uint32_t> list,
-                        std::size_t asked, int x0, int y0, const TileUpstream& upstream, bool with_depth,
-                        const RayEnds& ends, GroupGradient* pairs) {
+void composite_tile_vjp(const Splat* splats, std::span<const std::uint32_t> list, std::size_t asked, int x0, int y0,
+                        const TileUpstream& upstream, bool with_depth, const RayEnds& ends, const TilePairs& pairs) {
   HWY_DYNAMIC_DISPATCH(CompositeTileVjp)
-  (splats, pairs_of_splat, list.data(), list.size(), asked, x0, y0, upstream, with_depth, ends, pairs);
+  (splats, list.data(), list.size(), asked, x0, y0, upstream, with_depth, ends, pairs);
 }
 
 }  // namespace engine::render

@@ -118,8 +118,8 @@ std::size_t FrozenView::memory_bytes() const {
 }
 
 struct LocalFrame::Impl {
-  ForwardBuffers changeable;        ///< Of the changeable Gaussians alone.
-  ForwardBuffers merged;            ///< splats, count, entries, tile_begin, pairs_of_splat and ray_ends: of both.
+  ForwardBuffers changeable;  ///< Of the changeable Gaussians alone.
+  ForwardBuffers merged;      ///< splats, count, entries, tile_begin, tile_group, pairs_of_splat and ray_ends: of both.
   Buffer<std::uint32_t> of_frozen;  ///< [frozen splats] Number among the merged.
   Buffer<std::uint32_t> of_change;  ///< [changeable splats]
   scene::Rect reach;
@@ -169,6 +169,7 @@ void LocalFrame::merge(const FrozenView& frozen) {
   // Entries are numbered in 32 bits, and so are splats.
   if (merged.count > std::numeric_limits<std::int32_t>::max()) throw std::bad_alloc();
   Splat* const splats = merged.splats.reserve(merged.count);
+  merged.tile_group = top.tile_group;
   PairsOfSplat* const pairs_of_splat = merged.pairs_of_splat.reserve(merged.count);
   std::uint32_t* const of_frozen = frame.of_frozen.reserve(view.splats.size());
   std::uint32_t* const of_change = frame.of_change.reserve(top.count);

@@ -67,7 +67,9 @@ class Buffer {
 
 /// Tiles are walked back in square groups of so many on a side, and a splat's gradients are summed over a group before
 /// they are stored.
-constexpr int tile_group = 3;
+///   rows  that may change. Many of them take much memory, which groups save; few may lie in tiles that make up too few
+///         groups for all threads
+constexpr int tile_group_side(std::size_t rows) { return rows < 20'000 ? 1 : 3; }
 
 /// Numbers of the pairs of a splat: the groups that its box meets, row by row.
 struct PairsOfSplat {
@@ -124,6 +126,7 @@ struct ForwardBuffers {
   Buffer<std::uint32_t> entries;          ///< Indices into splats.
   std::vector<std::uint32_t> tile_begin;  ///< [tiles + 1] into entries.
   // bin, if told which rows may change: their pairs with groups of tiles, numbered row by row
+  int tile_group = 1;                   ///< Tiles on a side of a group.
   Buffer<PairsOfSplat> pairs_of_splat;  ///< [count]
   Buffer<std::uint32_t> first_pair;     ///< [rows that may change + 1] The first number of a row.
   // composite, if it is to be walked back

@@ -63,21 +63,24 @@ TEST(SortByDepth, OrdersByDepthAndEqualDepthsByRowWhateverTheirRange) {
     }
 }
 
-/// 19 x 13 tiles: groups at the right and the lower edge are not whole.
-scene::Camera wide_camera() { return off_centre_camera(300, 200); }
+/// 19 x 14 tiles: groups of 3 x 3 at the right and the lower edge are not whole.
+scene::Camera wide_camera() { return off_centre_camera(300, 220); }
 
-/// Binned with every third row changeable.
+constexpr std::size_t many_rows = 20'000;
+
+/// Binned with every third row changeable, and as many more that are nowhere as make up `rows`.
 struct Binned {
-  std::size_t rows = 0;                   ///< That may change.
+  std::size_t rows;                       ///< That may change.
   std::vector<std::int32_t> slot_of_row;  ///< Of all.
   TileGrid grid;
   ForwardBuffers buffers;
 
-  explicit Binned(const std::vector<std::uint8_t>& wanted = {}) {
+  explicit Binned(std::size_t at_least, const std::vector<std::uint8_t>& wanted = {}) {
     const auto cloud = cloud_in_view(600, 8);
     const auto camera = wide_camera();
-    for (std::size_t row = 0; row < cloud.size(); ++row)
-      slot_of_row.push_back(row % 3 == 0 ? std::int32_t(rows++) : -1);
+    std::int32_t next = 0;
+    for (std::size_t row = 0; row < cloud.size(); ++row) slot_of_row.push_back(row % 3 == 0 ? next++ : -1);
+    rows = std::max(at_least, std::size_t(next));
     grid = {.columns = tile_columns(camera.width),
             .rows = tile_rows(camera.height),
             .pixels = {0, 0, camera.width, camera.height},
@@ -92,6 +95,7 @@ struct Binned {
 /// its box meets groups, or none if no tile lists it.
 void expect_numbered(const Binned& binned) {
   const ForwardBuffers& buffers = binned.buffers;
+  const int tile_group = buffers.tile_group;
   std::map<std::uint32_t, std::pair<std::uint32_t, int>> owner;  // of a number: splat and group
   std::vector<bool> is_listed(buffers.count);
   for (int tile = 0; tile < binned.grid.columns * binned.grid.rows; ++tile) {
@@ -132,22 +136,25 @@ void expect_numbered(const Binned& binned) {
   }
 }
 
-TEST(Bin, NumbersThePairsOfSplatsAndGroupsRowByRow) {
-  const Binned binned;
-  expect_numbered(binned);
-  EXPECT_LT(binned.buffers.first_pair[binned.rows], binned.buffers.tile_begin.back() / 3)
-      << "what reaches several tiles has fewer pairs than tiles";
+TEST(Bin, FewRowsHaveAPairPerTileAndManyOnePerGroupOfTiles) {
+  const Binned few(0), many(many_rows);
+  EXPECT_EQ(few.buffers.tile_group, 1);
+  EXPECT_EQ(many.buffers.tile_group, 3);
+  expect_numbered(few);
+  expect_numbered(many);
+  EXPECT_LT(many.buffers.first_pair[many.rows], few.buffers.first_pair[few.rows] / 2);
 }
 
 TEST(Bin, NumbersThePairsOfWantedTilesAlike) {
-  std::vector<std::uint8_t> wanted(19 * 13, 0);
+  std::vector<std::uint8_t> wanted(19 * 14, 0);
   for (const int tile : {0, 5, 6, 18, 60, 61, 62, 80, 81, 100, 101, 119, 120, 121, 140, 246})
     wanted[std::size_t(tile)] = 1;
-  expect_numbered(Binned(wanted));
+  expect_numbered(Binned(0, wanted));
+  expect_numbered(Binned(many_rows, wanted));
 }
 
 TEST(Bin, WithoutSlotsAllRowsMayChange) {
-  Binned some;
+  Binned some(0);
   bin(some.grid, some.buffers, nullptr, some.slot_of_row.size());
   for (std::size_t row = 0; row < some.slot_of_row.size(); ++row) some.slot_of_row[row] = std::int32_t(row);
   some.rows = some.slot_of_row.size();
