@@ -147,11 +147,10 @@ struct Meeting {
 template <bool kClamped>
 HWY_INLINE Meeting Meet(D d, const Batch& batch, std::size_t k, std::size_t number, WalkedBlock& block) {
   const hn::RebindToSigned<D> di;
-  Meeting at{.block = &block, .alpha = {}, .u = {}, .v = {}};
-  const V power = PowerAt(d, batch, k, hn::Load(d, block.x), hn::Load(d, block.y), at.u, at.v);
+  V u, v;
+  const V power = PowerAt(d, batch, k, hn::Load(d, block.x), hn::Load(d, block.y), u, v);
   const auto before_end = hn::RebindMask(d, hn::Lt(hn::Set(di, std::int32_t(number)), hn::Load(di, block.end)));
-  at.alpha = AlphaOf<kClamped>(d, power, PassesCut(d, power, before_end));
-  return at;
+  return {&block, AlphaOf<kClamped>(d, power, PassesCut(d, power, before_end)), u, v};
 }
 
 /// What a splat looks like, in all lanes.

@@ -45,8 +45,8 @@ void store_tile(const TilePixels& tile, int x0, int y0, scene::Rect area, Render
     if (image.channels == 0) return;
     float* plane = image.plane(channel).data();
     for (int y = first_y; y < last_y; ++y)
-      std::copy_n(from + (y - y0) * tile_size + (first_x - x0), last_x - first_x,
-                  plane + std::ptrdiff_t(y - area.y0) * area.width() + (first_x - area.x0));
+      copy_tile_row(from + (y - y0) * tile_size + (first_x - x0), last_x - first_x,
+                    plane + std::ptrdiff_t(y - area.y0) * area.width() + (first_x - area.x0));
   };
   store(tile.alpha, out.alpha);
   store(tile.red, out.color, 0);
