@@ -1,9 +1,10 @@
 #include "engine/render/backward.h"
 
 #include <algorithm>
-#include <bit>
+#include <array>
 #include <cassert>
 #include <functional>
+#include <optional>
 
 #include "engine/core/parallel.h"
 #include "engine/render/backward_stages.h"
@@ -84,35 +85,50 @@ void Gradients::reset(std::size_t rows, int degree) {
 
 namespace {
 
-/// Reads dL/d(pictures) of the tile whose first pixel is (x0, y0), and what they make of the ray's end. False if all is
-/// zero.
-bool load_tile(const UpstreamPlanes& upstream, scene::Rect area, Vec3 background, int x0, int y0, TileUpstream& tile) {
+/// Planes of a tile that is not wholly shown: zero where it is not.
+struct PaddedTile {
+  std::array<std::array<float, TilePixels::count>, 5> planes;
+};
+
+/// dL/d(pictures) of the tile whose first pixel is (x0, y0), where it lies, or padded. Nothing if none of it is shown.
+std::optional<TileUpstream> upstream_of_tile(const UpstreamPlanes& upstream, scene::Rect area, int x0, int y0,
+                                             PaddedTile& padded) {
   const int first_x = std::max(x0, area.x0), last_x = std::min(x0 + tile_size, area.x1);
   const int first_y = std::max(y0, area.y0), last_y = std::min(y0 + tile_size, area.y1);
-  if (first_x >= last_x || first_y >= last_y) return false;
+  if (first_x >= last_x || first_y >= last_y) return std::nullopt;
   const bool whole = last_x - first_x == tile_size && last_y - first_y == tile_size;
-  std::uint32_t bits = 0;  // of all values but their signs, so that NaN is something and -0 is nothing
-  const auto load = [&](const scene::Image* image, int channel, float* to) {
-    if (image == nullptr || !whole) std::fill_n(to, TilePixels::count, 0.0f);
-    if (image == nullptr) return;
-    const float* const plane = image->plane(channel).data();
+  const auto plane = [&](const scene::Image* image, int channel, std::size_t number) -> const float* {
+    if (image == nullptr) return nullptr;
+    const float* const shown =
+        image->plane(channel).data() + std::ptrdiff_t(first_y - area.y0) * area.width() + (first_x - area.x0);
+    if (whole) return shown;
+    padded.planes[number].fill(0.0f);
+    float* const to = padded.planes[number].data();
     for (int y = first_y; y < last_y; ++y)
-      copy_tile_row(plane + std::ptrdiff_t(y - area.y0) * image->width + (first_x - area.x0), last_x - first_x,
-                    to + (y - y0) * tile_size + (first_x - x0));
-    for (std::size_t i = 0; i < TilePixels::count; ++i) bits |= std::bit_cast<std::uint32_t>(to[i]) << 1;
+      std::copy_n(shown + std::ptrdiff_t(y - first_y) * area.width(), last_x - first_x,
+                  to + (y - y0) * tile_size + (first_x - x0));
+    return to;
   };
-  load(upstream.color, 0, tile.red);
-  load(upstream.color, 1, tile.green);
-  load(upstream.color, 2, tile.blue);
-  load(upstream.depth, 0, tile.depth);
-  load(upstream.alpha, 0, tile.transmittance);
-  for (std::size_t i = 0; i < TilePixels::count; ++i)
-    tile.transmittance[i] =
-        background.x * tile.red[i] + background.y * tile.green[i] + background.z * tile.blue[i] - tile.transmittance[i];
-  return bits != 0;
+  return TileUpstream{.red = plane(upstream.color, 0, 0),
+                      .green = plane(upstream.color, 1, 1),
+                      .blue = plane(upstream.color, 2, 2),
+                      .depth = plane(upstream.depth, 0, 3),
+                      .alpha = plane(upstream.alpha, 0, 4),
+                      .stride = whole ? area.width() : tile_size};
 }
 
-/// fetch_tile() of the colours that load_tile() reads.
+/// Whether anything is to be pulled back. NaN is something.
+bool any(const TileUpstream& upstream) {
+  for (const float* plane : {upstream.red, upstream.green, upstream.blue, upstream.depth, upstream.alpha}) {
+    if (plane == nullptr) continue;
+    for (int y = 0; y < tile_size; ++y)
+      for (int x = 0; x < tile_size; ++x)
+        if (plane[y * upstream.stride + x] != 0) return true;
+  }
+  return false;
+}
+
+/// fetch_tile() of the colours that upstream_of_tile() finds.
 void fetch_upstream(const UpstreamPlanes& upstream, scene::Rect area, int x0, int y0) {
   if (upstream.color == nullptr || x0 < area.x0 || x0 >= area.x1 || y0 < area.y0) return;
   const int width = std::min(tile_size, area.x1 - x0), height = std::min(tile_size, area.y1 - y0);
@@ -138,8 +154,9 @@ void walk_tiles(const ForwardBuffers& forward, const RayEnds* ends, const TileGr
     const auto asked = std::find_if(list.begin(), list.end(), may_change);
     if (asked == list.end()) return;
     const TilePlace place = place_of(tile, grid.columns, grid.pixels);
-    TileUpstream tile_upstream;
-    if (!load_tile(upstream, grid.pixels, background, place.x0, place.y0, tile_upstream)) return;
+    PaddedTile padded;
+    const auto tile_upstream = upstream_of_tile(upstream, grid.pixels, place.x0, place.y0, padded);
+    if (!tile_upstream || !any(*tile_upstream)) return;
     RayEnds anew;
     if (ends == nullptr) {
       TilePixels pixels;
@@ -150,7 +167,7 @@ void walk_tiles(const ForwardBuffers& forward, const RayEnds* ends, const TileGr
                                .group_row = std::uint32_t(row / side),
                                .sums = sums};
     composite_tile_vjp(forward.splats.data(), list, std::size_t(asked - list.begin()), place.x0, place.y0,
-                       tile_upstream, upstream.depth != nullptr, ends != nullptr ? ends[tile] : anew, tile_pairs);
+                       *tile_upstream, background, ends != nullptr ? ends[tile] : anew, tile_pairs);
   };
   // A group's tiles follow each other on one thread, since they add to the same sums.
   const auto groups = [side](int tiles) { return (tiles + side - 1) / side; };

@@ -22,11 +22,11 @@ struct GroupGradient {
 };
 static_assert(sizeof(GroupGradient) == 12 * sizeof(float));
 
-/// dL/d(pictures) of one tile, row-major 16 x 16; zero outside the picture.
-struct alignas(64) TileUpstream {
-  float red[TilePixels::count], green[TilePixels::count], blue[TilePixels::count];
-  float depth[TilePixels::count];
-  float transmittance[TilePixels::count];  ///< dL/dT behind all: background . color - alpha
+/// dL/d(pictures) of one tile: that of pixel (x, y) is at [y * stride + x], and zero for those that are not shown.
+/// Planes that are null are zero.
+struct TileUpstream {
+  const float *red, *green, *blue, *depth, *alpha;
+  std::ptrdiff_t stride;
 };
 
 /// Where the gradients of a tile's splats are summed.
@@ -37,13 +37,12 @@ struct TilePairs {
 };
 
 /// Pulls back one tile, whose first pixel is (x0, y0).
-///   list        splats that reach the tile, nearest first
-///   asked       in front of this one of the list nothing may change
-///   with_depth  whether upstream.depth is anything but zero
-///   ends        as composite_tile() left them
-///   pairs       of splats that may change are added to
+///   list   splats that reach the tile, nearest first
+///   asked  in front of this one of the list nothing may change
+///   ends   as composite_tile() left them
+///   pairs  of splats that may change are added to
 void composite_tile_vjp(const Splat* splats, std::span<const std::uint32_t> list, std::size_t asked, int x0, int y0,
-                        const TileUpstream& upstream, bool with_depth, const RayEnds& ends, const TilePairs& pairs);
+                        const TileUpstream& upstream, Vec3 background, const RayEnds& ends, const TilePairs& pairs);
 
 /// Where the gradients of the rows [R] that may change are: row by row, so that what a row needs lies side by side.
 struct RowPairs {

@@ -30,11 +30,8 @@ inline void draw_tile(const Splat* splats, std::span<const std::uint32_t> list, 
   TilePixels pixels;
   composite_tile(splats, list, place, {.color = true}, background, pixels, ends);
   int channel = 0;
-  for (const float* from : {pixels.red, pixels.green, pixels.blue}) {
-    float* const to = pixels_of(channel++);
-    for (int y = 0; y < place.height; ++y)
-      copy_tile_row(from + y * tile_size, place.width, to + std::ptrdiff_t(y) * color.width);
-  }
+  for (const float* from : {pixels.red, pixels.green, pixels.blue})
+    copy_tile_plane(from, {0, 0, place.width, place.height}, pixels_of(channel++), color.width);
 }
 
 }  // namespace engine::render

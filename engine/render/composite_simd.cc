@@ -104,18 +104,6 @@ void BlendTile(const Splat* splats, const std::uint32_t* list, std::size_t count
   if constexpr (K::kEnds) std::copy_n(pixels.left, RayEnds::count, ends->transmittance);
 }
 
-/// From block order to rows, in place.
-void ToRows(float* plane) {
-  float blocks[TilePixels::count];
-  std::copy_n(plane, TilePixels::count, blocks);
-  for (std::size_t b = 0; b < Blocks::count; ++b) {
-    float* to = plane + b / Blocks::columns * Blocks::height * tile_size + b % Blocks::columns * Blocks::width;
-    const float* from = blocks + b * Blocks::lanes;
-    for (std::size_t y = 0; y < Blocks::height; ++y)
-      std::copy_n(from + y * Blocks::width, Blocks::width, to + y * tile_size);
-  }
-}
-
 /// Turns the state of the rays into what a picture shows: alpha, and the background through what is left.
 template <bool kColor>
 void Finish(Vec3 background, TilePixels& pixels) {
@@ -136,10 +124,6 @@ void Composite(const Splat* splats, const std::uint32_t* list, std::size_t count
                TilePixels& tile, RayEnds* ends) {
   BlendTile<K>(splats, list, count, place, tile, ends);
   Finish<K::kColor>(background, tile);
-  ToRows(tile.alpha);
-  if constexpr (K::kColor) ToRows(tile.red), ToRows(tile.green), ToRows(tile.blue);
-  if constexpr (K::kDepth) ToRows(tile.depth), ToRows(tile.median_depth);
-  if constexpr (K::kWeight) ToRows(tile.weight);
 }
 
 void CompositeTile(const Splat* splats, const std::uint32_t* list, std::size_t count, TilePlace place,
@@ -164,6 +148,24 @@ void CompositeTile(const Splat* splats, const std::uint32_t* list, std::size_t c
   return composite(Kept<false, false, false, false>());
 }
 
+/// From block order to rows.
+HWY_INLINE void ToRows(const float* plane, float* to, std::ptrdiff_t stride) {
+  for (std::size_t b = 0; b < Blocks::count; ++b) {
+    const std::size_t x = b % Blocks::columns * Blocks::width, y = b / Blocks::columns * Blocks::height;
+    for (std::size_t row = 0; row < Blocks::height; ++row)
+      std::copy_n(plane + b * Blocks::lanes + row * Blocks::width, Blocks::width,
+                  to + std::ptrdiff_t(y + row) * stride + x);
+  }
+}
+
+void CopyTilePlane(const float* plane, scene::Rect part, float* to, std::ptrdiff_t stride) {
+  if (part == scene::Rect{0, 0, tile_size, tile_size}) return ToRows(plane, to, stride);
+  float rows[TilePixels::count];
+  ToRows(plane, rows, tile_size);
+  for (int y = part.y0; y < part.y1; ++y)
+    std::copy_n(rows + y * tile_size + part.x0, part.width(), to + std::ptrdiff_t(y - part.y0) * stride);
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace engine::render
 HWY_AFTER_NAMESPACE();
@@ -172,11 +174,16 @@ HWY_AFTER_NAMESPACE();
 namespace engine::render {
 
 HWY_EXPORT(CompositeTile);
+HWY_EXPORT(CopyTilePlane);
 
 void composite_tile(const Splat* splats, std::span<const std::uint32_t> list, TilePlace place, Channels channels,
                     Vec3 background, TilePixels& tile, RayEnds* ends) {
   HWY_DYNAMIC_DISPATCH(CompositeTile)
   (splats, list.data(), list.size(), place, channels, background, tile, ends);
+}
+
+void copy_tile_plane(const float* plane, scene::Rect part, float* to, std::ptrdiff_t stride) {
+  HWY_DYNAMIC_DISPATCH(CopyTilePlane)(plane, part, to, stride);
 }
 
 }  // namespace engine::render

@@ -25,7 +25,8 @@ struct alignas(64) WalkedBlock {
   float red[Blocks::lanes], green[Blocks::lanes], blue[Blocks::lanes];  ///< dL/d(pictures)
   float depth[Blocks::lanes];                                           ///< The same. Read only if there is any.
   float transmittance[Blocks::lanes];  ///< What reached the splat that was come to last.
-  float beyond[Blocks::lanes];         ///< dL/dT of that splat and all that lies farther back, T being what reached it.
+  /// dL/dT of that splat and all that lies farther back, T being what reached it. At first background . color - alpha.
+  float beyond[Blocks::lanes];
 };
 
 /// A splat's sums over pixels, one lane each.
@@ -237,18 +238,25 @@ HWY_INLINE void WalkBack(D d, std::size_t first, const Batch& batch, const Reach
   }
 }
 
-/// A tile's plane, row by row, to its blocks.
-HWY_INLINE void ToBlocks(const float* rows, float (WalkedBlock::*plane)[Blocks::lanes], WalkedBlock* walked) {
+/// A plane of a tile to its blocks.
+HWY_INLINE void ToBlocks(const float* plane, std::ptrdiff_t stride, float (WalkedBlock::*to)[Blocks::lanes],
+                         WalkedBlock* walked) {
   for (std::size_t b = 0; b < Blocks::count; ++b) {
-    const float* from = rows + b / Blocks::columns * Blocks::height * tile_size + b % Blocks::columns * Blocks::width;
-    for (std::size_t y = 0; y < Blocks::height; ++y)
-      std::copy_n(from + y * tile_size, Blocks::width, walked[b].*plane + y * Blocks::width);
+    const std::size_t x = b % Blocks::columns * Blocks::width, y = b / Blocks::columns * Blocks::height;
+    for (std::size_t row = 0; row < Blocks::height; ++row) {
+      float* const at = walked[b].*to + row * Blocks::width;
+      if (plane == nullptr)
+        std::fill_n(at, Blocks::width, 0.0f);
+      else
+        std::copy_n(plane + std::ptrdiff_t(y + row) * stride + x, Blocks::width, at);
+    }
   }
 }
 
 template <bool kDepth>
 void WalkTile(const Splat* splats, const std::uint32_t* list, [[maybe_unused]] std::size_t count, std::size_t asked,
-              int x0, int y0, const TileUpstream& rows_upstream, const RayEnds& ends, const TilePairs& pairs) {
+              int x0, int y0, const TileUpstream& upstream, Vec3 background, const RayEnds& ends,
+              const TilePairs& pairs) {
   const D d;
   const hn::RebindToSigned<D> di;
   std::int32_t block_ends[Blocks::count];  // the farthest of its rays
@@ -259,17 +267,22 @@ void WalkTile(const Splat* splats, const std::uint32_t* list, [[maybe_unused]] s
   if (asked >= passed) return;
 
   WalkedBlock walked[Blocks::count];
+  ToBlocks(upstream.red, upstream.stride, &WalkedBlock::red, walked);
+  ToBlocks(upstream.green, upstream.stride, &WalkedBlock::green, walked);
+  ToBlocks(upstream.blue, upstream.stride, &WalkedBlock::blue, walked);
+  if constexpr (kDepth) ToBlocks(upstream.depth, upstream.stride, &WalkedBlock::depth, walked);
+  ToBlocks(upstream.alpha, upstream.stride, &WalkedBlock::beyond, walked);
   for (std::size_t b = 0, at = 0; b < Blocks::count; ++b, at += Blocks::lanes) {
-    hn::Store(hn::Load(d, places.x + at), d, walked[b].x);
-    hn::Store(hn::Load(d, places.y + at), d, walked[b].y);
-    hn::Store(hn::Load(di, ends.end + at), di, walked[b].end);
-    hn::Store(hn::Load(d, ends.transmittance + at), d, walked[b].transmittance);
+    WalkedBlock& block = walked[b];
+    hn::Store(hn::Load(d, places.x + at), d, block.x);
+    hn::Store(hn::Load(d, places.y + at), d, block.y);
+    hn::Store(hn::Load(di, ends.end + at), di, block.end);
+    hn::Store(hn::Load(d, ends.transmittance + at), d, block.transmittance);
+    const V behind = hn::MulAdd(hn::Set(d, background.x), hn::Load(d, block.red),
+                                hn::MulAdd(hn::Set(d, background.y), hn::Load(d, block.green),
+                                           hn::Mul(hn::Set(d, background.z), hn::Load(d, block.blue))));
+    hn::Store(hn::Sub(behind, hn::Load(d, block.beyond)), d, block.beyond);
   }
-  ToBlocks(rows_upstream.red, &WalkedBlock::red, walked);
-  ToBlocks(rows_upstream.green, &WalkedBlock::green, walked);
-  ToBlocks(rows_upstream.blue, &WalkedBlock::blue, walked);
-  if constexpr (kDepth) ToBlocks(rows_upstream.depth, &WalkedBlock::depth, walked);
-  ToBlocks(rows_upstream.transmittance, &WalkedBlock::beyond, walked);
   Batch batch;
   ReachedBlocks reached;
   BatchPairs batch_pairs;
@@ -288,12 +301,12 @@ void WalkTile(const Splat* splats, const std::uint32_t* list, [[maybe_unused]] s
 }
 
 void CompositeTileVjp(const Splat* splats, const std::uint32_t* list, std::size_t count, std::size_t asked, int x0,
-                      int y0, const TileUpstream& upstream, bool with_depth, const RayEnds& ends,
+                      int y0, const TileUpstream& upstream, Vec3 background, const RayEnds& ends,
                       const TilePairs& pairs) {
-  if (with_depth) {
-    WalkTile<true>(splats, list, count, asked, x0, y0, upstream, ends, pairs);
+  if (upstream.depth != nullptr) {
+    WalkTile<true>(splats, list, count, asked, x0, y0, upstream, background, ends, pairs);
   } else {
-    WalkTile<false>(splats, list, count, asked, x0, y0, upstream, ends, pairs);
+    WalkTile<false>(splats, list, count, asked, x0, y0, upstream, background, ends, pairs);
   }
 }
 
@@ -307,9 +320,9 @@ namespace engine::render {
 HWY_EXPORT(CompositeTileVjp);
 
 void composite_tile_vjp(const Splat* splats, std::span<const std::uint32_t> list, std::size_t asked, int x0, int y0,
-                        const TileUpstream& upstream, bool with_depth, const RayEnds& ends, const TilePairs& pairs) {
+                        const TileUpstream& upstream, Vec3 background, const RayEnds& ends, const TilePairs& pairs) {
   HWY_DYNAMIC_DISPATCH(CompositeTileVjp)
-  (splats, list.data(), list.size(), asked, x0, y0, upstream, with_depth, ends, pairs);
+  (splats, list.data(), list.size(), asked, x0, y0, upstream, background, ends, pairs);
 }
 
 }  // namespace engine::render

@@ -39,14 +39,14 @@ scene::Rect rect_of(const ForwardOptions& options, const scene::Camera& camera) 
 
 /// Copies the pixels of a finished tile that lie within `area` to the pictures, whose first pixel is area's.
 void store_tile(const TilePixels& tile, int x0, int y0, scene::Rect area, Rendering& out) {
-  const int first_x = std::max(x0, area.x0), last_x = std::min(x0 + tile_size, area.x1);
-  const int first_y = std::max(y0, area.y0), last_y = std::min(y0 + tile_size, area.y1);
+  const scene::Rect part{std::max(area.x0 - x0, 0), std::max(area.y0 - y0, 0), std::min(area.x1 - x0, tile_size),
+                         std::min(area.y1 - y0, tile_size)};
   auto store = [&](const float* from, scene::Image& image, int channel = 0) {
     if (image.channels == 0) return;
-    float* plane = image.plane(channel).data();
-    for (int y = first_y; y < last_y; ++y)
-      copy_tile_row(from + (y - y0) * tile_size + (first_x - x0), last_x - first_x,
-                    plane + std::ptrdiff_t(y - area.y0) * area.width() + (first_x - area.x0));
+    copy_tile_plane(
+        from, part,
+        image.plane(channel).data() + std::ptrdiff_t(y0 + part.y0 - area.y0) * area.width() + (x0 + part.x0 - area.x0),
+        area.width());
   };
   store(tile.alpha, out.alpha);
   store(tile.red, out.color, 0);

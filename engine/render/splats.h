@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <memory>
 #include <span>
 #include <type_traits>
@@ -179,7 +178,8 @@ struct Channels {
   bool color = false, depth = false, weight = false;
 };
 
-/// The pixels of one tile, row-major 16 x 16 once composite_tile() is done.
+/// The pixels of one tile, in the order in which kernels of the instruction set in use store them: copy_tile_plane()
+/// knows it.
 struct alignas(64) TilePixels {
   static constexpr std::size_t count = std::size_t(tile_size) * tile_size;
   // while blending
@@ -203,20 +203,17 @@ inline void fetch_tile(const float* at, std::ptrdiff_t stride, int width, int he
   }
 }
 
-/// Copies a row of a tile. Most are whole: a length that the compiler knows spares a call each.
-inline void copy_tile_row(const float* from, int width, float* to) {
-  if (width == tile_size) {
-    std::memcpy(to, from, tile_size * sizeof(float));
-  } else {
-    std::copy_n(from, width, to);
-  }
-}
-
 /// Blends the listed splats, nearest first, into the tile, and the background behind them. Only the planes that
 /// `channels` names, and alpha, are written, and of those only the pixels that are shown mean something.
 ///   ends  null: not needed. Else channels are colour or none.
 void composite_tile(const Splat* splats, std::span<const std::uint32_t> list, TilePlace place, Channels channels,
                     Vec3 background, TilePixels& tile, RayEnds* ends = nullptr);
+
+/// Copies some of the pixels of a plane of TilePixels to a picture.
+///   part    of the tile, whose first pixel is (0, 0)
+///   to      where the part's first pixel goes
+///   stride  floats from row to row
+void copy_tile_plane(const float* plane, scene::Rect part, float* to, std::ptrdiff_t stride);
 
 /// The largest blending weight of each listed splat over the pixels of a tile; see composite_tile().
 /// Pixels that are not shown count for nothing.
