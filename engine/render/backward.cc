@@ -150,7 +150,7 @@ void walk_tiles(const ForwardBuffers& forward, const RayEnds* ends, const TileGr
     const auto tile = std::size_t(row * grid.columns + column);
     const std::uint32_t first = forward.tile_begin[tile], last = forward.tile_begin[tile + 1];
     const std::span list(forward.entries.data() + first, last - first);
-    const auto may_change = [&](std::uint32_t splat) { return forward.pairs_of_splat[splat].any(); };
+    const auto may_change = [&](std::uint32_t splat) { return forward.splats[splat].pairs.any(); };
     const auto asked = std::find_if(list.begin(), list.end(), may_change);
     if (asked == list.end()) return;
     const TilePlace place = place_of(tile, grid.columns, grid.pixels);
@@ -162,7 +162,7 @@ void walk_tiles(const ForwardBuffers& forward, const RayEnds* ends, const TileGr
       TilePixels pixels;
       composite_tile(forward.splats.data(), list, place, {}, {}, pixels, &anew);
     }
-    const TilePairs tile_pairs{.of_splat = forward.pairs_of_splat.data(),
+    const TilePairs tile_pairs{.before_block = forward.pairs_before.data(),
                                .group_column = std::uint32_t(column / side),
                                .group_row = std::uint32_t(row / side),
                                .sums = sums};
@@ -190,7 +190,6 @@ const scene::Image* plane_or_none(const scene::Image& image) { return image.chan
 /// What a backward pass works in. The stages fill it from top to bottom.
 struct BackwardBuffers {
   ForwardBuffers forward;
-  Buffer<std::int32_t> slot_of_row;  ///< [layers.size()] Where a row is in the list of those that may change, or -1.
   Buffer<GroupGradient> pairs;
 };
 
@@ -206,13 +205,9 @@ void backward_simd(const Layers& layers, const scene::Camera& camera, const Back
                       .pixels = wanted.area(),
                       .wanted = wanted.tiles()};
   ForwardBuffers& forward = work.forward;
-  project(layers, view, sh_degree, {}, Culling::exact, grid.pixels, forward);
+  project(layers, view, sh_degree, grid.pixels, rows, forward);
   sort_by_depth(forward);
-
-  std::int32_t* const slot_of_row = work.slot_of_row.reserve(layers.size());
-  std::fill_n(slot_of_row, layers.size(), -1);
-  for (std::size_t r = 0; r < rows.size(); ++r) slot_of_row[rows[r]] = std::int32_t(r);
-  bin(grid, forward, slot_of_row, rows.size());
+  bin(grid, forward);
 
   const UpstreamPlanes planes{.color = plane_or_none(upstream.color),
                               .depth = plane_or_none(upstream.depth),

@@ -31,7 +31,7 @@ struct TileUpstream {
 
 /// Where the gradients of a tile's splats are summed.
 struct TilePairs {
-  const PairsOfSplat* of_splat;           ///< As bin() numbers them.
+  const std::uint32_t* before_block;      ///< ForwardBuffers::pairs_before.
   std::uint32_t group_column, group_row;  ///< The tile's.
   GroupGradient* sums;
 };
@@ -58,10 +58,10 @@ struct UpstreamPlanes {
 };
 
 /// Walks all tiles of `forward` back.
-///   forward    splats, entries, tile_begin, tile_group and pairs_of_splat are used
+///   forward    splats, entries, tile_begin, tile_group and pairs_before are used
 ///   ends       [tiles] as the forward pass of the same picture left them; null: found anew
 ///   grid       pixels: the rectangle of the picture that `upstream` is of
-///   pairs      there are, as pairs_of_splat numbers them
+///   pairs      there are, as first_pair says
 ///   gradients  [pairs] of each splat in each group of tiles
 void walk_tiles(const ForwardBuffers& forward, const RayEnds* ends, const TileGrid& grid,
                 const UpstreamPlanes& upstream, Vec3 background, std::size_t pairs, Buffer<GroupGradient>& gradients);

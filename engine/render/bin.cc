@@ -4,7 +4,9 @@
 #include <limits>
 #include <new>
 #include <numeric>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include "engine/core/parallel.h"
 #include "engine/render/splats.h"
@@ -14,136 +16,98 @@ namespace {
 
 constexpr std::size_t bin_block = 2048;  // splats per unit of parallel work
 
-using Keyed = ForwardBuffers::Keyed;
-
-/// The least and the largest key; {0, 0} if there is none.
-std::pair<std::uint32_t, std::uint32_t> range_of_keys(const Keyed* keys, std::size_t n) {
-  constexpr std::size_t block = 8192;
-  if (n == 0) return {0, 0};
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> ranges(chunk_count(n, block));
-  parallel_for(n, block, [&](std::size_t begin, std::size_t end) {
-    const auto [least, largest] = std::ranges::minmax(std::span(keys + begin, end - begin), {}, &Keyed::key);
-    ranges[begin / block] = {least.key, largest.key};
-  });
-  auto whole = ranges.front();
-  for (const auto& [least, largest] : ranges) whole = {std::min(whole.first, least), std::max(whole.second, largest)};
-  return whole;
-}
-
-/// Stable radix sort by key, of the bits that differ at most 11 at a time, least significant first. Returns whichever
-/// buffer holds the result. Each pass counts the digits of fixed blocks side by side, and then each block moves its
-/// elements to the places that the blocks before it leave.
-Keyed* radix_sort(Keyed* from, Keyed* to, std::size_t n) {
-  const std::size_t block = std::max(std::size_t{8192}, (n + 31) / 32);  // few: their counts are added up by one thread
-  constexpr int most_bits = 11;
-  const std::size_t blocks = chunk_count(n, block);
-  const auto [least, largest] = range_of_keys(from, n);
-  const int width = std::bit_width(largest - least);
-  const int passes = (width + most_bits - 1) / most_bits, bits = passes > 0 ? (width + passes - 1) / passes : 0;
-  const std::size_t buckets = std::size_t{1} << bits;
-  std::vector<std::uint32_t> places(blocks * buckets);
-  for (int shift = 0; shift < width; shift += bits) {
-    const auto digit = [=, least = least](const Keyed& keyed) { return (keyed.key - least) >> shift & (buckets - 1); };
-    parallel_for(n, block, [&](std::size_t begin, std::size_t end) {
-      std::uint32_t* count = places.data() + begin / block * buckets;
-      std::fill_n(count, buckets, 0u);
-      for (std::size_t i = begin; i < end; ++i) ++count[digit(from[i])];
-    });
-    std::uint32_t sum = 0;
-    for (std::size_t bucket = 0; bucket < buckets; ++bucket)
-      for (std::size_t b = 0; b < blocks; ++b) sum += std::exchange(places[b * buckets + bucket], sum);
-    parallel_for(n, block, [&](std::size_t begin, std::size_t end) {
-      std::uint32_t* place = places.data() + begin / block * buckets;
-      for (std::size_t i = begin; i < end; ++i) to[place[digit(from[i])]++] = from[i];
-    });
-    std::swap(from, to);
-  }
-  return from;
+/// Where each block's elements of a digit go in a pass of a radix sort: after those of lesser digits, and after the
+/// same ones of the blocks before.
+void place_digits(std::size_t blocks, std::size_t buckets, std::vector<std::uint32_t>& counts) {
+  std::uint32_t sum = 0;
+  for (std::size_t bucket = 0; bucket < buckets; ++bucket)
+    for (std::size_t b = 0; b < blocks; ++b) sum += std::exchange(counts[b * buckets + bucket], sum);
 }
 
 }  // namespace
 
+// A stable radix sort, of the bits that differ at most 11 at a time, least significant first. Each pass counts the
+// digits of fixed blocks side by side, and then each block moves its elements to the places that the blocks before it
+// leave. The first one takes the keys from where projection left them.
 void sort_by_depth(ForwardBuffers& buffers) {
-  const auto& blocks = buffers.block_sizes;
-  std::vector<std::size_t> begin(blocks.size() + 1, 0);
-  for (std::size_t b = 0; b < blocks.size(); ++b) begin[b + 1] = begin[b] + blocks[b];
-  buffers.count = begin.back();
-  Keyed* keys = buffers.keys.reserve(buffers.count);
-  Keyed* scratch = buffers.keys_scratch.reserve(buffers.count);
-  parallel_for(blocks.size(), 8, [&](std::size_t first, std::size_t last) {
-    for (std::size_t b = first; b < last; ++b)
-      for (std::size_t k = 0; k < blocks[b]; ++k) {
-        const std::size_t index = b * project_block + k;
-        keys[begin[b] + k] = {std::bit_cast<std::uint32_t>(buffers.projected[index].depth), std::uint32_t(index)};
-      }
-  });
-  const Keyed* order = radix_sort(keys, scratch, buffers.count);
-  Splat* splats = buffers.splats.reserve(buffers.count);
-  TileBox* boxes = buffers.boxes.reserve(buffers.count);
-  parallel_for(buffers.count, bin_block, [&](std::size_t first, std::size_t last) {
-    for (std::size_t i = first; i < last; ++i) {
-      splats[i] = buffers.projected[order[i].index];
-      boxes[i] = buffers.projected_boxes[order[i].index];
-    }
-  });
+  KeyRange range;
+  for (const KeyRange& of_block : buffers.key_ranges) range.extend(of_block);
+  const auto& sizes = buffers.block_sizes;
+  const auto n = std::accumulate(sizes.begin(), sizes.end(), std::size_t{0});
+  for (auto& buffer : buffers.sorted) buffer.reserve(n);
+  buffers.by_depth = {buffers.sorted[0].data(), n};
+  if (n == 0) return;
+
+  constexpr int most_bits = 11;
+  constexpr std::size_t most_blocks = 32;  // their counts are added up by one thread
+  const int width = std::max(1, int(std::bit_width(range.largest - range.least)));
+  const int passes = (width + most_bits - 1) / most_bits, bits = (width + passes - 1) / passes;
+  const std::size_t buckets = std::size_t{1} << bits;
+  std::vector<std::uint32_t> counts;
+  // each(begin, end, use) calls use() for some of the elements.
+  const auto pass = [&](int shift, std::size_t length, std::size_t block, auto&& each, DepthKey* to) {
+    const auto digit = [=, least = range.least](const DepthKey& keyed) {
+      return (keyed.key - least) >> shift & (buckets - 1);
+    };
+    counts.assign(chunk_count(length, block) * buckets, 0);
+    parallel_for(length, block, [&](std::size_t begin, std::size_t end) {
+      std::uint32_t* const count = counts.data() + begin / block * buckets;
+      each(begin, end, [&](const DepthKey& keyed) { ++count[digit(keyed)]; });
+    });
+    place_digits(chunk_count(length, block), buckets, counts);
+    parallel_for(length, block, [&](std::size_t begin, std::size_t end) {
+      std::uint32_t* const place = counts.data() + begin / block * buckets;
+      each(begin, end, [&](const DepthKey& keyed) { to[place[digit(keyed)]++] = keyed; });
+    });
+  };
+  const auto block_of = [&](std::size_t length, std::size_t least) {
+    return std::max(least, (length + most_blocks - 1) / most_blocks);
+  };
+  const auto projected = [&](std::size_t begin, std::size_t end, auto&& use) {
+    for (std::size_t b = begin; b < end; ++b)
+      for (const DepthKey& keyed : std::span(buffers.keys.data() + b * project_block, sizes[b])) use(keyed);
+  };
+  const auto sorted = [&](std::size_t begin, std::size_t end, auto&& use) {
+    for (const DepthKey& keyed : buffers.by_depth.subspan(begin, end - begin)) use(keyed);
+  };
+  pass(0, sizes.size(), block_of(sizes.size(), 8), projected, buffers.sorted[0].data());
+  for (int p = 1; p < passes; ++p) {
+    DepthKey* const to = buffers.sorted[std::size_t(p % 2)].data();
+    pass(p * bits, n, block_of(n, 8 * project_block), sorted, to);
+    buffers.by_depth = {to, n};
+  }
 }
 
 namespace {
 
-/// The groups of tiles that a box meets.
-struct TileGroups {
-  std::uint32_t first_column, first_row, columns, rows;
-
-  TileGroups(const TileBox& box, std::uint32_t side)
-      : first_column(box.first_column / side),
-        first_row(box.first_row / side),
-        columns(box.last_column / side - first_column + 1),
-        rows(box.last_row / side - first_row + 1) {}
-};
-
-/// Drops the tiles that are not wanted from the lists of splats. Returns their end.
-std::uint32_t* keep_wanted(const TileGrid& grid, std::span<std::uint32_t> reached, std::uint32_t* tiles) {
-  std::uint32_t* kept = tiles;
-  for (std::uint32_t& count : reached) {
-    std::uint32_t* const before = kept;
-    for (const std::uint32_t* const end = tiles + count; tiles != end; ++tiles)
-      if (grid.wanted[*tiles] != 0) *kept++ = *tiles;
-    count = std::uint32_t(kept - before);
+/// Drops the tiles that are not wanted.
+void keep_wanted(const TileGrid& grid, ReachedTiles& reached) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < reached.count; ++i) {
+    if (grid.wanted[reached.tiles[i]] == 0) continue;
+    reached.tiles[kept] = reached.tiles[i], reached.splats[kept++] = reached.splats[i];
   }
-  return kept;
+  reached.count = kept;
 }
 
-/// Counts the entries of each tile, and what of them is before those of each block; place_entries() puts them there.
-/// Calls reached_tiles(i, n) for each splat: in how many tiles it is listed.
-template <class Reached>
-void count_entries(const TileGrid& grid, ForwardBuffers& buffers, Reached&& reached_tiles) {
-  const std::size_t tiles = std::size_t(grid.columns) * std::size_t(grid.rows);
-  const std::size_t blocks = chunk_count(buffers.count, bin_block);
-  if (buffers.bin_blocks.size() < blocks) buffers.bin_blocks.resize(blocks);
-
-  // Each block lists the tiles of its splats, and counts them per tile.
-  parallel_for(buffers.count, bin_block, [&](std::size_t first, std::size_t last) {
+/// Lists the tiles of each block's splats, and counts them per tile.
+void list_blocks(const TileGrid& grid, std::size_t tiles, ForwardBuffers& buffers) {
+  parallel_for(buffers.by_depth.size(), bin_block, [&](std::size_t first, std::size_t last) {
     auto& block = buffers.bin_blocks[first / bin_block];
+    list_reached_tiles(buffers.splats.data(), buffers.by_depth.subspan(first, last - first), grid.columns,
+                       block.reached);
+    if (!grid.wanted.empty()) keep_wanted(grid, block.reached);
     block.position.assign(tiles, 0);
-    std::size_t at_most = 0;
-    for (std::size_t i = first; i < last; ++i) {
-      const TileBox& box = buffers.boxes[i];
-      at_most += std::size_t(box.last_column - box.first_column + 1) * std::size_t(box.last_row - box.first_row + 1);
-    }
-    std::uint32_t* const listed = block.tiles.reserve(at_most + reached_tiles_slack);
-    std::uint32_t* const reached = block.reached.reserve(last - first);
-    const std::uint32_t* listed_end =
-        list_reached_tiles({buffers.splats.data() + first, last - first}, buffers.boxes.data() + first, grid.columns,
-                           block.work, listed, reached);
-    if (!grid.wanted.empty()) listed_end = keep_wanted(grid, {reached, last - first}, listed);
-    block.listed = std::size_t(listed_end - listed);
-    for (const std::uint32_t* tile = listed; tile != listed_end; ++tile) ++block.position[*tile];
-    for (std::size_t i = first; i < last; ++i) reached_tiles(i, reached[i - first]);
+    const std::uint32_t* const listed = block.reached.tiles.data();
+    for (std::size_t i = 0; i < block.reached.count; ++i) ++block.position[listed[i]];
   });
+}
 
+/// What of each tile's entries is before those of each block. Returns how many entries there are.
+std::uint32_t place_blocks(std::size_t tiles, std::size_t blocks, ForwardBuffers& buffers) {
   // Entries are numbered in 32 bits. More would need 16 GiB for the list alone: out of memory, said before it happens.
   std::uint64_t total = 0;
-  for (std::size_t b = 0; b < blocks; ++b) total += buffers.bin_blocks[b].listed;
+  for (std::size_t b = 0; b < blocks; ++b) total += buffers.bin_blocks[b].reached.count;
   if (total > std::numeric_limits<std::uint32_t>::max()) throw std::bad_alloc();
   // A block's entries follow, within a tile, those of the blocks before it.
   std::vector<std::uint32_t>& begin = buffers.tile_begin;
@@ -157,58 +121,24 @@ void count_entries(const TileGrid& grid, ForwardBuffers& buffers, Reached&& reac
     }
   }
   std::exclusive_scan(begin.begin(), begin.end(), begin.begin(), 0u);
-  buffers.entries.reserve(begin[tiles]);
-}
-
-/// Lists the splats in their tiles.
-void place_entries(ForwardBuffers& buffers) {
-  std::uint32_t* const entries = buffers.entries.data();
-  parallel_for(buffers.count, bin_block, [&](std::size_t first, std::size_t last) {
-    auto& block = buffers.bin_blocks[first / bin_block];
-    const std::uint32_t* tile = block.tiles.data();
-    const std::uint32_t* const reached = block.reached.data();
-    std::uint32_t* const position = block.position.data();
-    for (std::size_t t = 0; t < block.position.size(); ++t) position[t] += buffers.tile_begin[t];
-    for (std::size_t i = first; i < last; ++i) {
-      const std::uint32_t* const tiles_end = tile + reached[i - first];
-      for (; tile != tiles_end; ++tile) entries[position[*tile]++] = std::uint32_t(i);
-    }
-  });
+  return begin[tiles];
 }
 
 }  // namespace
 
 void bin(const TileGrid& grid, ForwardBuffers& buffers) {
-  count_entries(grid, buffers, [](std::size_t, std::uint32_t) {});
-  place_entries(buffers);
-}
-
-void bin(const TileGrid& grid, ForwardBuffers& buffers, const std::int32_t* slot_of_row, std::size_t rows) {
-  buffers.tile_group = tile_group_side(rows);
-  const auto side = std::uint32_t(buffers.tile_group);
-  std::uint32_t* const first_pair = buffers.first_pair.reserve(rows + 1);
-  std::fill_n(first_pair, rows + 1, 0u);
-  PairsOfSplat* const pairs_of_splat = buffers.pairs_of_splat.reserve(buffers.count);
-  count_entries(grid, buffers, [&](std::size_t i, std::uint32_t tiles) {
-    const std::uint32_t row = buffers.splats[i].row;
-    const std::int32_t slot = slot_of_row != nullptr ? slot_of_row[row] : std::int32_t(row);
-    pairs_of_splat[i] = {};
-    if (slot < 0 || tiles == 0) return;
-    const TileGroups groups(buffers.boxes[i], side);
-    first_pair[slot] = groups.columns * groups.rows;
-    pairs_of_splat[i] = {.first = std::uint32_t(slot), .columns = groups.columns};  // until slots have their numbers
-  });
-  place_entries(buffers);
-  std::uint64_t sum = 0;
-  for (std::size_t r = 0; r <= rows; ++r) sum += std::exchange(first_pair[r], std::uint32_t(sum));
-  if (sum > std::numeric_limits<std::uint32_t>::max()) throw std::bad_alloc();  // pairs are numbered in 32 bits, too
-  parallel_for(buffers.count, bin_block, [&](std::size_t first, std::size_t last) {
-    for (std::size_t i = first; i < last; ++i) {
-      PairsOfSplat& pairs = pairs_of_splat[i];
-      if (!pairs.any()) continue;
-      const TileGroups groups(buffers.boxes[i], side);
-      pairs.first = first_pair[pairs.first] - groups.first_row * groups.columns - groups.first_column;
-    }
+  const std::size_t tiles = std::size_t(grid.columns) * std::size_t(grid.rows);
+  const std::size_t blocks = chunk_count(buffers.by_depth.size(), bin_block);
+  if (buffers.bin_blocks.size() < blocks) buffers.bin_blocks.resize(blocks);
+  list_blocks(grid, tiles, buffers);
+  std::uint32_t* const entries = buffers.entries.reserve(place_blocks(tiles, blocks, buffers));
+  parallel_for(blocks, 1, [&](std::size_t b, std::size_t) {
+    auto& block = buffers.bin_blocks[b];
+    std::uint32_t* const position = block.position.data();
+    for (std::size_t tile = 0; tile < tiles; ++tile) position[tile] += buffers.tile_begin[tile];
+    const std::uint32_t* const listed = block.reached.tiles.data();
+    const std::uint32_t* const splats = block.reached.splats.data();
+    for (std::size_t i = 0; i < block.reached.count; ++i) entries[position[listed[i]]++] = splats[i];
   });
 }
 

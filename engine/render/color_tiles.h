@@ -3,7 +3,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <numeric>
 #include <span>
+#include <vector>
 
 #include "engine/render/splats.h"
 
@@ -15,6 +17,13 @@ inline TileGrid whole_grid(const scene::Camera& camera) {
           .rows = tile_rows(camera.height),
           .pixels = {0, 0, camera.width, camera.height},
           .wanted = {}};
+}
+
+/// Makes rows that are kept from frame to frame 0, 1, ... n - 1.
+inline void count_up(std::size_t n, std::vector<std::uint32_t>& rows) {
+  if (rows.size() == n) return;
+  rows.resize(n);
+  std::iota(rows.begin(), rows.end(), 0u);
 }
 
 /// Blends a tile of the listed splats and copies it to a picture of `region`, which begins at a tile's edge and holds

@@ -65,13 +65,14 @@ struct BatchPairs {
 };
 
 /// Finds them for a batch of n splats, and asks for them.
-HWY_INLINE void FindPairs(const TilePairs& pairs, const std::uint32_t* list, std::size_t n, BatchPairs& out) {
+HWY_INLINE void FindPairs(const Splat* splats, const std::uint32_t* list, const TilePairs& pairs, std::size_t n,
+                          BatchPairs& out) {
   out.changeable = 0;
   for (std::size_t k = 0; k < n; ++k) {
-    const PairsOfSplat of = pairs.of_splat[list[k]];
+    const PairsOfSplat& of = splats[list[k]].pairs;
     if (!of.any()) continue;
     out.changeable |= std::uint64_t{1} << k;
-    out.number[k] = of.number(pairs.group_column, pairs.group_row);
+    out.number[k] = pairs.before_block[list[k] / project_block] + of.number(pairs.group_column, pairs.group_row);
     const GroupGradient& pair = pairs.sums[out.number[k]];
     hwy::Prefetch(&pair.g), hwy::Prefetch(&pair.padding[1]);  // often in two lines
   }
@@ -291,7 +292,7 @@ void WalkTile(const Splat* splats, const std::uint32_t* list, [[maybe_unused]] s
     Fill(splats, list + first, n, x0, y0, batch);
     if (b > asked / Batch::size)
       for (std::size_t k = first - Batch::size; k < first; ++k) hwy::Prefetch(&splats[list[k]]);
-    FindPairs(pairs, list + first, n, batch_pairs);
+    FindPairs(splats, list + first, pairs, n, batch_pairs);
     std::int32_t ends_from_here[Blocks::count];
     for (std::size_t i = 0; i < Blocks::count; ++i) ends_from_here[i] = block_ends[i] - std::int32_t(first);
     FindReachedBlocks(d, n, batch, ends_from_here, reached);

@@ -33,9 +33,10 @@ void Frame::forward(const scene::GaussianCloud& cloud, const scene::Camera& came
   frame.camera = camera, frame.background = background;
   frame.grid = whole_grid(camera);
   ForwardBuffers& buffers = frame.buffers;
-  project(cloud, view_params<float>(camera), cloud.sh_degree, {}, Culling::exact, frame.grid.pixels, buffers);
+  count_up(cloud.size(), frame.rows);
+  project(cloud, view_params<float>(camera), cloud.sh_degree, frame.grid.pixels, frame.rows, buffers);
   sort_by_depth(buffers);
-  bin(frame.grid, buffers, nullptr, cloud.size());
+  bin(frame.grid, buffers);
   const std::size_t tiles = buffers.tile_begin.size() - 1;
   RayEnds* const ends = buffers.ray_ends.reserve(tiles);
   parallel_for(tiles, 1, [&](std::size_t tile, std::size_t) {
@@ -49,8 +50,7 @@ void Frame::backward(const scene::GaussianCloud& cloud, const scene::Image& v_co
   Impl& frame = *impl_;
   assert(v_color.width == frame.camera.width && v_color.height == frame.camera.height && v_color.channels == 3);
   assert(out.size() == cloud.size() && out.sh_degree == cloud.sh_degree);
-  frame.rows.resize(cloud.size());
-  std::iota(frame.rows.begin(), frame.rows.end(), 0u);
+  assert(frame.rows.size() == cloud.size());
   const auto params = view_params<float>(frame.camera);
   walk_tiles(frame.buffers, frame.buffers.ray_ends.data(), frame.grid, {.color = &v_color}, frame.background,
              frame.buffers.first_pair[cloud.size()], frame.pairs);

@@ -82,14 +82,14 @@ void FrozenView::restore(const Layers& frozen) {
   bin(grid, buffers);
 
   const std::span<const std::uint32_t> entries(buffers.entries.data(), buffers.tile_begin.back());
-  std::vector<std::uint32_t> number(buffers.count, 0);  // of a splat among those kept, plus one
+  std::vector<std::uint32_t> number(buffers.block_sizes.size() * project_block, 0);  // among those kept, plus one
   for (const std::uint32_t splat : entries) number[splat] = 1;
-  std::uint32_t kept = 0;
-  for (std::uint32_t& n : number)
-    if (n != 0) n = ++kept;
-  view.splats.clear(), view.splats.reserve(kept);
-  for (std::size_t i = 0; i < number.size(); ++i)
-    if (number[i] != 0) view.splats.push_back(buffers.splats[i]);
+  view.splats.clear(), view.splats.reserve(std::size_t(std::count(number.begin(), number.end(), 1u)));
+  for (const DepthKey& keyed : buffers.by_depth) {
+    if (number[keyed.splat] == 0) continue;
+    view.splats.push_back(buffers.splats[keyed.splat]);
+    number[keyed.splat] = std::uint32_t(view.splats.size());
+  }
   view.entries.clear(), view.entries.reserve(entries.size());
   for (const std::uint32_t splat : entries) view.entries.push_back(number[splat] - 1);
   view.tile_begin = buffers.tile_begin;
@@ -119,9 +119,8 @@ std::size_t FrozenView::memory_bytes() const {
 
 struct LocalFrame::Impl {
   ForwardBuffers changeable;  ///< Of the changeable Gaussians alone.
-  ForwardBuffers merged;      ///< splats, count, entries, tile_begin, tile_group, pairs_of_splat and ray_ends: of both.
-  Buffer<std::uint32_t> of_frozen;  ///< [frozen splats] Number among the merged.
-  Buffer<std::uint32_t> of_change;  ///< [changeable splats]
+  ForwardBuffers merged;      ///< splats, entries, tile_begin, tile_group, pairs_before and ray_ends: of both.
+  Buffer<std::uint32_t> frozen_before;  ///< As changeable.splats: how many frozen splats lie in front of each.
   scene::Rect reach;
   std::vector<std::uint32_t> tiles;  ///< Reached.
   std::vector<std::uint32_t> rows;   ///< 0, 1, 2, ...
@@ -138,10 +137,10 @@ scene::Rect LocalFrame::project(const scene::GaussianCloud& changeable, const sc
   assert(scene::validate(camera));
   const TileGrid grid = whole_grid(camera);
   ForwardBuffers& buffers = impl_->changeable;
-  render::project(changeable, view_params<float>(camera), changeable.sh_degree, {}, Culling::exact, grid.pixels,
-                  buffers);
+  count_up(changeable.size(), impl_->rows);
+  render::project(changeable, view_params<float>(camera), changeable.sh_degree, grid.pixels, impl_->rows, buffers);
   sort_by_depth(buffers);
-  bin(grid, buffers, nullptr, changeable.size());
+  bin(grid, buffers);
 
   impl_->tiles.clear();
   scene::Rect reach;
@@ -164,31 +163,33 @@ void LocalFrame::merge(const FrozenView& frozen) {
   frame.drawn = false;
   assert(top.tile_begin.size() == view.tile_begin.size() && contains(view.region, frame.reach));
 
-  // By depth; a frozen splat comes before a changeable one of the same depth, as rows of a base do.
-  merged.count = view.splats.size() + top.count;
+  // The frozen splats, and in the blocks after them the changeable ones as they lie.
+  const std::size_t frozen_blocks = chunk_count(view.splats.size(), project_block);
+  const std::size_t blocks = frozen_blocks + top.block_sizes.size();
+  const std::size_t first_change = frozen_blocks * project_block;
   // Entries are numbered in 32 bits, and so are splats.
-  if (merged.count > std::numeric_limits<std::int32_t>::max()) throw std::bad_alloc();
-  Splat* const splats = merged.splats.reserve(merged.count);
+  if (blocks * project_block > std::numeric_limits<std::int32_t>::max()) throw std::bad_alloc();
+  Splat* const splats = merged.splats.reserve(blocks * project_block);
   merged.tile_group = top.tile_group;
-  PairsOfSplat* const pairs_of_splat = merged.pairs_of_splat.reserve(merged.count);
-  std::uint32_t* const of_frozen = frame.of_frozen.reserve(view.splats.size());
-  std::uint32_t* const of_change = frame.of_change.reserve(top.count);
-  std::size_t at = 0, f = 0;
-  for (std::size_t t = 0; t <= top.count; ++t) {
-    const std::size_t first = f;
-    if (t == top.count)
-      f = view.splats.size();
-    else
-      while (f < view.splats.size() && view.splats[f].depth <= top.splats[t].depth) ++f;
-    std::copy_n(view.splats.data() + first, f - first, splats + at);
-    std::fill_n(pairs_of_splat + at, f - first, PairsOfSplat{});
-    std::iota(of_frozen + first, of_frozen + f, std::uint32_t(at));
-    at += f - first;
-    if (t == top.count) break;
-    splats[at] = top.splats[t];
-    pairs_of_splat[at] = top.pairs_of_splat[t];
-    of_change[t] = std::uint32_t(at++);
+  merged.pairs_before.assign(frozen_blocks, 0);
+  merged.pairs_before.insert(merged.pairs_before.end(), top.pairs_before.begin(), top.pairs_before.end());
+  parallel_for(view.splats.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    std::copy(view.splats.data() + begin, view.splats.data() + end, splats + begin);
+  });
+  for (std::size_t b = 0; b < top.block_sizes.size(); ++b) {
+    const std::size_t first = b * project_block, n = top.block_sizes[b];
+    std::copy_n(top.splats.data() + first, n, splats + first_change + first);
   }
+  // By depth; a frozen splat comes before a changeable one of the same depth, as rows of a base do.
+  std::uint32_t* const frozen_before = frame.frozen_before.reserve(top.block_sizes.size() * project_block);
+  parallel_for(top.by_depth.size(), 512, [&](std::size_t begin, std::size_t end) {
+    const auto depth = [&](std::size_t t) { return top.splats[top.by_depth[t].splat].depth; };
+    auto at = std::ranges::upper_bound(view.splats, depth(begin), {}, &Splat::depth);
+    for (std::size_t t = begin; t < end; ++t) {
+      while (at != view.splats.end() && at->depth <= depth(t)) ++at;
+      frozen_before[top.by_depth[t].splat] = std::uint32_t(at - view.splats.begin());
+    }
+  });
 
   const std::size_t all_tiles = view.tile_begin.size() - 1;
   const auto list_of_change = [&](std::size_t tile) {
@@ -213,11 +214,10 @@ void LocalFrame::merge(const FrozenView& frozen) {
       std::uint32_t* to = entries + merged.tile_begin[tile];
       std::size_t a = 0;
       for (const std::uint32_t change : above) {
-        const std::uint32_t number = of_change[change];
-        for (; a < below.size() && of_frozen[below[a]] < number; ++a) *to++ = of_frozen[below[a]];
-        *to++ = number;
+        for (; a < below.size() && below[a] < frozen_before[change]; ++a) *to++ = below[a];
+        *to++ = std::uint32_t(first_change) + change;
       }
-      for (; a < below.size(); ++a) *to++ = of_frozen[below[a]];
+      std::copy(below.begin() + std::ptrdiff_t(a), below.end(), to);
     }
   });
 }
@@ -249,9 +249,8 @@ void LocalFrame::backward(const FrozenView& frozen, const scene::GaussianCloud& 
   const FrozenView::Impl& view = *frozen.impl_;
   assert(v_color.width == view.region.width() && v_color.height == view.region.height() && v_color.channels == 3);
   assert(out.size() == changeable.size() && out.sh_degree == changeable.sh_degree);
-  std::vector<std::uint32_t>& rows = impl_->rows;
-  rows.resize(changeable.size());
-  std::iota(rows.begin(), rows.end(), 0u);
+  const std::vector<std::uint32_t>& rows = impl_->rows;
+  assert(rows.size() == changeable.size());
   TileGrid grid = whole_grid(view.camera);
   grid.pixels = view.region;
   const UpstreamPlanes upstream{.color = &v_color};

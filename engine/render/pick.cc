@@ -108,7 +108,9 @@ std::optional<PixelHit> pick(const Layers& layers, const scene::Camera& camera, 
   ForwardBuffers& buffers = workspace.impl_->buffers;
   project(layers, view_params<float>(camera), /*sh_degree=*/-1, {}, Culling::by_bound, around, buffers);
   sort_by_depth(buffers);
-  const std::span<const Splat> splats(buffers.splats.data(), buffers.count);
+  std::vector<Splat> splats;  // nearest first
+  splats.reserve(buffers.by_depth.size());
+  for (const DepthKey& keyed : buffers.by_depth) splats.push_back(buffers.splats[keyed.splat]);
 
   const Ray ray = blend(splats, at);
   if (ray.median_depth == 0) return std::nullopt;

@@ -202,8 +202,7 @@ constexpr std::size_t fetch_ahead = 16;
 /// Writes the survivors that are not hidden, with their colours.
 ///   kDegree  bands used, -1 for none: black
 template <int kDegree>
-std::size_t WriteSplats(const ProjectedLayer& layer, std::size_t begin, const Survivors& found, Splat* out,
-                        TileBox* boxes) {
+std::size_t WriteSplats(const ProjectedLayer& layer, std::size_t begin, const Survivors& found, Splat* out) {
   const scene::GaussianCloud& cloud = layer.cloud;
   const std::size_t stored = scene::sh_coefficients(cloud.sh_degree), stride = cloud.sh_stride();
   const auto sh = [&](std::size_t k) { return cloud.sh.data() + std::size_t(found.row[k]) * stride; };
@@ -226,32 +225,33 @@ std::size_t WriteSplats(const ProjectedLayer& layer, std::size_t begin, const Su
       ShadeRow<kDegree>(sh(k), stored, basis[k % at_once], color);
       for (float& c : color) c = c > 0.0f ? (c < float(max_color) ? c : float(max_color)) : 0.0f;  // NaN becomes 0
     }
-    out[written] = {.x = found.x[k],
-                    .y = found.y[k],
-                    .l1 = found.l1[k],
-                    .l2 = found.l2[k],
-                    .l3 = found.l3[k],
-                    .log2_opacity = found.log2_opacity[k],
-                    .weight = layer.weight != nullptr ? layer.weight[row] : 0.0f,
-                    .row = std::uint32_t(layer.first_row + row),
-                    .red = color[0],
-                    .green = color[1],
-                    .blue = color[2],
-                    .depth = found.depth[k]};
-    boxes[written++] = {std::uint16_t(found.columns[k] & 0xffff), std::uint16_t(found.columns[k] >> 16),
-                        std::uint16_t(found.rows[k] & 0xffff), std::uint16_t(found.rows[k] >> 16)};
+    out[written++] = {.x = found.x[k],
+                      .y = found.y[k],
+                      .l1 = found.l1[k],
+                      .l2 = found.l2[k],
+                      .l3 = found.l3[k],
+                      .log2_opacity = found.log2_opacity[k],
+                      .weight = layer.weight != nullptr ? layer.weight[row] : 0.0f,
+                      .row = std::uint32_t(layer.first_row + row),
+                      .red = color[0],
+                      .green = color[1],
+                      .blue = color[2],
+                      .depth = found.depth[k],
+                      .box = {std::uint16_t(found.columns[k] & 0xffff), std::uint16_t(found.columns[k] >> 16),
+                              std::uint16_t(found.rows[k] & 0xffff), std::uint16_t(found.rows[k] >> 16)},
+                      .pairs = {}};
   }
   return written;
 }
 
 std::size_t ProjectRows(const ProjectedLayer& layer, const ViewParams<float>& view, int sh_degree, Culling culling,
-                        scene::Rect pixels, std::size_t begin, std::size_t end, Splat* out, TileBox* boxes) {
+                        scene::Rect pixels, std::size_t begin, std::size_t end, Splat* out) {
   const D d;
   Survivors found;
   for (std::size_t i = begin; i < end; i += hn::Lanes(d))
     ProjectVector(d, layer.cloud, view, culling, pixels, i, HWY_MIN(hn::Lanes(d), end - i), found);
-  if (sh_degree < 0) return WriteSplats<-1>(layer, begin, found, out, boxes);
-  return WithDegree(sh_degree, [&](auto degree) { return WriteSplats<degree>(layer, begin, found, out, boxes); });
+  if (sh_degree < 0) return WriteSplats<-1>(layer, begin, found, out);
+  return WithDegree(sh_degree, [&](auto degree) { return WriteSplats<degree>(layer, begin, found, out); });
 }
 
 }  // namespace HWY_NAMESPACE
@@ -264,8 +264,8 @@ namespace engine::render {
 HWY_EXPORT(ProjectRows);
 
 std::size_t project_rows(const ProjectedLayer& layer, const ViewParams<float>& view, int sh_degree, Culling culling,
-                         scene::Rect pixels, std::size_t begin, std::size_t end, Splat* out, TileBox* boxes) {
-  return HWY_DYNAMIC_DISPATCH(ProjectRows)(layer, view, sh_degree, culling, pixels, begin, end, out, boxes);
+                         scene::Rect pixels, std::size_t begin, std::size_t end, Splat* out) {
+  return HWY_DYNAMIC_DISPATCH(ProjectRows)(layer, view, sh_degree, culling, pixels, begin, end, out);
 }
 
 }  // namespace engine::render

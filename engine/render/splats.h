@@ -4,11 +4,14 @@
 #include <hwy/cache_control.h>
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "engine/render/forward.h"
@@ -17,10 +20,34 @@
 
 namespace engine::render {
 
+/// The tiles that a splat's bounding box meets; the ranges include their ends.
+struct TileBox {
+  std::uint16_t first_column, last_column, first_row, last_row;
+};
+
+/// Tiles are walked back in square groups of so many on a side, and a splat's gradients are summed over a group before
+/// they are stored.
+///   rows  that may change. Many of them take much memory, which groups save; few may lie in tiles that make up too few
+///         groups for all threads
+constexpr int large_tile_group = 3;
+constexpr int tile_group_side(std::size_t rows) { return rows < 20'000 ? 1 : large_tile_group; }
+
+/// Numbers of the pairs of a splat: the groups that its box meets, row by row.
+struct PairsOfSplat {
+  std::uint32_t
+      first;  ///< What group (0, 0) of the picture would have, modulo 2^32, less ForwardBuffers::pairs_before.
+  std::uint32_t columns;  ///< Groups that the box meets in a row. 0: the splat may not change.
+
+  [[nodiscard]] bool any() const { return columns != 0; }
+  [[nodiscard]] std::uint32_t number(std::uint32_t group_column, std::uint32_t group_row) const {
+    return first + group_row * columns + group_column;
+  }
+};
+
 /// One splat, ready to blend. Its alpha at offset (dx, dy) from the mean, in pixels, is
 ///   min(0.99, exp2(log2_opacity - (l1 dx + l2 dy)^2 - (l3 dy)^2)),
 /// so l1..l3 are those of Projection times sqrt(log2(e) / 2).
-struct Splat {
+struct alignas(64) Splat {
   float x, y;  ///< Mean, pixel-index units.
   float l1, l2, l3;
   float log2_opacity;
@@ -29,14 +56,11 @@ struct Splat {
   // What it looks like, in a four of its own: blending copies these as they lie.
   float red, green, blue;
   float depth;  ///< World units along the optical axis.
+  TileBox box;
+  PairsOfSplat pairs;  ///< None, unless project() was told which rows may change.
 };
-static_assert(sizeof(Splat) == 48);
+static_assert(sizeof(Splat) == 64);  // one cache line: lists take splats from anywhere
 static_assert(offsetof(Splat, l3) == 4 * sizeof(float) && offsetof(Splat, red) == 8 * sizeof(float));
-
-/// The tiles that a splat's bounding box meets; the ranges include their ends.
-struct TileBox {
-  std::uint16_t first_column, last_column, first_row, last_row;
-};
 
 /// exp2(log2_opacity - q) >= 1/255 exactly where q <= log2_opacity + log2_255.
 constexpr float log2_255 = 7.99435343685886f;
@@ -56,29 +80,21 @@ class Buffer {
     }
     return data_.get();
   }
+  /// Room for n elements or more, of which the first `kept` are still there.
+  T* grow(std::size_t n, std::size_t kept) {
+    if (n <= capacity_) return data_.get();
+    n = std::max(n, 2 * capacity_);
+    auto larger = std::make_unique_for_overwrite<T[]>(n);
+    std::copy_n(data_.get(), kept, larger.get());
+    data_ = std::move(larger), capacity_ = n;
+    return data_.get();
+  }
   [[nodiscard]] T* data() const { return data_.get(); }
   T& operator[](std::size_t i) const { return data_[i]; }
 
  private:
   std::unique_ptr<T[]> data_;
   std::size_t capacity_ = 0;
-};
-
-/// Tiles are walked back in square groups of so many on a side, and a splat's gradients are summed over a group before
-/// they are stored.
-///   rows  that may change. Many of them take much memory, which groups save; few may lie in tiles that make up too few
-///         groups for all threads
-constexpr int tile_group_side(std::size_t rows) { return rows < 20'000 ? 1 : 3; }
-
-/// Numbers of the pairs of a splat: the groups that its box meets, row by row.
-struct PairsOfSplat {
-  std::uint32_t first;    ///< What group (0, 0) of the picture would have, modulo 2^32.
-  std::uint32_t columns;  ///< Groups that the box meets in a row. 0: the splat may not change, or no tile lists it.
-
-  [[nodiscard]] bool any() const { return columns != 0; }
-  [[nodiscard]] std::uint32_t number(std::uint32_t group_column, std::uint32_t group_row) const {
-    return first + group_row * columns + group_column;
-  }
 };
 
 /// Which tiles of a picture are wanted, and the pixels that they can reach.
@@ -96,27 +112,46 @@ struct alignas(64) RayEnds {
   std::int32_t end[count];     ///< One past the last listed splat that its block met and that did not end it. 0: none.
 };
 
+/// Where a splat is in the order of depths.
+struct DepthKey {
+  std::uint32_t key;    ///< Bits of the depth: positive floats order as their bits.
+  std::uint32_t splat;  ///< Its index.
+};
+
+/// The least and the largest of some keys; the other way round for none.
+struct KeyRange {
+  std::uint32_t least = std::numeric_limits<std::uint32_t>::max(), largest = 0;
+
+  void extend(const KeyRange& other) {
+    least = std::min(least, other.least), largest = std::max(largest, other.largest);
+  }
+};
+
+/// Tiles that splats reach.
+struct ReachedTiles {
+  std::size_t count = 0;
+  Buffer<std::uint32_t> tiles, splats;  ///< [count] A tile, and the index of a splat that reaches it.
+  Buffer<std::int32_t> work;            ///< Of list_reached_tiles().
+};
+
 /// What a forward pass works in. The stages fill it from top to bottom.
 struct ForwardBuffers {
-  // project: block b of the rows, the base's blocks before those on top, writes its survivors from b * project_block on
-  Buffer<Splat> projected;
-  Buffer<TileBox> projected_boxes;
-  std::vector<std::size_t> block_sizes;
-  // sort: by depth, ties by row
-  struct Keyed {
-    std::uint32_t key;    ///< Bits of the depth: positive floats order as their bits.
-    std::uint32_t index;  ///< Into projected.
-  };
-  Buffer<Keyed> keys, keys_scratch;
+  // project: block b of the rows, the base's blocks before those on top, writes its survivors from b * project_block
+  // on, and leaves what is left of its room as it is
   Buffer<Splat> splats;
-  Buffer<TileBox> boxes;
-  std::size_t count = 0;  ///< Of splats.
-  // bin: for each tile the splats that reach it, in their order
+  Buffer<DepthKey> keys;  ///< As splats.
+  std::vector<std::size_t> block_sizes;
+  std::vector<KeyRange> key_ranges;  ///< [blocks]
+  // project, if told which rows may change: their pairs with groups of tiles, numbered row by row
+  int tile_group = 1;                       ///< Tiles on a side of a group.
+  Buffer<std::uint32_t> first_pair;         ///< [rows that may change + 1] The first number of a row.
+  std::vector<std::uint32_t> pairs_before;  ///< [blocks] What a block's splats count from.
+  // sort: by depth, ties by row
+  std::array<Buffer<DepthKey>, 2> sorted;
+  std::span<const DepthKey> by_depth;  ///< All splats, nearest first: one of the two.
+  // bin: for each tile the splats that reach it, by depth
   struct BinBlock {
-    Buffer<std::uint32_t> tiles;    ///< Those reached, splat by splat.
-    Buffer<std::uint32_t> reached;  ///< How many tiles each splat reaches.
-    Buffer<std::int32_t> work;      ///< Of list_reached_tiles().
-    std::size_t listed = 0;         ///< All of them.
+    ReachedTiles reached;
     /// Per tile: the block's count of entries, then how many of blocks before it there are, then where its next one
     /// goes.
     std::vector<std::uint32_t> position;
@@ -124,10 +159,6 @@ struct ForwardBuffers {
   std::vector<BinBlock> bin_blocks;
   Buffer<std::uint32_t> entries;          ///< Indices into splats.
   std::vector<std::uint32_t> tile_begin;  ///< [tiles + 1] into entries.
-  // bin, if told which rows may change: their pairs with groups of tiles, numbered row by row
-  int tile_group = 1;                   ///< Tiles on a side of a group.
-  Buffer<PairsOfSplat> pairs_of_splat;  ///< [count]
-  Buffer<std::uint32_t> first_pair;     ///< [rows that may change + 1] The first number of a row.
   // composite, if it is to be walked back
   Buffer<RayEnds> ray_ends;  ///< [tiles]
 };
@@ -152,10 +183,10 @@ enum class Culling {
 
 /// Projects the rows [begin, end) and writes those that can be seen within `pixels` to `out`, in row order.
 ///   sh_degree  bands used; -1: colours are not needed
-///   out, boxes room for end - begin
+///   out        room for end - begin
 ///   returns    how many were written
 std::size_t project_rows(const ProjectedLayer& layer, const ViewParams<float>& view, int sh_degree, Culling culling,
-                         scene::Rect pixels, std::size_t begin, std::size_t end, Splat* out, TileBox* boxes);
+                         scene::Rect pixels, std::size_t begin, std::size_t end, Splat* out);
 
 /// Most rows project_rows() takes at once.
 constexpr std::size_t project_block = 1024;
@@ -224,24 +255,19 @@ void largest_tile_weights(const Splat* splats, std::span<const std::uint32_t> li
 ///   weight  [layers.size()] or empty
 void project(const Layers& layers, const ViewParams<float>& view, int sh_degree, std::span<const float> weight,
              Culling culling, scene::Rect pixels, ForwardBuffers& buffers);
+/// The same for pictures that are differentiated.
+///   changeable  [R] rows that may change, ascending
+void project(const Layers& layers, const ViewParams<float>& view, int sh_degree, scene::Rect pixels,
+             std::span<const std::uint32_t> changeable, ForwardBuffers& buffers);
 
-/// Lists the tiles of a splat's box that hold a pixel within its reach (and rarely one that just misses), splat by
+/// Lists the tiles of splats' boxes that hold a pixel within their reach (and rarely one that just misses): splat by
 /// splat and, of each, row by row.
-///   boxes    [splats.size()]
+///   order    which splats
 ///   columns  tiles across the picture
-///   work     scratch
-///   tiles    room for all tiles of the boxes, and reached_tiles_slack more
-///   reached  [splats.size()] how many are listed for each
-///   returns  the end of what is listed
-std::uint32_t* list_reached_tiles(std::span<const Splat> splats, const TileBox* boxes, int columns,
-                                  Buffer<std::int32_t>& work, std::uint32_t* tiles, std::uint32_t* reached);
-constexpr std::size_t reached_tiles_slack = 8;  ///< So many past the end may be written: whole vectors are.
+void list_reached_tiles(const Splat* splats, std::span<const DepthKey> order, int columns, ReachedTiles& out);
 
 /// The stages between projection and blending.
 void sort_by_depth(ForwardBuffers& buffers);
 void bin(const TileGrid& grid, ForwardBuffers& buffers);
-/// The same, and numbers the pairs of the rows [R] that may change.
-///   slot_of_row  where a row is in their list, or -1. Null: all rows may change, and each is where it is
-void bin(const TileGrid& grid, ForwardBuffers& buffers, const std::int32_t* slot_of_row, std::size_t rows);
 
 }  // namespace engine::render
