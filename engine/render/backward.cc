@@ -140,11 +140,22 @@ void fetch_upstream(const UpstreamPlanes& upstream, scene::Rect area, int x0, in
 
 }  // namespace
 
+GroupGradient* PairSums::begin(std::size_t n) {
+  if (n > room_ || !are_zero_) zeroed_ = 0;
+  if (n > room_) sums_.reserve(n), room_ = n;
+  if (zeroed_ < n) {
+    GroupGradient* const sums = sums_.data() + zeroed_;
+    parallel_for(n - zeroed_, 4096,
+                 [&](std::size_t first, std::size_t last) { std::fill(sums + first, sums + last, GroupGradient{}); });
+    zeroed_ = n;
+  }
+  are_zero_ = false;
+  return sums_.data();
+}
+
 void walk_tiles(const ForwardBuffers& forward, const RayEnds* ends, const TileGrid& grid,
-                const UpstreamPlanes& upstream, Vec3 background, std::size_t pairs, Buffer<GroupGradient>& gradients) {
-  GroupGradient* const sums = gradients.reserve(pairs);
-  parallel_for(pairs, 4096,
-               [&](std::size_t begin, std::size_t end) { std::fill(sums + begin, sums + end, GroupGradient{}); });
+                const UpstreamPlanes& upstream, Vec3 background, std::size_t pairs, PairSums& pair_sums) {
+  GroupGradient* const sums = pair_sums.begin(pairs);
   const int side = forward.tile_group;
   const auto walk_tile = [&](int column, int row) {
     const auto tile = std::size_t(row * grid.columns + column);
@@ -183,6 +194,20 @@ void walk_tiles(const ForwardBuffers& forward, const RayEnds* ends, const TileGr
   });
 }
 
+void project_layers_vjp(const Layers& layers, const ViewParams<float>& view, int sh_degree,
+                        std::span<const std::uint32_t> rows, const std::uint32_t* first_pair, PairSums& sums,
+                        Gradients& out) {
+  const RowPairs row_pairs{.first_pair = first_pair, .pairs = sums.data()};
+  const std::size_t base_rows = layers.base->size();
+  const auto of_base = std::size_t(std::lower_bound(rows.begin(), rows.end(), base_rows) - rows.begin());
+  parallel_for(rows.size(), project_vjp_block, [&](std::size_t begin, std::size_t end) {
+    const std::size_t split = std::clamp(of_base, begin, end);
+    if (begin < split) project_rows_vjp(*layers.base, 0, view, sh_degree, rows, row_pairs, begin, split, out);
+    if (split < end) project_rows_vjp(*layers.top, base_rows, view, sh_degree, rows, row_pairs, split, end, out);
+  });
+  sums.end();
+}
+
 namespace {
 
 const scene::Image* plane_or_none(const scene::Image& image) { return image.channels != 0 ? &image : nullptr; }
@@ -190,7 +215,7 @@ const scene::Image* plane_or_none(const scene::Image& image) { return image.chan
 /// What a backward pass works in. The stages fill it from top to bottom.
 struct BackwardBuffers {
   ForwardBuffers forward;
-  Buffer<GroupGradient> pairs;
+  PairSums pairs;
 };
 
 void backward_simd(const Layers& layers, const scene::Camera& camera, const BackwardOptions& options,
@@ -213,14 +238,7 @@ void backward_simd(const Layers& layers, const scene::Camera& camera, const Back
                               .depth = plane_or_none(upstream.depth),
                               .alpha = plane_or_none(upstream.alpha)};
   walk_tiles(forward, nullptr, grid, planes, options.forward.background, forward.first_pair[rows.size()], work.pairs);
-  const RowPairs row_pairs{.first_pair = forward.first_pair.data(), .pairs = work.pairs.data()};
-  const std::size_t base_rows = layers.base->size();
-  const auto of_base = std::size_t(std::lower_bound(rows.begin(), rows.end(), base_rows) - rows.begin());
-  parallel_for(rows.size(), project_vjp_block, [&](std::size_t begin, std::size_t end) {
-    const std::size_t split = std::clamp(of_base, begin, end);
-    if (begin < split) project_rows_vjp(*layers.base, 0, view, sh_degree, rows, row_pairs, begin, split, out);
-    if (split < end) project_rows_vjp(*layers.top, base_rows, view, sh_degree, rows, row_pairs, split, end, out);
-  });
+  project_layers_vjp(layers, view, sh_degree, rows, forward.first_pair.data(), work.pairs, out);
 }
 
 }  // namespace

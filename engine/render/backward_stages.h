@@ -44,10 +44,27 @@ struct TilePairs {
 void composite_tile_vjp(const Splat* splats, std::span<const std::uint32_t> list, std::size_t asked, int x0, int y0,
                         const TileUpstream& upstream, Vec3 background, const RayEnds& ends, const TilePairs& pairs);
 
+/// Sums of gradients of pairs, kept from frame to frame. Whoever reads them leaves zeros, since that is when they are
+/// in the cache.
+class PairSums {
+ public:
+  /// The sums of n pairs, all zero.
+  GroupGradient* begin(std::size_t n);
+  /// All have been read, and are zero again.
+  void end() { are_zero_ = true; }
+  [[nodiscard]] GroupGradient* data() const { return sums_.data(); }
+
+ private:
+  Buffer<GroupGradient> sums_;
+  std::size_t room_ = 0;
+  std::size_t zeroed_ = 0;  ///< So many of the first were zero at the end.
+  bool are_zero_ = true;    ///< And still are: not so once a pass was left by an exception.
+};
+
 /// Where the gradients of the rows [R] that may change are: row by row, so that what a row needs lies side by side.
 struct RowPairs {
   const std::uint32_t* first_pair;  ///< [R + 1] Row r has the pairs [first_pair[r], first_pair[r + 1]).
-  const GroupGradient* pairs;
+  GroupGradient* pairs;
 };
 
 /// Upstream by reference; null: zero.
@@ -62,12 +79,12 @@ struct UpstreamPlanes {
 ///   ends       [tiles] as the forward pass of the same picture left them; null: found anew
 ///   grid       pixels: the rectangle of the picture that `upstream` is of
 ///   pairs      there are, as first_pair says
-///   gradients  [pairs] of each splat in each group of tiles
+///   sums       of each splat in each group of tiles
 void walk_tiles(const ForwardBuffers& forward, const RayEnds* ends, const TileGrid& grid,
-                const UpstreamPlanes& upstream, Vec3 background, std::size_t pairs, Buffer<GroupGradient>& gradients);
+                const UpstreamPlanes& upstream, Vec3 background, std::size_t pairs, PairSums& sums);
 
 /// Sums each row's gradients over groups of tiles, in their order, and pulls back projection and colour, for the rows
-/// [begin, end) of those that may change. Adds to `out`, but writes mean2d.
+/// [begin, end) of those that may change. Adds to `out`, but writes mean2d. Leaves the rows' pairs zero.
 ///   cloud      that holds these rows: cloud row of rows[r] is rows[r] - first_row
 ///   sh_degree  bands used
 void project_rows_vjp(const scene::GaussianCloud& cloud, std::size_t first_row, const ViewParams<float>& view,
@@ -76,5 +93,11 @@ void project_rows_vjp(const scene::GaussianCloud& cloud, std::size_t first_row, 
 
 /// Most rows project_rows_vjp() takes at once.
 constexpr std::size_t project_vjp_block = 256;
+
+/// The same for all rows that may change, of all layers.
+///   first_pair  [rows.size() + 1]
+void project_layers_vjp(const Layers& layers, const ViewParams<float>& view, int sh_degree,
+                        std::span<const std::uint32_t> rows, const std::uint32_t* first_pair, PairSums& sums,
+                        Gradients& out);
 
 }  // namespace engine::render

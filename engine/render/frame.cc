@@ -16,7 +16,7 @@ struct Frame::Impl {
   Vec3 background{0.0f};
   TileGrid grid;
   ForwardBuffers buffers;
-  Buffer<GroupGradient> pairs;
+  PairSums pairs;
   std::vector<std::uint32_t> rows;  ///< 0, 1, 2, ...
 };
 
@@ -51,13 +51,10 @@ void Frame::backward(const scene::GaussianCloud& cloud, const scene::Image& v_co
   assert(v_color.width == frame.camera.width && v_color.height == frame.camera.height && v_color.channels == 3);
   assert(out.size() == cloud.size() && out.sh_degree == cloud.sh_degree);
   assert(frame.rows.size() == cloud.size());
-  const auto params = view_params<float>(frame.camera);
   walk_tiles(frame.buffers, frame.buffers.ray_ends.data(), frame.grid, {.color = &v_color}, frame.background,
              frame.buffers.first_pair[cloud.size()], frame.pairs);
-  const RowPairs row_pairs{.first_pair = frame.buffers.first_pair.data(), .pairs = frame.pairs.data()};
-  parallel_for(cloud.size(), project_vjp_block, [&](std::size_t begin, std::size_t end) {
-    project_rows_vjp(cloud, 0, params, cloud.sh_degree, frame.rows, row_pairs, begin, end, out);
-  });
+  project_layers_vjp(cloud, view_params<float>(frame.camera), cloud.sh_degree, frame.rows,
+                     frame.buffers.first_pair.data(), frame.pairs, out);
 }
 
 }  // namespace engine::render

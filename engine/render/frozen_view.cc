@@ -124,7 +124,7 @@ struct LocalFrame::Impl {
   scene::Rect reach;
   std::vector<std::uint32_t> tiles;  ///< Reached.
   std::vector<std::uint32_t> rows;   ///< 0, 1, 2, ...
-  Buffer<GroupGradient> pairs;
+  PairSums pairs;
   bool drawn = false;  ///< Since merge(): ray_ends are those of `merged`.
 };
 
@@ -258,11 +258,8 @@ void LocalFrame::backward(const FrozenView& frozen, const scene::GaussianCloud& 
   assert(impl_->drawn);
   walk_tiles(impl_->merged, impl_->merged.ray_ends.data(), grid, upstream, view.background, top.first_pair[rows.size()],
              impl_->pairs);
-  const RowPairs row_pairs{.first_pair = top.first_pair.data(), .pairs = impl_->pairs.data()};
-  const auto params = view_params<float>(view.camera);
-  parallel_for(rows.size(), project_vjp_block, [&](std::size_t begin, std::size_t end) {
-    project_rows_vjp(changeable, 0, params, changeable.sh_degree, rows, row_pairs, begin, end, out);
-  });
+  project_layers_vjp(changeable, view_params<float>(view.camera), changeable.sh_degree, rows, top.first_pair.data(),
+                     impl_->pairs, out);
 }
 
 }  // namespace engine::render

@@ -261,8 +261,9 @@ void ColorVjp(const scene::GaussianCloud& cloud, std::size_t first_row, const st
   EachBasisVjp<kDegree>(bases, rows);
 }
 
-/// Sums a row's gradients over its groups of tiles, in their order and in double, into row i. False if all are zero.
-HWY_INLINE bool SumOverGroups(const GroupGradient* first, const GroupGradient* last, std::size_t i, VjpRows& rows) {
+/// Sums a row's gradients over its groups of tiles, in their order and in double, into row i, and leaves zeros there.
+/// False if all are zero.
+HWY_INLINE bool SumOverGroups(GroupGradient* first, GroupGradient* last, std::size_t i, VjpRows& rows) {
   constexpr std::size_t size = sizeof(GroupGradient) / sizeof(float);
   const hn::CappedTag<double, 4> d64;
   const hn::Rebind<float, decltype(d64)> d32;
@@ -272,9 +273,11 @@ HWY_INLINE bool SumOverGroups(const GroupGradient* first, const GroupGradient* l
   constexpr std::ptrdiff_t ahead = 16;  // rows' pairs follow each other
   for (; first != last; ++first) {
     hwy::Prefetch(first + ahead);
-    const auto* const values = reinterpret_cast<const float*>(first);
-    for (std::size_t p = 0; p < parts; ++p)
+    auto* const values = reinterpret_cast<float*>(first);
+    for (std::size_t p = 0; p < parts; ++p) {
       total[p] = hn::Add(total[p], hn::PromoteTo(d64, hn::LoadU(d32, values + p * lanes)));
+      hn::StoreU(hn::Zero(d32), d32, values + p * lanes);
+    }
   }
   alignas(32) float sums[size];
   bool any = false;

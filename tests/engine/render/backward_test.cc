@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -11,6 +13,7 @@
 #include "engine/core/finite.h"
 #include "engine/core/parallel.h"
 #include "engine/core/rng.h"
+#include "engine/render/backward_stages.h"
 #include "engine/render/frame.h"
 #include "engine/render/reference.h"
 #include "engine/render/reference_backward.h"
@@ -530,6 +533,27 @@ TEST(Backward, TilesWithoutUpstreamAndTilesThatNoRowReachesChangeNothing) {
     if (cloud.mean.x[i] < -0.2f * cloud.mean.z[i]) rows.push_back(i);
   expect_close(gradients_of(cloud, camera, on(Backend::simd), upstream, rows),
                gradients_of(cloud, camera, on(Backend::reference), upstream, rows), 2e-3);
+}
+
+TEST(PairSums, AreZeroAtTheBeginningOfAPassWhateverBecameOfTheOneBefore) {
+  const auto expect_zeros = [](const GroupGradient* sums, std::size_t n) {
+    for (std::size_t i = 0; i < n; ++i)
+      for (const float value : std::bit_cast<std::array<float, 12>>(sums[i])) ASSERT_EQ(value, 0) << i;
+  };
+  PairSums sums;
+  const auto spoil = [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) sums.data()[i].along = 7, sums.data()[i].depth = NAN;
+  };
+  expect_zeros(sums.begin(6000), 6000);
+  sums.end();
+  spoil(100, 200);  // so that one sees that what is zero at the end is not zeroed again
+  EXPECT_EQ(sums.begin(6000)[100].along, 7);
+  spoil(0, 6000);  // a pass that was left by an exception
+  expect_zeros(sums.begin(50), 50);
+  sums.end();
+  expect_zeros(sums.begin(6000), 6000);  // more than there were at the end
+  sums.end();
+  expect_zeros(sums.begin(9000), 9000);  // more than there was room for
 }
 
 TEST(Backward, IsTheSameToTheBitForAnyNumberOfThreads) {

@@ -20,7 +20,7 @@ scene::Image noise(const scene::Camera& camera) {
   return image;
 }
 
-/// Picture and gradients of a Frame that has drawn something else before.
+/// Picture and gradients of a Frame that has drawn something larger, and walked it back, before.
 struct Both {
   scene::Image color;
   Gradients gradients;
@@ -29,7 +29,11 @@ Both of_frame(const scene::GaussianCloud& cloud, const scene::Camera& camera, Ve
   Frame frame;
   const scene::Camera other = off_centre_camera(33, 90);
   scene::Image earlier(other.width, other.height, 3);
-  frame.forward(cloud_in_view(500, 9), other, Vec3(1.0f), earlier);
+  const scene::GaussianCloud larger = cloud_in_view(5000, 9, cloud.sh_degree);
+  frame.forward(larger, other, Vec3(1.0f), earlier);
+  Gradients of_larger;
+  of_larger.reset(larger.size(), larger.sh_degree);
+  frame.backward(larger, noise(other), of_larger);
   Both out{scene::Image(camera.width, camera.height, 3, 7.0f), {}};
   frame.forward(cloud, camera, background, out.color);
   out.gradients.reset(cloud.size(), cloud.sh_degree);
