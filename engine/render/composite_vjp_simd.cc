@@ -190,6 +190,13 @@ HWY_INLINE void StepBack(D d, const Meeting& at, const ShadeOfAll& shade, Sums& 
   if constexpr (kDepth) sums.depth = hn::MulAdd(weight, hn::Load(d, block.depth), sums.depth);
 }
 
+/// k, but the compiler does not know. It would else keep what a batch tells of splat k in all lanes of registers, more
+/// than there are: it writes them to the stack for every splat, to read them from there no faster than from the batch.
+HWY_INLINE std::size_t Forgotten(std::size_t k) {
+  asm volatile("" : "+r"(k));
+  return k;
+}
+
 /// Walks all rays back through a batch, splat by splat: a splat's sums stay in registers. Each step finds where the
 /// next one is to be, of the next splat if need be, before it is taken: one depends on the other in nothing, so that
 /// the processor has two chains to follow.
@@ -217,7 +224,8 @@ HWY_INLINE void WalkBack(D d, std::size_t first, const Batch& batch, const Reach
     Sums sums{zero, zero, zero, zero, zero, zero, zero, zero, zero, zero};
     const auto walk = [&](auto changes, auto clamped) {
       while (blocks.Any()) {
-        const Meeting next = Meet<clamped>(d, batch, k, first + k, walked[blocks.Next()]);
+        const std::size_t same = Forgotten(k);
+        const Meeting next = Meet<clamped>(d, batch, same, first + same, walked[blocks.Next()]);
         StepBack<kDepth, changes, clamped>(d, at, shade, sums);
         at = next;
       }
