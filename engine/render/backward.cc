@@ -130,38 +130,40 @@ bool any(const TileUpstream& upstream) {
 
 /// fetch_tile() of the colours that upstream_of_tile() finds.
 void fetch_upstream(const UpstreamPlanes& upstream, scene::Rect area, int x0, int y0) {
-  if (upstream.color == nullptr || x0 < area.x0 || x0 >= area.x1 || y0 < area.y0) return;
+  if (upstream.color == nullptr || x0 < area.x0 || x0 >= area.x1 || y0 < area.y0 || y0 >= area.y1) return;
   const int width = std::min(tile_size, area.x1 - x0), height = std::min(tile_size, area.y1 - y0);
   for (int channel = 0; channel < 3; ++channel)
-    fetch_tile(
-        upstream.color->plane(channel).data() + std::ptrdiff_t(y0 - area.y0) * upstream.color->width + (x0 - area.x0),
-        upstream.color->width, width, height);
+    fetch_tile(upstream.color->plane(channel).data() + std::ptrdiff_t(y0 - area.y0) * area.width() + (x0 - area.x0),
+               area.width(), width, height);
 }
 
 }  // namespace
 
-GroupGradient* PairSums::begin(std::size_t n) {
-  if (n > room_ || !are_zero_) zeroed_ = 0;
-  if (n > room_) sums_.reserve(n), room_ = n;
-  if (zeroed_ < n) {
-    GroupGradient* const sums = sums_.data() + zeroed_;
-    parallel_for(n - zeroed_, 4096,
-                 [&](std::size_t first, std::size_t last) { std::fill(sums + first, sums + last, GroupGradient{}); });
-    zeroed_ = n;
+GroupGradient* PairSums::zeroed(std::size_t n) {
+  if (n > sums_.capacity() || !still_zero_) zeros_ = 0;
+  GroupGradient* const sums = sums_.reserve(n);
+  if (zeros_ < n) {
+    parallel_for(n - zeros_, 4096, [&](std::size_t first, std::size_t last) {
+      std::fill(sums + zeros_ + first, sums + zeros_ + last, GroupGradient{});
+    });
+    zeros_ = n;
   }
-  are_zero_ = false;
-  return sums_.data();
+  still_zero_ = false;
+  return sums;
 }
 
 void walk_tiles(const ForwardBuffers& forward, const RayEnds* ends, const TileGrid& grid,
-                const UpstreamPlanes& upstream, Vec3 background, std::size_t pairs, PairSums& pair_sums) {
-  GroupGradient* const sums = pair_sums.begin(pairs);
+                const UpstreamPlanes& upstream, Vec3 background, PairSums& sums) {
+  GroupGradient* const first_sums = sums.zeroed(forward.pairs_before.back());
   const int side = forward.tile_group;
   const auto walk_tile = [&](int column, int row) {
     const auto tile = std::size_t(row * grid.columns + column);
     const std::uint32_t first = forward.tile_begin[tile], last = forward.tile_begin[tile + 1];
     const std::span list(forward.entries.data() + first, last - first);
-    const auto may_change = [&](std::uint32_t splat) { return forward.splats[splat].pairs.any(); };
+    const auto may_change = [&](std::uint32_t splat) {
+      const std::uint32_t* const before = forward.pairs_before.data() + splat / project_block;
+      return before[0] != before[1] && forward.splats[splat].pairs.any();  // frozen ones are blocks by themselves
+    };
     const auto asked = std::find_if(list.begin(), list.end(), may_change);
     if (asked == list.end()) return;
     const TilePlace place = place_of(tile, grid.columns, grid.pixels);
@@ -173,10 +175,10 @@ void walk_tiles(const ForwardBuffers& forward, const RayEnds* ends, const TileGr
       TilePixels pixels;
       composite_tile(forward.splats.data(), list, place, {}, {}, pixels, &anew);
     }
-    const TilePairs tile_pairs{.before_block = forward.pairs_before.data(),
+    const TilePairs tile_pairs{.pairs_before = forward.pairs_before.data(),
                                .group_column = std::uint32_t(column / side),
                                .group_row = std::uint32_t(row / side),
-                               .sums = sums};
+                               .sums = first_sums};
     composite_tile_vjp(forward.splats.data(), list, std::size_t(asked - list.begin()), place.x0, place.y0,
                        *tile_upstream, background, ends != nullptr ? ends[tile] : anew, tile_pairs);
   };
@@ -205,7 +207,7 @@ void project_layers_vjp(const Layers& layers, const ViewParams<float>& view, int
     if (begin < split) project_rows_vjp(*layers.base, 0, view, sh_degree, rows, row_pairs, begin, split, out);
     if (split < end) project_rows_vjp(*layers.top, base_rows, view, sh_degree, rows, row_pairs, split, end, out);
   });
-  sums.end();
+  sums.all_read();
 }
 
 namespace {
@@ -237,7 +239,7 @@ void backward_simd(const Layers& layers, const scene::Camera& camera, const Back
   const UpstreamPlanes planes{.color = plane_or_none(upstream.color),
                               .depth = plane_or_none(upstream.depth),
                               .alpha = plane_or_none(upstream.alpha)};
-  walk_tiles(forward, nullptr, grid, planes, options.forward.background, forward.first_pair[rows.size()], work.pairs);
+  walk_tiles(forward, nullptr, grid, planes, options.forward.background, work.pairs);
   project_layers_vjp(layers, view, sh_degree, rows, forward.first_pair.data(), work.pairs, out);
 }
 
@@ -259,6 +261,12 @@ void backward(const Layers& layers, const scene::Camera& camera, const BackwardO
   assert(options.forward.tiles.empty() || !options.forward.rect);
   assert(std::adjacent_find(rows.begin(), rows.end(), std::greater_equal<>()) == rows.end());
   assert(rows.empty() || rows.back() < layers.size());
+  [[maybe_unused]] const auto fits = [&](const scene::Image& image, int channels) {
+    const scene::Rect area = options.forward.rect.value_or(scene::Rect{0, 0, camera.width, camera.height});
+    return image.channels == 0 ||
+           (image.width == area.width() && image.height == area.height() && image.channels == channels);
+  };
+  assert(fits(upstream.color, 3) && fits(upstream.depth, 1) && fits(upstream.alpha, 1));
   assert(out.size() == rows.size() && out.sh_degree == layers.base->sh_degree);
   assert(options.forward.backend == Backend::reference ||
          (options.forward.semantics == Semantics::dense_stop && options.alpha_clamp == AlphaClamp::exact));

@@ -79,7 +79,8 @@ class BackwardWorkspace {
 /// tiles and cuts are taken as they are. At the edge of a clamp the derivative is the one from inside, but for that of
 /// alpha at 0.99, where it is zero. Costs projecting, sorting and, in the tiles that rows and upstream touch, blending
 /// once more, for nothing of the forward pass is kept (Frame and LocalFrame keep it), and about twice that for walking
-/// back. Memory: 48 bytes per row that may change and tile (of 20,000 rows on: 3 x 3 tiles) that its box meets.
+/// back. Memory: 48 bytes per row that may change and tile (of 20,000 rows on: 3 x 3 tiles) that its box meets, whether
+/// or not the tile is wanted.
 /// Precondition: that of forward(); semantics other than dense_stop and straight_through need Backend::reference.
 void backward(const Layers& layers, const scene::Camera& camera, const BackwardOptions& options,
               const Upstream& upstream, std::span<const std::uint32_t> rows, BackwardWorkspace& workspace,

@@ -31,7 +31,7 @@ struct TileUpstream {
 
 /// Where the gradients of a tile's splats are summed.
 struct TilePairs {
-  const std::uint32_t* before_block;      ///< ForwardBuffers::pairs_before.
+  const std::uint32_t* pairs_before;      ///< As ForwardBuffers has it.
   std::uint32_t group_column, group_row;  ///< The tile's.
   GroupGradient* sums;
 };
@@ -39,7 +39,7 @@ struct TilePairs {
 /// Pulls back one tile, whose first pixel is (x0, y0).
 ///   list   splats that reach the tile, nearest first
 ///   asked  in front of this one of the list nothing may change
-///   ends   as composite_tile() left them
+///   background, ends  as composite_tile() had it, and left them
 ///   pairs  of splats that may change are added to
 void composite_tile_vjp(const Splat* splats, std::span<const std::uint32_t> list, std::size_t asked, int x0, int y0,
                         const TileUpstream& upstream, Vec3 background, const RayEnds& ends, const TilePairs& pairs);
@@ -48,17 +48,16 @@ void composite_tile_vjp(const Splat* splats, std::span<const std::uint32_t> list
 /// in the cache.
 class PairSums {
  public:
-  /// The sums of n pairs, all zero.
-  GroupGradient* begin(std::size_t n);
-  /// All have been read, and are zero again.
-  void end() { are_zero_ = true; }
+  /// The sums of n pairs, all zero: a pass begins.
+  GroupGradient* zeroed(std::size_t n);
+  /// All have been read, and are zero again: it ends.
+  void all_read() { still_zero_ = true; }
   [[nodiscard]] GroupGradient* data() const { return sums_.data(); }
 
  private:
   Buffer<GroupGradient> sums_;
-  std::size_t room_ = 0;
-  std::size_t zeroed_ = 0;  ///< So many of the first were zero at the end.
-  bool are_zero_ = true;    ///< And still are: not so once a pass was left by an exception.
+  std::size_t zeros_ = 0;   ///< So many of the first were zero when the last pass began.
+  bool still_zero_ = true;  ///< And are. Not so while a pass goes on, or once it was left by an exception.
 };
 
 /// Where the gradients of the rows [R] that may change are: row by row, so that what a row needs lies side by side.
@@ -78,10 +77,9 @@ struct UpstreamPlanes {
 ///   forward    splats, entries, tile_begin, tile_group and pairs_before are used
 ///   ends       [tiles] as the forward pass of the same picture left them; null: found anew
 ///   grid       pixels: the rectangle of the picture that `upstream` is of
-///   pairs      there are, as first_pair says
-///   sums       of each splat in each group of tiles
+///   sums       of each splat in each group of tiles: a pass of theirs begins
 void walk_tiles(const ForwardBuffers& forward, const RayEnds* ends, const TileGrid& grid,
-                const UpstreamPlanes& upstream, Vec3 background, std::size_t pairs, PairSums& sums);
+                const UpstreamPlanes& upstream, Vec3 background, PairSums& sums);
 
 /// Sums each row's gradients over groups of tiles, in their order, and pulls back projection and colour, for the rows
 /// [begin, end) of those that may change. Adds to `out`, but writes mean2d. Leaves the rows' pairs zero.
@@ -94,8 +92,9 @@ void project_rows_vjp(const scene::GaussianCloud& cloud, std::size_t first_row, 
 /// Most rows project_rows_vjp() takes at once.
 constexpr std::size_t project_vjp_block = 256;
 
-/// The same for all rows that may change, of all layers.
+/// project_rows_vjp() for all rows that may change, of all layers.
 ///   first_pair  [rows.size() + 1]
+///   sums        as walk_tiles() left them: their pass ends
 void project_layers_vjp(const Layers& layers, const ViewParams<float>& view, int sh_degree,
                         std::span<const std::uint32_t> rows, const std::uint32_t* first_pair, PairSums& sums,
                         Gradients& out);

@@ -49,9 +49,10 @@ void sort_by_depth(ForwardBuffers& buffers) {
     const auto digit = [=, least = range.least](const DepthKey& keyed) {
       return (keyed.key - least) >> shift & (buckets - 1);
     };
-    counts.assign(chunk_count(length, block) * buckets, 0);
+    counts.resize(chunk_count(length, block) * buckets);
     parallel_for(length, block, [&](std::size_t begin, std::size_t end) {
       std::uint32_t* const count = counts.data() + begin / block * buckets;
+      std::fill_n(count, buckets, 0u);
       each(begin, end, [&](const DepthKey& keyed) { ++count[digit(keyed)]; });
     });
     place_digits(chunk_count(length, block), buckets, counts);

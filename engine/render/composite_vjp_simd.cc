@@ -72,7 +72,7 @@ HWY_INLINE void FindPairs(const Splat* splats, const std::uint32_t* list, const 
     const PairsOfSplat& of = splats[list[k]].pairs;
     if (!of.any()) continue;
     out.changeable |= std::uint64_t{1} << k;
-    out.number[k] = pairs.before_block[list[k] / project_block] + of.number(pairs.group_column, pairs.group_row);
+    out.number[k] = pairs.pairs_before[list[k] / project_block] + of.number(pairs.group_column, pairs.group_row);
     const GroupGradient& pair = pairs.sums[out.number[k]];
     hwy::Prefetch(&pair.g), hwy::Prefetch(&pair.padding[1]);  // often in two lines
   }

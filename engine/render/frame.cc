@@ -1,8 +1,6 @@
 #include "engine/render/frame.h"
 
-#include <algorithm>
 #include <cassert>
-#include <numeric>
 #include <vector>
 
 #include "engine/core/parallel.h"
@@ -52,7 +50,7 @@ void Frame::backward(const scene::GaussianCloud& cloud, const scene::Image& v_co
   assert(out.size() == cloud.size() && out.sh_degree == cloud.sh_degree);
   assert(frame.rows.size() == cloud.size());
   walk_tiles(frame.buffers, frame.buffers.ray_ends.data(), frame.grid, {.color = &v_color}, frame.background,
-             frame.buffers.first_pair[cloud.size()], frame.pairs);
+             frame.pairs);
   project_layers_vjp(cloud, view_params<float>(frame.camera), cloud.sh_degree, frame.rows,
                      frame.buffers.first_pair.data(), frame.pairs, out);
 }

@@ -4,7 +4,6 @@
 #include <cassert>
 #include <limits>
 #include <new>
-#include <numeric>
 #include <vector>
 
 #include "engine/core/parallel.h"
@@ -125,7 +124,7 @@ struct LocalFrame::Impl {
   std::vector<std::uint32_t> tiles;  ///< Reached.
   std::vector<std::uint32_t> rows;   ///< 0, 1, 2, ...
   PairSums pairs;
-  bool drawn = false;  ///< Since merge(): ray_ends are those of `merged`.
+  bool drawn = false;  ///< Since project() and merge(): ray_ends are those of `merged`.
 };
 
 LocalFrame::LocalFrame() : impl_(std::make_unique<Impl>()) {}
@@ -137,6 +136,7 @@ scene::Rect LocalFrame::project(const scene::GaussianCloud& changeable, const sc
   assert(scene::validate(camera));
   const TileGrid grid = whole_grid(camera);
   ForwardBuffers& buffers = impl_->changeable;
+  impl_->drawn = false;
   count_up(changeable.size(), impl_->rows);
   render::project(changeable, view_params<float>(camera), changeable.sh_degree, grid.pixels, impl_->rows, buffers);
   sort_by_depth(buffers);
@@ -234,7 +234,6 @@ std::size_t LocalFrame::entries() const {
 void LocalFrame::forward(const FrozenView& frozen, scene::Image& color) {
   const FrozenView::Impl& view = *frozen.impl_;
   assert(color.width == view.region.width() && color.height == view.region.height() && color.channels == 3);
-  impl_->drawn = true;
   ForwardBuffers& merged = impl_->merged;
   RayEnds* const ends = merged.ray_ends.reserve(merged.tile_begin.size() - 1);
   parallel_for(impl_->tiles.size(), 1, [&](std::size_t i, std::size_t) {
@@ -242,6 +241,7 @@ void LocalFrame::forward(const FrozenView& frozen, scene::Image& color) {
     draw_tile(merged.splats.data(), {merged.entries.data() + first, last - first}, tile, view.columns, view.background,
               view.region, color, ends + tile);
   });
+  impl_->drawn = true;
 }
 
 void LocalFrame::backward(const FrozenView& frozen, const scene::GaussianCloud& changeable, const scene::Image& v_color,
@@ -256,8 +256,7 @@ void LocalFrame::backward(const FrozenView& frozen, const scene::GaussianCloud& 
   const UpstreamPlanes upstream{.color = &v_color};
   const ForwardBuffers& top = impl_->changeable;
   assert(impl_->drawn);
-  walk_tiles(impl_->merged, impl_->merged.ray_ends.data(), grid, upstream, view.background, top.first_pair[rows.size()],
-             impl_->pairs);
+  walk_tiles(impl_->merged, impl_->merged.ray_ends.data(), grid, upstream, view.background, impl_->pairs);
   project_layers_vjp(changeable, view_params<float>(view.camera), changeable.sh_degree, rows, top.first_pair.data(),
                      impl_->pairs, out);
 }

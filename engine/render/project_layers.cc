@@ -2,6 +2,7 @@
 // its pairs with groups of tiles.
 #include <algorithm>
 #include <bit>
+#include <cassert>
 #include <limits>
 #include <new>
 #include <span>
@@ -34,11 +35,12 @@ KeyRange key_by_depth(std::size_t block, const ForwardBuffers& buffers) {
   return range;
 }
 
-///   after_block  after_block(b, first row, end of rows) is called for each block once it is projected
+///   first_row    rows_of_blocks()
+///   after_block  after_block(b) is called for each block once it is projected
 template <class AfterBlock>
-void project_blocks(const Layers& layers, const ViewParams<float>& view, int sh_degree, std::span<const float> weight,
-                    Culling culling, scene::Rect pixels, ForwardBuffers& buffers, AfterBlock&& after_block) {
-  const std::vector<std::size_t> first_row = rows_of_blocks(layers);
+void project_blocks(const Layers& layers, std::span<const std::size_t> first_row, const ViewParams<float>& view,
+                    int sh_degree, std::span<const float> weight, Culling culling, scene::Rect pixels,
+                    ForwardBuffers& buffers, AfterBlock&& after_block) {
   const std::size_t blocks = first_row.size() - 1, base_rows = layers.base->size();
   buffers.splats.reserve(blocks * project_block), buffers.keys.reserve(blocks * project_block);
   buffers.block_sizes.resize(blocks), buffers.key_ranges.resize(blocks);
@@ -52,7 +54,7 @@ void project_blocks(const Layers& layers, const ViewParams<float>& view, int sh_
     buffers.block_sizes[b] = project_rows(of, view, sh_degree, culling, pixels, first_row[b] - of.first_row,
                                           first_row[b + 1] - of.first_row, buffers.splats.data() + b * project_block);
     buffers.key_ranges[b] = key_by_depth(b, buffers);
-    after_block(b, first_row[b], first_row[b + 1]);
+    after_block(b);
   });
 }
 
@@ -61,6 +63,7 @@ struct TileGroups {
   std::uint32_t first_column, first_row, columns, rows;
 
   TileGroups(const TileBox& box, int side) {
+    assert(side == 1 || side == large_tile_group);
     // By a constant: a division costs as much as all the rest.
     const auto group = [side](std::uint32_t tile) { return side == 1 ? tile : tile / large_tile_group; };
     first_column = group(box.first_column), first_row = group(box.first_row);
@@ -92,38 +95,33 @@ std::uint64_t number_pairs(std::span<const std::uint32_t> rows, int side, std::s
 
 void project(const Layers& layers, const ViewParams<float>& view, int sh_degree, std::span<const float> weight,
              Culling culling, scene::Rect pixels, ForwardBuffers& buffers) {
-  project_blocks(layers, view, sh_degree, weight, culling, pixels, buffers,
-                 [](std::size_t, std::size_t, std::size_t) {});
+  project_blocks(layers, rows_of_blocks(layers), view, sh_degree, weight, culling, pixels, buffers, [](std::size_t) {});
 }
 
 void project(const Layers& layers, const ViewParams<float>& view, int sh_degree, scene::Rect pixels,
              std::span<const std::uint32_t> changeable, ForwardBuffers& buffers) {
-  buffers.tile_group = tile_group_side(changeable.size());
-  std::uint32_t* const first_pair = buffers.first_pair.reserve(changeable.size() + 1);
-  const auto slot_of = [&](std::size_t row) {
-    return std::size_t(std::lower_bound(changeable.begin(), changeable.end(), row) - changeable.begin());
-  };
   const std::vector<std::size_t> first_row = rows_of_blocks(layers);
   const std::size_t blocks = first_row.size() - 1;
+  std::vector<std::size_t> slots;  // [blocks + 1] where the rows of a block begin among the changeable ones
+  for (const std::size_t row : first_row)
+    slots.push_back(std::size_t(std::lower_bound(changeable.begin(), changeable.end(), row) - changeable.begin()));
+  buffers.tile_group = tile_group_side(changeable.size());
+  std::uint32_t* const first_pair = buffers.first_pair.reserve(changeable.size() + 1);
   std::vector<std::uint64_t> pairs(blocks);
-  project_blocks(layers, view, sh_degree, {}, Culling::exact, pixels, buffers,
-                 [&](std::size_t b, std::size_t first, std::size_t end) {
-                   const std::size_t slot = slot_of(first);
-                   pairs[b] = number_pairs(changeable.subspan(slot, slot_of(end) - slot), buffers.tile_group,
-                                           {buffers.splats.data() + b * project_block, buffers.block_sizes[b]},
-                                           first_pair + slot);
-                 });
+  project_blocks(layers, first_row, view, sh_degree, {}, Culling::exact, pixels, buffers, [&](std::size_t b) {
+    pairs[b] = number_pairs(changeable.subspan(slots[b], slots[b + 1] - slots[b]), buffers.tile_group,
+                            {buffers.splats.data() + b * project_block, buffers.block_sizes[b]}, first_pair + slots[b]);
+  });
 
-  buffers.pairs_before.resize(blocks);
+  buffers.pairs_before.resize(blocks + 1);
   std::uint64_t before = 0;
   for (std::size_t b = 0; b < blocks; ++b) buffers.pairs_before[b] = std::uint32_t(before), before += pairs[b];
   if (before > std::numeric_limits<std::uint32_t>::max()) throw std::bad_alloc();  // pairs are numbered in 32 bits
-  for (std::size_t b = 0; b < blocks; ++b) {
-    std::uint32_t* const end = first_pair + slot_of(first_row[b + 1]);
-    for (std::uint32_t* pair = first_pair + slot_of(first_row[b]); pair != end; ++pair)
-      *pair += buffers.pairs_before[b];
-  }
-  first_pair[changeable.size()] = std::uint32_t(before);
+  buffers.pairs_before[blocks] = first_pair[changeable.size()] = std::uint32_t(before);
+  parallel_for(blocks, 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t b = begin; b < end; ++b)
+      for (std::size_t slot = slots[b]; slot < slots[b + 1]; ++slot) first_pair[slot] += buffers.pairs_before[b];
+  });
 }
 
 }  // namespace engine::render

@@ -125,7 +125,7 @@ void ListReachedTiles(const Splat* splats, const DepthKey* order, std::size_t n,
 
     // The rows of tiles of all boxes, one after the other, so that large boxes and small ones fill the same vectors.
     const auto all_rows = std::size_t(std::accumulate(boxed.rows, boxed.rows + here, std::int64_t{0}));
-    const std::size_t room = all_rows + 2 * lanes;
+    const std::size_t room = all_rows + lanes;
     std::int32_t* const row_of = out.work.reserve(3 * room);
     std::int32_t* const owner = row_of + room;  // 0 to lanes - 1
     std::int32_t* const count = owner + room;
@@ -137,7 +137,7 @@ void ListReachedTiles(const Splat* splats, const DepthKey* order, std::size_t n,
     }
     hn::StoreU(hn::Zero(di), di, owner + written);  // of what fills up the last vector
 
-    // In a row, the tiles that are reached lie side by side: the first of them, and how many.
+    // In a row, the tiles that are reached lie side by side: the first of them, in place of the row, and how many.
     std::int32_t* const first = row_of;
     for (std::size_t at = 0; at < written; at += lanes) {
       const auto who = hn::SetTableIndices(d, owner + at);

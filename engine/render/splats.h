@@ -32,10 +32,10 @@ struct TileBox {
 constexpr int large_tile_group = 3;
 constexpr int tile_group_side(std::size_t rows) { return rows < 20'000 ? 1 : large_tile_group; }
 
-/// Numbers of the pairs of a splat: the groups that its box meets, row by row.
+/// Numbers of the pairs of a splat with the groups that its box meets, row by row. They begin anew with each block of
+/// splats: ForwardBuffers::pairs_before is to be added.
 struct PairsOfSplat {
-  std::uint32_t
-      first;  ///< What group (0, 0) of the picture would have, modulo 2^32, less ForwardBuffers::pairs_before.
+  std::uint32_t first;    ///< What group (0, 0) of the picture would have, modulo 2^32.
   std::uint32_t columns;  ///< Groups that the box meets in a row. 0: the splat may not change.
 
   [[nodiscard]] bool any() const { return columns != 0; }
@@ -90,6 +90,7 @@ class Buffer {
     return data_.get();
   }
   [[nodiscard]] T* data() const { return data_.get(); }
+  [[nodiscard]] std::size_t capacity() const { return capacity_; }
   T& operator[](std::size_t i) const { return data_[i]; }
 
  private:
@@ -145,7 +146,7 @@ struct ForwardBuffers {
   // project, if told which rows may change: their pairs with groups of tiles, numbered row by row
   int tile_group = 1;                       ///< Tiles on a side of a group.
   Buffer<std::uint32_t> first_pair;         ///< [rows that may change + 1] The first number of a row.
-  std::vector<std::uint32_t> pairs_before;  ///< [blocks] What a block's splats count from.
+  std::vector<std::uint32_t> pairs_before;  ///< [blocks + 1] How many pairs the blocks before have; last, all.
   // sort: by depth, ties by row
   std::array<Buffer<DepthKey>, 2> sorted;
   std::span<const DepthKey> by_depth;  ///< All splats, nearest first: one of the two.
@@ -264,6 +265,7 @@ void project(const Layers& layers, const ViewParams<float>& view, int sh_degree,
 /// splat and, of each, row by row.
 ///   order    which splats
 ///   columns  tiles across the picture
+///   out      written over; its memory is kept
 void list_reached_tiles(const Splat* splats, std::span<const DepthKey> order, int columns, ReachedTiles& out);
 
 /// The stages between projection and blending.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <new>
 #include <numeric>
 #include <string>
 #include <utility>
@@ -17,21 +18,27 @@
 namespace engine::render {
 namespace {
 
-/// Rows of splats with these depths after sort_by_depth(). Projection is taken to have left half of every block.
+/// Rows of splats with these depths after sort_by_depth(). Projection is taken to have left half of every block, but
+/// nothing of every third.
 std::vector<std::uint32_t> sorted_rows(const std::vector<float>& depths) {
-  const std::size_t kept_per_block = project_block / 2;
-  const std::size_t blocks = (depths.size() + kept_per_block - 1) / kept_per_block;
   ForwardBuffers buffers;
-  DepthKey* const keys = buffers.keys.reserve(blocks * project_block);
-  std::vector<std::uint32_t> row_of_splat(blocks * project_block, 0);
-  buffers.block_sizes.resize(blocks), buffers.key_ranges.resize(blocks);
-  for (std::size_t row = 0; row < depths.size(); ++row) {
-    const std::size_t block = row / kept_per_block, splat = block * project_block + buffers.block_sizes[block]++;
-    const auto key = std::bit_cast<std::uint32_t>(depths[row]);
-    keys[splat] = {key, std::uint32_t(splat)};
-    buffers.key_ranges[block].extend({key, key});
-    row_of_splat[splat] = std::uint32_t(row);
+  std::vector<std::uint32_t> row_of_splat;
+  std::vector<DepthKey> keys;
+  for (std::size_t row = 0; row < depths.size();) {
+    const std::size_t first = buffers.block_sizes.size() * project_block;
+    keys.resize(first + project_block), row_of_splat.resize(first + project_block);
+    std::size_t kept = 0;
+    KeyRange range;
+    if (buffers.block_sizes.size() % 3 != 1)
+      for (; kept < project_block / 2 && row < depths.size(); ++kept, ++row) {
+        const auto key = std::bit_cast<std::uint32_t>(depths[row]);
+        keys[first + kept] = {key, std::uint32_t(first + kept)};
+        range.extend({key, key});
+        row_of_splat[first + kept] = std::uint32_t(row);
+      }
+    buffers.block_sizes.push_back(kept), buffers.key_ranges.push_back(range);
   }
+  std::copy(keys.begin(), keys.end(), buffers.keys.reserve(keys.size()));
   sort_by_depth(buffers);
   EXPECT_EQ(buffers.by_depth.size(), depths.size());
   std::vector<std::uint32_t> rows;
@@ -143,7 +150,7 @@ void expect_numbered(const Binned& binned) {
     ASSERT_EQ(buffers.first_pair[r + 1] - buffers.first_pair[r], expected[r]) << r;
 }
 
-TEST(Bin, FewRowsHaveAPairPerTileAndManyOnePerGroupOfTiles) {
+TEST(PairNumbers, FewRowsHaveAPairPerTileAndManyOnePerGroupOfTiles) {
   const auto some = cloud_of(3000), more = cloud_of(60'000);  // of several blocks
   const Binned few(some, every_third(some.size())), many(more, every_third(more.size()));
   EXPECT_EQ(few.buffers.tile_group, 1);
@@ -153,7 +160,7 @@ TEST(Bin, FewRowsHaveAPairPerTileAndManyOnePerGroupOfTiles) {
   EXPECT_LT(many.buffers.first_pair[many.rows.size()], few.buffers.first_pair[few.rows.size()] / 2);
 }
 
-TEST(Bin, NumbersThePairsOfAllTilesWhereSomeAreWanted) {
+TEST(PairNumbers, AreThoseOfAllTilesWhereSomeAreWanted) {
   std::vector<std::uint8_t> wanted(19 * 14, 0);
   for (const int tile : {0, 5, 6, 18, 60, 61, 62, 80, 81, 100, 101, 119, 120, 121, 140, 246})
     wanted[std::size_t(tile)] = 1;
@@ -162,7 +169,7 @@ TEST(Bin, NumbersThePairsOfAllTilesWhereSomeAreWanted) {
   expect_numbered(Binned(more, every_third(more.size()), wanted));
 }
 
-TEST(Bin, RowsOfAllLayersAreNumberedOneAfterTheOther) {
+TEST(PairNumbers, GoThroughAllLayers) {
   const auto base = cloud_of(1800), top = cloud_of(1200);
   Layers layers(base);
   layers.top = &top;
@@ -174,11 +181,41 @@ TEST(Bin, RowsOfAllLayersAreNumberedOneAfterTheOther) {
   EXPECT_GT(binned.buffers.first_pair[binned.rows.size()], binned.buffers.first_pair[of_top] + 100);
 }
 
-TEST(Bin, WhereNobodyMayChangeNothingIsNumbered) {
+TEST(PairNumbers, ThereAreNoneWhereNothingMayChange) {
   const auto cloud = cloud_of(1800);
   const Binned binned(cloud, {});
+  ASSERT_GT(binned.buffers.by_depth.size(), 100u);
   EXPECT_EQ(binned.buffers.first_pair[0], 0u);
   for (const DepthKey& keyed : binned.buffers.by_depth) EXPECT_FALSE(binned.buffers.splats[keyed.splat].pairs.any());
+}
+
+TEST(PairNumbers, EndAtThirtyTwoBitsAndSayThatMemoryDoes) {
+  // Gaussians that cover each of a million tiles.
+  const scene::Camera camera = off_centre_camera(16384, 16384);
+  const auto project_all = [](const scene::GaussianCloud& cloud, const scene::Camera& seen_by,
+                              ForwardBuffers& buffers) {
+    std::vector<std::uint32_t> rows(cloud.size());
+    std::iota(rows.begin(), rows.end(), 0u);
+    project(cloud, view_params<float>(seen_by), -1, {0, 0, seen_by.width, seen_by.height}, rows, buffers);
+  };
+  const auto covering = [](std::size_t n) {
+    auto cloud = cloud_in_view(n, 3, 0);
+    for (std::size_t row = 0; row < n; ++row) {
+      cloud.mean.set(row, {0, 0, 2}), cloud.log_scale.set(row, {6, 6, 6});
+      cloud.opacity_logit[row] = 4;
+    }
+    return cloud;
+  };
+  ForwardBuffers buffers;
+  project_all(covering(4095), camera, buffers);
+  EXPECT_EQ(buffers.first_pair[4095], 4095u << 20);
+  EXPECT_EQ(buffers.first_pair[4094], 4094u << 20);
+  EXPECT_THROW(project_all(covering(4096), camera, buffers), std::bad_alloc);
+
+  const auto small = cloud_of(1800);
+  ForwardBuffers fresh;
+  project_all(small, wide_camera(), fresh), project_all(small, wide_camera(), buffers);
+  for (std::size_t row = 0; row <= small.size(); ++row) ASSERT_EQ(buffers.first_pair[row], fresh.first_pair[row]);
 }
 
 }  // namespace

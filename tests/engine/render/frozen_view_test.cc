@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <numeric>
+#include <string>
 #include <vector>
 
 #include "engine/core/parallel.h"
@@ -105,15 +106,37 @@ void expect_gradients_of_all_layers(const Scene& scene, const FrozenView& frozen
   EXPECT_NE(local.opacity_logit, std::vector<float>(local.size(), 0.0f));
 }
 
-TEST(FrozenView, GivesTheGradientsOfAllLayers) {
-  const Scene scene;
-  LocalFrame frame;
+/// Draws the scene by a frame and walks it back, and compares both with all layers.
+void expect_all_layers(const Scene& scene, LocalFrame& frame) {
+  const Vec3 background(0.3f);
   const scene::Rect region = frame.project(scene.changeable, scene.camera);
-  const FrozenView frozen(scene.only_frozen(), scene.camera, region, Vec3(0.3f));
+  const FrozenView frozen(scene.only_frozen(), scene.camera, region, background);
   frame.merge(frozen);
   scene::Image picture = frozen.color();
   frame.forward(frozen, picture);
-  expect_gradients_of_all_layers(scene, frozen, frame, Vec3(0.3f));
+  EXPECT_TRUE(picture == part(forward(scene.layers(), scene.camera, {.background = background}).color, region));
+  expect_gradients_of_all_layers(scene, frozen, frame, background);
+}
+
+TEST(FrozenView, GivesTheGradientsOfAllLayersOfAnySizeForAnyNumberOfThreads) {
+  std::vector<Scene> scenes(4);
+  scenes[1].changeable = random_cloud(2500, 2, 0.1f, 0.05f, 0.1f);    // of several blocks
+  scenes[2].changeable = random_cloud(20'500, 2, 0.1f, 0.05f, 0.1f);  // and by groups of tiles; few of them are seen
+  for (std::size_t row = 0; row < 20'500; ++row)
+    if (row % 17 != 0) scenes[2].changeable.opacity_logit[row] = -30;
+  // As deep as frozen ones, to the bit, several of which share a depth.
+  for (std::size_t row = 0; row < scenes[3].changeable.size(); ++row)
+    scenes[3].changeable.mean.set(row, scenes[3].frozen.mean.get(1000 + row / 2));
+  for (const int threads : {1, 4}) {
+    WorkArena arena(threads);
+    arena.run([&] {
+      LocalFrame frame;
+      for (const std::size_t i : {0, 1, 2, 3, 0}) {
+        SCOPED_TRACE(std::to_string(threads) + " threads, scene " + std::to_string(i));
+        expect_all_layers(scenes[i], frame);
+      }
+    });
+  }
 }
 
 TEST(FrozenView, ServesOnePictureAfterAnother) {
