@@ -91,8 +91,8 @@ HWY_INLINE std::size_t Take(const Splat* splats, const DepthKey* order, std::siz
   return tiles;
 }
 
-/// Writes first, first + 1, ... and n times `same`, whole vectors of them: mostly there are few, and what is too much
-/// is written over by what comes next.
+/// Writes first, first + 1, ... and n times `same`, in whole vectors, and one at least: mostly there are few, and what
+/// is too much, up to a vector, is written over by what comes next.
 template <class DI>
 HWY_INLINE void WriteRun(DI di, std::size_t n, hn::TFromD<DI> first, hn::TFromD<DI> same, hn::TFromD<DI>* counted,
                          hn::TFromD<DI>* repeated) {

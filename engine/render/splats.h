@@ -25,11 +25,12 @@ struct TileBox {
   std::uint16_t first_column, last_column, first_row, last_row;
 };
 
-/// Tiles are walked back in square groups of so many on a side, and a splat's gradients are summed over a group before
-/// they are stored.
+/// Tiles on a side of a group, where groups are worth it.
+constexpr int large_tile_group = 3;
+/// Tiles are walked back in square groups, and a splat's gradients are summed over a group before they are stored. So
+/// many tiles on a side:
 ///   rows  that may change. Many of them take much memory, which groups save; few may lie in tiles that make up too few
 ///         groups for all threads
-constexpr int large_tile_group = 3;
 constexpr int tile_group_side(std::size_t rows) { return rows < 20'000 ? 1 : large_tile_group; }
 
 /// Numbers of the pairs of a splat with the groups that its box meets, row by row. They begin anew with each block of
@@ -268,7 +269,7 @@ void project(const Layers& layers, const ViewParams<float>& view, int sh_degree,
 ///   out      written over; its memory is kept
 void list_reached_tiles(const Splat* splats, std::span<const DepthKey> order, int columns, ReachedTiles& out);
 
-/// The stages between projection and blending.
+/// The stages between projection and blending: an order of the splats, and lists of them, where they lie.
 void sort_by_depth(ForwardBuffers& buffers);
 void bin(const TileGrid& grid, ForwardBuffers& buffers);
 
