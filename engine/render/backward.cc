@@ -17,8 +17,7 @@ namespace {
 class Wanted {
  public:
   Wanted(const ForwardOptions& options, const scene::Camera& camera)
-      : area_(options.rect.value_or(scene::Rect{0, 0, camera.width, camera.height})),
-        columns_(tile_columns(camera.width)) {
+      : area_(rect_of(options, camera)), columns_(tile_columns(camera.width)) {
     if (options.tiles.empty()) return;
     tiles_.assign(std::size_t(columns_) * std::size_t(tile_rows(camera.height)), 0);
     for (const std::uint32_t tile : options.tiles) tiles_[tile] = 1;
@@ -93,20 +92,17 @@ struct PaddedTile {
 /// dL/d(pictures) of the tile whose first pixel is (x0, y0), where it lies, or padded. Nothing if none of it is shown.
 std::optional<TileUpstream> upstream_of_tile(const UpstreamPlanes& upstream, scene::Rect area, int x0, int y0,
                                              PaddedTile& padded) {
-  const int first_x = std::max(x0, area.x0), last_x = std::min(x0 + tile_size, area.x1);
-  const int first_y = std::max(y0, area.y0), last_y = std::min(y0 + tile_size, area.y1);
-  if (first_x >= last_x || first_y >= last_y) return std::nullopt;
-  const bool whole = last_x - first_x == tile_size && last_y - first_y == tile_size;
+  const scene::Rect part = part_of_tile(x0, y0, area);
+  if (part.empty()) return std::nullopt;
+  const bool whole = part == whole_tile;
   const auto plane = [&](const scene::Image* image, int channel, std::size_t number) -> const float* {
     if (image == nullptr) return nullptr;
-    const float* const shown =
-        image->plane(channel).data() + std::ptrdiff_t(first_y - area.y0) * area.width() + (first_x - area.x0);
+    const float* const shown = image->plane(channel).data() + place_in(area, x0 + part.x0, y0 + part.y0);
     if (whole) return shown;
     padded.planes[number].fill(0.0f);
     float* const to = padded.planes[number].data();
-    for (int y = first_y; y < last_y; ++y)
-      std::copy_n(shown + std::ptrdiff_t(y - first_y) * area.width(), last_x - first_x,
-                  to + (y - y0) * tile_size + (first_x - x0));
+    for (int y = part.y0; y < part.y1; ++y)
+      std::copy_n(shown + std::ptrdiff_t(y - part.y0) * area.width(), part.width(), to + y * tile_size + part.x0);
     return to;
   };
   return TileUpstream{.red = plane(upstream.color, 0, 0),
@@ -130,11 +126,11 @@ bool any(const TileUpstream& upstream) {
 
 /// fetch_tile() of the colours that upstream_of_tile() finds.
 void fetch_upstream(const UpstreamPlanes& upstream, scene::Rect area, int x0, int y0) {
-  if (upstream.color == nullptr || x0 < area.x0 || x0 >= area.x1 || y0 < area.y0 || y0 >= area.y1) return;
-  const int width = std::min(tile_size, area.x1 - x0), height = std::min(tile_size, area.y1 - y0);
+  const scene::Rect part = part_of_tile(x0, y0, area);
+  if (upstream.color == nullptr || part.empty()) return;
   for (int channel = 0; channel < 3; ++channel)
-    fetch_tile(upstream.color->plane(channel).data() + std::ptrdiff_t(y0 - area.y0) * area.width() + (x0 - area.x0),
-               area.width(), width, height);
+    fetch_tile(upstream.color->plane(channel).data() + place_in(area, x0 + part.x0, y0 + part.y0), area.width(),
+               part.width(), part.height());
 }
 
 }  // namespace
@@ -262,7 +258,7 @@ void backward(const Layers& layers, const scene::Camera& camera, const BackwardO
   assert(std::adjacent_find(rows.begin(), rows.end(), std::greater_equal<>()) == rows.end());
   assert(rows.empty() || rows.back() < layers.size());
   [[maybe_unused]] const auto fits = [&](const scene::Image& image, int channels) {
-    const scene::Rect area = options.forward.rect.value_or(scene::Rect{0, 0, camera.width, camera.height});
+    const scene::Rect area = rect_of(options.forward, camera);
     return image.channels == 0 ||
            (image.width == area.width() && image.height == area.height() && image.channels == channels);
   };

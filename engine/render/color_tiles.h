@@ -33,7 +33,7 @@ inline void draw_tile(const Splat* splats, std::span<const std::uint32_t> list, 
                       Vec3 background, scene::Rect region, scene::Image& color, RayEnds* ends = nullptr) {
   const TilePlace place = place_of(tile, columns, region);
   const auto pixels_of = [&](int channel) {
-    return color.plane(channel).data() + std::ptrdiff_t(place.y0 - region.y0) * color.width + (place.x0 - region.x0);
+    return color.plane(channel).data() + place_in(region, place.x0, place.y0);
   };
   for (int channel = 0; channel < 3; ++channel) fetch_tile(pixels_of(channel), color.width, place.width, place.height);
   TilePixels pixels;

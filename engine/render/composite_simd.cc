@@ -150,16 +150,13 @@ void CompositeTile(const Splat* splats, const std::uint32_t* list, std::size_t c
 
 /// From block order to rows.
 HWY_INLINE void ToRows(const float* plane, float* to, std::ptrdiff_t stride) {
-  for (std::size_t b = 0; b < Blocks::count; ++b) {
-    const std::size_t x = b % Blocks::columns * Blocks::width, y = b / Blocks::columns * Blocks::height;
-    for (std::size_t row = 0; row < Blocks::height; ++row)
-      std::copy_n(plane + b * Blocks::lanes + row * Blocks::width, Blocks::width,
-                  to + std::ptrdiff_t(y + row) * stride + x);
-  }
+  EachBlockRow([&](std::size_t at, std::size_t x, std::size_t y) {
+    std::copy_n(plane + at, Blocks::width, to + std::ptrdiff_t(y) * stride + x);
+  });
 }
 
 void CopyTilePlane(const float* plane, scene::Rect part, float* to, std::ptrdiff_t stride) {
-  if (part == scene::Rect{0, 0, tile_size, tile_size}) return ToRows(plane, to, stride);
+  if (part == whole_tile) return ToRows(plane, to, stride);
   float rows[TilePixels::count];
   ToRows(plane, rows, tile_size);
   for (int y = part.y0; y < part.y1; ++y)

@@ -247,19 +247,16 @@ HWY_INLINE void WalkBack(D d, std::size_t first, const Batch& batch, const Reach
   }
 }
 
-/// A plane of a tile to its blocks.
+/// A plane of a tile to its blocks; zero if it is null.
 HWY_INLINE void ToBlocks(const float* plane, std::ptrdiff_t stride, float (WalkedBlock::*to)[Blocks::lanes],
                          WalkedBlock* walked) {
-  for (std::size_t b = 0; b < Blocks::count; ++b) {
-    const std::size_t x = b % Blocks::columns * Blocks::width, y = b / Blocks::columns * Blocks::height;
-    for (std::size_t row = 0; row < Blocks::height; ++row) {
-      float* const at = walked[b].*to + row * Blocks::width;
-      if (plane == nullptr)
-        std::fill_n(at, Blocks::width, 0.0f);
-      else
-        std::copy_n(plane + std::ptrdiff_t(y + row) * stride + x, Blocks::width, at);
-    }
-  }
+  const auto pixels = [&](std::size_t at) { return walked[at / Blocks::lanes].*to + at % Blocks::lanes; };
+  if (plane == nullptr)
+    EachBlockRow([&](std::size_t at, std::size_t, std::size_t) { std::fill_n(pixels(at), Blocks::width, 0.0f); });
+  else
+    EachBlockRow([&](std::size_t at, std::size_t x, std::size_t y) {
+      std::copy_n(plane + std::ptrdiff_t(y) * stride + x, Blocks::width, pixels(at));
+    });
 }
 
 template <bool kDepth>

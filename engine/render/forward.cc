@@ -33,20 +33,12 @@ void shape(const ForwardOptions& options, bool weighted, int width, int height, 
   shape(out.weight, weighted, width, height, 1, zero);
 }
 
-scene::Rect rect_of(const ForwardOptions& options, const scene::Camera& camera) {
-  return options.rect.value_or(scene::Rect{0, 0, camera.width, camera.height});
-}
-
 /// Copies the pixels of a finished tile that lie within `area` to the pictures, whose first pixel is area's.
 void store_tile(const TilePixels& tile, int x0, int y0, scene::Rect area, Rendering& out) {
-  const scene::Rect part{std::max(area.x0 - x0, 0), std::max(area.y0 - y0, 0), std::min(area.x1 - x0, tile_size),
-                         std::min(area.y1 - y0, tile_size)};
+  const scene::Rect part = part_of_tile(x0, y0, area);
   auto store = [&](const float* from, scene::Image& image, int channel = 0) {
     if (image.channels == 0) return;
-    copy_tile_plane(
-        from, part,
-        image.plane(channel).data() + std::ptrdiff_t(y0 + part.y0 - area.y0) * area.width() + (x0 + part.x0 - area.x0),
-        area.width());
+    copy_tile_plane(from, part, image.plane(channel).data() + place_in(area, x0 + part.x0, y0 + part.y0), area.width());
   };
   store(tile.alpha, out.alpha);
   store(tile.red, out.color, 0);

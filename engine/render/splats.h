@@ -206,6 +206,23 @@ inline TilePlace place_of(std::size_t tile, int columns, scene::Rect shown) {
   return {x0, y0, std::min(tile_size, shown.x1 - x0), std::min(tile_size, shown.y1 - y0)};
 }
 
+/// The part of the tile whose first pixel is (x0, y0) that lies within `area`, from that pixel on. Empty if none does.
+inline scene::Rect part_of_tile(int x0, int y0, scene::Rect area) {
+  return {std::max(area.x0 - x0, 0), std::max(area.y0 - y0, 0), std::min(area.x1 - x0, tile_size),
+          std::min(area.y1 - y0, tile_size)};
+}
+constexpr scene::Rect whole_tile{0, 0, tile_size, tile_size};
+
+/// Where pixel (x, y) of the whole picture is in a plane that holds `area` of it.
+inline std::ptrdiff_t place_in(scene::Rect area, int x, int y) {
+  return std::ptrdiff_t(y - area.y0) * area.width() + (x - area.x0);
+}
+
+/// The pixels that a picture is asked for.
+inline scene::Rect rect_of(const ForwardOptions& options, const scene::Camera& camera) {
+  return options.rect.value_or(scene::Rect{0, 0, camera.width, camera.height});
+}
+
 /// Which sums composite_tile() keeps.
 struct Channels {
   bool color = false, depth = false, weight = false;

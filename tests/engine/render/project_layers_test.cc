@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <map>
 #include <new>
-#include <numeric>
 #include <utility>
 #include <vector>
 
 #include "engine/render/splats.h"
+#include "tests/engine/render/gradients.h"
 #include "tests/engine/render/test_scenes.h"
 
 namespace engine::render {
@@ -135,9 +135,7 @@ TEST(PairNumbers, EndAtThirtyTwoBitsAndSayThatMemoryDoes) {
   const scene::Camera camera = off_centre_camera(16384, 16384);
   const auto project_all = [](const scene::GaussianCloud& cloud, const scene::Camera& seen_by,
                               ForwardBuffers& buffers) {
-    std::vector<std::uint32_t> rows(cloud.size());
-    std::iota(rows.begin(), rows.end(), 0u);
-    project(cloud, view_params<float>(seen_by), -1, {0, 0, seen_by.width, seen_by.height}, rows, buffers);
+    project(cloud, view_params<float>(seen_by), -1, {0, 0, seen_by.width, seen_by.height}, all_rows(cloud), buffers);
   };
   const auto covering = [](std::size_t n) {
     auto cloud = cloud_in_view(n, 3, 0);
