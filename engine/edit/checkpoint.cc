@@ -7,14 +7,18 @@
 #include "engine/core/byte_reader.h"
 #include "engine/core/byte_writer.h"
 #include "engine/core/checksum.h"
+#include "engine/edit/handles.h"
 #include "engine/scene/cloud_arrays.h"
 #include "engine/scene/cloud_bytes.h"
 
 namespace engine::edit {
 namespace {
 
+using working::Members;
+using working::Role;
+
 constexpr std::string_view magic = "SDCHKPNT";
-constexpr std::uint32_t version = 3;
+constexpr std::uint32_t version = 4;
 
 // Each part is written and read by a pair of functions that name the same fields in the same order.
 
@@ -78,7 +82,7 @@ void read(ByteReader& in, Enum& value, Enum last) {
 void write(ByteWriter& out, const Array3& array) { write(out, array.x), write(out, array.y), write(out, array.z); }
 void read(ByteReader& in, Array3& array) { read(in, array.x), read(in, array.y), read(in, array.z); }
 
-void write(ByteWriter& out, const MemberRows& members) {
+void write(ByteWriter& out, const Members& members) {
   write(out, members.inputs);
   scene::write_cloud(out, members.cloud);
   for (const Role role : members.role) out.write(std::uint8_t(role));
@@ -87,7 +91,7 @@ void write(ByteWriter& out, const MemberRows& members) {
   write(out, members.mean_at_deform);
 }
 
-void read(ByteReader& in, MemberRows& members) {
+void read(ByteReader& in, Members& members) {
   read(in, members.inputs);
   members.cloud = scene::read_cloud(in);
   if (!in.has(members.cloud.size())) return in.fail();
@@ -175,8 +179,8 @@ void read(ByteReader& in, HandleReport& handle) {
 void write(ByteWriter& out, const ViewReport& view) { write(out, view.name), out.write(view.mask_area); }
 void read(ByteReader& in, ViewReport& view) { read(in, view.name), view.mask_area = in.read<double>(); }
 
-void write(ByteWriter& out, const StageTime& time) { write(out, time.stage), out.write(time.seconds); }
-void read(ByteReader& in, StageTime& time) { read(in, time.stage), time.seconds = in.read<double>(); }
+void write(ByteWriter& out, const StageTime& time) { out.write(std::uint8_t(time.stage)), out.write(time.seconds); }
+void read(ByteReader& in, StageTime& time) { read(in, time.stage, Stage::finish), time.seconds = in.read<double>(); }
 
 void write(ByteWriter& out, const Report& report) {
   write(out, report.resolved);
@@ -206,24 +210,14 @@ tl::unexpected<Error> damaged(const std::string& what) {
   return fail(ErrorCode::corrupt_data, "the checkpoint is damaged: " + what, "checkpoint");
 }
 
-}  // namespace
+/// What is written down of a state.
+struct Contents {
+  State state;  ///< But for its scene.
+  Members members;
+};
 
-std::string encode(const Checkpoint& checkpoint) {
-  ByteWriter out;
-  out.write_all(std::span(magic));
-  out.write(version);
-  out.write(std::int32_t(checkpoint.interval));
-  write(out, checkpoint.members);
-  write_list(out, checkpoint.positions);
-  write_list(out, checkpoint.views);
-  write_list(out, checkpoint.masks);
-  write(out, checkpoint.report);
-  out.write(fnv1a(out.bytes()));
-  return std::move(out).take();
-}
-
-Result<Checkpoint> decode(std::string_view text) {
-  const auto bytes = std::as_bytes(std::span(text));
+/// The contents between version and checksum.
+Result<std::span<const std::byte>> contents_of(std::span<const std::byte> bytes) {
   ByteReader in(bytes);
   const auto found_magic = in.take(magic.size());
   if (!in.ok() || !std::ranges::equal(found_magic, std::as_bytes(std::span(magic))))
@@ -236,86 +230,67 @@ Result<Checkpoint> decode(std::string_view text) {
                     std::to_string(version),
                 "checkpoint");
   if (in.remaining() < sizeof(std::uint64_t)) return damaged("it ends too early");
-  const auto contents = bytes.first(bytes.size() - sizeof(std::uint64_t));
-  if (ByteReader(bytes.subspan(contents.size())).read<std::uint64_t>() != fnv1a(contents))
+  const auto checked = bytes.first(bytes.size() - sizeof(std::uint64_t));
+  if (ByteReader(bytes.subspan(checked.size())).read<std::uint64_t>() != fnv1a(checked))
     return damaged("its checksum does not match");
+  return checked.subspan(in.offset());
+}
 
-  in = ByteReader(contents.subspan(in.offset()));
-  Checkpoint checkpoint;
-  checkpoint.interval = in.read<std::int32_t>();
-  read(in, checkpoint.members);
-  read_list(in, checkpoint.positions);
-  read_list(in, checkpoint.views);
-  read_list(in, checkpoint.masks);
-  read(in, checkpoint.report);
+Result<Contents> read_contents(std::span<const std::byte> bytes) {
+  ByteReader in(bytes);
+  Contents contents;
+  contents.state.interval = in.read<std::int32_t>();
+  read(in, contents.members);
+  read_list(in, contents.state.positions);
+  read_list(in, contents.state.views);
+  read_list(in, contents.state.masks);
+  read(in, contents.state.report);
   if (!in.ok() || in.remaining() != 0) return damaged("its parts do not fit together");
-  return checkpoint;
+  return contents;
 }
 
-MemberRows members_of(const WorkingScene& working) {
-  MemberRows members;
-  members.cloud.sh_degree = working.cloud.sh_degree;
-  members.cloud.extra_stride = working.cloud.extra_stride;
-  std::vector<std::uint32_t> rows;
-  for (std::size_t i = 0; i < working.role.size(); ++i) {
-    if (working.role[i] == Role::frozen) continue;
-    rows.push_back(std::uint32_t(i));
-    if (i < working.input_rows) members.inputs.push_back(std::uint32_t(i));
-    members.role.push_back(working.role[i]);
-    members.handle.push_back(working.handle[i]);
-    members.parent.push_back(working.parent[i]);
-    members.mean_at_deform.push_back(working.mean_at_deform.get(i));
-  }
-  scene::append_rows(members.cloud, working.cloud, rows);
-  return members;
-}
-
-namespace {
-
-/// Could this be the state of an edit of a scene with so many rows?
-bool makes_sense(const MemberRows& members, const WorkingScene& working) {
-  const std::size_t count = members.cloud.size(), inputs = members.inputs.size();
-  if (inputs > count || members.role.size() != count || members.handle.size() != count ||
-      members.parent.size() != count || members.mean_at_deform.x.size() != count ||
-      members.mean_at_deform.y.size() != count || members.mean_at_deform.z.size() != count)
-    return false;
-  if (members.cloud.sh_degree != working.cloud.sh_degree || members.cloud.extra_stride != working.cloud.extra_stride)
-    return false;
-  for (std::size_t k = 0; k < count; ++k) {
-    const Role role = members.role[k];
-    const bool is_input = k < inputs;
-    if (is_input != (role == Role::held || role == Role::original) || role == Role::frozen) return false;
-    if ((role == Role::held || role == Role::copy) != (members.handle[k] != 0)) return false;
-    if (members.parent[k] >= working.input_rows) return false;
-    if (is_input && (members.parent[k] != members.inputs[k] || (k > 0 && members.inputs[k] <= members.inputs[k - 1])))
-      return false;
-  }
-  return true;
+/// Does it belong to this request? What it says of the scene, working::restore() checks.
+bool is_of(const Request& request, const Contents& contents) {
+  const State& state = contents.state;
+  const std::size_t handles = request.handles.size();
+  bool fits = state.interval >= 1 && state.interval <= resolved_intervals(request) &&
+              state.report.resolved.intervals == resolved_intervals(request) && state.positions.size() == handles &&
+              state.report.handles.size() == handles && state.masks.size() == state.views.size();
+  for (std::size_t v = 0; fits && v < state.views.size(); ++v)
+    fits = scene::validate(state.views[v]).has_value() && state.masks[v].width == state.views[v].width &&
+           state.masks[v].height == state.views[v].height;
+  for (const std::uint16_t handle : contents.members.handle) fits = fits && handle <= handles;
+  return fits;
 }
 
 }  // namespace
 
-Result<void> restore(const MemberRows& members, WorkingScene& working) {
-  if (!makes_sense(members, working))
+std::string encode(const State& state) {
+  ByteWriter out;
+  out.write_all(std::span(magic));
+  out.write(version);
+  out.write(std::int32_t(state.interval));
+  write(out, working::members_of(state.scene));
+  write_list(out, state.positions);
+  write_list(out, state.views);
+  write_list(out, state.masks);
+  write(out, state.report);
+  out.write(fnv1a(out.bytes()));
+  return std::move(out).take();
+}
+
+Result<State> decode(std::string_view text, const scene::GaussianCloud& input, const Request& request) {
+  const auto bytes = contents_of(std::as_bytes(std::span(text)));
+  if (!bytes) return propagate(bytes);
+  auto contents = read_contents(*bytes);
+  if (!contents) return propagate(contents);
+  if (!is_of(request, *contents))
+    return fail(ErrorCode::invalid_argument, "the checkpoint is of another edit", "checkpoint");
+  auto scene = working::restore(contents->members, input, frame_of(request));
+  if (!scene)
     return fail(ErrorCode::invalid_argument, "the checkpoint is of an edit of another scene", "checkpoint");
-  const std::size_t inputs = members.inputs.size();
-  std::vector<std::uint32_t> copies;
-  for (std::size_t k = inputs; k < members.role.size(); ++k) copies.push_back(std::uint32_t(k));
-  for (std::size_t k = 0; k < inputs; ++k) {
-    const std::size_t row = members.inputs[k];
-    copy_row(members.cloud, k, working.cloud, row);
-    working.role[row] = members.role[k];
-    working.handle[row] = members.handle[k];
-    working.mean_at_deform.set(row, members.mean_at_deform.get(k));
-  }
-  scene::append_rows(working.cloud, members.cloud, copies);
-  for (const std::uint32_t k : copies) {
-    working.role.push_back(members.role[k]);
-    working.handle.push_back(members.handle[k]);
-    working.parent.push_back(members.parent[k]);
-    working.mean_at_deform.push_back(members.mean_at_deform.get(k));
-  }
-  return {};
+  contents->state.scene = std::move(*scene);
+  return std::move(contents->state);
 }
 
 }  // namespace engine::edit

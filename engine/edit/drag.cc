@@ -1,6 +1,7 @@
 #include "engine/edit/drag.h"
 
 #include <optional>
+#include <utility>
 
 #include "engine/deform/rigid.h"
 #include "engine/edit/handles.h"
@@ -17,33 +18,42 @@ Result<deform::Assignment> assign(const Array3& mean, const Request& request) {
   return deform::assign(mean, spheres, region);
 }
 
-Step plan_step(const WorkingScene& working, const Request& request, std::span<const DVec3> positions, int u,
-               int intervals) {
-  Step step;
-  const auto drags = interval_drags(working, request, positions, u, intervals);
+PlannedMotion plan_motion(const WorkingScene& working, const Request& request, std::span<const DVec3> positions, int u,
+                          int intervals) {
+  const auto drags = interval_drags(working.frame(), request, positions, u, intervals);
   auto motions = deform::handle_motions(drags, request.params.rotation);
   if (request.params.interpolation == Interpolation::rigid && request.params.rotation == Rotation::shortest_arc)
     deform::turn_whole_groups(drags, motions);
-  step.rows = dragged_rows(working);
-  step.deformation =
-      deform::deformation(working.cloud, step.rows, working.handle, motions, request.params.interpolation);
-  for (std::size_t k = 0; k < step.rows.size(); ++k)
-    if (step.deformation.moves[k]) step.moving.push_back(step.rows[k]);
-  return step;
+  PlannedMotion motion;
+  motion.rows = working.dragged_rows();
+  motion.deformation =
+      deform::deformation(working.cloud(), motion.rows, working.handle(), motions, request.params.interpolation);
+  for (std::size_t k = 0; k < motion.rows.size(); ++k)
+    if (motion.deformation.moves[k]) motion.moving.push_back(motion.rows[k]);
+  return motion;
 }
 
-DragResult drag_through(WorkingScene& working, const Request& request, int intervals, bool rotate_sh) {
-  DragResult result;
-  result.positions = handle_sources(working, request);
+std::vector<std::uint32_t> dragged_rows(std::span<const std::uint16_t> handle) {
+  std::vector<std::uint32_t> rows;
+  for (std::size_t i = 0; i < handle.size(); ++i)
+    if (handle[i] != 0) rows.push_back(std::uint32_t(i));
+  return rows;
+}
+
+DraggedAlone drag_alone(std::vector<std::uint32_t> rows, const scene::GaussianCloud& gaussians,
+                        std::span<const std::uint16_t> handle, const Request& request, int intervals, bool rotate_sh) {
+  working::HandleColumn own_handle;
+  for (const std::uint32_t row : rows) own_handle.push_back(handle[row]);
+  const working::Frame frame = frame_of(request);
+  DraggedAlone drag{std::move(rows), WorkingScene(gaussians, frame, std::move(own_handle)),
+                    handle_sources(frame, request), {}};
   for (int u = 1; u <= intervals; ++u) {
-    const Step step = plan_step(working, request, result.positions, u, intervals);
-    paste(working, step.deformation, step.rows, request.mode, rotate_sh);
-    for (const std::size_t lost : relocate(working, request, result.positions))
-      result.warnings.push_back(handle_lost(lost, u));
+    const PlannedMotion motion = plan_motion(drag.working, request, drag.positions, u, intervals);
+    copy_and_paste(drag.working, motion, request.mode, rotate_sh);
+    for (const std::size_t lost : relocate(drag.working, request, drag.positions))
+      drag.warnings.push_back(handle_lost(lost, u));
   }
-  for (std::size_t i = 0; i < working.role.size(); ++i)
-    if (working.role[i] == Role::copy) result.copies.push_back(std::uint32_t(i));
-  return result;
+  return drag;
 }
 
 }  // namespace engine::edit

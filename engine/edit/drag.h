@@ -1,4 +1,6 @@
-// The deformation of an edit, interval by interval, without a look at any picture.
+// Steps 1 and 3: which Gaussians a drag takes along, and where an interval takes them; and a whole drag without a look
+// at any picture.
+// Source: 3DGS-Drag (ICLR 2025), sections 3.1 and 3.3.
 #pragma once
 
 #include <cstdint>
@@ -9,34 +11,46 @@
 #include "engine/deform/assign.h"
 #include "engine/deform/deform.h"
 #include "engine/edit/request.h"
-#include "engine/edit/working_scene.h"
+#include "engine/scene/gaussian_cloud.h"
+#include "engine/working/working_scene.h"
 
 namespace engine::edit {
+
+using working::WorkingScene;
 
 /// P_h^i of every handle of the request.
 ///   errors  unprocessable: a handle without Gaussians; `where` names it
 [[nodiscard]] Result<deform::Assignment> assign(const Array3& mean, const Request& request);
 
 /// What an interval will do to P_h, before it is done.
-struct Step {
+struct PlannedMotion {
   std::vector<std::uint32_t> rows;    ///< P_h, ascending.
   deform::Deformation deformation;    ///< Of `rows`.
   std::vector<std::uint32_t> moving;  ///< Those of `rows` that move, ascending.
 };
 
-/// The deformation of interval u = 1..intervals, from the handles' present positions.
-[[nodiscard]] Step plan_step(const WorkingScene& working, const Request& request, std::span<const DVec3> positions,
-                             int u, int intervals);
+/// The deformation of interval u = 1..intervals, from the handles' present positions (in the frame of `working`).
+[[nodiscard]] PlannedMotion plan_motion(const WorkingScene& working, const Request& request,
+                                        std::span<const DVec3> positions, int u, int intervals);
 
-/// Where a whole drag has led.
-struct DragResult {
-  std::vector<std::uint32_t> copies;  ///< Rows of the copies at their final place, ascending.
-  std::vector<DVec3> positions;       ///< Of the handles, in the frame of the working scene.
+/// The Gaussians of a drag alone, after it: no step of a drag looks at any other row, and their order stays.
+struct DraggedAlone {
+  std::vector<std::uint32_t> rows;  ///< Of the scene: its row rows[k] is row k of `working`. Ascending.
+  WorkingScene working;             ///< These rows, and the copies that the drag has made of them.
+  std::vector<DVec3> positions;     ///< Of the handles, in the frame of `working`.
   std::vector<std::string> warnings;
 };
 
-/// All intervals one after the other: deform, copy and paste, relocate.
+/// The rows that have a handle, ascending.
+[[nodiscard]] std::vector<std::uint32_t> dragged_rows(std::span<const std::uint16_t> handle);
+
+/// All intervals one after the other: deform, copy and paste, relocate. Costs what is dragged, not what there is.
+///   rows       of the scene that have a handle: dragged_rows(handle)
+///   gaussians  those rows, of the world
+///   handle     [N], of assign()
 ///   rotate_sh  false where only shapes matter
-DragResult drag_through(WorkingScene& working, const Request& request, int intervals, bool rotate_sh);
+[[nodiscard]] DraggedAlone drag_alone(std::vector<std::uint32_t> rows, const scene::GaussianCloud& gaussians,
+                                      std::span<const std::uint16_t> handle, const Request& request, int intervals,
+                                      bool rotate_sh);
 
 }  // namespace engine::edit

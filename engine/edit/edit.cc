@@ -2,25 +2,260 @@
 
 #include <algorithm>
 #include <chrono>
-#include <optional>
+#include <string>
 #include <utility>
 
+#include "engine/edit/annealing.h"
 #include "engine/edit/drag.h"
 #include "engine/edit/handles.h"
-#include "engine/edit/look.h"
+#include "engine/edit/masks.h"
 #include "engine/edit/messages.h"
 #include "engine/edit/optimise.h"
 #include "engine/edit/paste.h"
-#include "engine/edit/repair.h"
-#include "engine/edit/stages.h"
-#include "engine/edit/stretch.h"
-#include "engine/edit/working_scene.h"
+#include "engine/edit/progress.h"
+#include "engine/edit/publish.h"
+#include "engine/edit/views.h"
+#include "engine/repair/repair.h"
+#include "engine/repair/stretch.h"
 
 namespace engine::edit {
 namespace {
 
-// How the time of an edit divides, for its progress: rough, but monotone.
-constexpr double views_from = 0.02, intervals_from = 0.35, finish_from = 0.97;
+using Clock = std::chrono::steady_clock;
+using Rows = std::vector<std::uint32_t>;
+
+/// What stays the same while an edit runs, and what can be made again from that at any time.
+struct Edit {
+  const scene::GaussianCloud& input;
+  const Request& request;
+  const Observer& observer;
+  optim::PerceptualLoss& perceptual;
+  correct::Corrector* corrector;
+  ProgressMeter progress;
+  std::vector<scene::Camera> candidates = {};  ///< That views are chosen from; they have seen the scene.
+  std::optional<repair::Repair> repair = {};   ///< What the unedited scene looks like to a corrector.
+  Rows covered = {};                           ///< The rows that masks were last united with.
+
+  [[nodiscard]] const Params& params() const { return request.params; }
+  /// Step 8 takes place, and so step 7 where there is a corrector.
+  [[nodiscard]] bool optimises() const { return params().iterations > 0; }
+};
+
+/// The scene as it would be published now, for an observer that wants to see it.
+Result<void> show(const State& state, Edit& edit, int u, const char* moment,
+                  std::span<const scene::Image> pictures = {}) {
+  if (!edit.observer.moment) return {};
+  if (auto going = edit.progress.enter(Stage::renders, u); !going) return going;
+  const Published published = publish(state.scene, edit.input, edit.request.mode);
+  return edit.observer.moment(
+      {u, state.report.resolved.intervals, moment, published.overlay, state.views, pictures});
+}
+
+/// 1. Assign: P_h^i, the start of the 3D mask M. 2. Intervals: T, and the handles at their sources.
+Result<State> assign_and_divide(Edit& edit) {
+  if (auto going = edit.progress.enter(Stage::assign, 0); !going) return propagate(going);
+  auto assignment = assign(edit.input.mean, edit.request);
+  if (!assignment) return propagate(assignment);
+  State state;
+  state.scene = WorkingScene(edit.input, frame_of(edit.request), std::move(assignment->handle));
+  state.positions = handle_sources(state.scene.frame(), edit.request);
+  state.report.resolved = edit.params();
+  state.report.resolved.intervals = resolved_intervals(edit.request);
+  state.report.input_gaussians = edit.input.size();
+  for (const std::size_t count : assignment->count) state.report.handles.push_back({count, {}});
+  return state;
+}
+
+/// 5. Views: chosen by what they see of the source and of the fully deformed target.
+Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Camera> cameras) {
+  if (auto going = edit.progress.enter(Stage::views, 0); !going) return going;
+  edit.candidates = candidate_cameras(edit.input, cameras, edit.request);
+  auto& warnings = state.report.warnings;
+  for (const std::string& name : edit.params().exclude_views)
+    if (std::ranges::none_of(edit.candidates, [&](const scene::Camera& c) { return c.name == name; }))
+      warnings.push_back(no_view_to_exclude(name));
+  auto choice = choose_views(state.scene, edit.input, edit.candidates, edit.request, state.report.resolved.intervals,
+                             [&](double part) { return edit.progress.advance(part); });
+  if (!choice) return propagate(choice);
+  if (!choice->moves)
+    warnings.push_back(nothing_moves());
+  else if (choice->views.empty())
+    warnings.push_back(no_view_sees_it());
+  state.views = std::move(choice->views);
+  for (const scene::Camera& view : state.views) state.masks.emplace_back(view.width, view.height);
+  return {};
+}
+
+/// 3. Deform: from the relocated handles to p_t'(u). Nothing has moved yet.
+Result<PlannedMotion> deform(const State& state, Edit& edit, int u) {
+  if (auto going = edit.progress.enter(Stage::deform, u); !going) return propagate(going);
+  return plan_motion(state.scene, edit.request, state.positions, u, state.report.resolved.intervals);
+}
+
+/// 4. Copy and paste. Where a corrector repairs what is torn, copies are drawn out with their surface.
+Result<Rows> paste(State& state, Edit& edit, int u, const PlannedMotion& motion) {
+  if (auto going = edit.progress.enter(Stage::deform, u); !going) return propagate(going);
+  Rows copies = copy_and_paste(state.scene, motion, edit.request.mode, edit.params().rotate_sh);
+  if (edit.corrector != nullptr && edit.optimises()) repair::draw_out(state.scene);
+  if (edit.params().optimise_unmoved) copies = state.scene.dragged_rows();
+  return copies;
+}
+
+/// 6. Masks: the pixels that these rows cover join the mask of each view.
+Result<void> mask(State& state, Edit& edit, int u, const Rows& rows) {
+  if (auto going = edit.progress.enter(Stage::mask, u); !going) return going;
+  edit.covered = rows;
+  return unite_masks(state.scene, rows, state.views, state.masks,
+                     [&](double part) { return edit.progress.advance(part); });
+}
+
+/// The pixels of each view that corrections may change.
+std::vector<scene::Mask> masks_to_edit(const State& state, const Edit& edit) {
+  std::vector<scene::Mask> masks = dilated(state.masks);
+  if (!edit.params().local_mask)
+    for (scene::Mask& mask : masks) std::fill(mask.data.begin(), mask.data.end(), std::uint8_t{1});
+  return masks;
+}
+
+repair::Repair make_repair(const State& state, const Edit& edit) {
+  const working::Frame& frame = state.scene.frame();
+  const auto in_frame = [&](std::span<const scene::Camera> cameras) {
+    std::vector<scene::Camera> out;
+    for (const scene::Camera& camera : cameras)
+      out.push_back(scene::fit_within(frame.edit_from_world(camera), edit.params().max_image_side));
+    return out;
+  };
+  return {frame.edit_from_world(edit.input), in_frame(edit.candidates), in_frame(state.views), edit.request.mode,
+          edit.params().seed,                *edit.corrector};
+}
+
+/// 7. Correct: I_e of each view, and seeds where a surface goes on that nobody has seen.
+Result<repair::Corrected> correct(State& state, Edit& edit, std::span<const scene::Mask> masks,
+                                  const repair::Round& round) {
+  if (edit.corrector == nullptr) return repair::Corrected{};
+  if (auto going = edit.progress.enter(Stage::correct, round.interval); !going) return propagate(going);
+  if (!edit.repair) edit.repair.emplace(make_repair(state, edit));
+  auto corrected = edit.repair->correct(state.scene, masks, round,
+                                        [&](double part) { return edit.progress.advance(part); });
+  if (corrected) state.report.seeds += corrected->seeds;
+  return corrected;
+}
+
+/// 8. Optimise: M towards the corrected views inside the masks, towards the unedited scene outside.
+Result<double> optimise(State& state, Edit& edit, std::span<const scene::Mask> masks,
+                        const repair::Corrected& corrected, const repair::Round& round) {
+  if (auto going = edit.progress.enter(Stage::optimise, round.interval); !going) return propagate(going);
+  const int before = (round.correction - 1) * edit.params().iterations;
+  const auto advance = [&](const OptimiseProgress& at) {
+    return edit.progress.advance(double(at.iteration) / at.iterations, before + at.iteration, at.loss);
+  };
+  const auto outcome = edit::optimise(state.scene, edit.input, state.views, masks, corrected, edit.params(), round,
+                                      edit.perceptual, advance);
+  if (!outcome) return propagate(outcome);
+  return outcome->loss;
+}
+
+/// 7. and 8., as often as annealing asks.
+Result<void> correct_and_optimise(State& state, Edit& edit, int u) {
+  const std::vector<scene::Mask> masks = masks_to_edit(state, edit);
+  const int corrections = edit.params().annealing_steps;
+  for (int a = 1; a <= corrections; ++a) {
+    const repair::Round round{u, a, strength_of(edit.params(), a)};
+    const auto corrected = correct(state, edit, masks, round);
+    if (!corrected) return propagate(corrected);
+    if (a == corrections && !corrected->pictures.empty())
+      if (auto shown = show(state, edit, u, "corrected", corrected->pictures); !shown) return shown;
+    const auto loss = optimise(state, edit, masks, *corrected, round);
+    if (!loss) return propagate(loss);
+    if (a == corrections) state.report.losses.push_back(*loss);
+  }
+  return show(state, edit, u, "optimised");
+}
+
+/// 9. Relocate: each handle to where its Gaussians have gone.
+Result<void> relocate_handles(State& state, Edit& edit, int u) {
+  if (auto going = edit.progress.enter(Stage::relocate, u); !going) return going;
+  for (const std::size_t lost : relocate(state.scene, edit.request, state.positions))
+    state.report.warnings.push_back(handle_lost(lost, u));
+  for (std::size_t i = 0; i < state.positions.size(); ++i)
+    state.report.handles[i].relocated.push_back(state.scene.frame().world_from_edit(state.positions[i]));
+  return {};
+}
+
+/// Steps 3 to 9 of interval u.
+Result<void> carry_out_interval(State& state, Edit& edit, int u) {
+  if (auto shown = show(state, edit, u, "before"); !shown) return shown;
+  const auto motion = deform(state, edit, u);
+  if (!motion) return propagate(motion);
+  const Rows& before = edit.params().optimise_unmoved ? motion->rows : motion->moving;
+  if (before != edit.covered)
+    if (auto masked = mask(state, edit, u, before); !masked) return masked;
+  const auto copies = paste(state, edit, u, *motion);
+  if (!copies) return propagate(copies);
+  if (auto shown = show(state, edit, u, "deformed"); !shown) return shown;
+  if (auto masked = mask(state, edit, u, *copies); !masked) return masked;
+  if (edit.optimises() && !copies->empty())
+    if (auto repaired = correct_and_optimise(state, edit, u); !repaired) return repaired;
+  if (auto relocated = relocate_handles(state, edit, u); !relocated) return relocated;
+  state.interval = u;
+  return {};
+}
+
+Result<void> hand_out(State& state, Edit& edit, Clock::time_point begun) {
+  if (!edit.observer.interval_done) return {};
+  if (auto going = edit.progress.enter(Stage::checkpoint, state.interval); !going) return going;
+  state.report.times = edit.progress.times();
+  std::vector<DVec3> in_world;
+  for (const DVec3& position : state.positions) in_world.push_back(state.scene.frame().world_from_edit(position));
+  const double seconds = std::chrono::duration<double>(Clock::now() - begun).count();
+  std::optional<double> loss;
+  if (!state.report.losses.empty()) loss = state.report.losses.back();
+  return edit.observer.interval_done(
+      {state.interval, state.report.resolved.intervals, seconds, loss, std::move(in_world), state});
+}
+
+Result<State> next_interval(State state, Edit& edit) {
+  const auto begun = Clock::now();
+  if (auto done = carry_out_interval(state, edit, state.interval + 1); !done) return propagate(done);
+  if (auto handed = hand_out(state, edit, begun); !handed) return propagate(handed);
+  return state;
+}
+
+/// Where the edit starts: from the state that it goes on from, or from steps 1, 2 and 5.
+Result<State> begin(Edit& edit, std::span<const scene::Camera> cameras, std::optional<State> from) {
+  if (from) {
+    if (edit.corrector != nullptr) edit.candidates = candidate_cameras(edit.input, cameras, edit.request);
+    edit.progress.go_on_after(from->interval);
+    if (auto going = edit.progress.enter(Stage::assign, from->interval); !going) return propagate(going);
+    if (edit.observer.assigned) edit.observer.assigned(from->report);
+    return std::move(*from);
+  }
+  auto state = assign_and_divide(edit);
+  if (!state) return state;
+  if (edit.observer.assigned) edit.observer.assigned(state->report);
+  if (auto found = look_for_views(*state, edit, cameras); !found) return propagate(found);
+  return state;
+}
+
+Result<Outcome> finish(State state, Edit& edit) {
+  if (auto going = edit.progress.enter(Stage::finish, 0); !going) return propagate(going);
+  Published published = publish(state.scene, edit.input, edit.request.mode);
+  const scene::Overlay& overlay = published.overlay;
+  Report& report = state.report;
+  report.output_gaussians = edit.input.size() - overlay.removed.size() + overlay.added();
+  if (report.output_gaussians == 0) return tl::make_unexpected(leaves_nothing());
+  if (published.faint > 0) report.warnings.push_back(faint_left_out(published.faint));
+  std::vector<scene::Mask> masks = dilated(state.masks);
+  for (std::size_t v = 0; v < state.views.size(); ++v)
+    report.views.push_back({state.views[v].name, double(masks[v].area()) / double(masks[v].data.size())});
+  report.changeable = published.changeable;
+  report.copies = overlay.added();
+  report.removed = overlay.removed.size();
+  edit.progress.finish();
+  report.times = edit.progress.times();
+  return Outcome{std::move(published.overlay), state.interval < report.resolved.intervals, std::move(state.views),
+                 std::move(masks), std::move(report)};
+}
 
 Result<void> validate_cameras(std::span<const scene::Camera> cameras) {
   for (std::size_t i = 0; i < cameras.size(); ++i)
@@ -30,314 +265,33 @@ Result<void> validate_cameras(std::span<const scene::Camera> cameras) {
   return {};
 }
 
-/// The input rows that gave rise to the given copies, ascending, each once.
-std::vector<std::uint32_t> parents_of(const WorkingScene& working, std::span<const std::uint32_t> copies) {
-  std::vector<std::uint32_t> parents;
-  for (const std::uint32_t row : copies) parents.push_back(working.parent[row]);
-  std::sort(parents.begin(), parents.end());
-  parents.erase(std::unique(parents.begin(), parents.end()), parents.end());
-  return parents;
-}
-
-void warn_of_unknown_names(std::span<const scene::Camera> cameras, const Params& params,
-                           std::vector<std::string>& warnings) {
-  for (const std::string& name : params.exclude_views)
-    if (std::none_of(cameras.begin(), cameras.end(), [&](const scene::Camera& c) { return c.name == name; }))
-      warnings.push_back("there is no view \"" + name + "\" to exclude");
-}
-
-/// 5. Views, by the covered area of the source and of the fully deformed target, which a dry run gives. Leaves the
-/// working scene as it was.
-Result<std::vector<scene::Camera>> choose_views(const scene::GaussianCloud& scene,
-                                                std::span<const scene::Camera> cameras, const Request& request,
-                                                const deform::HandleColumn& handle, WorkingScene& working,
-                                                Stages& stages, Report& report) {
-  const auto candidates = candidate_cameras(scene, cameras, request);
-  warn_of_unknown_names(candidates, request.params, report.warnings);
-  const auto advance_from = [&](double part) {
-    return [&stages, part](double done) {
-      return stages.advance(views_from + (intervals_from - views_from) * (part + done / 2));
-    };
-  };
-  auto copies = drag_through(working, request, report.resolved.intervals, /*rotate_sh=*/false).copies;
-  const bool moves = !copies.empty();
-  if (!moves && request.params.optimise_unmoved) copies = dragged_rows(working);
-  const auto target_areas = covered_areas(working, copies, candidates, advance_from(0));
-  if (!target_areas) return propagate(target_areas);
-  const auto sources = parents_of(working, copies);
-  rewind(working, scene, handle);
-  const auto source_areas = covered_areas(working, sources, candidates, advance_from(0.5));
-  if (!source_areas) return propagate(source_areas);
-  auto chosen = choose_views(candidates, *source_areas, *target_areas, request);
-  if (!moves)
-    report.warnings.push_back(nothing_moves());
-  else if (chosen.empty())
-    report.warnings.push_back("no view sees the edited part");
-  return chosen;
-}
-
-/// Does the state belong to this request? What it says of the scene, restore() checks.
-Result<void> check_resume(const Checkpoint& from, const Request& request) {
-  const std::size_t handles = request.handles.size();
-  bool fits = from.interval >= 1 && from.interval <= resolved_intervals(request) &&
-              from.report.resolved.intervals == resolved_intervals(request) && from.positions.size() == handles &&
-              from.report.handles.size() == handles && from.masks.size() == from.views.size() &&
-              validate_cameras(from.views).has_value();
-  for (std::size_t v = 0; fits && v < from.views.size(); ++v)
-    fits = from.masks[v].width == from.views[v].width && from.masks[v].height == from.views[v].height;
-  for (const std::uint16_t handle : from.members.handle) fits = fits && handle <= handles;
-  if (!fits) return fail(ErrorCode::invalid_argument, "the checkpoint is of another edit", "checkpoint");
-  return {};
-}
-
-/// One edit while it runs.
-class Run {
- public:
-  Run(const scene::GaussianCloud& scene, const Request& request, const Observer& observer,
-      optim::PerceptualLoss& perceptual, correct::Corrector* corrector)
-      : scene_(scene), request_(request), observer_(observer), perceptual_(perceptual), corrector_(corrector) {
-    stages_.set_lengths(resolved_intervals(request), iterations_of_interval(request.params));
-  }
-
-  Result<void> start(std::span<const scene::Camera> cameras);
-  Result<void> go_on(const Checkpoint& from, std::span<const scene::Camera> cameras);
-  [[nodiscard]] int finished() const { return finished_; }
-  [[nodiscard]] int intervals() const { return report_.resolved.intervals; }
-  Result<void> next_interval();
-  Result<Outcome> finish();
-
- private:
-  using Clock = std::chrono::steady_clock;
-
-  [[nodiscard]] double fraction(int u, double part) const {
-    return intervals_from + (finish_from - intervals_from) * (u - 1 + part) / intervals();
-  }
-  /// Of an interval: what comes before the optimisation, which takes most of the time of an edit that has one.
-  [[nodiscard]] double early(double part) const { return request_.params.iterations > 0 ? 0.1 * part : part; }
-  /// A part of the a-th correction of interval u is done, its optimisation included.
-  [[nodiscard]] double in_correction(int u, int a, double part) const {
-    const double done = (a - 1 + part) / request_.params.annealing_steps;
-    return fraction(u, early(0.95) + (0.95 - early(0.95)) * done);
-  }
-  [[nodiscard]] double corrected_to(int u, int a, double part) const {
-    return in_correction(u, a, correcting() * part);
-  }
-  [[nodiscard]] double optimised_to(int u, int a, double part) const {
-    return in_correction(u, a, correcting() + (1 - correcting()) * part);
-  }
-  [[nodiscard]] double correcting() const { return corrector_ != nullptr ? 0.3 : 0; }
-  Result<void> mask(int u, std::span<const std::uint32_t> rows, double from, double to);
-  Result<void> repair(int u);
-  Result<Corrected> correct(int u, int a, std::span<const scene::Mask> dilated);
-  Result<void> optimise(int u, int a, std::span<const scene::Mask> dilated, const Corrected& corrected);
-  Result<void> show(const char* stage, int u, double part, std::span<const scene::Image> pictures = {});
-  Result<void> hand_out_checkpoint(int u, Clock::time_point start);
-
-  const scene::GaussianCloud& scene_;
-  const Request& request_;
-  const Observer& observer_;
-  optim::PerceptualLoss& perceptual_;
-  correct::Corrector* corrector_;
-  std::vector<scene::Camera> observers_;  ///< That have seen the scene, if a corrector asks.
-  Report report_;
-  Stages stages_{observer_, report_.times};
-  WorkingScene working_;
-  std::vector<scene::Camera> views_;
-  std::vector<scene::Mask> masks_;  ///< Undilated.
-  std::vector<DVec3> positions_;
-  std::optional<WorkingScene> original_;  ///< As the edit found it, for `repair_`.
-  std::optional<Repair> repair_;
-  std::vector<std::uint32_t> shown_;  ///< The rows of the last mask rendering, as long as they are as they were then.
-  int finished_ = 0;
-};
-
-Result<void> Run::start(std::span<const scene::Camera> cameras) {
-  // 1. Assign: P_h^i, and the start of the 3D mask M.
-  if (auto going = stages_.enter("assign", 0, 0); !going) return going;
-  const auto assignment = assign(scene_.mean, request_);
-  if (!assignment) return propagate(assignment);
-  working_ = begin(scene_, request_, assignment->handle);
-
-  if (corrector_ != nullptr) observers_ = candidate_cameras(scene_, cameras, request_);
-
-  // 2. Intervals.
-  report_.resolved = request_.params;
-  report_.resolved.intervals = resolved_intervals(request_);
-  report_.input_gaussians = scene_.size();
-  for (const std::size_t count : assignment->count) report_.handles.push_back({count, {}});
-
-  if (auto going = stages_.enter("views", 0, views_from); !going) return going;
-  auto views = choose_views(scene_, cameras, request_, assignment->handle, working_, stages_, report_);
-  if (!views) return propagate(views);
-  views_ = std::move(*views);
-  for (const scene::Camera& view : views_) masks_.emplace_back(view.width, view.height);
-  positions_ = handle_sources(working_, request_);
-  return {};
-}
-
-Result<void> Run::go_on(const Checkpoint& from, std::span<const scene::Camera> cameras) {
-  if (auto fits = check_resume(from, request_); !fits) return fits;
-  if (corrector_ != nullptr) observers_ = candidate_cameras(scene_, cameras, request_);
-  report_ = from.report;
-  if (auto going = stages_.enter("assign", from.interval, fraction(from.interval, 1)); !going) return going;
-  working_ = begin(scene_, request_, deform::HandleColumn(scene_.size(), 0));
-  if (auto restored = restore(from.members, working_); !restored) return restored;
-  views_ = from.views;
-  masks_ = from.masks;
-  positions_ = from.positions;
-  finished_ = from.interval;
-  return {};
-}
-
-Result<void> Run::mask(int u, std::span<const std::uint32_t> rows, double from, double to) {
-  if (auto going = stages_.enter("mask", u, fraction(u, from)); !going) return going;
-  return unite_masks(working_, rows, views_, masks_,
-                     [&](double done) { return stages_.advance(fraction(u, from + (to - from) * done)); });
-}
-
-Result<void> Run::repair(int u) {
-  std::vector<scene::Mask> dilated = masks_;
-  dilate_masks(dilated);
-  if (!request_.params.local_mask)
-    for (scene::Mask& mask : dilated) std::fill(mask.data.begin(), mask.data.end(), std::uint8_t{1});
-  for (int a = 1; a <= request_.params.annealing_steps; ++a) {
-    Corrected corrected;
-    if (corrector_ != nullptr) {
-      auto pictures = correct(u, a, dilated);
-      if (!pictures) return propagate(pictures);
-      corrected = std::move(*pictures);
-      if (a == request_.params.annealing_steps)
-        if (auto shown = show("corrected", u, early(0.95), corrected.pictures); !shown) return shown;
-    }
-    if (auto optimised = optimise(u, a, dilated, corrected); !optimised) return optimised;
-  }
-  shown_.clear();
-  return show("optimised", u, 0.95);
-}
-
-Result<Corrected> Run::correct(int u, int a, std::span<const scene::Mask> dilated) {
-  if (auto going = stages_.enter("correct", u, corrected_to(u, a, 0)); !going) return propagate(going);
-  if (!repair_) {
-    original_ = begin(scene_, request_, deform::HandleColumn(scene_.size(), 0));
-    const auto in_frame = [&](std::span<const scene::Camera> cameras) {
-      std::vector<scene::Camera> out;
-      for (const scene::Camera& camera : cameras)
-        out.push_back(scene::fit_within(in_frame_of(working_, camera), request_.params.max_image_side));
-      return out;
-    };
-    repair_.emplace(original_->cloud, in_frame(observers_), in_frame(views_), request_.params, request_.mode,
-                    *corrector_);
-  }
-  auto outcome =
-      repair_->correct(working_, dilated, u, a, [&](double done) { return stages_.advance(corrected_to(u, a, done)); });
-  if (!outcome) return propagate(outcome);
-  report_.seeds += outcome->seeds;
-  return std::move(outcome->corrected);
-}
-
-Result<void> Run::optimise(int u, int a, std::span<const scene::Mask> dilated, const Corrected& corrected) {
-  if (auto going = stages_.enter("optimise", u, optimised_to(u, a, 0)); !going) return going;
-  const int before = (a - 1) * request_.params.iterations;
-  const auto advance = [&](const OptimiseProgress& at) {
-    return stages_.advance(optimised_to(u, a, double(at.iteration) / at.iterations), before + at.iteration, at.loss);
-  };
-  const auto outcome =
-      edit::optimise(working_, scene_, views_, dilated, corrected, request_.params, u, a, perceptual_, advance);
-  if (!outcome) return propagate(outcome);
-  if (a == request_.params.annealing_steps) report_.losses.push_back(outcome->loss);
-  return {};
-}
-
-Result<void> Run::show(const char* stage, int u, double part, std::span<const scene::Image> pictures) {
-  if (!observer_.moment) return {};
-  if (auto going = stages_.enter("renders", u, fraction(u, part)); !going) return going;
-  const Published published = publish(working_, scene_, request_.mode);
-  return observer_.moment({u, intervals(), stage, published.overlay, views_, pictures});
-}
-
-Result<void> Run::hand_out_checkpoint(int u, Clock::time_point start) {
-  if (!observer_.interval_done) return {};
-  if (auto going = stages_.enter("checkpoint", u, fraction(u, 0.97)); !going) return going;
-  const Checkpoint checkpoint{u, members_of(working_), positions_, views_, masks_, report_};
-  std::vector<DVec3> in_world;
-  for (const DVec3& position : positions_) in_world.push_back(position + working_.origin);
-  const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
-  std::optional<double> loss;
-  if (!report_.losses.empty()) loss = report_.losses.back();
-  return observer_.interval_done({u, intervals(), seconds, loss, std::move(in_world), checkpoint});
-}
-
-Result<void> Run::next_interval() {
-  const int u = finished_ + 1;
-  const auto start = Clock::now();
-  if (auto shown = show("before", u, 0); !shown) return shown;
-
-  // 3. Deform from the relocated handles to p_t'(u).
-  if (auto going = stages_.enter("deform", u, fraction(u, 0)); !going) return going;
-  const Step step = plan_step(working_, request_, positions_, u, intervals());
-
-  // 6. 2D masks: the moving Gaussians before the deformation ... (unless the last picture showed exactly that)
-  const bool forced = request_.params.optimise_unmoved;
-  if (const auto& rows = forced ? step.rows : step.moving; rows != shown_)
-    if (auto masked = mask(u, rows, 0, early(0.45)); !masked) return masked;
-
-  // 4. Copy and paste.
-  if (auto going = stages_.enter("deform", u, fraction(u, early(0.45))); !going) return going;
-  shown_ = paste(working_, step.deformation, step.rows, request_.mode, request_.params.rotate_sh);
-  if (corrector_ != nullptr && request_.params.iterations > 0) draw_out(working_);
-  std::sort(shown_.begin(), shown_.end());
-  if (forced) shown_ = dragged_rows(working_);
-  if (auto shown = show("deformed", u, early(0.48)); !shown) return shown;
-
-  // 6. ... and after it.
-  if (auto masked = mask(u, shown_, early(0.5), early(0.95)); !masked) return masked;
-
-  // 7. and 8. Correct and optimise, as often as annealing asks.
-  if (request_.params.iterations > 0 && !shown_.empty())
-    if (auto repaired = repair(u); !repaired) return repaired;
-
-  // 9. Relocate.
-  if (auto going = stages_.enter("relocate", u, fraction(u, 0.95)); !going) return going;
-  for (const std::size_t lost : relocate(working_, request_, positions_))
-    report_.warnings.push_back(handle_lost(lost, u));
-  for (std::size_t i = 0; i < positions_.size(); ++i)
-    report_.handles[i].relocated.push_back(positions_[i] + working_.origin);
-  finished_ = u;
-  return hand_out_checkpoint(u, start);
-}
-
-Result<Outcome> Run::finish() {
-  if (auto going = stages_.enter("finish", finished_, finish_from); !going) return propagate(going);
-  dilate_masks(masks_);
-  Published published = publish(working_, scene_, request_.mode);
-  const scene::Overlay& overlay = published.overlay;
-  report_.output_gaussians = scene_.size() - overlay.removed.size() + overlay.added();
-  if (report_.output_gaussians == 0) return tl::make_unexpected(leaves_nothing());
-  if (published.faint > 0) report_.warnings.push_back(faint_left_out(published.faint));
-  for (std::size_t v = 0; v < views_.size(); ++v)
-    report_.views.push_back({views_[v].name, double(masks_[v].area()) / double(masks_[v].data.size())});
-  report_.changeable = published.changeable;
-  report_.copies = overlay.added();
-  report_.removed = overlay.removed.size();
-  stages_.finish();
-  return Outcome{std::move(published.overlay), finished_ < intervals(), std::move(views_), std::move(masks_),
-                 std::move(report_)};
+Workload workload_of(const Request& request, const Tools& tools, const Observer& observer) {
+  Workload work;
+  work.intervals = resolved_intervals(request);
+  work.corrections = request.params.annealing_steps;
+  work.iterations = request.params.iterations;
+  work.corrected = tools.corrector != nullptr;
+  work.shown = bool(observer.moment);
+  work.kept = bool(observer.interval_done);
+  return work;
 }
 
 }  // namespace
 
 Result<Outcome> run(const scene::GaussianCloud& scene, std::span<const scene::Camera> cameras, const Request& request,
-                    const Observer& observer, const Checkpoint* resume, optim::PerceptualLoss* perceptual,
-                    correct::Corrector* corrector) {
+                    const Tools& tools, const Observer& observer, std::optional<State> from) {
   if (const auto valid = validate(request); !valid) return propagate(valid);
   if (const auto valid = validate_cameras(cameras); !valid) return propagate(valid);
   optim::MsSsimLoss ms_ssim;
-  Run run(scene, request, observer, perceptual != nullptr ? *perceptual : ms_ssim, corrector);
-  if (const auto ready = resume ? run.go_on(*resume, cameras) : run.start(cameras); !ready) return propagate(ready);
-  const auto is_enough = [&] { return run.finished() > 0 && observer.keep && observer.keep(); };
-  while (run.finished() < run.intervals() && !is_enough())
-    if (const auto done = run.next_interval(); !done) return propagate(done);
-  return run.finish();
+  Edit edit{scene, request, observer, tools.perceptual != nullptr ? *tools.perceptual : ms_ssim, tools.corrector,
+            ProgressMeter(observer, workload_of(request, tools, observer),
+                          from ? from->report.times : std::vector<StageTime>())};
+  Result<State> state = begin(edit, cameras, std::move(from));
+  const auto is_enough = [&] { return state->interval > 0 && observer.keep && observer.keep(); };
+  while (state && state->interval < state->report.resolved.intervals && !is_enough())
+    state = next_interval(std::move(*state), edit);
+  if (!state) return propagate(state);
+  return finish(std::move(*state), edit);
 }
 
 }  // namespace engine::edit

@@ -8,7 +8,8 @@
 
 #include "engine/deform/motion.h"
 #include "engine/edit/request.h"
-#include "engine/edit/working_scene.h"
+#include "engine/working/frame.h"
+#include "engine/working/working_scene.h"
 
 namespace engine::edit {
 
@@ -19,12 +20,18 @@ namespace engine::edit {
 /// shortest arc) keep it one piece: one step carries it there. Without handles: false.
 [[nodiscard]] bool one_interval_is_exact(const Request& request);
 
-/// Where the handles are before the first interval, in the frame of the working scene.
-[[nodiscard]] std::vector<DVec3> handle_sources(const WorkingScene& working, const Request& request);
+/// The frame in which a drag is carried out: the world's own, unless the handles lie far from its origin compared with
+/// their extent. Then it is centred on them, at a point with float coordinates, so that the means near the handles
+/// carry over exactly.
+[[nodiscard]] working::Frame frame_of(const Request& request);
+
+/// Where the handles are before the first interval.
+[[nodiscard]] std::vector<DVec3> handle_sources(const working::Frame& frame, const Request& request);
 
 /// The drags of interval u = 1..T: from where the handles are now to p_t'(u), which is measured from where the user
 /// placed them. The last one ends on the targets exactly.
-[[nodiscard]] std::vector<deform::Drag> interval_drags(const WorkingScene& working, const Request& request,
+///   positions  of the handles, in `frame`, as the drags are
+[[nodiscard]] std::vector<deform::Drag> interval_drags(const working::Frame& frame, const Request& request,
                                                        std::span<const DVec3> positions, int u, int intervals);
 
 /// p_h^i += opacity-weighted mean over the Gaussians of P_h^i of (mean - mean_at_deform): the way they went in this
@@ -32,6 +39,6 @@ namespace engine::edit {
 /// follow its neighbours too; the next interval starts from where the part really is.
 /// An anchor marks a place, so it stays. A handle none of whose Gaussians is left stays too.
 ///   returns  the handles that have lost all their Gaussians
-std::vector<std::size_t> relocate(const WorkingScene& working, const Request& request, std::vector<DVec3>& positions);
+std::vector<std::size_t> relocate(const working::WorkingScene& working, const Request& request, std::vector<DVec3>& positions);
 
 }  // namespace engine::edit

@@ -4,6 +4,10 @@ namespace engine::edit {
 
 std::string nothing_moves() { return "nothing moves: every target is where its handle is"; }
 
+std::string no_view_sees_it() { return "no view sees the edited part"; }
+
+std::string no_view_to_exclude(const std::string& name) { return "there is no view \"" + name + "\" to exclude"; }
+
 std::string handle_lost(std::size_t handle, int interval) {
   return "handle " + std::to_string(handle + 1) + " has lost all its Gaussians in interval " + std::to_string(interval) +
          " and stays where it is";

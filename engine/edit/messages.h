@@ -10,6 +10,8 @@
 namespace engine::edit {
 
 [[nodiscard]] std::string nothing_moves();
+[[nodiscard]] std::string no_view_sees_it();
+[[nodiscard]] std::string no_view_to_exclude(const std::string& name);
 [[nodiscard]] std::string handle_lost(std::size_t handle, int interval);  ///< handle: from 0
 [[nodiscard]] std::string faint_left_out(std::size_t copies);
 /// unprocessable, `where` is "handles".

@@ -9,6 +9,8 @@
 namespace engine::edit {
 namespace {
 
+using working::Role;
+
 // What is trusted fully stays as it was deformed. Adam takes no notice of how small a gradient is: the little that a
 // hole nearby leaves in windows of SSIM would carry a row off at full speed, or at a hundredth of it in four intervals.
 constexpr float held_by_trust = 1.0f;
@@ -22,42 +24,49 @@ double scene_extent(std::span<const scene::Camera> cameras) {
   return 1.1 * reach;
 }
 
+/// The rows of M, as the trainer takes them.
+train::Changeable changeable_rows(const working::WorkingScene& working, std::span<const std::uint32_t> members,
+                                  const repair::Corrected& corrected) {
+  train::Changeable changeable;
+  changeable.cloud.sh_degree = working.cloud().sh_degree;
+  changeable.cloud.extra_stride = working.cloud().extra_stride;
+  scene::append_rows(changeable.cloud, working.cloud(), members);
+  for (const std::uint32_t row : members) {
+    changeable.name.push_back(working.parent()[row]);
+    if (!corrected.trust.empty()) changeable.mobility.push_back(1 - held_by_trust * corrected.trust[row]);
+  }
+  return changeable;
+}
+
 /// Writes what the trainer has made of the members back, and appends their children.
-void take_over(const train::Trainer& trainer, std::span<const std::uint32_t> members, WorkingScene& working) {
-  for (std::size_t k = 0; k < members.size(); ++k) copy_row(trainer.cloud(), k, working.cloud, members[k]);
-  std::vector<std::uint32_t> children(trainer.cloud().size() - members.size());
+void take_over(const train::Trainer& trainer, std::span<const std::uint32_t> members, working::WorkingScene& working) {
+  for (std::size_t k = 0; k < members.size(); ++k)
+    working::copy_row(trainer.cloud(), k, working.gaussians(), members[k]);
+  std::vector<std::uint32_t> children(trainer.cloud().size() - members.size()), ancestors;
   std::iota(children.begin(), children.end(), std::uint32_t(members.size()));
-  scene::append_rows(working.cloud, trainer.cloud(), children);
+  std::vector<Role> roles;
   for (const std::uint32_t child : children) {
     const std::uint32_t ancestor = members[trainer.ancestors()[child]];
-    working.handle.push_back(working.handle[ancestor]);
-    const bool is_of_seed = working.role[ancestor] == Role::seed;
-    working.role.push_back(is_of_seed ? Role::seed : working.handle[ancestor] != 0 ? Role::copy : Role::trail);
-    working.parent.push_back(working.parent[ancestor]);
-    working.mean_at_deform.push_back(working.mean_at_deform.get(ancestor));
+    const Role role = working.role()[ancestor];
+    ancestors.push_back(ancestor);
+    roles.push_back(role == Role::seed ? Role::seed : working::is_dragged(role) ? Role::copy : Role::trail);
   }
+  working.append(trainer.cloud(), children, roles, ancestors);
 }
 
 }  // namespace
 
-Result<OptimiseOutcome> optimise(WorkingScene& working, const scene::GaussianCloud& input,
+Result<OptimiseOutcome> optimise(working::WorkingScene& working, const scene::GaussianCloud& input,
                                  std::span<const scene::Camera> views, std::span<const scene::Mask> masks,
-                                 const Corrected& corrected, const Params& params, int u, int a,
+                                 const repair::Corrected& corrected, const Params& params, const repair::Round& round,
                                  optim::PerceptualLoss& perceptual,
                                  const std::function<Result<void>(const OptimiseProgress&)>& advance) {
-  const std::vector<std::uint32_t> members = member_rows(working);
-  train::Changeable changeable;
-  changeable.cloud.sh_degree = working.cloud.sh_degree;
-  changeable.cloud.extra_stride = working.cloud.extra_stride;
-  scene::append_rows(changeable.cloud, working.cloud, members);
-  for (const std::uint32_t row : members) {
-    changeable.name.push_back(working.parent[row]);
-    if (!corrected.trust.empty()) changeable.mobility.push_back(1 - held_by_trust * corrected.trust[row]);
-  }
-  const scene::GaussianCloud originals = as_begun(working, input, members);
-  train::Trainer trainer({&working.cloud, members}, std::move(changeable), scene_extent(views), {}, perceptual);
+  const std::vector<std::uint32_t> members = working.member_rows();
+  const scene::GaussianCloud originals = working.unedited(input, members);
+  train::Trainer trainer({&working.cloud(), members}, changeable_rows(working, members, corrected),
+                         scene_extent(views), {}, perceptual);
   for (std::size_t v = 0; v < views.size(); ++v) {
-    const bool added = trainer.add_view(in_frame_of(working, views[v]), masks[v], originals);
+    const bool added = trainer.add_view(working.frame().edit_from_world(views[v]), masks[v], originals);
     if (added && !corrected.pictures.empty()) {
       const std::size_t last = trainer.views() - 1;
       trainer.set_edited(last, scene::cut_out(corrected.pictures[v], trainer.view(last).frozen.region()));
@@ -68,7 +77,7 @@ Result<OptimiseOutcome> optimise(WorkingScene& working, const scene::GaussianClo
   if (trainer.views() == 0) return outcome;
 
   std::vector<double> losses(trainer.views(), 0.0);
-  trainer.begin_correction({params.seed, u, a}, params.iterations);
+  trainer.begin_correction({params.seed, round.interval, round.correction}, params.iterations);
   for (int i = 0; i < params.iterations; ++i) {
     const auto done = trainer.step();
     if (!done) return propagate(done);

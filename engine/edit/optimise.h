@@ -10,12 +10,13 @@
 
 #include "engine/core/result.h"
 #include "engine/edit/request.h"
-#include "engine/edit/working_scene.h"
 #include "engine/optim/perceptual.h"
+#include "engine/repair/repair.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/gaussian_cloud.h"
 #include "engine/scene/image.h"
 #include "engine/train/options.h"
+#include "engine/working/working_scene.h"
 
 namespace engine::edit {
 
@@ -29,29 +30,24 @@ struct OptimiseProgress {
   std::optional<double> loss = {};  ///< Of the last iteration.
 };
 
-/// What a correction asks for.
-struct Corrected {
-  std::vector<scene::Image> pictures;  ///< I_e of each view, in its size.
-  std::vector<float> trust;            ///< [rows of the working scene] 0 to 1: the more, the slower a row may change.
-};
-
 struct OptimiseOutcome {
   double loss = 0;           ///< Mean over the views of the last epoch.
   std::size_t children = 0;  ///< Rows that densification added and the guard against floaters left.
 };
 
-/// The optimisation after the a-th correction of interval u: params.iterations iterations.
+/// The optimisation after a correction: params.iterations iterations.
 /// I_o is the render of the input. Only rows of M change. Children are appended: they inherit handle, parent and
 /// mean_at_deform; those of members of P_h are copies, those of seeds seeds, others a trail.
 ///   masks      per view, dilated; views without a set pixel are left out. If none is left, nothing happens.
-///   corrected  empty (`corrector: "none"`): I_e is what a view shows now. Rounded to 8 bits.
-///   advance  called after every view that is set up and every iteration; its error ends the optimisation
-///   errors   internal: a value is not finite; `where` names it by the input's row ("gaussian[12].opacity")
+///   corrected  without pictures (`corrector: "none"`): I_e is what a view shows now. Rounded to 8 bits.
+///   round      names the random choices
+///   advance    called after every view that is set up and every iteration; its error ends the optimisation
+///   errors     internal: a value is not finite; `where` names it by the input's row ("gaussian[12].opacity")
 /// On an error the working scene is as it was.
-[[nodiscard]] Result<OptimiseOutcome> optimise(WorkingScene& working, const scene::GaussianCloud& input,
+[[nodiscard]] Result<OptimiseOutcome> optimise(working::WorkingScene& working, const scene::GaussianCloud& input,
                                                std::span<const scene::Camera> views, std::span<const scene::Mask> masks,
-                                               const Corrected& corrected, const Params& params, int u, int a,
-                                               optim::PerceptualLoss& perceptual,
+                                               const repair::Corrected& corrected, const Params& params,
+                                               const repair::Round& round, optim::PerceptualLoss& perceptual,
                                                const std::function<Result<void>(const OptimiseProgress&)>& advance);
 
 /// Of each interval: all corrections together.

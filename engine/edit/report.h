@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "engine/core/vec.h"
+#include "engine/edit/plan.h"
 #include "engine/edit/request.h"
 
 namespace engine::edit {
@@ -24,7 +25,7 @@ struct ViewReport {
 
 /// Wall time of one stage, seconds.
 struct StageTime {
-  std::string stage;
+  Stage stage = Stage::assign;
   double seconds = 0;
 };
 

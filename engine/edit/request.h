@@ -10,6 +10,7 @@
 #include "engine/core/result.h"
 #include "engine/core/vec.h"
 #include "engine/deform/motion.h"
+#include "engine/working/mode.h"
 
 namespace engine::edit {
 
@@ -19,13 +20,9 @@ enum class Annealing {
   paper,   ///< As printed: (a - 1) / A in its place, so that the final value is never reached.
 };
 
-enum class Mode {
-  move,    ///< The dragged part leaves its place.
-  extend,  ///< It is drawn out: the original and the trail stay.
-};
-
 using deform::Interpolation;
 using deform::Rotation;
+using working::Mode;
 
 constexpr std::size_t max_handles = 256;
 constexpr int max_views = 1000;

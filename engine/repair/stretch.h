@@ -3,10 +3,12 @@
 #pragma once
 
 #include <cstddef>
+#include "engine/working/working_scene.h"
 
-#include "engine/edit/working_scene.h"
 
-namespace engine::edit {
+namespace engine::repair {
+
+using working::WorkingScene;
 
 /// Draws the covariance of each copy out (or together) as the last deformation has drawn its surroundings:
 /// Sigma' = S Sigma S^T, S the linear map that fits what its nearest copies did, from mean_at_deform to mean, beyond
@@ -16,4 +18,4 @@ namespace engine::edit {
 /// Source: the covariance of a Gaussian under a linear map, as in Zwicker et al. 2001, "EWA volume splatting".
 std::size_t draw_out(WorkingScene& working);
 
-}  // namespace engine::edit
+}  // namespace engine::repair

@@ -1,4 +1,4 @@
-#include "engine/edit/stretch.h"
+#include "engine/repair/stretch.h"
 
 #include <algorithm>
 #include <array>
@@ -10,7 +10,7 @@
 #include "engine/core/parallel.h"
 #include "engine/neighbours/point_index.h"
 
-namespace engine::edit {
+namespace engine::repair {
 namespace {
 
 // So many neighbours fix the nine numbers of a linear map well, and lie on the same surface.
@@ -113,13 +113,10 @@ void stretch_row(scene::GaussianCloud& cloud, std::size_t row, const DMat3& stre
 }  // namespace
 
 std::size_t draw_out(WorkingScene& working) {
-  std::vector<std::uint32_t> copies;
+  const std::vector<std::uint32_t> copies = working.rows_of(working::Role::copy);
   std::vector<float> points;
-  for (std::uint32_t row = 0; row < working.role.size(); ++row) {
-    if (working.role[row] != Role::copy) continue;
-    copies.push_back(row);
-    for (int axis = 0; axis < 3; ++axis) points.push_back(working.mean_at_deform.get(row)[axis]);
-  }
+  for (const std::uint32_t row : copies)
+    for (int axis = 0; axis < 3; ++axis) points.push_back(working.mean_at_deform().get(row)[axis]);
   const std::size_t asked = neighbours_asked + 1;  // the nearest is the copy itself
   if (copies.size() < asked) return 0;
   const auto nearest = neighbours::PointIndex(points, 3).nearest(points, asked);
@@ -131,16 +128,16 @@ std::size_t draw_out(WorkingScene& working) {
       Surroundings around;
       for (std::size_t n = 0; n < neighbours_asked; ++n) {
         const std::uint32_t other = copies[nearest[k * asked + n + 1].index];
-        around.before[n] = DVec3(working.mean_at_deform.get(other)) - DVec3(working.mean_at_deform.get(row));
-        around.now[n] = DVec3(working.cloud.mean.get(other)) - DVec3(working.cloud.mean.get(row));
+        around.before[n] = DVec3(working.mean_at_deform().get(other)) - DVec3(working.mean_at_deform().get(row));
+        around.now[n] = DVec3(working.cloud().mean.get(other)) - DVec3(working.cloud().mean.get(row));
       }
       const DMat3 stretch = stretch_of(around);
       if (stretch == DMat3(1.0)) continue;
-      stretch_row(working.cloud, row, stretch);
+      stretch_row(working.gaussians(), row, stretch);
       changed[k] = 1;
     }
   });
   return std::size_t(std::count(changed.begin(), changed.end(), 1));
 }
 
-}  // namespace engine::edit
+}  // namespace engine::repair

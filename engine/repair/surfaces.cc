@@ -1,4 +1,4 @@
-#include "engine/edit/surfaces.h"
+#include "engine/repair/surfaces.h"
 
 #include <algorithm>
 #include <array>
@@ -9,7 +9,7 @@
 #include "engine/core/parallel.h"
 #include "engine/core/rng.h"
 
-namespace engine::edit {
+namespace engine::repair {
 namespace {
 
 constexpr std::size_t most_planes = 5;
@@ -184,4 +184,4 @@ scene::Image continued_surfaces(const SurfaceView& view, const IsFree& is_free, 
   return without_crumbs(out);
 }
 
-}  // namespace engine::edit
+}  // namespace engine::repair

@@ -1,4 +1,4 @@
-#include "engine/edit/trust.h"
+#include "engine/repair/trust.h"
 
 #include <algorithm>
 #include <cassert>
@@ -8,8 +8,10 @@
 #include "engine/render/largest_weight.h"
 #include "engine/render/project.h"
 
-namespace engine::edit {
+namespace engine::repair {
 namespace {
+
+using working::Role;
 
 // A Gaussian that was only seen through others that let through less than this was hardly trained: it may have any
 // colour. Its largest blending weight is about its opacity times the largest transmittance in front of it.
@@ -25,16 +27,16 @@ constexpr std::size_t neighbours_asked = 16;
 /// How much farther copies are from their neighbours than their parents are from each other, by the parent's row: for
 /// each parent its first copy is asked, the others are children of the optimisation. 1 where nothing is known.
 std::vector<float> stretch_by_parent(const WorkingScene& working, std::span<const std::uint32_t> copies) {
-  std::vector<float> stretch(working.input_rows, 1.0f);
-  std::vector<std::uint8_t> seen(working.input_rows, 0);
+  std::vector<float> stretch(working.input_rows(), 1.0f);
+  std::vector<std::uint8_t> seen(working.input_rows(), 0);
   std::vector<std::uint32_t> first_copies;
   std::vector<float> points;
   for (const std::uint32_t row : copies) {
-    const std::uint32_t parent = working.parent[row];
+    const std::uint32_t parent = working.parent()[row];
     if (seen[parent] != 0) continue;
     seen[parent] = 1;
     first_copies.push_back(row);
-    for (int axis = 0; axis < 3; ++axis) points.push_back(working.cloud.mean.get(parent)[axis]);
+    for (int axis = 0; axis < 3; ++axis) points.push_back(working.cloud().mean.get(parent)[axis]);
   }
   if (first_copies.size() <= neighbours_asked) return stretch;
   const std::size_t asked = neighbours_asked + 1;  // the nearest is the copy itself
@@ -43,10 +45,10 @@ std::vector<float> stretch_by_parent(const WorkingScene& working, std::span<cons
     double before = 0, now = 0;
     for (const neighbours::Neighbour& neighbour : std::span(nearest).subspan(k * asked, asked)) {
       before += std::sqrt(double(neighbour.squared_distance));
-      now += glm::distance(DVec3(working.cloud.mean.get(first_copies[k])),
-                           DVec3(working.cloud.mean.get(first_copies[neighbour.index])));
+      now += glm::distance(DVec3(working.cloud().mean.get(first_copies[k])),
+                           DVec3(working.cloud().mean.get(first_copies[neighbour.index])));
     }
-    if (before > 0) stretch[working.parent[first_copies[k]]] = float(now / before);
+    if (before > 0) stretch[working.parent()[first_copies[k]]] = float(now / before);
   }
   return stretch;
 }
@@ -65,20 +67,20 @@ std::vector<float> observed_rows(const scene::GaussianCloud& scene, std::span<co
 }
 
 std::vector<float> trust_of_rows(const WorkingScene& working, std::span<const float> observed, Mode mode) {
-  assert(observed.size() == working.input_rows);
-  std::vector<float> trust(working.role.size());
+  assert(observed.size() == working.input_rows());
+  std::vector<float> trust(working.role().size());
   std::vector<std::uint32_t> copies;
   for (std::uint32_t row = 0; row < trust.size(); ++row) {
-    trust[row] = observed[working.parent[row]];
-    if (working.role[row] == Role::original && mode == Mode::move) trust[row] = 0;
-    if (working.role[row] == Role::seed) trust[row] = 1;
-    if (working.role[row] == Role::copy) copies.push_back(row);
+    trust[row] = observed[working.parent()[row]];
+    if (working.role()[row] == Role::original && mode == Mode::move) trust[row] = 0;
+    if (working.role()[row] == Role::seed) trust[row] = 1;
+    if (working.role()[row] == Role::copy) copies.push_back(row);
   }
   const std::vector<float> stretch = stretch_by_parent(working, copies);
   for (const std::uint32_t row : copies)
     trust[row] *=
-        std::clamp((torn_stretch - stretch[working.parent[row]]) / (torn_stretch - tolerable_stretch), 0.0f, 1.0f);
+        std::clamp((torn_stretch - stretch[working.parent()[row]]) / (torn_stretch - tolerable_stretch), 0.0f, 1.0f);
   return trust;
 }
 
-}  // namespace engine::edit
+}  // namespace engine::repair

@@ -4,11 +4,15 @@
 #include <span>
 #include <vector>
 
-#include "engine/edit/working_scene.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/gaussian_cloud.h"
+#include "engine/working/mode.h"
+#include "engine/working/working_scene.h"
 
-namespace engine::edit {
+namespace engine::repair {
+
+using working::Mode;
+using working::WorkingScene;
 
 /// How well the cameras have seen each row, 0 to 1: its largest blending weight over them, in parts of the one at
 /// which a Gaussian counts as observed. Costs a forward pass per camera.
@@ -20,4 +24,4 @@ namespace engine::edit {
 ///   observed  [input rows], of observed_rows()
 [[nodiscard]] std::vector<float> trust_of_rows(const WorkingScene& working, std::span<const float> observed, Mode mode);
 
-}  // namespace engine::edit
+}  // namespace engine::repair

@@ -1,4 +1,4 @@
-#include "engine/edit/footprint.h"
+#include "engine/working/footprint.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 #include "engine/render/project.h"
 
-namespace engine::edit {
+namespace engine::working {
 namespace {
 
 // A splat ends where opacity * exp(-q / 2) < 1 / 255; for opacity 1 that is sqrt(2 ln 255) = 3.33 standard deviations.
@@ -26,10 +26,13 @@ int whole(double pixel, int limit) { return int(std::clamp(pixel, 0.0, double(li
 
 }  // namespace
 
-scene::Rect touched_rect(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
+scene::Rect touched_rect(const render::Layers& layers, std::span<const std::uint32_t> rows,
                          const scene::Camera& camera) {
   Box box;
-  for (const std::uint32_t row : rows) {
+  for (const std::uint32_t of_layers : rows) {
+    const bool is_base = of_layers < layers.base->size();
+    const scene::GaussianCloud& cloud = is_base ? *layers.base : *layers.top;
+    const std::size_t row = is_base ? of_layers : of_layers - layers.base->size();
     const DVec3 p = camera.cam_from_world(DVec3(cloud.mean.get(row)));
     // Rounding in the renderer may put a mean on the other side of the plane.
     if (p.z <= render::near_plane * (1 - 1e-4)) continue;
@@ -49,22 +52,22 @@ scene::Rect touched_rect(const scene::GaussianCloud& cloud, std::span<const std:
   return rect.empty() ? scene::Rect{} : rect;
 }
 
-scene::Image footprint(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
+scene::Image footprint(const render::Layers& layers, std::span<const std::uint32_t> rows,
                        const scene::Camera& camera, render::Workspace& workspace) {
   scene::Image picture(camera.width, camera.height, 1);
-  const scene::Rect rect = touched_rect(cloud, rows, camera);
+  const scene::Rect rect = touched_rect(layers, rows, camera);
   if (rect.empty()) return picture;
-  std::vector<float> member(cloud.size(), 0.0f);
+  std::vector<float> member(layers.size(), 0.0f);
   for (const std::uint32_t row : rows) member[row] = 1.0f;
   render::ForwardOptions options;
   options.color = false;
   options.rect = rect;
   render::Rendering rendering;
-  render::forward(cloud, camera, options, member, workspace, rendering);
+  render::forward(layers, camera, options, member, workspace, rendering);
   for (int y = 0; y < rect.height(); ++y)
     std::copy_n(rendering.weight.data.begin() + std::ptrdiff_t(y) * rect.width(), rect.width(),
                 picture.data.begin() + std::ptrdiff_t(rect.y0 + y) * picture.width + rect.x0);
   return picture;
 }
 
-}  // namespace engine::edit
+}  // namespace engine::working

@@ -3,12 +3,14 @@
 
 #include <cstddef>
 
-#include "engine/edit/working_scene.h"
 #include "engine/neighbours/point_index.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/image.h"
+#include "engine/working/working_scene.h"
 
-namespace engine::edit {
+namespace engine::repair {
+
+using working::WorkingScene;
 
 /// The point of the ray through a pixel position at 1 / inverse_depth world units along the optical axis.
 [[nodiscard]] DVec3 point_at(const scene::Camera& camera, DVec2 pixel, double inverse_depth);
@@ -22,4 +24,4 @@ namespace engine::edit {
 std::size_t add_seeds(WorkingScene& working, const scene::Camera& camera, const scene::Image& inverse_depth,
                       const scene::Image& picture, const neighbours::PointIndex& inputs);
 
-}  // namespace engine::edit
+}  // namespace engine::repair

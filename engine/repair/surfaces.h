@@ -12,7 +12,7 @@
 #include "engine/core/vec.h"
 #include "engine/scene/image.h"
 
-namespace engine::edit {
+namespace engine::repair {
 
 /// What one view shows around the vacated place.
 struct SurfaceView {
@@ -29,4 +29,4 @@ using IsFree = std::function<bool(DVec2 pixel, double inverse_depth)>;
 ///   seed  of the random choices
 [[nodiscard]] scene::Image continued_surfaces(const SurfaceView& view, const IsFree& is_free, std::uint64_t seed);
 
-}  // namespace engine::edit
+}  // namespace engine::repair

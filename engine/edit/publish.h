@@ -1,0 +1,26 @@
+// A working scene as its user gets it.
+#pragma once
+
+#include <cstddef>
+
+#include "engine/scene/gaussian_cloud.h"
+#include "engine/scene/overlay.h"
+#include "engine/working/mode.h"
+#include "engine/working/working_scene.h"
+
+namespace engine::edit {
+
+struct Published {
+  scene::Overlay overlay;      ///< Over the input: rows that changed and stay; then new ones, as they were made.
+  std::size_t changeable = 0;  ///< Rows of M among the output's.
+  std::size_t faint = 0;       ///< Copies left out because they are too faint to be seen.
+};
+
+/// What an edit has come to, of the world. Surviving input rows are the input's bytes, but for those of M that the edit
+/// changed. In a move, originals whose opacity has not risen above the one they were lowered to are left out, and so is
+/// what else of M the edit has made or changed and is too faint to be seen (opacity below 1/255). Rows the edit has not
+/// changed always stay, however faint.
+[[nodiscard]] Published publish(const working::WorkingScene& working, const scene::GaussianCloud& input,
+                                working::Mode mode);
+
+}  // namespace engine::edit

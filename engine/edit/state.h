@@ -1,0 +1,26 @@
+// Everything an edit has come to know, as a value.
+#pragma once
+
+#include <vector>
+
+#include "engine/core/vec.h"
+#include "engine/edit/report.h"
+#include "engine/scene/camera.h"
+#include "engine/scene/image.h"
+#include "engine/working/working_scene.h"
+
+namespace engine::edit {
+
+/// The state of an edit between two intervals. Each step of an interval takes it from one value to the next; written
+/// down, it is the checkpoint (checkpoint.h). Whatever else an edit keeps while it runs can be made anew from the
+/// input, the request and this.
+struct State {
+  int interval = 0;  ///< Finished, 0 to T.
+  working::WorkingScene scene;
+  std::vector<DVec3> positions;      ///< Of the handles, in the frame of `scene`.
+  std::vector<scene::Camera> views;  ///< Chosen, best first, of the world.
+  std::vector<scene::Mask> masks;    ///< Per view, in its size: what the part has covered so far, not dilated yet.
+  Report report;                     ///< So far.
+};
+
+}  // namespace engine::edit

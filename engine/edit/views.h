@@ -1,0 +1,38 @@
+// Step 5: the views an edit looks through.
+// Source: 3DGS-Drag (ICLR 2025), section 4.1 for the number of views; the choice by what they see is ours.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/edit/request.h"
+#include "engine/scene/camera.h"
+#include "engine/scene/gaussian_cloud.h"
+#include "engine/working/working_scene.h"
+
+namespace engine::edit {
+
+/// The cameras an edit may choose from: the dataset's, or a dome of virtual ones around sources and targets.
+[[nodiscard]] std::vector<scene::Camera> candidate_cameras(const scene::GaussianCloud& input,
+                                                           std::span<const scene::Camera> dataset,
+                                                           const Request& request);
+
+/// What is to be seen: the dragged part before the edit, and after the whole drag without corrections.
+struct ViewChoice {
+  std::vector<scene::Camera> views;  ///< Up to params.views, best first, scaled to the working picture size.
+  bool moves = false;                ///< Does the drag move anything?
+};
+
+/// Chooses views by the area that the part covers in them, at its source and at its target, and by their spread. The
+/// target is where a dry run of the drag takes it; nothing is left of the dry run but the choice.
+///   begun      the scene as the edit begins, its rows assigned
+///   input      the same, of the world
+///   intervals  T
+///   advance    called after each small picture with the part that is done, 0 to 1; its error ends the choice
+[[nodiscard]] Result<ViewChoice> choose_views(const working::WorkingScene& begun, const scene::GaussianCloud& input,
+                                              std::span<const scene::Camera> candidates, const Request& request,
+                                              int intervals, const std::function<Result<void>(double)>& advance);
+
+}  // namespace engine::edit

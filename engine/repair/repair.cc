@@ -1,0 +1,221 @@
+#include "engine/repair/repair.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "engine/repair/seed.h"
+#include "engine/repair/surfaces.h"
+#include "engine/repair/trust.h"
+#include "engine/repair/view_order.h"
+#include "engine/mask/mask.h"
+#include "engine/render/forward.h"
+#include "engine/train/densify.h"
+#include "engine/working/footprint.h"
+
+namespace engine::repair {
+namespace {
+
+using working::Role;
+
+// As long as half of what moved was seen, it is better kept than made up.
+constexpr float half_seen = 0.5f;
+// Share of the dragged part in a pixel from which on it is no longer background, and from which on it no longer shows
+// what is behind.
+constexpr float covering = 0.1f, trace = 0.02f;
+constexpr std::size_t most_examples = 6;  // of the buffer, for each view: its neighbours on either side
+
+/// While it lives, what a drawn-out part leaves along its way is as opaque as the part: it was only made half
+/// transparent so that the optimisation can choose, and a picture that shows it so is no picture of the scene.
+class OpaqueTrail {
+ public:
+  OpaqueTrail(WorkingScene& working, const scene::GaussianCloud& original, Mode mode) : working_(working) {
+    if (mode == Mode::move) return;
+    const auto& role = working.role();
+    std::vector<float>& logits = working.gaussians().opacity_logit;
+    lowered_ = logits;
+    const bool has_trail = std::find(role.begin(), role.end(), Role::trail) != role.end();
+    for (std::size_t row = 0; row < role.size(); ++row)
+      if (role[row] == Role::original || role[row] == Role::trail) {
+        const float before = original.opacity_logit[working.parent()[row]];
+        logits[row] = std::max(logits[row], has_trail ? train::halved_opacity(before) : before);
+      }
+  }
+  ~OpaqueTrail() { std::copy(lowered_.begin(), lowered_.end(), working_.gaussians().opacity_logit.begin()); }
+  OpaqueTrail(const OpaqueTrail&) = delete;
+  OpaqueTrail& operator=(const OpaqueTrail&) = delete;
+
+ private:
+  WorkingScene& working_;
+  std::vector<float> lowered_;  ///< Opacities as they were; seeds appended since have none.
+};
+
+/// Where the random choices of a view in a correction begin.
+std::uint64_t key_of(std::uint64_t seed, const Round& round, std::size_t v) {
+  return seed + std::uint64_t(round.interval) * 0x10001 + std::uint64_t(round.correction) * 0x101 + v * 0x1000003;
+}
+
+}  // namespace
+
+/// What a view shows now, without the rows that are hidden.
+struct Repair::ViewNow {
+  scene::Image color;          ///< [3]
+  scene::Image trust;          ///< [1]
+  scene::Image inverse_depth;  ///< [1] Of the first half of the light; 0: nothing.
+  scene::Mask reliable;        ///< Trusted and opaque.
+};
+
+Repair::Repair(scene::GaussianCloud original, std::span<const scene::Camera> observers,
+               std::vector<scene::Camera> views, Mode mode, std::uint64_t seed, correct::Corrector& corrector)
+    : original_(std::move(original)),
+      views_(std::move(views)),
+      mode_(mode),
+      seed_(seed),
+      corrector_(corrector),
+      observed_(observed_rows(original_, observers)),
+      unedited_(render_unedited(original_, views_)) {
+  for (std::size_t v = 0; v < views_.size(); ++v)
+    buffer_.push_back({std::move(unedited_.color[v]), scene::Mask(views_[v].width, views_[v].height), {}});
+  unedited_.color.clear();
+}
+
+Repair::ViewNow Repair::look(const WorkingScene& working, std::span<const std::uint32_t> hidden, std::size_t v) {
+  const scene::Camera& view = views_[v];
+  render::Layers layers(working.cloud());
+  layers.hidden = hidden;
+  render::ForwardOptions options;
+  options.depth = true;
+  render::Rendering now;
+  render::forward(layers, view, options, trust_, workspace_, now);
+  ViewNow seen{std::move(now.color), std::move(now.weight), std::move(now.median_depth),
+            scene::Mask(view.width, view.height)};
+  for (std::size_t i = 0; i < now.alpha.data.size(); ++i) {
+    float& depth = seen.inverse_depth.data[i];
+    depth = depth > 0 ? 1 / depth : 0;
+    seen.reliable.data[i] =
+        depth > 0 && seen.trust.data[i] >= correct::trusted && now.alpha.data[i] >= correct::trusted;
+  }
+  return seen;
+}
+
+Result<scene::Image> Repair::ask_corrector(scene::Image picture, const scene::Mask& mask, scene::Image trust,
+                                           std::size_t v, double strength, std::uint64_t key) {
+  const correct::Flawed flawed{std::move(picture), mask, std::move(trust), nearest_views(views_, v, most_examples)};
+  auto pictures = corrector_.correct(std::span(&flawed, 1), strength, key);
+  if (!pictures) return propagate(pictures);
+  return std::move(pictures->front());
+}
+
+scene::Image Repair::surfaces_behind(const ViewNow& now, std::size_t v, std::uint64_t key) const {
+  const scene::Camera& view = views_[v];
+  SurfaceView surface_view{now.inverse_depth, now.reliable, vacated_[v], scene::Mask(view.width, view.height)};
+  for (std::size_t i = 0; i < now.trust.data.size(); ++i)
+    surface_view.doubtful.data[i] = now.trust.data[i] < correct::trusted;
+  const auto is_free_at = [&](DVec2 pixel, double inverse_depth) {
+    return is_free(point_at(view, pixel, inverse_depth), unedited_, views_);
+  };
+  return continued_surfaces(surface_view, is_free_at, key);
+}
+
+Result<Repair::Background> Repair::complete_background(WorkingScene& working, const Rows& rows, std::size_t v,
+                                                       double strength, std::uint64_t key) {
+  const scene::Camera& view = views_[v];
+  ViewNow now = look(working, rows.dragged, v);
+  const scene::Image surface = surfaces_behind(now, v, key);
+  Background background{{}, scene::Mask(view.width, view.height), 0};
+  bool goes_on = false;
+  for (std::size_t i = 0; i < surface.data.size(); ++i) {
+    if (surface.data[i] > 0) now.trust.data[i] = 0, goes_on = true;
+    background.filled.data[i] = vacated_[v].data[i] != 0 && now.trust.data[i] < correct::trusted;
+  }
+  auto picture = ask_corrector(std::move(now.color), vacated_[v], std::move(now.trust), v, strength, key);
+  if (!picture) return propagate(picture);
+  background.picture = std::move(*picture);
+  if (goes_on) background.seeds = add_seeds(working, view, surface, background.picture, inputs());
+  trust_.resize(working.size(), 1.0f);  // what has been decided stays
+  return background;
+}
+
+Result<scene::Image> Repair::correct_view(const WorkingScene& working, const Rows& rows, const Background& background,
+                                          const scene::Mask& mask, std::size_t v, double strength, std::uint64_t key) {
+  ViewNow now = look(working, rows.gone, v);
+  if (!rows.gone.empty()) {
+    const scene::Image share = working::footprint(working.cloud(), rows.moved, views_[v], workspace_);
+    for (std::size_t i = 0; i < share.data.size(); ++i) {
+      if (background.filled.data[i] == 0) continue;
+      // Seeds blur a little what they were made from, so the picture itself counts, but for what stands before it.
+      const float behind = std::clamp(1 - share.data[i] / covering, 0.0f, 1.0f);
+      for (int c = 0; c < 3; ++c) {
+        float& shown = now.color.plane(c)[i];
+        shown += behind * (background.picture.plane(c)[i] - shown);
+      }
+      if (behind > 0) now.trust.data[i] = 1;
+    }
+  }
+  for (float& trust : now.trust.data) trust = std::min(trust / half_seen, 1.0f);
+  return ask_corrector(std::move(now.color), mask, std::move(now.trust), v, strength, key);
+}
+
+Result<Corrected> Repair::correct(WorkingScene& working, std::span<const scene::Mask> masks, const Round& round,
+                                  const std::function<Result<void>(double)>& advance) {
+  Corrected corrected;
+  corrected.pictures.resize(views_.size());
+  const Rows rows = rows_of(working);
+  note_vacated(rows, masks);
+  if (auto tuned = corrector_.fine_tune(buffer_, 0); !tuned) return propagate(tuned);
+  const std::vector<std::size_t> order = outward(views_);
+  trust_ = trust_of_rows(working, observed_, mode_);
+  const OpaqueTrail opaque(working, original_, mode_);
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const std::size_t v = order[k];
+    const std::uint64_t key = key_of(seed_, round, v);
+    Background background;
+    if (!rows.gone.empty()) {
+      auto completed = complete_background(working, rows, v, round.strength, key);
+      if (!completed) return propagate(completed);
+      background = std::move(*completed);
+      corrected.seeds += background.seeds;
+    }
+    auto picture = correct_view(working, rows, background, masks[v], v, round.strength, key + 1);
+    if (!picture) return propagate(picture);
+    corrected.pictures[v] = std::move(*picture);
+    if (auto going = advance(double(k + 1) / double(order.size())); !going) return propagate(going);
+  }
+  corrected.trust = std::move(trust_);  // seeds, trails and originals are what the optimisation is to change
+  for (std::size_t i = 0; i < working.size(); ++i)
+    if (!working::is_dragged(working.role()[i])) corrected.trust[i] = 0;
+  return corrected;
+}
+
+Repair::Rows Repair::rows_of(const WorkingScene& working) const {
+  Rows rows;
+  for (std::uint32_t i = 0; i < working.size(); ++i) {
+    const bool is_gone = working.role()[i] == Role::original && mode_ == Mode::move;
+    const bool is_moved = working.role()[i] == Role::copy;
+    if (is_gone) rows.gone.push_back(i);
+    if (is_moved) rows.moved.push_back(i);
+    if (is_gone || is_moved) rows.dragged.push_back(i);
+  }
+  return rows;
+}
+
+void Repair::note_vacated(const Rows& rows, std::span<const scene::Mask> masks) {
+  vacated_.resize(views_.size());
+  for (std::size_t v = 0; v < views_.size(); ++v) {
+    const scene::Image share = working::footprint(original_, rows.gone, views_[v], workspace_);
+    vacated_[v] = mask::dilate(mask::mask2d(share), std::max(1, views_[v].height / 128));
+    buffer_[v].excluded = mask::mask2d(share, trace);
+    buffer_[v].box = scene::bounding_box(masks[v]);
+  }
+}
+
+const neighbours::PointIndex& Repair::inputs() {
+  if (!inputs_) {
+    std::vector<float> points;
+    for (std::size_t i = 0; i < original_.size(); ++i)
+      for (int axis = 0; axis < 3; ++axis) points.push_back(original_.mean.get(i)[axis]);
+    inputs_.emplace(points, 3);
+  }
+  return *inputs_;
+}
+
+}  // namespace engine::repair

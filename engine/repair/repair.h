@@ -1,0 +1,108 @@
+// Step 7, correct, and what it needs: the walk over the views. They are corrected one after the other, outward from the
+// best one, and what the first ones decide of places that nobody has seen is put into the scene as new Gaussians
+// (step 4, seed), so that the next ones show it already.
+// Source: 3DGS-Drag (ICLR 2025), section 3.4, for the correction; the walk, trust and seeds are ours (ADR 9).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/correct/corrector.h"
+#include "engine/neighbours/point_index.h"
+#include "engine/render/forward.h"
+#include "engine/repair/unedited_views.h"
+#include "engine/scene/camera.h"
+#include "engine/scene/gaussian_cloud.h"
+#include "engine/scene/image.h"
+#include "engine/working/mode.h"
+#include "engine/working/working_scene.h"
+
+namespace engine::repair {
+
+using working::Mode;
+using working::WorkingScene;
+
+/// What the optimisation should reach.
+struct Corrected {
+  std::vector<scene::Image> pictures;  ///< I_e of each view, in its size. Empty: what a view shows now.
+  std::vector<float> trust;            ///< [rows of the working scene] 0 to 1: the more, the slower a row may change.
+  std::size_t seeds = 0;               ///< Rows that the correction appended.
+};
+
+/// Which correction it is.
+struct Round {
+  int interval = 1;     ///< u, from 1.
+  int correction = 1;   ///< a, from 1.
+  double strength = 0;  ///< S(a), 0 to 1.
+};
+
+/// Corrects the views of one edit. What it knows of the unedited scene is made once; nothing else is carried from one
+/// correction to the next, so an edit that goes on after an interval makes a new one.
+class Repair {
+ public:
+  ///   original   the scene as the edit found it, in the frame of the edit
+  ///   observers  cameras that have seen it, in that frame
+  ///   views      of the edit, in that frame, best first
+  ///   seed       of all random choices
+  ///   corrector  outlives this
+  Repair(scene::GaussianCloud original, std::span<const scene::Camera> observers, std::vector<scene::Camera> views,
+         Mode mode, std::uint64_t seed, correct::Corrector& corrector);
+
+  /// One correction of all views. Appends seeds to the working scene.
+  ///   masks    per view, dilated; views without a set pixel stay as they are
+  ///   advance  called with the part that is done after each view; its error ends the correction
+  ///   errors   those of the corrector and of `advance`
+  [[nodiscard]] Result<Corrected> correct(WorkingScene& working, std::span<const scene::Mask> masks, const Round& round,
+                                          const std::function<Result<void>(double)>& advance);
+
+ private:
+  struct ViewNow;
+  struct Rows {
+    std::vector<std::uint32_t> gone;     ///< Left their place, in a move.
+    std::vector<std::uint32_t> moved;    ///< Copies.
+    std::vector<std::uint32_t> dragged;  ///< Both, ascending.
+  };
+  /// What a view shows behind the dragged part.
+  struct Background {
+    scene::Image picture;
+    scene::Mask filled;     ///< Pixels that were made up.
+    std::size_t seeds = 0;  ///< Rows appended.
+  };
+
+  [[nodiscard]] Rows rows_of(const WorkingScene& working) const;
+  /// Notes in each view what has been left so far, and keeps it from being learned from.
+  void note_vacated(const Rows& rows, std::span<const scene::Mask> masks);
+  [[nodiscard]] ViewNow look(const WorkingScene& working, std::span<const std::uint32_t> hidden, std::size_t v);
+  /// I_e of view v: what it shows now, what was filled in as it was filled in, and the rest corrected as well.
+  [[nodiscard]] Result<scene::Image> correct_view(const WorkingScene& working, const Rows& rows,
+                                                  const Background& background, const scene::Mask& mask, std::size_t v,
+                                                  double strength, std::uint64_t key);
+  [[nodiscard]] Result<scene::Image> ask_corrector(scene::Image picture, const scene::Mask& mask, scene::Image trust,
+                                                   std::size_t v, double strength, std::uint64_t key);
+  /// Inverse depth of the surfaces that go on behind the dragged part in view v; 0 where none does.
+  [[nodiscard]] scene::Image surfaces_behind(const ViewNow& now, std::size_t v, std::uint64_t key) const;
+  /// Lays what goes on behind the dragged part into the working scene as seeds.
+  [[nodiscard]] Result<Background> complete_background(WorkingScene& working, const Rows& rows, std::size_t v,
+                                                       double strength, std::uint64_t key);
+  [[nodiscard]] const neighbours::PointIndex& inputs();
+
+  scene::GaussianCloud original_;
+  std::vector<scene::Camera> views_;
+  Mode mode_;
+  std::uint64_t seed_;
+  correct::Corrector& corrector_;
+  std::vector<float> observed_;  ///< Of observed_rows().
+  UneditedViews unedited_;
+  std::vector<correct::Example> buffer_;
+  std::vector<scene::Mask> vacated_;  ///< Per view: what the part has left.
+  render::Workspace workspace_;
+  std::vector<float> trust_;  ///< Of the rows of the working scene, in the correction at hand.
+  std::optional<neighbours::PointIndex> inputs_;
+};
+
+}  // namespace engine::repair

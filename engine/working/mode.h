@@ -1,0 +1,17 @@
+// What becomes of the place that a dragged part comes from.
+#pragma once
+
+#include <cstdint>
+
+namespace engine::working {
+
+enum class Mode : std::uint8_t {
+  move,    ///< The dragged part leaves its place.
+  extend,  ///< It is drawn out: the original and the trail stay.
+};
+
+/// Logit of the opacity an original is lowered to: 0.01 in a move (about to vanish, unless the optimisation wants it
+/// back), 0.5 in an extend. Opacity grows with its logit, so min(alpha, keep) is the smaller logit, without rounding.
+[[nodiscard]] float keep_logit(Mode mode);
+
+}  // namespace engine::working
