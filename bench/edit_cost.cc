@@ -257,9 +257,9 @@ EditCost measure_edit(Sample sample, int max_image_side) {
   cost.views = outcome->views.size();
   cost.iterations = params.intervals * params.annealing_steps * params.iterations;
   for (const edit::StageTime& time : outcome->report.times) {
-    if (time.stage == "views") cost.views_s = time.seconds;
-    if (time.stage == "mask") cost.masks_s = time.seconds;
-    if (time.stage == "optimise") cost.optimise_s = time.seconds;
+    if (time.stage == edit::Stage::views) cost.views_s = time.seconds;
+    if (time.stage == edit::Stage::mask) cost.masks_s = time.seconds;
+    if (time.stage == edit::Stage::optimise) cost.optimise_s = time.seconds;
   }
   return cost;
 }

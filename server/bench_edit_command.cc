@@ -144,15 +144,15 @@ Result<ordered_json> judge(const evaluate::Case& the_case, const edit::Request& 
     return {};
   };
   const auto outcome =
-      edit::run(the_case.before, the_case.cameras, request, observer, nullptr, nullptr, corrector.get());
+      edit::run(the_case.before, the_case.cameras, request, {.corrector = corrector.get()}, observer);
   if (!outcome) return propagate(outcome);
   peak = std::max(peak, status_bytes("VmHWM"));
   edited = scene::flatten(the_case.before, outcome->overlay);
   double seconds = 0;
   ordered_json stages = ordered_json::object();
   for (const edit::StageTime& time : outcome->report.times) {
-    if (time.stage == "renders") continue;  // for the judge alone
-    stages[time.stage] = time.seconds;
+    if (time.stage == edit::Stage::renders) continue;  // for the judge alone
+    stages[std::string(edit::name_of(time.stage))] = time.seconds;
     seconds += time.seconds;
   }
   return ordered_json{{"case", the_case.name},

@@ -124,7 +124,7 @@ Result<edit::Outcome> run_shown(const scene::GaussianCloud& input, const std::ve
   edit::Observer observer;
   observer.progress = [&](const edit::Progress& progress) { display.show(progress); };
   const auto corrector = edits::make_corrector(request.asked.request);
-  return edit::run(input, cameras, request.engine, observer, nullptr, nullptr, corrector.get());
+  return edit::run(input, cameras, request.engine, {.corrector = corrector.get()}, observer);
 }
 
 std::vector<std::string> all_warnings(const edit::Report& report, const proto::EditRequest& asked) {

@@ -60,7 +60,7 @@ std::string to_json(const EditReport& report) {
                          {"seconds", report.seconds},
                          {"stages", list_of(edit.times,
                                             [](const auto& time) {
-                                              return ordered_json{{"stage", time.stage}, {"seconds", time.seconds}};
+                                              return ordered_json{{"stage", engine::edit::name_of(time.stage)}, {"seconds", time.seconds}};
                                             })},
                          {"warnings", edit.warnings}};
   return proto::pretty(out) + "\n";

@@ -47,7 +47,7 @@ void ProgressDisplay::show(const engine::edit::Progress& progress) {
   std::string doing;
   if (progress.interval > 0)
     doing = "interval " + std::to_string(progress.interval) + " of " + std::to_string(progress.intervals) + "  ";
-  doing += progress.stage;
+  doing += engine::edit::name_of(progress.stage);
   if (progress.loss) {
     std::array<char, 64> text{};
     std::snprintf(text.data(), text.size(), ", iteration %d of %d, loss %.3g", progress.iteration, progress.iterations,

@@ -5,8 +5,8 @@
 #include <functional>
 #include <limits>
 
-#include "engine/edit/footprint.h"
-#include "engine/edit/seed.h"
+#include "engine/working/footprint.h"
+#include "engine/repair/seed.h"
 #include "engine/mask/mask.h"
 #include "engine/neighbours/point_index.h"
 #include "engine/optim/losses.h"
@@ -21,7 +21,7 @@ constexpr int rim_px_at_360 = 4;
 
 scene::Mask shown(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows, const scene::Camera& camera) {
   render::Workspace workspace;
-  return mask::mask2d(edit::footprint(cloud, rows, camera, workspace));
+  return mask::mask2d(working::footprint(cloud, rows, camera, workspace));
 }
 
 double miss(const Case& the_case, const scene::GaussianCloud& result) {
@@ -155,7 +155,7 @@ Agreement agreement(const Case& the_case, std::span<const scene::Camera> views,
       for (int x = 0; x < from.width; ++x) {
         const double z = double(depth[v].at(x, y));
         if (vacated.at(x, y) == 0 || z <= 0) continue;
-        const DVec3 there = to.cam_from_world(edit::point_at(from, DVec2(x + 0.5, y + 0.5), 1 / z));
+        const DVec3 there = to.cam_from_world(repair::point_at(from, DVec2(x + 0.5, y + 0.5), 1 / z));
         if (there.z <= 0) continue;
         const DVec2 pixel = to.pixel_from_cam(there);
         if (pixel.x < 0 || pixel.y < 0 || pixel.x >= to.width || pixel.y >= to.height) continue;

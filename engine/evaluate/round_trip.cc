@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "engine/edit/edit.h"
-#include "engine/edit/footprint.h"
+#include "engine/working/footprint.h"
 #include "engine/mask/mask.h"
 #include "engine/neighbours/point_index.h"
 #include "engine/render/forward.h"
@@ -110,12 +110,12 @@ scene::Mask shown_change(const scene::GaussianCloud& input, const scene::Overlay
   std::vector<std::uint32_t> gone = overlay.removed;
   gone.insert(gone.end(), overlay.changed.begin(), overlay.changed.end());
   std::sort(gone.begin(), gone.end());
-  scene::Mask mask = mask::mask2d(edit::footprint(input, gone, camera, workspace));
+  scene::Mask mask = mask::mask2d(working::footprint(input, gone, camera, workspace));
   const scene::GaussianCloud edited = scene::flatten(input, overlay);
   std::vector<std::uint32_t> added;
   for (std::size_t row = edited.size() - overlay.added(); row < edited.size(); ++row)
     added.push_back(std::uint32_t(row));
-  mask::unite(mask, mask::mask2d(edit::footprint(edited, added, camera, workspace)));
+  mask::unite(mask, mask::mask2d(working::footprint(edited, added, camera, workspace)));
   return mask::dilate(mask, mask::dilation_radius(camera.height));
 }
 
@@ -128,7 +128,7 @@ Result<Likeness> zero_drag(const scene::GaussianCloud& scene, std::span<const sc
     if (handle.target) handle.target = handle.source;
   still.params.intervals = 1;
   still.params.optimise_unmoved = true;
-  const auto outcome = edit::run(scene, cameras, still, {}, nullptr, nullptr, corrector);
+  const auto outcome = edit::run(scene, cameras, still, {.corrector = corrector});
   if (!outcome) return propagate(outcome);
   const scene::GaussianCloud edited = scene::flatten(scene, outcome->overlay);
   LikenessSum inside;
@@ -150,7 +150,7 @@ scene::Camera between(const scene::Camera& a, const scene::Camera& b) {
 
 Result<RoundTrip> there_and_back(const scene::GaussianCloud& scene, std::span<const scene::Camera> cameras,
                                  const edit::Request& request, correct::Corrector* corrector) {
-  const auto there = edit::run(scene, cameras, request, {}, nullptr, nullptr, corrector);
+  const auto there = edit::run(scene, cameras, request, {.corrector = corrector});
   if (!there) return propagate(there);
   edit::Request deform_only = request;
   deform_only.params.iterations = 0;
@@ -161,7 +161,7 @@ Result<RoundTrip> there_and_back(const scene::GaussianCloud& scene, std::span<co
   trip.arrived = arrived(scene, request, there->overlay);
   trip.halfway = scene::flatten(scene, there->overlay);
   const auto back =
-      edit::run(trip.halfway, cameras, reversed(request, there->report, dry->overlay), {}, nullptr, nullptr, corrector);
+      edit::run(trip.halfway, cameras, reversed(request, there->report, dry->overlay), {.corrector = corrector});
   if (!back) return propagate(back);
   trip.back = scene::flatten(trip.halfway, back->overlay);
 

@@ -12,9 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include "engine/edit/drag.h"
+#include "engine/edit/checkpoint.h"
 #include "engine/edit/edit.h"
-#include "engine/edit/handles.h"
 #include "engine/render/forward.h"
 #include "proto/edit_record.h"
 #include "server/edits/convert.h"
@@ -98,7 +97,6 @@ class Run {
   }
 
   Result<void> work() {
-    if (auto begun = begin(); !begun) return begun;
     pictures_.emplace(context_.folder(), *input_, workshop_.pictured_views);
     auto outcome = run();
     if (!outcome) return propagate(outcome);
@@ -106,25 +104,20 @@ class Run {
   }
 
   /// Tells at once what will be done.
-  Result<void> begin() {
-    keeper_.enter("assign");
-    const auto assignment = edit::assign(input_->mean, request_);
-    if (!assignment) return propagate(assignment);
+  void tell_assignment(const edit::Report& report) {
     proto::EditRecord& record = keeper_.record();
-    edit::Params params = request_.params;
-    params.intervals = edit::resolved_intervals(request_);
-    record.intervals = params.intervals;
-    record.request = resolved(asked_, params);
+    record.intervals = report.resolved.intervals;
+    record.request = resolved(asked_, report.resolved);
     record.simd = engine::render::simd_target();
     record.handles.clear();
-    for (const std::size_t count : assignment->count) record.handles.push_back({count});
+    for (const edit::HandleReport& handle : report.handles) record.handles.push_back({handle.gaussians});
     for (const std::string& warning : warnings_about(asked_)) keeper_.warn(warning);
     keeper_.publish();
-    return {};
   }
 
   Result<edit::Outcome> run() {
     edit::Observer observer;
+    observer.assigned = [this](const edit::Report& report) { tell_assignment(report); };
     observer.progress = [this](const edit::Progress& progress) { keeper_.advance(progress); };
     observer.moment = [this](const edit::Moment& moment) { return picture(moment); };
     observer.interval_done = [this](const edit::IntervalDone& done) { return finish_interval(done); };
@@ -132,26 +125,21 @@ class Run {
     observer.keep = [this] { return context_.stop_requested() && last_interval_ >= context_.finished_intervals(); };
     observer.stop = context_.cancel_token();
     const auto corrector = make_corrector(asked_);
-    if (const auto checkpoint = last_checkpoint()) {
-      last_interval_ = checkpoint->interval;
-      auto outcome =
-          edit::run(*input_, cameras_, request_, observer, &*checkpoint, workshop_.perceptual, corrector.get());
-      if (outcome || outcome.error().where != "checkpoint") return outcome;
-      begin_again(outcome.error());
-    }
-    last_interval_ = 0;
-    return edit::run(*input_, cameras_, request_, observer, nullptr, workshop_.perceptual, corrector.get());
+    auto state = last_state();
+    last_interval_ = state ? state->interval : 0;
+    return edit::run(*input_, cameras_, request_, {corrector.get(), workshop_.perceptual}, observer, std::move(state));
   }
 
-  std::optional<edit::Checkpoint> last_checkpoint() {
+  /// The state to go on from; nothing: from the start.
+  std::optional<edit::State> last_state() {
     if (context_.finished_intervals() == 0) return std::nullopt;
-    auto checkpoint = context_.load_checkpoint().and_then([](const std::string& bytes) { return edit::decode(bytes); });
-    if (checkpoint && checkpoint->interval == context_.finished_intervals()) {
-      note(spdlog::level::info, "goes on after interval " + std::to_string(checkpoint->interval));
-      return std::move(*checkpoint);
+    auto state = context_.load_checkpoint().and_then(
+        [&](const std::string& bytes) { return edit::decode(bytes, *input_, request_); });
+    if (state && state->interval == context_.finished_intervals()) {
+      note(spdlog::level::info, "goes on after interval " + std::to_string(state->interval));
+      return std::move(*state);
     }
-    begin_again(checkpoint ? engine::Error{ErrorCode::corrupt_data, "it is that of another interval", {}}
-                           : checkpoint.error());
+    begin_again(state ? engine::Error{ErrorCode::corrupt_data, "it is that of another interval", {}} : state.error());
     return std::nullopt;
   }
 
@@ -183,7 +171,7 @@ class Run {
                  .renders = pictures_->of(done.interval)});
     keeper_.publish();
     if (done.interval <= context_.finished_intervals()) return {};  // made up for
-    auto saved = context_.save_checkpoint(done.interval, edit::encode(done.checkpoint));
+    auto saved = context_.save_checkpoint(done.interval, edit::encode(done.state));
     if (!saved && saved.error().code != ErrorCode::cancelled)
       return fail(saved.error().code, "the checkpoint of interval " + std::to_string(done.interval) +
                                           " cannot be kept: " + saved.error().message);

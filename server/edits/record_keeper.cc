@@ -54,9 +54,9 @@ void RecordKeeper::advance(const engine::edit::Progress& progress) {
     if (progress.interval > 1) base_time_ = clock_(), base_fraction_ = progress.fraction;
     base_interval_ = progress.interval;
   }
-  if (progress.stage != record_.stage) {
+  if (const std::string_view stage = engine::edit::name_of(progress.stage); stage != record_.stage) {
     count_time();
-    record_.stage = progress.stage;
+    record_.stage = stage;
   } else if (!another_interval && clock_() - published_ < publish_every) {
     return;
   }

@@ -17,8 +17,8 @@ TEST(ProgressDisplay, PrintsALineEveryFewPercentWhereThereIsNoTerminal) {
   {
     ProgressDisplay display(out, ProgressDisplay::Style::lines, [&] { return now; });
     for (int i = 0; i <= 1000; ++i)
-      display.show({.interval = 1, .intervals = 2, .stage = "mask", .fraction = i / 1000.0});
-    display.show({.interval = 2, .intervals = 2, .stage = "finish", .fraction = 1});
+      display.show({.interval = 1, .intervals = 2, .stage = engine::edit::Stage::mask, .fraction = i / 1000.0});
+    display.show({.interval = 2, .intervals = 2, .stage = engine::edit::Stage::finish, .fraction = 1});
   }
   const std::string text = out.str();
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 21) << text;
@@ -31,14 +31,14 @@ TEST(ProgressDisplay, GuessesTheTimeLeft) {
   std::ostringstream out;
   Time now{};
   ProgressDisplay display(out, ProgressDisplay::Style::lines, [&] { return now; });
-  display.show({.stage = "views", .fraction = 0});
+  display.show({.stage = engine::edit::Stage::views, .fraction = 0});
   now += 10s;
-  display.show({.stage = "views", .fraction = 0.25});
+  display.show({.stage = engine::edit::Stage::views, .fraction = 0.25});
   EXPECT_NE(out.str().find("25 %  views  about 30 s left"), std::string::npos) << out.str();
   now += 290s;
-  display.show({.stage = "views", .fraction = 0.5});
+  display.show({.stage = engine::edit::Stage::views, .fraction = 0.5});
   EXPECT_NE(out.str().find("about 5 min left"), std::string::npos) << out.str();
-  display.show({.stage = "finish", .fraction = 1});
+  display.show({.stage = engine::edit::Stage::finish, .fraction = 1});
   EXPECT_EQ(out.str().find("left", out.str().find("100 %")), std::string::npos) << out.str();
 }
 
@@ -47,12 +47,12 @@ TEST(ProgressDisplay, RedrawsOneLineOnATerminalAndRemovesItAtTheEnd) {
   Time now{};
   {
     ProgressDisplay display(out, ProgressDisplay::Style::bar, [&] { return now; });
-    display.show({.stage = "views", .fraction = 0.5});
+    display.show({.stage = engine::edit::Stage::views, .fraction = 0.5});
     const std::size_t once = out.str().size();
-    display.show({.stage = "views", .fraction = 0.51});
+    display.show({.stage = engine::edit::Stage::views, .fraction = 0.51});
     EXPECT_EQ(out.str().size(), once) << "too soon to redraw";
     now += 1s;
-    display.show({.stage = "views", .fraction = 0.52});
+    display.show({.stage = engine::edit::Stage::views, .fraction = 0.52});
     EXPECT_GT(out.str().size(), once);
   }
   EXPECT_EQ(out.str().find('\n'), std::string::npos);

@@ -29,17 +29,17 @@ class RecordKeeperTest : public testing::Test {
 
 TEST_F(RecordKeeperTest, TellsEveryNewStageAndIntervalAtOnceAndTheRestTenTimesASecond) {
   auto keeper = keeper_of();
-  keeper.advance({.interval = 1, .intervals = 2, .stage = "mask", .fraction = 0.1});
+  keeper.advance({.interval = 1, .intervals = 2, .stage = engine::edit::Stage::mask, .fraction = 0.1});
   EXPECT_EQ(texts.size(), 1u);
   now += 50ms;
-  keeper.advance({.interval = 1, .intervals = 2, .stage = "mask", .fraction = 0.2});
+  keeper.advance({.interval = 1, .intervals = 2, .stage = engine::edit::Stage::mask, .fraction = 0.2});
   EXPECT_EQ(texts.size(), 1u);
   now += 60ms;
-  keeper.advance({.interval = 1, .intervals = 2, .stage = "mask", .fraction = 0.3});
+  keeper.advance({.interval = 1, .intervals = 2, .stage = engine::edit::Stage::mask, .fraction = 0.3});
   EXPECT_EQ(texts.size(), 2u);
-  keeper.advance({.interval = 1, .intervals = 2, .stage = "relocate", .fraction = 0.3});
+  keeper.advance({.interval = 1, .intervals = 2, .stage = engine::edit::Stage::relocate, .fraction = 0.3});
   EXPECT_EQ(texts.size(), 3u);
-  keeper.advance({.interval = 2, .intervals = 2, .stage = "relocate", .fraction = 0.3});
+  keeper.advance({.interval = 2, .intervals = 2, .stage = engine::edit::Stage::relocate, .fraction = 0.3});
   EXPECT_EQ(texts.size(), 4u);
   EXPECT_EQ(published().interval, 2);
   EXPECT_EQ(published().intervals, 2);
@@ -50,7 +50,7 @@ TEST_F(RecordKeeperTest, SumsTheTimeOfEachStage) {
   auto keeper = keeper_of();
   keeper.enter("load");
   now += 2s;
-  keeper.advance({.stage = "mask"});
+  keeper.advance({.stage = engine::edit::Stage::mask});
   now += 1s;
   keeper.enter("pictures");
   now += 4s;
@@ -73,32 +73,32 @@ TEST_F(RecordKeeperTest, GoesOnWithTheTimesAndTheProgressOfAnEarlierRun) {
   now += 100s;  // nobody worked on it meanwhile
   keeper.enter("load");
   EXPECT_EQ(published().eta_seconds, std::nullopt);
-  keeper.advance({.interval = 3, .stage = "mask", .fraction = 0.5});
+  keeper.advance({.interval = 3, .stage = engine::edit::Stage::mask, .fraction = 0.5});
   EXPECT_EQ(published().progress, 0.7) << "it never falls";
   now += 1s;
-  keeper.advance({.interval = 3, .stage = "mask", .fraction = 0.8});
+  keeper.advance({.interval = 3, .stage = engine::edit::Stage::mask, .fraction = 0.8});
   EXPECT_EQ(published().progress, 0.8);
   EXPECT_DOUBLE_EQ(timing("mask"), 6);
 }
 
 TEST_F(RecordKeeperTest, GuessesTheTimeLeftFromThePaceSoFar) {
   auto keeper = keeper_of();
-  keeper.advance({.interval = 0, .stage = "views", .fraction = 0});
+  keeper.advance({.interval = 0, .stage = engine::edit::Stage::views, .fraction = 0});
   now += 2s;
-  keeper.advance({.interval = 1, .stage = "mask", .fraction = 0.02});
+  keeper.advance({.interval = 1, .stage = engine::edit::Stage::mask, .fraction = 0.02});
   EXPECT_EQ(published().eta_seconds, std::nullopt) << "too early";
   now += 2s;
-  keeper.advance({.interval = 1, .stage = "mask", .fraction = 0.4});
+  keeper.advance({.interval = 1, .stage = engine::edit::Stage::mask, .fraction = 0.4});
   EXPECT_NEAR(*published().eta_seconds, 6, 0.11);
 }
 
 TEST_F(RecordKeeperTest, GuessesFromWhereAResumedRunBeganToWork) {
   auto keeper = keeper_of();
-  keeper.advance({.interval = 0, .stage = "assign", .fraction = 0});
+  keeper.advance({.interval = 0, .stage = engine::edit::Stage::assign, .fraction = 0});
   now += 1s;
-  keeper.advance({.interval = 3, .stage = "deform", .fraction = 0.6});
+  keeper.advance({.interval = 3, .stage = engine::edit::Stage::deform, .fraction = 0.6});
   now += 4s;
-  keeper.advance({.interval = 4, .stage = "deform", .fraction = 0.8});
+  keeper.advance({.interval = 4, .stage = engine::edit::Stage::deform, .fraction = 0.8});
   EXPECT_NEAR(*published().eta_seconds, 4, 0.11);
 }
 
@@ -114,7 +114,7 @@ TEST_F(RecordKeeperTest, TellsIterationAndLossAsLongAsItOptimises) {
     now += 101ms;
     keeper.advance({.interval = 1,
                     .intervals = 2,
-                    .stage = "optimise",
+                    .stage = engine::edit::Stage::optimise,
                     .fraction = 0.1 * i,
                     .iteration = i,
                     .iterations = 3,
@@ -122,14 +122,14 @@ TEST_F(RecordKeeperTest, TellsIterationAndLossAsLongAsItOptimises) {
     EXPECT_EQ(published().iteration, i);
     EXPECT_EQ(published().loss, 1.0 / i);
   }
-  keeper.advance({.interval = 1, .intervals = 2, .stage = "relocate", .fraction = 0.4, .iterations = 3});
+  keeper.advance({.interval = 1, .intervals = 2, .stage = engine::edit::Stage::relocate, .fraction = 0.4, .iterations = 3});
   EXPECT_EQ(published().iteration, 0);
   EXPECT_EQ(published().loss, std::nullopt);
 }
 
 TEST_F(RecordKeeperTest, OnlyTheEndIsOne) {
   auto keeper = keeper_of();
-  keeper.advance({.interval = 1, .stage = "finish", .fraction = 1});
+  keeper.advance({.interval = 1, .stage = engine::edit::Stage::finish, .fraction = 1});
   EXPECT_LT(published().progress, 1);
   keeper.finish();
   EXPECT_EQ(published().progress, 1);
