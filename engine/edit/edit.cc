@@ -188,7 +188,7 @@ Result<void> carry_out_interval(State& state, Edit& edit, int u) {
   const auto motion = deform(state, edit, u);
   if (!motion) return propagate(motion);
   const Rows& before = edit.params().optimise_unmoved ? motion->rows : motion->moving;
-  if (before != edit.covered)
+  if (edit.optimises() || before != edit.covered)
     if (auto masked = mask(state, edit, u, before); !masked) return masked;
   const auto copies = paste(state, edit, u, *motion);
   if (!copies) return propagate(copies);
@@ -238,7 +238,7 @@ Result<State> begin(Edit& edit, std::span<const scene::Camera> cameras, std::opt
 }
 
 Result<Outcome> finish(State state, Edit& edit) {
-  if (auto going = edit.progress.enter(Stage::finish, 0); !going) return propagate(going);
+  if (auto going = edit.progress.enter(Stage::finish, state.interval); !going) return propagate(going);
   Published published = publish(state.scene, edit.input, edit.request.mode);
   const scene::Overlay& overlay = published.overlay;
   Report& report = state.report;

@@ -39,7 +39,7 @@ struct Workload {
 /// One stage of one interval.
 struct PlannedStage {
   Stage stage = Stage::assign;
-  int interval = 0;    ///< 1 to T; 0: before the first or after the last.
+  int interval = 0;    ///< 1 to T; 0: of no interval in particular.
   double seconds = 0;  ///< It should take.
 };
 

@@ -23,7 +23,7 @@ Result<void> ProgressMeter::enter(Stage stage, int interval) {
   entered_ = true;
   const auto planned =
       std::find_if(plan_.begin() + std::ptrdiff_t(next_), plan_.end(),
-                   [&](const PlannedStage& entry) { return entry.stage == stage && entry.interval == interval; });
+                   [&](const PlannedStage& entry) { return entry.stage == stage && (entry.interval == interval || entry.interval == 0); });
   if (planned != plan_.end()) at_ = std::size_t(planned - plan_.begin()), next_ = at_ + 1;
   progress_.stage = stage;
   progress_.interval = interval;

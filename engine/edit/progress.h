@@ -24,7 +24,7 @@ class ProgressMeter {
   void go_on_after(int interval);
   /// The stage before ends here, and the next one of this kind in the plan begins. Stages of the plan that are passed
   /// over count as done: the edit found nothing to do there.
-  ///   interval  1 to T; 0: before the first or after the last
+  ///   interval  1 to T, or the last one that is finished; 0: before the first
   ///   errors    cancelled: a stop was requested
   [[nodiscard]] Result<void> enter(Stage stage, int interval);
   /// Still in the same stage, of which this part is done, 0 to 1.
