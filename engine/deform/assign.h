@@ -1,5 +1,5 @@
 // Which Gaussians a drag takes along.
-// Source: 3DGS-Drag (ICLR 2025), section 3.1, "Drag Deformation"; ties between handles are our decision.
+// Source: 3DGS-Drag (ICLR 2025), section 3.3, "Drag Deformation"; ties between handles are our decision.
 #pragma once
 
 #include <cstddef>

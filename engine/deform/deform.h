@@ -1,5 +1,5 @@
 // The motion of the handles, carried over to rows of a scene.
-// Source: 3DGS-Drag (ICLR 2025), section 3.1; turning the SH bands with the Gaussian is our addition.
+// Source: 3DGS-Drag (ICLR 2025), section 3.3, eqs. 3 and 4; turning the SH bands with the Gaussian is our addition.
 #pragma once
 
 #include <cstddef>

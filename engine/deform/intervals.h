@@ -1,5 +1,5 @@
 // The multi-step schedule of a drag.
-// Source: 3DGS-Drag (ICLR 2025), section 3.3; the choice of T is ours.
+// Source: 3DGS-Drag (ICLR 2025), section 3.5, eq. 7; the choice of T is ours.
 #pragma once
 
 #include <span>

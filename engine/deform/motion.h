@@ -1,5 +1,5 @@
 // How the handles of a drag move the Gaussians around them.
-// Source: 3DGS-Drag (ICLR 2025), section 3.1 and appendix "Additional Deformation Details". Where a formula there is
+// Source: 3DGS-Drag (ICLR 2025), section 3.3, eqs. 1 to 4, and appendix D, eqs. 8 to 10. Where a formula there is
 // undefined or does not do what it says, the decision stands at the function.
 //
 // Everything here is in double, in any one frame; callers far from the origin pass positions relative to a point

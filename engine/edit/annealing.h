@@ -1,5 +1,5 @@
 // How the strength of a correction falls within an interval.
-// Source: 3DGS-Drag (ICLR 2025), section 3.4, "Annealed Dataset Editing".
+// Source: 3DGS-Drag (ICLR 2025), section 3.4, "Annealed Dataset Editing", eq. 5.
 #pragma once
 
 #include "engine/edit/request.h"

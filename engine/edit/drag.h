@@ -1,6 +1,6 @@
 // Steps 1 and 3: which Gaussians a drag takes along, and where an interval takes them; and a whole drag without a look
 // at any picture.
-// Source: 3DGS-Drag (ICLR 2025), sections 3.1 and 3.3.
+// Source: 3DGS-Drag (ICLR 2025), sections 3.3 and 3.5.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // The handles of an edit from interval to interval: where they are, where they go, and where their Gaussians took them.
-// Source: 3DGS-Drag (ICLR 2025), section 3.3.
+// Source: 3DGS-Drag (ICLR 2025), section 3.5, eq. 7, and "Handle Point Relocation".
 #pragma once
 
 #include <cstddef>

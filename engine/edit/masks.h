@@ -1,5 +1,5 @@
 // Step 6: the 2D masks of an edit's views.
-// Source: 3DGS-Drag (ICLR 2025), section 3.1, "Local Editing Mask".
+// Source: 3DGS-Drag (ICLR 2025), section 3.3, "Local Editing Mask".
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // Step 8, optimise: the Gaussians of M are trained towards what each view should show.
-// Source: 3DGS-Drag (ICLR 2025), section 3.4.
+// Source: 3DGS-Drag (ICLR 2025), section 3.4, "Loss Function", eq. 6.
 #pragma once
 
 #include <cstddef>

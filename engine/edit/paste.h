@@ -1,5 +1,5 @@
 // Step 4, copy and paste: the deformed Gaussians are put beside the old ones.
-// Source: 3DGS-Drag (ICLR 2025), section 3.1; what becomes of the old ones in each mode is our decision.
+// Source: 3DGS-Drag (ICLR 2025), section 3.3, eqs. 3 and 4; what becomes of the old ones in each mode is our decision.
 #pragma once
 
 #include <cstdint>

@@ -2,53 +2,77 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
 #include "engine/core/checksum.h"
-#include "engine/edit/drag.h"
+#include "tests/engine/edit/drags.h"
 #include "tests/engine/edit/samples.h"
 
 namespace engine::edit {
 namespace {
 
-Checkpoint sample() {
-  const scene::GaussianCloud scene = ball_before_wall(6);
+/// The middle of an extend, with something in every field.
+struct Sample {
+  scene::GaussianCloud input;
   Request request;
-  request.mode = Mode::extend;
-  request.handles = {{DVec3(0), DVec3(0.7, 0, 0), 0.3, 0}};
-  request.params.exclude_views = {"", "a view"};
-  request.params.seed = 0x1234567890abcdef;
-  const auto assignment = assign(scene.mean, request);
-  EXPECT_TRUE(assignment);
-  WorkingScene working = begin(scene, request, assignment->handle);
-  Checkpoint checkpoint;
-  checkpoint.positions = drag_through(working, request, 2, true).positions;
-  checkpoint.interval = 2;
-  checkpoint.members = members_of(working);
-  checkpoint.views = arc_of_cameras(2, 13);
-  for (const scene::Camera& view : checkpoint.views) {
-    scene::Mask mask(view.width, view.height);
-    for (std::size_t i = 0; i < mask.data.size(); ++i) mask.data[i] = i * i % 7 == 1;
-    checkpoint.masks.push_back(mask);
+  State state;
+
+  explicit Sample(scene::GaussianCloud scene = ball_before_wall(6)) : input(std::move(scene)) {
+    request.mode = Mode::extend;
+    request.handles = {{DVec3(0), DVec3(0.7, 0, 0), 0.3, 0}};
+    request.params.exclude_views = {"", "a view"};
+    request.params.seed = 0x1234567890abcdef;
+    state.scene = begun(input, request);
+    state.positions = carry_out(state.scene, request, 2).positions;
+    state.interval = 2;
+    state.views = arc_of_cameras(2, 13);
+    for (const scene::Camera& view : state.views) {
+      scene::Mask mask(view.width, view.height);
+      for (std::size_t i = 0; i < mask.data.size(); ++i) mask.data[i] = i * i % 7 == 1;
+      state.masks.push_back(mask);
+    }
+    Report& report = state.report;
+    report.resolved = request.params;
+    report.resolved.intervals = resolved_intervals(request);
+    report.resolved.rotation = Rotation::none;
+    report.resolved.interpolation = Interpolation::rigid;
+    report.handles = {{6, {DVec3(0.1, 0.2, 0.3), DVec3(1, 2, 3)}}};
+    report.views = {{"view_0", 0.25}};
+    report.input_gaussians = input.size();
+    report.output_gaussians = 1, report.changeable = 2;
+    report.copies = 3, report.seeds = 5, report.removed = 4;
+    report.losses = {0.5, 0.25};
+    report.warnings = {"something \"odd\""};
+    report.times = {{Stage::deform, 0.5}};
   }
-  checkpoint.report.resolved = request.params;
-  checkpoint.report.resolved.rotation = Rotation::none;
-  checkpoint.report.resolved.interpolation = Interpolation::rigid;
-  checkpoint.report.handles = {{6, {DVec3(0.1, 0.2, 0.3), DVec3(1, 2, 3)}}};
-  checkpoint.report.views = {{"view_0", 0.25}};
-  checkpoint.report.input_gaussians = scene.size();
-  checkpoint.report.output_gaussians = 1, checkpoint.report.changeable = 2;
-  checkpoint.report.copies = 3, checkpoint.report.removed = 4;
-  checkpoint.report.warnings = {"something \"odd\""};
-  checkpoint.report.times = {{"deform", 0.5}};
-  return checkpoint;
+  [[nodiscard]] Result<State> read(std::string_view bytes) const { return decode(bytes, input, request); }
+};
+
+/// The bytes with the checksum that they ought to have.
+std::string checked(std::string bytes) {
+  const std::uint64_t checksum = fnv1a(std::as_bytes(std::span(bytes)).first(bytes.size() - sizeof(std::uint64_t)));
+  bytes.replace(bytes.size() - sizeof checksum, sizeof checksum, reinterpret_cast<const char*>(&checksum),
+                sizeof checksum);
+  return bytes;
 }
 
 TEST(Checkpoint, IsReadAsItWasWritten) {
-  const Checkpoint written = sample();
+  const Sample sample;
+  const State& written = sample.state;
   const std::string bytes = encode(written);
-  const auto read = decode(bytes);
+  const auto read = sample.read(bytes);
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(read->interval, 2);
-  EXPECT_EQ(read->members, written.members);
+  EXPECT_EQ(read->scene.cloud(), written.scene.cloud());
+  EXPECT_EQ(read->scene.frame(), written.scene.frame());
+  EXPECT_EQ(read->scene.input_rows(), written.scene.input_rows());
+  EXPECT_EQ(working::members_of(read->scene), working::members_of(written.scene));
   EXPECT_EQ(read->positions, written.positions);
   EXPECT_EQ(read->masks, written.masks);
   ASSERT_EQ(read->views.size(), 2u);
@@ -59,84 +83,88 @@ TEST(Checkpoint, IsReadAsItWasWritten) {
   EXPECT_EQ(read->report.resolved.seed, written.report.resolved.seed);
   EXPECT_EQ(read->report.resolved.rotation, Rotation::none);
   EXPECT_EQ(read->report.handles[0].relocated, written.report.handles[0].relocated);
+  EXPECT_EQ(read->report.losses, written.report.losses);
   EXPECT_EQ(read->report.warnings, written.report.warnings);
+  ASSERT_EQ(read->report.times.size(), 1u);
+  EXPECT_EQ(read->report.times[0].stage, Stage::deform);
   EXPECT_EQ(encode(*read), bytes) << "so nothing else was lost either";
 }
 
 TEST(Checkpoint, HoldsTheMembersAndNotTheFrozenRows) {
-  const Checkpoint checkpoint = sample();
-  EXPECT_EQ(checkpoint.members.inputs.size(), 6u);
-  EXPECT_EQ(checkpoint.members.cloud.size(), 6u * 3) << "originals, and a copy of each per interval";
-  for (const Role role : checkpoint.members.role) EXPECT_NE(role, Role::frozen);
+  const Sample sample;
+  const working::Members members = working::members_of(sample.state.scene);
+  EXPECT_EQ(members.inputs.size(), 6u);
+  EXPECT_EQ(members.cloud.size(), 6u * 3) << "originals, and a copy of each per interval";
+  for (const working::Role role : members.role) EXPECT_NE(role, working::Role::frozen);
+  scene::GaussianCloud larger = sample.input;
+  scene::append_rows(larger, larger, std::vector<std::uint32_t>(1000, std::uint32_t(larger.size() - 1)));
+  EXPECT_EQ(encode(Sample(std::move(larger)).state).size(), encode(sample.state).size()) << "a thousand more of wall";
 }
 
 TEST(Checkpoint, CutAnywhereItIsAnError) {
-  const std::string bytes = encode(sample());
+  const Sample sample;
+  const std::string bytes = encode(sample.state);
   for (std::size_t length = 0; length < bytes.size(); ++length) {
-    const auto read = decode(std::string_view(bytes).substr(0, length));
+    const auto read = sample.read(std::string_view(bytes).substr(0, length));
     ASSERT_FALSE(read) << length;
     EXPECT_EQ(read.error().code, ErrorCode::corrupt_data) << length;
     EXPECT_EQ(read.error().where, "checkpoint");
   }
-  EXPECT_FALSE(decode(bytes + '\0'));
+  EXPECT_FALSE(sample.read(bytes + '\0'));
 }
 
 TEST(Checkpoint, AnyFlippedBitIsFound) {
-  std::string bytes = encode(sample());
+  const Sample sample;
+  std::string bytes = encode(sample.state);
   for (std::size_t i = 0; i < bytes.size(); ++i) {
     const int bit = int(i % 8);
     bytes[i] = char(bytes[i] ^ 1 << bit);
-    EXPECT_FALSE(decode(bytes)) << i;
+    EXPECT_FALSE(sample.read(bytes)) << i;
     bytes[i] = char(bytes[i] ^ 1 << bit);
   }
-  EXPECT_TRUE(decode(bytes));
+  EXPECT_TRUE(sample.read(bytes));
 }
 
 TEST(Checkpoint, AnotherVersionIsNamed) {
-  std::string bytes = encode(sample());
+  const Sample sample;
+  std::string bytes = encode(sample.state);
   bytes[8] = 77;
-  const auto read = decode(bytes);
+  const auto read = sample.read(bytes);
   ASSERT_FALSE(read);
   EXPECT_EQ(read.error().code, ErrorCode::unsupported);
   EXPECT_NE(read.error().message.find("77"), std::string::npos) << read.error().message;
 }
 
 TEST(Checkpoint, LengthsThatLieAreFoundEvenUnderARightChecksum) {
-  // Whatever eight bytes of the contents say, decode() ends in an error or a checkpoint, not in a crash.
-  const std::string good = encode(sample());
+  // Whatever eight bytes of the contents say, decode() ends in an error or in a state that holds, not in a crash.
+  const Sample sample;
+  const std::string good = encode(sample.state);
   for (std::size_t i = 12; i + 16 <= good.size(); ++i)
     for (const std::uint64_t lie : {~std::uint64_t{0}, std::uint64_t{1} << 61, std::uint64_t{1} << 31}) {
       std::string bytes = good;
       bytes.replace(i, 8, reinterpret_cast<const char*>(&lie), 8);
-      const auto contents = std::as_bytes(std::span(bytes)).first(bytes.size() - 8);
-      const std::uint64_t checksum = fnv1a(contents);
-      bytes.replace(bytes.size() - 8, 8, reinterpret_cast<const char*>(&checksum), 8);
-      if (const auto read = decode(bytes); !read) {
-        EXPECT_EQ(read.error().code, ErrorCode::corrupt_data);
+      const auto read = sample.read(checked(std::move(bytes)));
+      if (read) {
+        EXPECT_TRUE(read->scene.check()) << i;
+        EXPECT_EQ(read->scene.input_rows(), sample.input.size()) << i;
+      } else {
+        // A number that may be any length is of another edit; a length that does not fit is damage.
+        EXPECT_TRUE(read.error().code == ErrorCode::corrupt_data || read.error().code == ErrorCode::invalid_argument);
+        EXPECT_EQ(read.error().where, "checkpoint") << i;
       }
     }
 }
 
-TEST(MemberRows, PutBackGiveTheWorkingSceneAgain) {
-  for (const DVec3 center : {DVec3(0), DVec3(65536, 0, -65536)})
-    for (const Mode mode : {Mode::move, Mode::extend}) {
-      const scene::GaussianCloud scene = ball_before_wall(40, Vec3(center));
-      Request request;
-      request.mode = mode;
-      request.handles = {{center, center + DVec3(0.4, 0.1, 0), 0.3, 0},
-                         {center + DVec3(0.05, 0, 0), std::nullopt, 0.1, 0}};
-      const auto assignment = assign(scene.mean, request);
-      ASSERT_TRUE(assignment);
-      WorkingScene working = begin(scene, request, assignment->handle);
-      drag_through(working, request, 3, true);
-      WorkingScene fresh = begin(scene, request, deform::HandleColumn(scene.size(), 0));
-      ASSERT_TRUE(restore(members_of(working), fresh));
-      EXPECT_EQ(fresh.cloud, working.cloud);
-      EXPECT_EQ(fresh.handle, working.handle);
-      EXPECT_EQ(fresh.role, working.role);
-      EXPECT_EQ(fresh.parent, working.parent);
-      EXPECT_EQ(fresh.mean_at_deform, working.mean_at_deform);
-    }
+TEST(Checkpoint, RowsThatMakeNoSceneAreRefusedEvenUnderARightChecksum) {
+  const Sample sample;
+  std::string bytes = encode(sample.state);
+  constexpr std::size_t first_row = 24;  // after magic, version, interval, and the number of rows
+  ASSERT_EQ(working::members_of(sample.state.scene).inputs.at(0), std::uint32_t(std::uint8_t(bytes[first_row])));
+  std::swap_ranges(bytes.begin() + first_row, bytes.begin() + first_row + 4, bytes.begin() + first_row + 4);
+  const auto read = sample.read(checked(bytes));
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().code, ErrorCode::invalid_argument);
+  EXPECT_EQ(read.error().where, "checkpoint");
 }
 
 }  // namespace

@@ -6,6 +6,8 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "engine/core/parallel.h"
 #include "engine/correct/scene_corrector.h"
@@ -19,8 +21,8 @@ namespace engine::edit {
 namespace {
 
 Outcome run_with(const BlockScene& block, correct::Corrector* corrector, const Observer& observer = {},
-                 const Checkpoint* resume = nullptr) {
-  auto outcome = run(block.cloud, block.cameras, block.request, observer, resume, nullptr, corrector);
+                 std::optional<State> from = std::nullopt) {
+  auto outcome = run(block.cloud, block.cameras, block.request, {corrector}, observer, std::move(from));
   if (!outcome) {
     ADD_FAILURE() << outcome.error().message << " at " << outcome.error().where;
     return {};
@@ -29,9 +31,9 @@ Outcome run_with(const BlockScene& block, correct::Corrector* corrector, const O
 }
 
 Outcome run_with_scene_corrector(const BlockScene& block, const Observer& observer = {},
-                                 const Checkpoint* resume = nullptr) {
+                                 std::optional<State> from = std::nullopt) {
   correct::SceneCorrector corrector;
-  return run_with(block, &corrector, observer, resume);
+  return run_with(block, &corrector, observer, std::move(from));
 }
 
 /// What the outcome shows where the floor was hidden below the block, over all views.
@@ -164,13 +166,13 @@ TEST(EditWithACorrector, WhatIsStretchedIsDrawnOutOncePerInterval) {
         std::string checkpoint;
         Observer observer;
         observer.interval_done = [&](const IntervalDone& done) {
-          if (done.interval == 1) checkpoint = encode(done.checkpoint);
+          if (done.interval == 1) checkpoint = encode(done.state);
           return Result<void>{};
         };
         Outcome outcome = run_with_scene_corrector(block, observer);
-        const auto resumed = decode(checkpoint);
+        const auto resumed = decode(checkpoint, block.cloud, block.request);
         ASSERT_TRUE(resumed) << resumed.error().message;
-        EXPECT_EQ(run_with_scene_corrector(block, {}, &*resumed).overlay, outcome.overlay) << "gone on with";
+        EXPECT_EQ(run_with_scene_corrector(block, {}, *resumed).overlay, outcome.overlay) << "gone on with";
         if (!first)
           first = std::move(outcome);
         else
@@ -203,7 +205,8 @@ TEST(EditWithACorrector, GoesOnAfterAnIntervalToTheSameBytes) {
       std::map<int, std::string> checkpoints;
       Observer observer;
       observer.interval_done = [&](const IntervalDone& done) {
-        checkpoints[done.interval] = encode(done.checkpoint);
+        EXPECT_TRUE(done.state.scene.check()) << done.interval;
+        checkpoints[done.interval] = encode(done.state);
         return Result<void>{};
       };
       const Outcome undisturbed = run_with_scene_corrector(block, observer);
@@ -212,9 +215,9 @@ TEST(EditWithACorrector, GoesOnAfterAnIntervalToTheSameBytes) {
         EXPECT_GT(undisturbed.report.seeds, 0u);
       }
       for (const auto& [interval, bytes] : checkpoints) {
-        const auto from = decode(bytes);
+        const auto from = decode(bytes, block.cloud, block.request);
         ASSERT_TRUE(from) << from.error().message;
-        const Outcome resumed = run_with_scene_corrector(block, {}, &*from);
+        const Outcome resumed = run_with_scene_corrector(block, {}, *from);
         EXPECT_EQ(resumed.overlay, undisturbed.overlay) << interval;
         EXPECT_EQ(resumed.masks, undisturbed.masks) << interval;
         EXPECT_EQ(resumed.report.seeds, undisturbed.report.seeds) << interval;
@@ -257,11 +260,35 @@ TEST(EditWithACorrector, AnErrorOfTheCorrectorEndsTheEdit) {
   const BlockScene block;
   for (const bool when_tuned : {false, true}) {
     Failing failing(when_tuned);
-    const auto outcome = run(block.cloud, block.cameras, block.request, {}, nullptr, nullptr, &failing);
+    const auto outcome = run(block.cloud, block.cameras, block.request, {&failing});
     ASSERT_FALSE(outcome);
     EXPECT_EQ(outcome.error().code, ErrorCode::unavailable);
     EXPECT_EQ(outcome.error().where, when_tuned ? "tuning" : "corrector");
   }
+}
+
+/// Leaves pictures as they are, and notes how strongly it was to correct them.
+class Noting final : public correct::Corrector {
+ public:
+  std::vector<double> strengths;  ///< Each time that it changed.
+  Result<void> fine_tune(std::span<const correct::Example>, int) override { return {}; }
+  Result<std::vector<scene::Image>> correct(std::span<const correct::Flawed> views, double strength,
+                                            std::uint64_t) override {
+    if (strengths.empty() || strengths.back() != strength) strengths.push_back(strength);
+    std::vector<scene::Image> pictures;
+    for (const correct::Flawed& flawed : views) pictures.push_back(flawed.picture);
+    return pictures;
+  }
+};
+
+TEST(EditWithACorrector, StrengthFallsFromTheFirstCorrectionOfAnIntervalToItsLast) {
+  BlockScene block;
+  Params& params = block.request.params;
+  params.intervals = 2, params.iterations = 1, params.annealing_steps = 3;
+  params.strength_initial = 0.75, params.strength_final = 0.25;
+  Noting noting;
+  run_with(block, &noting);
+  EXPECT_EQ(noting.strengths, (std::vector<double>{0.75, 0.5, 0.25, 0.75, 0.5, 0.25}));
 }
 
 TEST(EditWithACorrector, IsNotAskedWhereNothingIsOptimisedOrMoved) {
@@ -282,7 +309,7 @@ TEST(EditWithACorrector, ReportsItsProgressAndStopsWhenAsked) {
   observer.progress = [&](const Progress& progress) {
     EXPECT_GE(progress.fraction, last);
     last = progress.fraction;
-    if (progress.stage == "correct") correcting.push_back(progress.fraction);
+    if (progress.stage == Stage::correct) correcting.push_back(progress.fraction);
   };
   run_with_scene_corrector(block, observer);
   EXPECT_EQ(last, 1.0);
@@ -293,10 +320,10 @@ TEST(EditWithACorrector, ReportsItsProgressAndStopsWhenAsked) {
   observer.stop = stop.get_token();
   int steps = 0;
   observer.progress = [&](const Progress& progress) {
-    if (progress.stage == "correct" && ++steps == 2) stop.request_stop();
+    if (progress.stage == Stage::correct && ++steps == 2) stop.request_stop();
   };
   correct::SceneCorrector corrector;
-  const auto stopped = run(block.cloud, block.cameras, block.request, observer, nullptr, nullptr, &corrector);
+  const auto stopped = run(block.cloud, block.cameras, block.request, {&corrector}, observer);
   ASSERT_FALSE(stopped);
   EXPECT_EQ(stopped.error().code, ErrorCode::cancelled);
   EXPECT_EQ(steps, 2) << "at once";

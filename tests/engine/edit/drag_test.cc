@@ -5,16 +5,22 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <string>
 
 #include "engine/core/parallel.h"
 #include "engine/edit/handles.h"
-#include "engine/edit/opacity.h"
+#include "engine/edit/messages.h"
 #include "engine/edit/paste.h"
+#include "engine/edit/publish.h"
 #include "engine/render/project.h"
+#include "tests/engine/edit/drags.h"
 #include "tests/engine/edit/samples.h"
 
 namespace engine::edit {
 namespace {
+
+using working::Role;
 
 Request drag(DVec3 by, int intervals, Mode mode = Mode::move, DVec3 center = DVec3(0)) {
   Request request;
@@ -37,9 +43,9 @@ Merged merged(const WorkingScene& working, const scene::GaussianCloud& scene, Mo
   Merged out{scene::flatten(scene, published.overlay), survivors_of(scene.size(), published.overlay), 0,
              published.changeable};
   out.survivors = out.parent.size();
-  for (std::size_t i = scene.size(); i < working.role.size(); ++i)
-    if (mode == Mode::extend || render::opacity<double>(working.cloud.opacity_logit[i]) >= render::min_alpha)
-      out.parent.push_back(working.parent[i]);
+  for (std::size_t i = scene.size(); i < working.size(); ++i)
+    if (mode == Mode::extend || render::opacity<double>(working.cloud().opacity_logit[i]) >= render::min_alpha)
+      out.parent.push_back(working.parent()[i]);
   EXPECT_EQ(out.parent.size(), out.cloud.size());
   return out;
 }
@@ -52,12 +58,10 @@ struct Dragged {
 };
 
 Dragged carry_out(const scene::GaussianCloud& scene, const Request& request) {
-  const auto assignment = assign(scene.mean, request);
-  EXPECT_TRUE(assignment) << assignment.error().message;
   Dragged out;
-  for (const std::size_t n : assignment->count) out.assigned += n;
-  out.working = begin(scene, request, assignment->handle);
-  out.copies = drag_through(out.working, request, resolved_intervals(request), request.params.rotate_sh).copies;
+  out.working = begun(scene, request);
+  out.assigned = out.working.dragged_rows().size();
+  out.copies = carry_out(out.working, request, resolved_intervals(request)).copies;
   out.published = merged(out.working, scene, request.mode);
   return out;
 }
@@ -110,7 +114,7 @@ TEST(Extend, LeavesTheOriginalAndTheTrailAtHalfOpacity) {
   ASSERT_EQ(out.cloud.size(), scene.size() + 3 * 30);
   std::size_t lowered = 0;
   for (std::size_t i = 0; i < scene.size(); ++i) {
-    const bool dragged = result.working.role[i] == Role::original;
+    const bool dragged = result.working.role()[i] == Role::original;
     const float before = scene.opacity_logit[i];
     EXPECT_EQ(out.cloud.opacity_logit[i], dragged ? std::min(before, 0.0f) : before) << i;
     lowered += dragged && before > 0;
@@ -140,8 +144,8 @@ TEST(CopyAndPaste, AnOriginalFainterThanKeepKeepsItsBytes) {
   scene.opacity_logit[0] = -7.5f;
   scene.opacity_logit[2] = 2.0f;
   const Dragged result = carry_out(scene, drag(DVec3(1, 0, 0), 1));
-  EXPECT_EQ(result.working.cloud.opacity_logit[0], -7.5f);
-  EXPECT_EQ(result.working.cloud.opacity_logit[2], keep);
+  EXPECT_EQ(result.working.cloud().opacity_logit[0], -7.5f);
+  EXPECT_EQ(result.working.cloud().opacity_logit[2], keep);
 }
 
 TEST(Publish, LeavesOutFaintCopiesOfAMoveButNoRowThatDidNotMove) {
@@ -158,7 +162,7 @@ TEST(Publish, LeavesOutFaintCopiesOfAMoveButNoRowThatDidNotMove) {
 TEST(Publish, AnOriginalWhoseOpacityHasRisenStays) {
   const scene::GaussianCloud scene = ball_before_wall(3);
   Dragged result = carry_out(scene, drag(DVec3(1, 0, 0), 1));
-  result.working.cloud.opacity_logit[2] = 0.25f;  // as an optimisation might
+  result.working.gaussians().opacity_logit[2] = 0.25f;  // as an optimisation might
   const Merged out = merged(result.working, scene, Mode::move);
   ASSERT_EQ(out.cloud.size(), scene.size() + 1);
   const auto row = std::size_t(std::find(out.parent.begin(), out.parent.end(), 2u) - out.parent.begin());
@@ -175,53 +179,75 @@ TEST(CopyAndPaste, WhatDoesNotMoveIsNotCopiedAndMayMoveLater) {
   scene.mean.set(pulled, {1, 0, 0});
   Request request;
   request.handles = {{DVec3(0), std::nullopt, 0.2, 0}, {DVec3(1, 0, 0), DVec3(1, 1, 0), 0.2, 0}};
-  const auto assignment = assign(scene.mean, request);
-  ASSERT_TRUE(assignment);
-  WorkingScene working = begin(scene, request, assignment->handle);
-  std::vector<DVec3> positions = handle_sources(working, request);
-  const Step step = plan_step(working, request, positions, 1, 2);
-  EXPECT_EQ(step.rows, (std::vector<std::uint32_t>{std::uint32_t(still), std::uint32_t(pulled)}));
-  EXPECT_EQ(step.moving, (std::vector<std::uint32_t>{std::uint32_t(pulled)}));
-  const auto copies = paste(working, step.deformation, step.rows, request.mode, true);
+  WorkingScene working = begun(scene, request);
+  const std::vector<DVec3> positions = handle_sources(working.frame(), request);
+  const PlannedMotion motion = plan_motion(working, request, positions, 1, 2);
+  EXPECT_EQ(motion.rows, (std::vector<std::uint32_t>{std::uint32_t(still), std::uint32_t(pulled)}));
+  EXPECT_EQ(motion.moving, (std::vector<std::uint32_t>{std::uint32_t(pulled)}));
+  const auto copies = copy_and_paste(working, motion, request.mode, true);
+  EXPECT_TRUE(working.check());
   EXPECT_EQ(copies, (std::vector<std::uint32_t>{std::uint32_t(scene.size())}));
-  EXPECT_EQ(working.role[still], Role::held);
-  EXPECT_EQ(working.handle[still], 1);
-  EXPECT_EQ(working.handle[pulled], 0);
-  EXPECT_EQ(working.handle.back(), 2);
+  EXPECT_EQ(working.role()[still], Role::held);
+  EXPECT_EQ(working.handle()[still], 1);
+  EXPECT_EQ(working.handle()[pulled], 0);
+  EXPECT_EQ(working.handle().back(), 2);
   const Merged out = merged(working, scene, request.mode);
   EXPECT_EQ(out.survivors, scene.size() - 1);
   EXPECT_EQ(out.changeable, 2u);
 }
 
-TEST(Rewind, BringsBackTheStart) {
-  const scene::GaussianCloud scene = ball_before_wall(20);
-  for (const Mode mode : {Mode::move, Mode::extend}) {
-    const Request request = drag(DVec3(1, 0, 0), 3, mode);
-    const auto assignment = assign(scene.mean, request);
-    ASSERT_TRUE(assignment);
-    const WorkingScene fresh = begin(scene, request, assignment->handle);
-    WorkingScene working = fresh;
-    drag_through(working, request, 3, true);
-    ASSERT_NE(working.cloud, fresh.cloud);
-    rewind(working, scene, assignment->handle);
-    EXPECT_EQ(working.cloud, fresh.cloud);
-    EXPECT_EQ(working.handle, fresh.handle);
-    EXPECT_EQ(working.role, fresh.role);
-    EXPECT_EQ(working.parent, fresh.parent);
-    EXPECT_EQ(working.mean_at_deform, fresh.mean_at_deform);
-  }
+TEST(DragAlone, IsTheDragOfTheWholeSceneWithoutItsOtherRows) {
+  for (const DVec3 center : {DVec3(0), DVec3(65536, 0, -65536)})
+    for (const Mode mode : {Mode::move, Mode::extend}) {
+      const scene::GaussianCloud scene = ball_before_wall(40, Vec3(center));
+      Request request = drag(DVec3(1, 0, 0), 3, mode, center);
+      request.handles.push_back({center + DVec3(0, 1.7, 2), std::nullopt, 0.9, 1});  // holds a part of the wall
+      const WorkingScene begun = edit::begun(scene, request);
+      WorkingScene whole = begun;
+      const CarriedOut carried = carry_out(whole, request, 3);
+
+      const std::vector<std::uint32_t> rows = dragged_rows(begun.handle());
+      EXPECT_EQ(rows, begun.dragged_rows());
+      scene::GaussianCloud gaussians;
+      gaussians.sh_degree = scene.sh_degree, gaussians.extra_stride = scene.extra_stride;
+      scene::append_rows(gaussians, scene, rows);
+      const auto alone = [&] { return drag_alone(rows, gaussians, begun.handle(), request, 3, true); };
+      const DraggedAlone first = alone(), again = alone();
+      EXPECT_TRUE(first.working.check());
+      EXPECT_EQ(first.positions, carried.positions);
+      EXPECT_TRUE(first.warnings.empty());
+      ASSERT_EQ(first.working.size() - rows.size(), whole.size() - scene.size());
+      for (std::size_t k = 0; k < first.working.size(); ++k) {
+        const std::size_t row = k < rows.size() ? rows[k] : scene.size() + (k - rows.size());
+        EXPECT_TRUE(same_row(first.working.cloud(), k, whole.cloud(), row)) << k;
+        EXPECT_EQ(first.working.role()[k], whole.role()[row]) << k;
+        EXPECT_EQ(first.working.handle()[k], whole.handle()[row]) << k;
+        EXPECT_EQ(first.working.mean_at_deform().get(k), whole.mean_at_deform().get(row)) << k;
+        EXPECT_EQ(rows[first.working.parent()[k]], whole.parent()[row]) << k;
+      }
+      EXPECT_EQ(again.working.cloud(), first.working.cloud()) << "nothing is left of the first one";
+      EXPECT_EQ(working::members_of(again.working), working::members_of(first.working));
+    }
+}
+
+TEST(DragAlone, TellsWhichHandlesHaveLostTheirGaussians) {
+  const scene::GaussianCloud scene = ball_before_wall(2);
+  const Request request = drag(DVec3(1, 0, 0), 2);
+  const DraggedAlone alone = drag_alone({}, scene::select(scene, std::vector<std::uint8_t>(scene.size(), 0)),
+                                        working::HandleColumn(scene.size(), 0), request, 2, true);
+  EXPECT_EQ(alone.warnings, (std::vector<std::string>{handle_lost(0, 1), handle_lost(0, 2)}));
+  EXPECT_EQ(alone.positions, (std::vector<DVec3>{DVec3(0)}));
 }
 
 TEST(Relocate, FollowsTheOpacityWeightedMotionOfItsGaussians) {
   scene::GaussianCloud scene = ball_before_wall(2);
   const Request request = drag(DVec3(1, 0, 0), 1);
-  const auto assignment = assign(scene.mean, request);
-  ASSERT_TRUE(assignment);
-  WorkingScene working = begin(scene, request, assignment->handle);
-  working.cloud.opacity_logit[0] = 0.0f;                            // 1/2
-  working.cloud.opacity_logit[2] = float(-std::log(3.0));           // 1/4
-  working.cloud.mean.set(0, scene.mean.get(0) + Vec3(0.3f, 0, 0));  // as deformation and optimisation might
-  working.cloud.mean.set(2, scene.mean.get(2) + Vec3(0, 0.6f, 0));
+  WorkingScene working = begun(scene, request);
+  scene::GaussianCloud& gaussians = working.gaussians();
+  gaussians.opacity_logit[0] = 0.0f;                            // 1/2
+  gaussians.opacity_logit[2] = float(-std::log(3.0));           // 1/4
+  gaussians.mean.set(0, scene.mean.get(0) + Vec3(0.3f, 0, 0));  // as deformation and optimisation might
+  gaussians.mean.set(2, scene.mean.get(2) + Vec3(0, 0.6f, 0));
   std::vector<DVec3> positions{DVec3(5)};
   EXPECT_TRUE(relocate(working, request, positions).empty());
   EXPECT_LT(glm::distance(positions[0], DVec3(5.2, 5.2, 5)), 1e-6);
@@ -230,10 +256,7 @@ TEST(Relocate, FollowsTheOpacityWeightedMotionOfItsGaussians) {
 TEST(Relocate, WithoutSurvivorsTheHandleStaysAndIsReported) {
   const scene::GaussianCloud scene = ball_before_wall(2);
   const Request request = drag(DVec3(1, 0, 0), 1);
-  const auto assignment = assign(scene.mean, request);
-  ASSERT_TRUE(assignment);
-  WorkingScene working = begin(scene, request, assignment->handle);
-  std::fill(working.handle.begin(), working.handle.end(), std::uint16_t{0});
+  const WorkingScene working(scene, working::Frame(), working::HandleColumn(scene.size(), 0));
   std::vector<DVec3> positions{DVec3(5)};
   EXPECT_EQ(relocate(working, request, positions), (std::vector<std::size_t>{0}));
   EXPECT_EQ(positions[0], DVec3(5));
@@ -242,13 +265,10 @@ TEST(Relocate, WithoutSurvivorsTheHandleStaysAndIsReported) {
 TEST(Relocate, WithOneHandleItIsWhereItsTargetWas) {
   const scene::GaussianCloud scene = ball_before_wall(25);
   const Request request = drag(DVec3(0.7, -0.4, 0.2), 2);
-  const auto assignment = assign(scene.mean, request);
-  ASSERT_TRUE(assignment);
-  WorkingScene working = begin(scene, request, assignment->handle);
-  std::vector<DVec3> positions = handle_sources(working, request);
+  WorkingScene working = begun(scene, request);
+  std::vector<DVec3> positions = handle_sources(working.frame(), request);
   for (int u = 1; u <= 2; ++u) {
-    const Step step = plan_step(working, request, positions, u, 2);
-    paste(working, step.deformation, step.rows, request.mode, true);
+    copy_and_paste(working, plan_motion(working, request, positions, u, 2), request.mode, true);
     relocate(working, request, positions);
     EXPECT_LT(glm::distance(positions[0], (u / 2.0) * DVec3(0.7, -0.4, 0.2)), 1e-7) << u;
   }
@@ -273,8 +293,9 @@ TEST(LocalFrame, AFarSceneIsDraggedLikeOneAtTheOrigin) {
     const Dragged at_origin = carry_out(near, request);
     for (Handle& handle : request.handles) handle.source += away, *handle.target += away;
     const Dragged far_away = carry_out(far, request);
-    EXPECT_NE(far_away.working.origin, DVec3(0));
-    EXPECT_EQ(at_origin.working.origin, DVec3(0));
+    const DVec3 origin = far_away.working.frame().origin();
+    EXPECT_NE(origin, DVec3(0));
+    EXPECT_TRUE(at_origin.working.frame().is_world());
     ASSERT_EQ(at_origin.published.parent, far_away.published.parent);
     for (std::size_t i = 0; i < at_origin.published.cloud.size(); ++i) {
       const DVec3 here = DVec3(at_origin.published.cloud.mean.get(i)) + away;
@@ -283,13 +304,13 @@ TEST(LocalFrame, AFarSceneIsDraggedLikeOneAtTheOrigin) {
     }
     for (std::size_t k = 0; k < at_origin.copies.size(); ++k) {  // before they are stored in the world's floats
       const DVec3 here(at_origin.working.cloud.mean.get(at_origin.copies[k]));
-      const DVec3 there = DVec3(far_away.working.cloud.mean.get(far_away.copies[k])) + far_away.working.origin - away;
+      const DVec3 there = DVec3(far_away.working.cloud().mean.get(far_away.copies[k])) + origin - away;
       EXPECT_LT(glm::distance(here, there), 5e-6) << k;
     }
   }
 }
 
-TEST(DragThrough, DegenerateHandlesKeepEveryNumberFinite) {
+TEST(Drag, DegenerateHandlesKeepEveryNumberFinite) {
   const scene::GaussianCloud scene = ball_before_wall(80);
   const DVec3 on_gaussian(scene.mean.get(0));
   std::vector<std::vector<Handle>> cases{
@@ -310,7 +331,7 @@ TEST(DragThrough, DegenerateHandlesKeepEveryNumberFinite) {
       }
 }
 
-TEST(DragThrough, GivesTheSameBytesForAnyNumberOfThreads) {
+TEST(Drag, GivesTheSameBytesForAnyNumberOfThreads) {
   const scene::GaussianCloud scene = ball_before_wall(3000, Vec3(0), 3);
   Request request = drag(DVec3(0.5, 0.2, 0.1), 3, Mode::extend);
   request.handles.push_back({DVec3(0.1, 0, 0), DVec3(0.3, 0.6, 0), 0.3, 0});

@@ -7,6 +7,8 @@
 
 #include "engine/core/parallel.h"
 #include "engine/edit/handles.h"
+#include "engine/edit/views.h"
+#include "tests/engine/edit/drags.h"
 #include "tests/engine/edit/samples.h"
 
 namespace engine::edit {
@@ -22,7 +24,7 @@ Request drag_right(int intervals = 2) {
 
 Outcome run_well(const scene::GaussianCloud& scene, std::span<const scene::Camera> cameras, const Request& request,
                  const Observer& observer = {}) {
-  auto outcome = run(scene, cameras, request, observer);
+  auto outcome = run(scene, cameras, request, {}, observer);
   if (!outcome) {
     ADD_FAILURE() << outcome.error().message << " at " << outcome.error().where;
     return {};
@@ -134,6 +136,34 @@ TEST(Edit, LeavesOutExcludedViewsAndSaysWhenThereIsNoSuchView) {
   EXPECT_EQ(outcome.report.warnings, (std::vector<std::string>{"there is no view \"view_9\" to exclude"}));
 }
 
+TEST(ChooseViews, LeavesTheSceneAsItWasAndChoosesTheSameAgain) {
+  const scene::GaussianCloud scene = ball_before_wall(60);
+  for (const Mode mode : {Mode::move, Mode::extend}) {
+    Request request = drag_right(3);
+    request.mode = mode;
+    request.params.views = 3;
+    const WorkingScene working = begun(scene, request);
+    const working::Members before = working::members_of(working);
+    std::vector<double> told;
+    const auto choose = [&] {
+      return choose_views(working, scene, arc_of_cameras(5, 64), request, 3, [&](double part) {
+        told.push_back(part);
+        return Result<void>{};
+      });
+    };
+    const auto first = choose(), again = choose();
+    ASSERT_TRUE(first && again);
+    EXPECT_TRUE(first->moves);
+    ASSERT_EQ(first->views.size(), 3u);
+    for (std::size_t v = 0; v < 3; ++v) EXPECT_EQ(first->views[v].name, again->views[v].name);
+    EXPECT_EQ(working::members_of(working), before);
+    EXPECT_EQ(working.cloud(), scene);
+    ASSERT_EQ(told.size(), 20u) << "two pictures per camera, twice";
+    EXPECT_TRUE(std::is_sorted(told.begin(), told.begin() + 10));
+    EXPECT_EQ(told[9], 1.0);
+  }
+}
+
 TEST(Edit, SaysWhenNoViewSeesIt) {
   const scene::GaussianCloud scene = ball_before_wall(60);
   auto cameras = arc_of_cameras(1, 32);
@@ -203,7 +233,7 @@ TEST(Edit, ReportsProgressThatNeverFallsAndEveryInterval) {
   observer.interval_done = [&](const IntervalDone& done) {
     EXPECT_EQ(done.interval, int(sizes.size()) + 1);
     EXPECT_EQ(done.intervals, 3);
-    sizes.push_back(done.checkpoint.members.cloud.size());
+    sizes.push_back(working::members_of(done.state.scene).cloud.size());
     EXPECT_EQ(done.positions.size(), 1u);
     EXPECT_LT(glm::distance(done.positions[0], DVec3(0.7 * done.interval / 3, 0, 0)), 1e-6);
     EXPECT_GT(done.seconds, 0);
@@ -220,29 +250,31 @@ TEST(Edit, ReportsProgressThatNeverFallsAndEveryInterval) {
     EXPECT_GE(seen[i].fraction, seen[i - 1].fraction);
     EXPECT_GE(seen[i].interval, seen[i - 1].interval);
   }
-  EXPECT_EQ(seen.front().stage, "assign");
+  EXPECT_EQ(seen.front().stage, Stage::assign);
   EXPECT_EQ(seen.back().fraction, 1.0);
-  for (const char* stage : {"assign", "views", "deform", "mask", "relocate", "checkpoint", "finish"})
+  for (const Stage stage : {Stage::assign, Stage::views, Stage::deform, Stage::mask, Stage::relocate,
+                            Stage::checkpoint, Stage::finish})
     EXPECT_EQ(std::count_if(outcome.report.times.begin(), outcome.report.times.end(),
                             [&](const StageTime& time) { return time.stage == stage && time.seconds >= 0; }),
               1)
-        << stage;
+        << name_of(stage);
 }
 
 TEST(Edit, StopsWhenAsked) {
   const scene::GaussianCloud scene = ball_before_wall(30);
-  for (const char* stage : {"assign", "views", "deform", "mask", "relocate", "finish"}) {
+  for (const Stage stage :
+       {Stage::assign, Stage::views, Stage::deform, Stage::mask, Stage::relocate, Stage::finish}) {
     std::stop_source source;
     Observer observer;
     observer.stop = source.get_token();
     observer.progress = [&](const Progress& progress) {
       if (progress.stage == stage) source.request_stop();
     };
-    const auto outcome = run(scene, arc_of_cameras(1, 32), drag_right(2), observer);
-    if (std::string(stage) == "finish") {
+    const auto outcome = run(scene, arc_of_cameras(1, 32), drag_right(2), {}, observer);
+    if (stage == Stage::finish) {
       EXPECT_TRUE(outcome);  // nothing is left to stop
     } else {
-      ASSERT_FALSE(outcome) << stage;
+      ASSERT_FALSE(outcome) << name_of(stage);
       EXPECT_EQ(outcome.error().code, ErrorCode::cancelled);
     }
   }

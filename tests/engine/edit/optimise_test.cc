@@ -39,7 +39,8 @@ struct Case {
 Observer collecting(std::map<int, std::string>& checkpoints) {
   Observer observer;
   observer.interval_done = [&](const IntervalDone& done) {
-    checkpoints[done.interval] = encode(done.checkpoint);
+    EXPECT_TRUE(done.state.scene.check()) << done.interval;
+    checkpoints[done.interval] = encode(done.state);
     return Result<void>{};
   };
   return observer;
@@ -105,7 +106,7 @@ TEST(Optimise, ReportsTheLossOfEveryIterationAndInterval) {
     last = progress.fraction;
     EXPECT_EQ(progress.iterations, 24) << "two corrections of twelve";
     if (!progress.loss) return;  // the views of a correction are being set up
-    EXPECT_EQ(progress.stage, "optimise");
+    EXPECT_EQ(progress.stage, Stage::optimise);
     losses[progress.interval].push_back(*progress.loss);
     EXPECT_EQ(progress.iteration, int(losses[progress.interval].size()));
   };
@@ -118,7 +119,7 @@ TEST(Optimise, ReportsTheLossOfEveryIterationAndInterval) {
     of_intervals.push_back(done.loss.value());
     return Result<void>{};
   };
-  const auto outcome = run(c.scene, c.cameras, c.request, observer);
+  const auto outcome = run(c.scene, c.cameras, c.request, {}, observer);
   ASSERT_TRUE(outcome);
   ASSERT_EQ(losses.size(), 2u);
   for (const auto& [interval, of_iterations] : losses) {
@@ -139,7 +140,7 @@ TEST(Optimise, WithoutIterationsThereIsNoLoss) {
     EXPECT_FALSE(done.loss);
     return Result<void>{};
   };
-  EXPECT_TRUE(run(c.scene, c.cameras, c.request, observer)->report.losses.empty());
+  EXPECT_TRUE(run(c.scene, c.cameras, c.request, {}, observer)->report.losses.empty());
 }
 
 TEST(Optimise, GivesTheSameBytesForAnyNumberOfThreads) {
@@ -170,13 +171,13 @@ TEST(Optimise, GoesOnAfterAnIntervalToTheSameBytes) {
     for (const DVec3 center : {DVec3(0), far_away}) {
       const Case c(mode, center);
       std::map<int, std::string> checkpoints;
-      const auto undisturbed = run(c.scene, c.cameras, c.request, collecting(checkpoints));
+      const auto undisturbed = run(c.scene, c.cameras, c.request, {}, collecting(checkpoints));
       ASSERT_TRUE(undisturbed);
       for (const auto& [interval, bytes] : checkpoints) {
-        const auto from = decode(bytes);
+        const auto from = decode(bytes, c.scene, c.request);
         ASSERT_TRUE(from) << from.error().message;
         EXPECT_EQ(encode(*from), bytes);
-        const auto resumed = run(c.scene, c.cameras, c.request, {}, &*from);
+        const auto resumed = run(c.scene, c.cameras, c.request, {}, {}, *from);
         ASSERT_TRUE(resumed) << resumed.error().message;
         EXPECT_EQ(resumed->overlay, undisturbed->overlay) << interval;
         EXPECT_EQ(resumed->masks, undisturbed->masks) << interval;
@@ -188,7 +189,7 @@ TEST(Optimise, GoesOnAfterAnIntervalToTheSameBytes) {
 TEST(Optimise, EndedInTheMiddleOfAnIntervalItGoesOnFromTheLastOneToTheSameBytes) {
   const Case c;
   std::map<int, std::string> all, until;
-  const auto undisturbed = run(c.scene, c.cameras, c.request, collecting(all));
+  const auto undisturbed = run(c.scene, c.cameras, c.request, {}, collecting(all));
   std::stop_source stop;
   Observer observer = collecting(until);
   observer.stop = stop.get_token();
@@ -196,13 +197,14 @@ TEST(Optimise, EndedInTheMiddleOfAnIntervalItGoesOnFromTheLastOneToTheSameBytes)
   observer.progress = [&](const Progress& progress) {
     if (progress.interval == 2 && progress.loss && ++iterations == 9) stop.request_stop();
   };
-  const auto ended = run(c.scene, c.cameras, c.request, observer);
+  const auto ended = run(c.scene, c.cameras, c.request, {}, observer);
   ASSERT_FALSE(ended);
   EXPECT_EQ(ended.error().code, ErrorCode::cancelled);
   EXPECT_EQ(iterations, 9) << "it ended at once";
   ASSERT_EQ(until.size(), 1u);
-  const auto from = decode(until.at(1));
-  const auto resumed = run(c.scene, c.cameras, c.request, {}, &*from);
+  const auto from = decode(until.at(1), c.scene, c.request);
+  ASSERT_TRUE(from) << from.error().message;
+  const auto resumed = run(c.scene, c.cameras, c.request, {}, {}, *from);
   EXPECT_EQ(resumed->overlay, undisturbed->overlay);
 }
 
@@ -243,7 +245,7 @@ class Poison final : public optim::PerceptualLoss {
 TEST(Optimise, APoisonedGradientEndsTheEditWithTheNameOfTheParameter) {
   const Case c;
   Poison poison;
-  const auto outcome = run(c.scene, c.cameras, c.request, {}, nullptr, &poison);
+  const auto outcome = run(c.scene, c.cameras, c.request, {.perceptual = &poison});
   ASSERT_FALSE(outcome);
   EXPECT_EQ(outcome.error().code, ErrorCode::internal);
   EXPECT_TRUE(outcome.error().where.starts_with("gaussian[")) << outcome.error().where;
@@ -260,7 +262,7 @@ class Failing final : public optim::PerceptualLoss {
 TEST(Optimise, AnErrorOfTheLossEndsTheEdit) {
   const Case c;
   Failing failing;
-  const auto outcome = run(c.scene, c.cameras, c.request, {}, nullptr, &failing);
+  const auto outcome = run(c.scene, c.cameras, c.request, {.perceptual = &failing});
   ASSERT_FALSE(outcome);
   EXPECT_EQ(outcome.error().where, "loss");
 }

@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "engine/core/parallel.h"
@@ -77,7 +78,8 @@ Undisturbed run_undisturbed(const Case& c) {
   Undisturbed told;
   Observer observer;
   observer.interval_done = [&](const IntervalDone& done) {
-    told.checkpoints[done.interval] = encode(done.checkpoint);
+    EXPECT_TRUE(done.state.scene.check()) << done.interval;
+    told.checkpoints[done.interval] = encode(done.state);
     return Result<void>{};
   };
   observer.moment = [&](const Moment& moment) {
@@ -86,7 +88,7 @@ Undisturbed run_undisturbed(const Case& c) {
     EXPECT_EQ(moment.views.size(), 3u);
     return Result<void>{};
   };
-  auto outcome = run(c.scene, c.cameras, c.request, observer);
+  auto outcome = run(c.scene, c.cameras, c.request, {}, observer);
   if (!outcome) {
     ADD_FAILURE() << outcome.error().message;
     return told;
@@ -96,14 +98,14 @@ Undisturbed run_undisturbed(const Case& c) {
 }
 
 Outcome resumed(const Case& c, const std::string& bytes, bool keep) {
-  const auto checkpoint = decode(bytes);
-  if (!checkpoint) {
-    ADD_FAILURE() << checkpoint.error().message;
+  auto state = decode(bytes, c.scene, c.request);
+  if (!state) {
+    ADD_FAILURE() << state.error().message;
     return {};
   }
   Observer observer;
   if (keep) observer.keep = [] { return true; };
-  auto outcome = run(c.scene, c.cameras, c.request, observer, &*checkpoint);
+  auto outcome = run(c.scene, c.cameras, c.request, {}, observer, std::move(*state));
   if (!outcome) {
     ADD_FAILURE() << outcome.error().message;
     return {};
@@ -129,19 +131,19 @@ TEST(Resume, FromAnyIntervalGivesTheBytesOfTheUndisturbedRun) {
 TEST(Resume, FromAResumedRunsCheckpointIsTheSameAgain) {
   const Case c(Mode::extend, DVec3(0));
   const Undisturbed whole = run_undisturbed(c);
-  const auto first = decode(whole.checkpoints.at(1));
+  const auto first = decode(whole.checkpoints.at(1), c.scene, c.request);
   ASSERT_TRUE(first);
   std::optional<std::string> second;
   Observer observer;
   observer.interval_done = [&](const IntervalDone& done) -> Result<void> {
-    second = encode(done.checkpoint);
+    second = encode(done.state);
     return fail(ErrorCode::unavailable, "the machine goes down");
   };
-  const auto cut = run(c.scene, c.cameras, c.request, observer, &*first);
+  const auto cut = run(c.scene, c.cameras, c.request, {}, observer, *first);
   ASSERT_FALSE(cut);
   EXPECT_EQ(cut.error().message, "the machine goes down");
   ASSERT_TRUE(second);
-  EXPECT_EQ(decode(*second)->interval, 2);
+  EXPECT_EQ(decode(*second, c.scene, c.request)->interval, 2);
   expect_same(resumed(c, *second, false), whole.outcome);
 }
 
@@ -153,7 +155,7 @@ TEST(Keep, EndsWithWhatTheIntervalShowed) {
       int asked = 0;
       Observer observer;
       observer.keep = [&] { return ++asked == u; };
-      const auto kept = run(c.scene, c.cameras, c.request, observer);
+      const auto kept = run(c.scene, c.cameras, c.request, {}, observer);
       ASSERT_TRUE(kept) << kept.error().message;
       EXPECT_EQ(asked, u);
       EXPECT_TRUE(kept->stopped_early);
@@ -178,7 +180,7 @@ TEST(Keep, IsNotAskedAfterTheLastIntervalNorBeforeTheFirst) {
   int asked = 0;
   Observer observer;
   observer.keep = [&] { return ++asked > 100; };
-  const auto outcome = run(c.scene, c.cameras, c.request, observer);
+  const auto outcome = run(c.scene, c.cameras, c.request, {}, observer);
   ASSERT_TRUE(outcome);
   EXPECT_EQ(asked, intervals - 1);
   EXPECT_FALSE(outcome->stopped_early);
@@ -206,46 +208,52 @@ TEST(Moments, AnErrorOfTheWatcherEndsTheEdit) {
     if (moment.stage == "deformed") return fail(ErrorCode::no_space, "no room for the picture");
     return {};
   };
-  const auto outcome = run(c.scene, c.cameras, c.request, observer);
+  const auto outcome = run(c.scene, c.cameras, c.request, {}, observer);
   ASSERT_FALSE(outcome);
   EXPECT_EQ(outcome.error().code, ErrorCode::no_space);
 }
 
 TEST(Resume, RefusesACheckpointOfAnotherEditOrScene) {
   const Case c(Mode::move, DVec3(0));
-  const auto checkpoint = decode(run_undisturbed(c).checkpoints.at(2));
-  ASSERT_TRUE(checkpoint);
-  const auto expect_refused = [&](const scene::GaussianCloud& scene, const Request& request, const Checkpoint& from,
+  const auto state = decode(run_undisturbed(c).checkpoints.at(2), c.scene, c.request);
+  ASSERT_TRUE(state);
+  const auto expect_refused = [&](const scene::GaussianCloud& scene, const Request& request, const State& from,
                                   const char* what) {
-    const auto outcome = run(scene, c.cameras, request, {}, &from);
-    ASSERT_FALSE(outcome) << what;
-    EXPECT_EQ(outcome.error().code, ErrorCode::invalid_argument) << what;
-    EXPECT_EQ(outcome.error().where, "checkpoint") << what;
+    const auto read = decode(encode(from), scene, request);
+    ASSERT_FALSE(read) << what;
+    EXPECT_EQ(read.error().code, ErrorCode::invalid_argument) << what;
+    EXPECT_EQ(read.error().where, "checkpoint") << what;
   };
   Request other = c.request;
   other.handles.pop_back();
-  expect_refused(c.scene, other, *checkpoint, "fewer handles");
+  expect_refused(c.scene, other, *state, "fewer handles");
+  other = c.request;
+  other.handles.push_back(other.handles.back());
+  expect_refused(c.scene, other, *state, "more handles");
   other = c.request;
   other.params.intervals = intervals + 1;
-  expect_refused(c.scene, other, *checkpoint, "more intervals");
-  expect_refused(ball_before_wall(0), c.request, *checkpoint, "a smaller scene");
-  expect_refused(ball_before_wall(120, Vec3(0), 1), c.request, *checkpoint, "another SH degree");
-  const auto spoilt = [&](auto&& spoil) {
-    Checkpoint bad = *checkpoint;
+  expect_refused(c.scene, other, *state, "more intervals");
+  expect_refused(ball_before_wall(0), c.request, *state, "a smaller scene");
+  expect_refused(ball_before_wall(120, Vec3(0), 1), c.request, *state, "another SH degree");
+  const auto refuse = [&](const char* what, auto&& spoil) {
+    State bad = *state;
     spoil(bad);
-    return bad;
+    expect_refused(c.scene, c.request, bad, what);
   };
-  const auto refuse = [&](const char* what, auto&& spoil) { expect_refused(c.scene, c.request, spoilt(spoil), what); };
-  refuse("interval 0", [](Checkpoint& s) { s.interval = 0; });
-  refuse("an interval too many", [](Checkpoint& s) { s.interval = intervals + 1; });
-  refuse("a mask too few", [](Checkpoint& s) { s.masks.pop_back(); });
-  refuse("a mask of another size", [](Checkpoint& s) { s.masks[0] = scene::Mask(3, 3); });
-  refuse("a camera that is none", [](Checkpoint& s) { s.views[0].fx = 0; });
-  refuse("a handle that is not there", [](Checkpoint& s) { s.members.handle.back() = 9; });
-  refuse("rows out of order", [](Checkpoint& s) { std::swap(s.members.inputs[0], s.members.inputs[1]); });
-  refuse("a role of its own", [](Checkpoint& s) { s.members.role[0] = Role::copy; });
-  refuse("a parent beyond the scene", [](Checkpoint& s) { s.members.parent.back() = 1u << 30; });
-  refuse("a column too short", [](Checkpoint& s) { s.members.mean_at_deform.y.pop_back(); });
+  refuse("interval 0", [](State& s) { s.interval = 0; });
+  refuse("an interval too many", [](State& s) { s.interval = intervals + 1; });
+  refuse("intervals of another number", [](State& s) { s.report.resolved.intervals = intervals + 1; });
+  refuse("a position too few", [](State& s) { s.positions.pop_back(); });
+  refuse("a handle reported too few", [](State& s) { s.report.handles.pop_back(); });
+  refuse("a mask too few", [](State& s) { s.masks.pop_back(); });
+  refuse("a mask of another size", [](State& s) { s.masks[0] = scene::Mask(3, 3); });
+  refuse("a camera that is none", [](State& s) { s.views[0].fx = 0; });
+  refuse("a handle that is not there", [&](State& s) {
+    s.scene = working::WorkingScene(c.scene, s.scene.frame(), working::HandleColumn(c.scene.size(), 9));
+  });
+  refuse("a scene with more rows", [](State& s) {
+    s.scene = working::WorkingScene(ball_before_wall(500), s.scene.frame(), working::HandleColumn(500 + 144, 1));
+  });
 }
 
 }  // namespace

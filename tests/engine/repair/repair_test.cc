@@ -1,4 +1,4 @@
-#include "engine/edit/repair.h"
+#include "engine/repair/repair.h"
 
 #include <gtest/gtest.h>
 
@@ -8,14 +8,16 @@
 #include <set>
 #include <utility>
 
-#include "engine/edit/drag.h"
-#include "engine/edit/look.h"
-#include "engine/mask/mask.h"
+#include "engine/edit/masks.h"
 #include "engine/render/forward.h"
 #include "tests/engine/edit/block.h"
+#include "tests/engine/edit/drags.h"
 
-namespace engine::edit {
+namespace engine::repair {
 namespace {
+
+using edit::add_gaussian, edit::BlockScene, edit::floor_color;
+using working::Role;
 
 /// Notes what it is asked and gives back what it gets, or something else.
 class Recorder final : public correct::Corrector {
@@ -55,22 +57,22 @@ struct Moved {
 
   explicit Moved(float gap = 0, Mode mode = Mode::move) : Moved(BlockScene(gap, mode)) {}
   explicit Moved(BlockScene scene) : block(std::move(scene)), original(block.cloud) {
-    working = begin(block.cloud, block.request, assign(block.cloud.mean, block.request).value().handle);
-    const auto copies = drag_through(working, block.request, 1, true).copies;
+    working = edit::begun(block.cloud, block.request);
+    const auto copies = edit::carry_out(working, block.request, 1).copies;
     for (const scene::Camera& view : block.cameras) masks.emplace_back(view.width, view.height);
     std::vector<std::uint32_t> parents;
-    for (const std::uint32_t copy : copies) parents.push_back(working.parent[copy]);
+    for (const std::uint32_t copy : copies) parents.push_back(working.parent()[copy]);
     const auto go_on = [](double) { return Result<void>{}; };
-    EXPECT_TRUE(unite_masks(working, copies, block.cameras, masks, go_on));
-    WorkingScene before = begin(block.cloud, block.request, deform::HandleColumn(block.cloud.size(), 0));
-    EXPECT_TRUE(unite_masks(before, parents, block.cameras, masks, go_on));
-    dilate_masks(masks);
+    EXPECT_TRUE(edit::unite_masks(working, copies, block.cameras, masks, go_on));
+    const WorkingScene before = edit::begun(block.cloud, block.request);
+    EXPECT_TRUE(edit::unite_masks(before, parents, block.cameras, masks, go_on));
+    masks = edit::dilated(masks);
   }
   [[nodiscard]] Repair repair() {
-    return {original, block.cameras, block.cameras, block.request.params, block.request.mode, corrector};
+    return {original, block.cameras, block.cameras, block.request.mode, block.request.params.seed, corrector};
   }
-  Result<Repair::Outcome> correct(int u = 1, int a = 1) {
-    return repair().correct(working, masks, u, a, [](double) { return Result<void>{}; });
+  Result<Corrected> correct(const Round& round = {1, 1, 0.5}) {
+    return repair().correct(working, masks, round, [](double) { return Result<void>{}; });
   }
   /// Pixels of view v where the floor below the block is, and the moved block is not.
   [[nodiscard]] scene::Mask uncovered(std::size_t v) const {
@@ -94,7 +96,7 @@ Result<scene::Image> painted(const correct::Flawed& flawed, Vec3 color) {
 }
 
 scene::Image shown(const WorkingScene& working, const scene::Camera& camera) {
-  return render::forward(working.cloud, camera).color;
+  return render::forward(working.cloud(), camera).color;
 }
 
 TEST(Repair, AsksForEachViewFirstWhatIsBehindAndThenAll) {
@@ -137,7 +139,7 @@ TEST(Repair, EveryCorrectionHasSeedsOfItsOwn) {
   std::size_t pictures = 0;
   for (const auto& [u, a] : {std::pair{1, 1}, {1, 2}, {2, 1}, {2, 2}}) {
     Moved moved;
-    ASSERT_TRUE(moved.correct(u, a));
+    ASSERT_TRUE(moved.correct({u, a, 0.5}));
     seeds.insert(moved.corrector.seeds.begin(), moved.corrector.seeds.end());
     pictures += moved.corrector.seeds.size();
   }
@@ -164,15 +166,15 @@ TEST(Repair, LaysWhatTheCorrectorFindsIntoTheSceneSoThatLaterViewsShowIt) {
   Moved moved;
   const Vec3 found{0.1f, 0.9f, 0.2f};
   moved.corrector.answer = [&](const correct::Flawed& flawed) { return painted(flawed, found); };
-  const std::size_t rows = moved.working.cloud.size();
+  const std::size_t rows = moved.working.size();
   const auto outcome = moved.correct();
   ASSERT_TRUE(outcome);
   EXPECT_GT(outcome->seeds, 30u);
-  ASSERT_EQ(moved.working.cloud.size(), rows + outcome->seeds);
-  ASSERT_EQ(moved.working.role.size(), rows + outcome->seeds);
-  for (std::size_t row = rows; row < moved.working.role.size(); ++row) {
-    EXPECT_EQ(moved.working.role[row], Role::seed);
-    EXPECT_NEAR(moved.working.cloud.mean.y[row], 0, 0.1) << "on the floor, to the size of its Gaussians";
+  ASSERT_EQ(moved.working.size(), rows + outcome->seeds);
+  EXPECT_TRUE(moved.working.check());
+  for (std::size_t row = rows; row < moved.working.size(); ++row) {
+    EXPECT_EQ(moved.working.role()[row], Role::seed);
+    EXPECT_NEAR(moved.working.cloud().mean.y[row], 0, 0.1) << "on the floor, to the size of its Gaussians";
   }
   for (std::size_t v = 0; v < moved.block.cameras.size(); ++v) {
     const scene::Image now = shown(moved.working, moved.block.cameras[v]);
@@ -182,7 +184,7 @@ TEST(Repair, LaysWhatTheCorrectorFindsIntoTheSceneSoThatLaterViewsShowIt) {
       if (uncovered.data[i] == 0) continue;
       for (int c = 0; c < 3; ++c) {
         in_scene += double(std::abs(now.plane(c)[i] - found[c])) / 3;
-        in_picture += double(std::abs(outcome->corrected.pictures[v].plane(c)[i] - found[c])) / 3;
+        in_picture += double(std::abs(outcome->pictures[v].plane(c)[i] - found[c])) / 3;
       }
     }
     EXPECT_LT(in_scene / double(uncovered.area()), 0.12) << v << ": what was found shows in the scene";
@@ -221,9 +223,9 @@ TEST(Repair, LeavesAPitOpenThatViewsHaveLookedInto) {
   moved.corrector.answer = [](const correct::Flawed& flawed) { return painted(flawed, {0, 1, 0}); };
   ASSERT_TRUE(moved.correct());
   std::size_t over_pit = 0, beside = 0;
-  for (std::size_t row = moved.original.size(); row < moved.working.role.size(); ++row) {
-    if (moved.working.role[row] != Role::seed || std::abs(moved.working.cloud.mean.y[row]) > 0.15f) continue;
-    ++(in_pit(moved.working.cloud.mean.get(row), 0.12f) ? over_pit : beside);
+  for (std::size_t row = moved.original.size(); row < moved.working.size(); ++row) {
+    if (moved.working.role()[row] != Role::seed || std::abs(moved.working.cloud().mean.y[row]) > 0.15f) continue;
+    ++(in_pit(moved.working.cloud().mean.get(row), 0.12f) ? over_pit : beside);
   }
   // Only along the rim, where fewer than two views see past the block into it; else there would be some 45.
   EXPECT_LT(over_pit, 25u) << beside << " beside it";
@@ -249,8 +251,8 @@ TEST(Repair, KeepsInThePictureWhatWasFilledInWhereNoSurfaceGoesOn) {
     const scene::Mask uncovered = moved.uncovered(v);
     for (std::size_t i = 0; i < uncovered.data.size(); ++i) {
       if (uncovered.data[i] == 0) continue;
-      EXPECT_GT(outcome->corrected.pictures[v].plane(1)[i], 0.99f) << v;
-      EXPECT_LT(outcome->corrected.pictures[v].plane(2)[i], 0.01f) << v << ": it is not asked for again";
+      EXPECT_GT(outcome->pictures[v].plane(1)[i], 0.99f) << v;
+      EXPECT_LT(outcome->pictures[v].plane(2)[i], 0.01f) << v << ": it is not asked for again";
     }
   }
 }
@@ -262,14 +264,14 @@ TEST(Repair, OfAnExtendShowsThePartOpaqueAndAsksOnce) {
   ASSERT_TRUE(outcome);
   EXPECT_EQ(outcome->seeds, 0u);
   EXPECT_EQ(moved.corrector.asked.size(), moved.block.cameras.size());
-  EXPECT_EQ(moved.working.cloud, before.cloud) << "opacities are lowered again afterwards";
+  EXPECT_EQ(moved.working.cloud(), before.cloud()) << "opacities are lowered again afterwards";
   for (std::size_t v = 0; v < moved.block.cameras.size(); ++v) {
     const scene::Camera& camera = moved.block.cameras[v];
     const scene::Image input = render::forward(moved.original, camera).color, lowered = shown(before, camera);
     double of_picture = 0, of_lowered = 0, count = 0;
     for (std::size_t i = 0; i < input.pixels(); ++i) {
       if (input.plane(0)[i] < 0.5f) continue;  // not the block
-      of_picture += double(std::abs(outcome->corrected.pictures[v].plane(0)[i] - input.plane(0)[i]));
+      of_picture += double(std::abs(outcome->pictures[v].plane(0)[i] - input.plane(0)[i]));
       of_lowered += double(std::abs(lowered.plane(0)[i] - input.plane(0)[i]));
       ++count;
     }
@@ -283,13 +285,13 @@ TEST(Repair, HoldsWhatWasSeenAndLetsTheRestGo) {
   Moved moved;
   const auto outcome = moved.correct();
   ASSERT_TRUE(outcome);
-  const auto& trust = outcome->corrected.trust;
-  ASSERT_EQ(trust.size(), moved.working.role.size());
+  const auto& trust = outcome->trust;
+  ASSERT_EQ(trust.size(), moved.working.size());
   float least = 1, most = 0;
   for (std::size_t row = 0; row < trust.size(); ++row) {
     ASSERT_GE(trust[row], 0);
     ASSERT_LE(trust[row], 1);
-    const Role role = moved.working.role[row];
+    const Role role = moved.working.role()[row];
     if (role == Role::copy) {
       least = std::min(least, trust[row]), most = std::max(most, trust[row]);
     } else {
@@ -300,27 +302,12 @@ TEST(Repair, HoldsWhatWasSeenAndLetsTheRestGo) {
   EXPECT_LT(least, 0.05f) << "its inside";
 }
 
-TEST(Repair, StrengthFallsFromTheFirstCorrectionToTheLast) {
-  const auto strengths = [](Annealing annealing, int steps) {
-    std::vector<double> out;
-    for (int a = 1; a <= steps; ++a) {
-      Moved moved(0.5f);
-      moved.block.request.params.annealing = annealing;
-      moved.block.request.params.annealing_steps = steps;
-      moved.block.request.params.strength_initial = 0.8;
-      moved.block.request.params.strength_final = 0.2;
-      EXPECT_TRUE(moved.correct(1, a));
-      for (const double strength : moved.corrector.strengths) EXPECT_EQ(strength, moved.corrector.strengths[0]);
-      out.push_back(moved.corrector.strengths.at(0));
-    }
-    return out;
-  };
-  const auto linear = strengths(Annealing::linear, 3), paper = strengths(Annealing::paper, 3);
-  for (std::size_t a = 0; a < 3; ++a) {
-    EXPECT_NEAR(linear[a], 0.8 - 0.3 * double(a), 1e-12) << a;
-    EXPECT_NEAR(paper[a], 0.8 - 0.2 * double(a), 1e-12) << a;
+TEST(Repair, AsksForEveryPictureWithTheStrengthOfTheCorrection) {
+  for (const double strength : {0.8, 0.25}) {
+    Moved moved;
+    ASSERT_TRUE(moved.correct({1, 2, strength}));
+    EXPECT_EQ(moved.corrector.strengths, std::vector<double>(moved.corrector.asked.size(), strength));
   }
-  EXPECT_EQ(strengths(Annealing::linear, 1), std::vector<double>{0.8});
 }
 
 TEST(Repair, GoesOutwardFromTheBestViewAndTellsHowFarItIs) {
@@ -329,7 +316,7 @@ TEST(Repair, GoesOutwardFromTheBestViewAndTellsHowFarItIs) {
   std::swap(moved.masks[0], moved.masks[2]);
   std::vector<double> told;
   Repair repair = moved.repair();
-  ASSERT_TRUE(repair.correct(moved.working, moved.masks, 1, 1, [&](double done) {
+  ASSERT_TRUE(repair.correct(moved.working, moved.masks, {1, 1, 0.5}, [&](double done) {
     told.push_back(done);
     return Result<void>{};
   }));
@@ -358,7 +345,7 @@ TEST(Repair, EndsWithTheErrorOfTheCorrectorOrOfWhoeverIsTold) {
   ASSERT_FALSE(failed);
   EXPECT_EQ(failed.error().where, "corrector");
   Moved told;
-  const auto ended = told.repair().correct(told.working, told.masks, 1, 1, [](double) -> Result<void> {
+  const auto ended = told.repair().correct(told.working, told.masks, {1, 1, 0.5}, [](double) -> Result<void> {
     return fail(ErrorCode::cancelled, "enough", "here");
   });
   ASSERT_FALSE(ended);
@@ -367,4 +354,4 @@ TEST(Repair, EndsWithTheErrorOfTheCorrectorOrOfWhoeverIsTold) {
 }
 
 }  // namespace
-}  // namespace engine::edit
+}  // namespace engine::repair

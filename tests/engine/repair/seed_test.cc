@@ -1,4 +1,4 @@
-#include "engine/edit/seed.h"
+#include "engine/repair/seed.h"
 
 #include <gtest/gtest.h>
 
@@ -11,8 +11,11 @@
 #include "engine/scene/sh.h"
 #include "tests/engine/edit/samples.h"
 
-namespace engine::edit {
+namespace engine::repair {
 namespace {
+
+using edit::ball_before_wall, edit::same_row;
+using working::Role;
 
 /// A tilted camera that looks down at the floor y = 0 from the side, by this angle about the vertical.
 scene::Camera above_floor(int side, double angle_rad = 0) {
@@ -50,9 +53,7 @@ struct Seeded {
 
   Seeded(int side, scene::Rect part) : camera(above_floor(side)), picture(smooth_picture(side)) {
     inverse_depth = floor_in(camera, part);
-    Request request;
-    request.handles = {{DVec3(0), DVec3(1, 0, 0), 1, 0}};
-    working = begin(scene, request, deform::HandleColumn(scene.size(), 0));
+    working = WorkingScene(scene, working::Frame(), working::HandleColumn(scene.size(), 0));
     std::vector<float> points;
     for (std::size_t row = 0; row < scene.size(); ++row)
       for (int axis = 0; axis < 3; ++axis) points.push_back(scene.mean.get(row)[axis]);
@@ -60,9 +61,9 @@ struct Seeded {
   }
   /// The seeds alone.
   [[nodiscard]] scene::GaussianCloud alone() const {
-    std::vector<std::uint8_t> keep(working.cloud.size(), 1);
+    std::vector<std::uint8_t> keep(working.size(), 1);
     std::fill_n(keep.begin(), scene.size(), std::uint8_t(0));
-    return scene::select(working.cloud, keep);
+    return scene::select(working.cloud(), keep);
   }
 };
 
@@ -80,7 +81,7 @@ TEST(PointAt, IsOnTheRayThroughThePixelAtThatDepth) {
 
 TEST(AddSeeds, LaysOnePerPixelOnTheSurfaceInThePicturesColour) {
   const Seeded seeded(side, part);
-  const scene::GaussianCloud& cloud = seeded.working.cloud;
+  const scene::GaussianCloud& cloud = seeded.working.cloud();
   ASSERT_EQ(seeded.seeds, std::size_t(part.width() * part.height()));
   ASSERT_EQ(cloud.size(), seeded.scene.size() + seeded.seeds);
   std::size_t row = seeded.scene.size();
@@ -139,31 +140,32 @@ TEST(AddSeeds, CoversTheSurfaceFromThereAndFromBeside) {
 TEST(AddSeeds, TakesWhatItCannotKnowFromTheNearestInputRow) {
   const Seeded seeded(side, part);
   const WorkingScene& working = seeded.working;
-  for (std::size_t row = seeded.scene.size(); row < working.cloud.size(); ++row) {
-    EXPECT_EQ(working.role[row], Role::seed);
-    EXPECT_EQ(working.handle[row], 0);
-    EXPECT_EQ(working.mean_at_deform.get(row), working.cloud.mean.get(row));
+  EXPECT_TRUE(working.check());
+  for (std::size_t row = seeded.scene.size(); row < working.size(); ++row) {
+    EXPECT_EQ(working.role()[row], Role::seed);
+    EXPECT_EQ(working.handle()[row], 0);
+    EXPECT_EQ(working.mean_at_deform().get(row), working.cloud().mean.get(row));
     const auto distance = [&](std::size_t input) {
-      return glm::distance(DVec3(seeded.scene.mean.get(input)), DVec3(working.cloud.mean.get(row)));
+      return glm::distance(DVec3(seeded.scene.mean.get(input)), DVec3(working.cloud().mean.get(row)));
     };
     double nearest = 1e9;
     for (std::size_t input = 0; input < seeded.scene.size(); ++input) nearest = std::min(nearest, distance(input));
-    ASSERT_LT(working.parent[row], seeded.scene.size());
-    EXPECT_NEAR(distance(working.parent[row]), nearest, 1e-6);
-    const auto extra = working.cloud.extra_row(row), of_parent = seeded.scene.extra_row(working.parent[row]);
+    ASSERT_LT(working.parent()[row], seeded.scene.size());
+    EXPECT_NEAR(distance(working.parent()[row]), nearest, 1e-6);
+    const auto extra = working.cloud().extra_row(row), of_parent = seeded.scene.extra_row(working.parent()[row]);
     EXPECT_EQ(std::memcmp(extra.data(), of_parent.data(), extra.size()), 0);
   }
   for (std::size_t row = 0; row < seeded.scene.size(); ++row) {
-    EXPECT_TRUE(same_row(working.cloud, row, seeded.scene, row)) << row;
-    EXPECT_EQ(working.role[row], Role::frozen);
+    EXPECT_TRUE(same_row(working.cloud(), row, seeded.scene, row)) << row;
+    EXPECT_EQ(working.role()[row], Role::frozen);
   }
 }
 
 TEST(AddSeeds, OfNothingAddsNothing) {
   const Seeded seeded(side, {});
   EXPECT_EQ(seeded.seeds, 0u);
-  EXPECT_EQ(seeded.working.cloud, seeded.scene);
-  EXPECT_EQ(seeded.working.role.size(), seeded.scene.size());
+  EXPECT_EQ(seeded.working.cloud(), seeded.scene);
+  EXPECT_EQ(seeded.working.size(), seeded.scene.size());
 }
 
 TEST(AddSeeds, ALonePixelFacesTheCamera) {
@@ -186,4 +188,4 @@ TEST(AddSeeds, AreNotMoreThanAnEditCanBear) {
 }
 
 }  // namespace
-}  // namespace engine::edit
+}  // namespace engine::repair

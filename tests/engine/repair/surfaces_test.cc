@@ -1,4 +1,4 @@
-#include "engine/edit/surfaces.h"
+#include "engine/repair/surfaces.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include "engine/core/parallel.h"
 #include "engine/core/rng.h"
 
-namespace engine::edit {
+namespace engine::repair {
 namespace {
 
 constexpr int width = 72, height = 60;
@@ -161,4 +161,4 @@ TEST(ContinuedSurfaces, GivesTheSameBytesForAnyNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace engine::edit
+}  // namespace engine::repair

@@ -1,16 +1,22 @@
-#include "engine/edit/trust.h"
+#include "engine/repair/trust.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <functional>
+#include <span>
+#include <utility>
+#include <vector>
 
 #include "engine/core/parallel.h"
 #include "tests/engine/edit/block.h"
 #include "tests/engine/edit/samples.h"
 
-namespace engine::edit {
+namespace engine::repair {
 namespace {
+
+using edit::add_gaussian, edit::arc_of_cameras, edit::ball_before_wall, edit::block_color, edit::floor_color;
+using working::Role;
 
 /// An opaque wall at z = 0 without a gap, and one Gaussian each before it, behind it, beside the pictures.
 struct Wall {
@@ -61,22 +67,23 @@ TEST(ObservedRows, AFaintGaussianInFullViewIs) {
 
 /// The working scene of `scene` in which rows [0, dragged) have copies at `at(row's mean)`.
 WorkingScene with_copies(const scene::GaussianCloud& scene, std::size_t dragged, const std::function<Vec3(Vec3)>& at) {
-  Request request;
-  request.handles = {{DVec3(0), DVec3(1, 0, 0), 1, 0}};
-  deform::HandleColumn handle(scene.size(), 0);
+  working::HandleColumn handle(scene.size(), 0);
   std::fill_n(handle.begin(), dragged, std::uint16_t(1));
-  WorkingScene working = begin(scene, request, handle);
+  WorkingScene working(scene, working::Frame(), std::move(handle));
   std::vector<std::uint32_t> rows(dragged);
   for (std::uint32_t row = 0; row < dragged; ++row) rows[row] = row;
-  scene::append_rows(working.cloud, working.cloud, rows);
+  working.append(scene, rows, std::vector<Role>(dragged, Role::copy), rows);
   for (const std::uint32_t row : rows) {
-    working.cloud.mean.set(scene.size() + row, at(scene.mean.get(row)));
-    working.handle.push_back(1), working.handle[row] = 0;
-    working.role.push_back(Role::copy), working.role[row] = Role::original;
-    working.parent.push_back(row);
-    working.mean_at_deform.push_back(scene.mean.get(row));
+    working.gaussians().mean.set(scene.size() + row, at(scene.mean.get(row)));
+    working.leave_behind(row);
   }
+  EXPECT_TRUE(working.check());
   return working;
+}
+
+/// A copy of the row's Gaussian, of this role.
+std::uint32_t append_one(WorkingScene& working, Role role, std::uint32_t row) {
+  return working.append(working.cloud(), std::span(&row, 1), std::span(&role, 1), std::span(&row, 1));
 }
 
 std::vector<float> some_observed(std::size_t rows) {
@@ -117,10 +124,8 @@ TEST(TrustOfRows, ChildrenOfACopyFareAsItDoes) {
   const scene::GaussianCloud scene = ball_before_wall(60);
   WorkingScene working = with_copies(scene, 50, [](Vec3 mean) { return 2.3f * mean; });
   const std::uint32_t copy = std::uint32_t(scene.size()) + 7;
-  scene::append_rows(working.cloud, working.cloud, std::vector<std::uint32_t>{copy});
-  working.cloud.mean.set(working.cloud.size() - 1, {5, 5, 5});
-  working.handle.push_back(1), working.role.push_back(Role::copy), working.parent.push_back(7);
-  working.mean_at_deform.push_back(scene.mean.get(7));
+  const std::uint32_t child = append_one(working, Role::copy, copy);
+  working.gaussians().mean.set(child, {5, 5, 5});
   const auto trust = trust_of_rows(working, std::vector<float>(scene.size(), 1.0f), Mode::move);
   EXPECT_EQ(trust.back(), trust[copy]);
   EXPECT_NEAR(trust.back(), 0.5f, 1e-3);
@@ -129,9 +134,7 @@ TEST(TrustOfRows, ChildrenOfACopyFareAsItDoes) {
 TEST(TrustOfRows, SeedsAreTrustedAndTooFewCopiesAreNotJudged) {
   const scene::GaussianCloud scene = ball_before_wall(60);
   WorkingScene working = with_copies(scene, 16, [](Vec3 mean) { return 9.0f * mean; });
-  scene::append_rows(working.cloud, working.cloud, std::vector<std::uint32_t>{3});
-  working.handle.push_back(0), working.role.push_back(Role::seed), working.parent.push_back(3);
-  working.mean_at_deform.push_back(Vec3(0));
+  append_one(working, Role::seed, 3);
   const auto trust = trust_of_rows(working, std::vector<float>(scene.size(), 0.5f), Mode::move);
   EXPECT_EQ(trust.back(), 1);
   for (std::size_t row = scene.size(); row < scene.size() + 16; ++row) EXPECT_EQ(trust[row], 0.5f) << row;
@@ -144,4 +147,4 @@ TEST(TrustOfRows, WithoutCopiesItIsWhatWasObserved) {
 }
 
 }  // namespace
-}  // namespace engine::edit
+}  // namespace engine::repair

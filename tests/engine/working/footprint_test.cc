@@ -1,4 +1,4 @@
-#include "engine/edit/footprint.h"
+#include "engine/working/footprint.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,10 @@
 #include "engine/render/forward.h"
 #include "tests/engine/edit/samples.h"
 
-namespace engine::edit {
+namespace engine::working {
 namespace {
+
+using edit::arc_of_cameras, edit::ball_before_wall;
 
 /// The footprint from a rendering of the whole picture.
 scene::Image whole_footprint(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
@@ -50,4 +52,4 @@ TEST(Footprint, OfNothingOrOfWhatIsBehindTheCameraIsEmpty) {
 }
 
 }  // namespace
-}  // namespace engine::edit
+}  // namespace engine::working
