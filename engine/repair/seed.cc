@@ -109,7 +109,10 @@ std::size_t add_seeds(WorkingScene& working, const scene::Camera& camera, const 
   const std::vector<std::uint32_t> parents = nearest_rows(seeds, inputs);
   const std::vector<working::Role> roles(seeds.size(), working::Role::seed);
   const std::uint32_t first = working.append(working.cloud(), parents, roles, parents);
-  for (std::size_t k = 0; k < seeds.size(); ++k) set_gaussian(working.gaussians(), first + k, seeds[k]);
+  for (std::size_t k = 0; k < seeds.size(); ++k) {
+    set_gaussian(working.gaussians(), first + k, seeds[k]);
+    working.note_mean(std::uint32_t(first + k));  // not its parent's: it has come from nowhere
+  }
   return seeds.size();
 }
 

@@ -148,7 +148,7 @@ TEST(Checkpoint, LengthsThatLieAreFoundEvenUnderARightChecksum) {
         EXPECT_TRUE(read->scene.check()) << i;
         EXPECT_EQ(read->scene.input_rows(), sample.input.size()) << i;
       } else {
-        // A number that may be any length is of another edit; a length that does not fit is damage.
+        // Damage; or what reads well, and belongs to no edit of this scene.
         EXPECT_TRUE(read.error().code == ErrorCode::corrupt_data || read.error().code == ErrorCode::invalid_argument);
         EXPECT_EQ(read.error().where, "checkpoint") << i;
       }

@@ -303,7 +303,7 @@ TEST(LocalFrame, AFarSceneIsDraggedLikeOneAtTheOrigin) {
       for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(here[axis], there[axis], 0.5 / 16 + 1e-5) << i;
     }
     for (std::size_t k = 0; k < at_origin.copies.size(); ++k) {  // before they are stored in the world's floats
-      const DVec3 here(at_origin.working.cloud.mean.get(at_origin.copies[k]));
+      const DVec3 here(at_origin.working.cloud().mean.get(at_origin.copies[k]));
       const DVec3 there = DVec3(far_away.working.cloud().mean.get(far_away.copies[k])) + origin - away;
       EXPECT_LT(glm::distance(here, there), 5e-6) << k;
     }

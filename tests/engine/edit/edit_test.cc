@@ -252,8 +252,8 @@ TEST(Edit, ReportsProgressThatNeverFallsAndEveryInterval) {
   }
   EXPECT_EQ(seen.front().stage, Stage::assign);
   EXPECT_EQ(seen.back().fraction, 1.0);
-  for (const Stage stage : {Stage::assign, Stage::views, Stage::deform, Stage::mask, Stage::relocate,
-                            Stage::checkpoint, Stage::finish})
+  for (const Stage stage :
+       {Stage::assign, Stage::views, Stage::deform, Stage::mask, Stage::relocate, Stage::checkpoint, Stage::finish})
     EXPECT_EQ(std::count_if(outcome.report.times.begin(), outcome.report.times.end(),
                             [&](const StageTime& time) { return time.stage == stage && time.seconds >= 0; }),
               1)
@@ -262,8 +262,7 @@ TEST(Edit, ReportsProgressThatNeverFallsAndEveryInterval) {
 
 TEST(Edit, StopsWhenAsked) {
   const scene::GaussianCloud scene = ball_before_wall(30);
-  for (const Stage stage :
-       {Stage::assign, Stage::views, Stage::deform, Stage::mask, Stage::relocate, Stage::finish}) {
+  for (const Stage stage : {Stage::assign, Stage::views, Stage::deform, Stage::mask, Stage::relocate, Stage::finish}) {
     std::stop_source source;
     Observer observer;
     observer.stop = source.get_token();
