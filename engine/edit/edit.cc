@@ -15,6 +15,7 @@
 #include "engine/edit/progress.h"
 #include "engine/edit/publish.h"
 #include "engine/edit/views.h"
+#include "engine/render/forward.h"
 #include "engine/repair/repair.h"
 #include "engine/repair/stretch.h"
 
@@ -129,10 +130,27 @@ repair::Repair make_repair(const State& state, const Edit& edit) {
           edit.params().seed,                *edit.corrector};
 }
 
+/// 7. without a corrector: I_e is what the deformation shows. In a move that is the scene without what has left: a
+/// picture with the originals in it, however faint, would ask for them, and where there are many they came back.
+repair::Corrected uncorrected(const State& state, const Edit& edit) {
+  repair::Corrected out;
+  const Rows gone = state.scene.rows_of(working::Role::original);
+  if (edit.request.mode != Mode::move || gone.empty()) return out;
+  render::Layers layers(state.scene.cloud());
+  layers.hidden = gone;
+  render::Workspace workspace;
+  for (const scene::Camera& view : state.views) {
+    render::Rendering rendering;
+    render::forward(layers, state.scene.frame().edit_from_world(view), {}, {}, workspace, rendering);
+    out.pictures.push_back(std::move(rendering.color));
+  }
+  return out;
+}
+
 /// 7. Correct: I_e of each view, and seeds where a surface goes on that nobody has seen.
 Result<repair::Corrected> correct(State& state, Edit& edit, std::span<const scene::Mask> masks,
                                   const repair::Round& round) {
-  if (edit.corrector == nullptr) return repair::Corrected{};
+  if (edit.corrector == nullptr) return uncorrected(state, edit);
   if (auto going = edit.progress.enter(Stage::correct, round.interval); !going) return propagate(going);
   if (!edit.repair) edit.repair.emplace(make_repair(state, edit));
   auto corrected = edit.repair->correct(state.scene, masks, round,
@@ -163,7 +181,7 @@ Result<void> correct_and_optimise(State& state, Edit& edit, int u) {
     const repair::Round round{u, a, strength_of(edit.params(), a)};
     const auto corrected = correct(state, edit, masks, round);
     if (!corrected) return propagate(corrected);
-    if (a == corrections && !corrected->pictures.empty())
+    if (a == corrections && edit.corrector != nullptr)
       if (auto shown = show(state, edit, u, "corrected", corrected->pictures); !shown) return shown;
     const auto loss = optimise(state, edit, masks, *corrected, round);
     if (!loss) return propagate(loss);
