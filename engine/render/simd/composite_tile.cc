@@ -1,11 +1,11 @@
 // Blends the splats of one tile, a vector of pixels at a time.
 #include <hwy/cache_control.h>
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "engine/render/composite_simd.cc"
+#define HWY_TARGET_INCLUDE "engine/render/simd/composite_tile.cc"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 // After highway.h: compiled once per instruction set.
-#include "engine/render/tile_blocks.inc"
+#include "engine/render/simd/tile_blocks.inc"
 
 #include <algorithm>
 #include <cassert>

@@ -1,13 +1,13 @@
 // The projection of project.h, a vector of Gaussians at a time.
 #include <hwy/cache_control.h>
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "engine/render/project_simd.cc"
+#define HWY_TARGET_INCLUDE "engine/render/simd/project_rows.cc"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 // After highway.h: the math functions are compiled once per instruction set.
 #include <hwy/contrib/math/math-inl.h>
 
-#include "engine/render/shade_rows.inc"
+#include "engine/render/simd/shade_rows.inc"
 
 #include <algorithm>
 
