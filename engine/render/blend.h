@@ -68,7 +68,7 @@ ProjectionGradient<Real> projection_gradient(const Projection<Real>& splat, cons
 /// dL/dlogit from a splat's sums: opacity dL/dopacity is the sum of g.
 template <std::floating_point Real>
 Real opacity_logit_gradient(Real logit, const SplatGradient<Real>& v_splat) {
-  return std::abs(logit) <= Real(max_opacity_logit) ? v_splat.g * opacity(-logit) : Real(0);
+  return logit_vjp(logit, v_splat.g);
 }
 
 /// A ray walked back to front. Starts behind the last blended splat, with the transmittance that is left there, and
