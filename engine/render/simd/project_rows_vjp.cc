@@ -1,12 +1,12 @@
-// The pullbacks of project_vjp.h, a vector of Gaussians at a time.
+// Pullback of the projection of rows of Gaussians, a vector of them at a time: the formulas of
+// engine/render/projection_vjp.inc, between the sums over groups of tiles and the gradients of what is stored.
 #include <hwy/cache_control.h>
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "engine/render/simd/project_rows_vjp.cc"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
-// After highway.h: the math functions are compiled once per instruction set.
-#include <hwy/contrib/math/math-inl.h>
-
+// After highway.h: compiled once per instruction set.
+#include "engine/render/simd/lanes.inc"
 #include "engine/render/simd/shade_rows.inc"
 
 #include "engine/render/backward_stages.h"
@@ -16,10 +16,8 @@ HWY_BEFORE_NAMESPACE();
 namespace engine::render {
 namespace HWY_NAMESPACE {
 
-namespace hn = hwy::HWY_NAMESPACE;
-
-using VjpD = hn::ScalableTag<float>;
-using VjpV = hn::Vec<VjpD>;
+#include "engine/render/projection.inc"
+#include "engine/render/projection_vjp.inc"
 
 /// A block of the rows that may change, one array per value, and what becomes of them: all zero for rows that no tile
 /// has or that change nothing.
@@ -34,163 +32,47 @@ struct VjpRows {
   alignas(64) float to[3][room], inverse_distance[room];  // unit direction from the camera centre
 };
 
-/// Three components.
-struct V3 {
-  VjpV x, y, z;
-};
+/// From K d as Splat has it, with |K d|^2 = q log2(e) / 2, to standard deviations: sqrt(2 ln 2), and its square.
+constexpr double sigmas_of_splat = 1.1774100225154747, square_sigmas_of_splat = 1.3862943611198906;
 
-HWY_INLINE VjpV Dot(const V3& a, const V3& b) { return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z))); }
-HWY_INLINE V3 Cross(const V3& a, const V3& b) {
-  return {hn::MulSub(a.y, b.z, hn::Mul(a.z, b.y)), hn::MulSub(a.z, b.x, hn::Mul(a.x, b.z)),
-          hn::MulSub(a.x, b.y, hn::Mul(a.y, b.x))};
+/// dL/d(projection) from the sums over pixels, which GroupGradient has in the units of Splat: see projection_gradient() in
+/// blend.h.
+///   load  load(k) is sum k of GroupGradient
+template <class LoadSum>
+HWY_INLINE ProjectionGradient<Lanes> GradientOfProjection(const Reprojection<Lanes>& of, LoadSum&& load) {
+  const Lanes along = load(1) * Lanes(sigmas_of_splat), across = load(2) * Lanes(sigmas_of_splat);
+  const FalloffMatrix<Lanes>& K = of.K;
+  return {.x = K.l1 * of.cov.inverse_unit * along,
+          .y = mul_add(K.l2, along, K.l3 * across) * of.cov.inverse_unit,
+          .depth = load(9),
+          .strain_11 = load(3) * Lanes(square_sigmas_of_splat),
+          .strain_12 = load(4) * Lanes(square_sigmas_of_splat),
+          .strain_22 = load(5) * Lanes(square_sigmas_of_splat)};
 }
-HWY_INLINE V3 Scaled(const V3& a, VjpV s) { return {hn::Mul(a.x, s), hn::Mul(a.y, s), hn::Mul(a.z, s)}; }
 
-/// project_vjp() and opacity_logit_gradient() for the rows [i, i + lanes). Those that are seen are visible; of all
-/// others anything may come, infinities too, and is dropped.
-HWY_INLINE void ProjectVjpVector(VjpD d, const ViewParams<float>& view, std::size_t i, VjpRows& rows) {
-  const hn::RebindToSigned<VjpD> di;
-  const auto seen = hn::RebindMask(d, hn::Ne(hn::Load(di, rows.seen + i), hn::Zero(di)));
-  const auto store = [&](VjpV v, float* to) { hn::Store(hn::IfThenElseZero(seen, v), d, to + i); };
-  const auto set = [&](double value) { return hn::Set(d, float(value)); };
-  const auto load = [&](const float* from) { return hn::Load(d, from + i); };
-  const VjpV zero = hn::Zero(d), one = set(1), two = set(2);
-  const auto& r = view.rotation;
-  const auto rotated = [&](const V3& a) {  // cam_from_world
-    return V3{hn::MulAdd(set(r[0]), a.x, hn::MulAdd(set(r[1]), a.y, hn::Mul(set(r[2]), a.z))),
-              hn::MulAdd(set(r[3]), a.x, hn::MulAdd(set(r[4]), a.y, hn::Mul(set(r[5]), a.z))),
-              hn::MulAdd(set(r[6]), a.x, hn::MulAdd(set(r[7]), a.y, hn::Mul(set(r[8]), a.z)))};
-  };
-  const auto rotated_back = [&](const V3& a) {  // world_from_cam
-    return V3{hn::MulAdd(set(r[0]), a.x, hn::MulAdd(set(r[3]), a.y, hn::Mul(set(r[6]), a.z))),
-              hn::MulAdd(set(r[1]), a.x, hn::MulAdd(set(r[4]), a.y, hn::Mul(set(r[7]), a.z))),
-              hn::MulAdd(set(r[2]), a.x, hn::MulAdd(set(r[5]), a.y, hn::Mul(set(r[8]), a.z)))};
-  };
+/// project_vjp() and logit_vjp() for the rows [i, i + lanes), and where they are seen from. Those that are seen are
+/// visible; of all others anything may come, infinities too, and is dropped.
+HWY_INLINE void ProjectVjpVector(const ViewParams<float>& view, std::size_t i, VjpRows& rows) {
+  const LanesD any;
+  const hn::RebindToSigned<LanesD> di;
+  const Mask seen = hn::RebindMask(any, hn::Ne(hn::Load(di, rows.seen + i), hn::Zero(di)));
+  const auto load = [&](const float* from) { return Lanes(hn::Load(any, from + i)); };
+  const auto load_three = [&](const auto& from) { return Vector<Lanes>{load(from[0]), load(from[1]), load(from[2])}; };
+  const auto store = [&](Lanes value, float* to) { hn::Store(where<Lanes>(seen, value).v, any, to + i); };
 
-  // As in project().
-  const auto from_centre = [&](std::size_t axis) {
-    return hn::Sub(hn::Sub(load(rows.mean[axis]), set(view.centre_high[axis])), set(view.centre_low[axis]));
-  };
-  const V3 from_camera{from_centre(0), from_centre(1), from_centre(2)};
-  const V3 p = rotated(from_camera);
-  const VjpV inverse_z = hn::Div(one, p.z);
-  const VjpV x_over_z = hn::Mul(p.x, inverse_z), y_over_z = hn::Mul(p.y, inverse_z);
-  const VjpV jx = hn::Mul(set(view.fx), inverse_z), jy = hn::Mul(set(view.fy), inverse_z);
-  const VjpV tx = hn::Clamp(x_over_z, set(view.min_x_over_z), set(view.max_x_over_z));
-  const VjpV ty = hn::Clamp(y_over_z, set(view.min_y_over_z), set(view.max_y_over_z));
+  const Vector<Lanes> log_scale = load_three(rows.log_scale);
+  const auto& q = rows.rotation;
+  const Reprojection<Lanes> of =
+      reproject<Lanes>(view, load_three(rows.mean), log_scale, {load(q[0]), load(q[1]), load(q[2]), load(q[3])});
+  const ProjectionGradient<Lanes> v_out = GradientOfProjection(of, [&](std::size_t k) { return load(rows.sums[k]); });
+  const GaussianGradient<Lanes> v = project_vjp(view, of, log_scale, v_out);
+  for (std::size_t k = 0; k < 3; ++k) store(v.mean[k], rows.v_mean[k]), store(v.log_scale[k], rows.v_log_scale[k]);
+  for (std::size_t k = 0; k < 4; ++k) store(v.rotation[k], rows.v_rotation[k]);
+  store(v_out.x, rows.v_x), store(v_out.y, rows.v_y);
+  store(logit_vjp(load(rows.logit), load(rows.sums[0])), rows.v_logit);
 
-  VjpV w = load(rows.rotation[0]), x = load(rows.rotation[1]), y = load(rows.rotation[2]), z = load(rows.rotation[3]);
-  const VjpV largest = hn::Max(hn::Max(hn::Max(hn::Abs(w), hn::Abs(x)), hn::Max(hn::Abs(y), hn::Abs(z))), set(1e-30));
-  const VjpV inverse_largest = hn::Div(one, largest);
-  w = hn::Mul(w, inverse_largest), x = hn::Mul(x, inverse_largest);
-  y = hn::Mul(y, inverse_largest), z = hn::Mul(z, inverse_largest);
-  const VjpV length = hn::Sqrt(hn::MulAdd(w, w, hn::MulAdd(x, x, hn::MulAdd(y, y, hn::Mul(z, z)))));
-  const VjpV guard = hn::Mul(set(1e-12), inverse_largest);
-  const auto has_direction = hn::Gt(length, guard);
-  const VjpV inverse_length = hn::Div(one, hn::Max(length, guard));
-  w = hn::Mul(w, inverse_length), x = hn::Mul(x, inverse_length);
-  y = hn::Mul(y, inverse_length), z = hn::Mul(z, inverse_length);
-  const VjpV x2 = hn::Mul(two, x), y2 = hn::Mul(two, y), z2 = hn::Mul(two, z);
-  const V3 columns[3] = {{hn::NegMulAdd(z2, z, hn::NegMulAdd(y2, y, one)), hn::MulAdd(x2, y, hn::Mul(z2, w)),
-                          hn::MulSub(x2, z, hn::Mul(y2, w))},
-                         {hn::MulSub(x2, y, hn::Mul(z2, w)), hn::NegMulAdd(z2, z, hn::NegMulAdd(x2, x, one)),
-                          hn::MulAdd(y2, z, hn::Mul(x2, w))},
-                         {hn::MulAdd(x2, z, hn::Mul(y2, w)), hn::MulSub(y2, z, hn::Mul(x2, w)),
-                          hn::NegMulAdd(y2, y, hn::NegMulAdd(x2, x, one))}};
-
-  VjpV sigma[3], unit = one;
-  V3 axes[3];  // one sigma long, camera space
-  VjpV u[3], v[3];
-  for (std::size_t j = 0; j < 3; ++j) {
-    sigma[j] = hn::Exp(d, hn::Clamp(load(rows.log_scale[j]), set(-max_log_scale), set(max_log_scale)));
-    axes[j] = Scaled(rotated(columns[j]), sigma[j]);
-    u[j] = hn::Mul(jx, hn::NegMulAdd(tx, axes[j].z, axes[j].x));
-    v[j] = hn::Mul(jy, hn::NegMulAdd(ty, axes[j].z, axes[j].y));
-    unit = hn::Max(unit, hn::Max(hn::Abs(u[j]), hn::Abs(v[j])));
-  }
-  const VjpV inverse_unit = hn::Div(one, unit);
-  const V3 us = Scaled({u[0], u[1], u[2]}, inverse_unit), vs = Scaled({v[0], v[1], v[2]}, inverse_unit);
-  const VjpV low_pass = hn::Mul(set(low_pass_px2), hn::Mul(inverse_unit, inverse_unit));
-  const V3 normal = Cross(us, vs);
-  const VjpV determinant = hn::Add(
-      Dot(normal, normal), hn::MulAdd(low_pass, hn::Add(Dot(us, us), Dot(vs, vs)), hn::Mul(low_pass, low_pass)));
-  const VjpV yy = hn::Add(Dot(vs, vs), low_pass), inverse_yy = hn::Div(one, yy);
-  const VjpV l1 = hn::Sqrt(hn::Div(yy, determinant)), l3 = hn::Sqrt(inverse_yy);
-  const VjpV l2 = hn::Neg(hn::Mul(hn::Mul(l1, Dot(us, vs)), inverse_yy));  // all times 1 / unit
-
-  // From the units of Splat to those of SplatGradient.
-  const VjpV to_sigmas = set(1.1774100225154747), to_sigmas_squared = set(1.3862943611198906);  // sqrt(2 ln 2), 2 ln 2
-  const VjpV along = hn::Mul(load(rows.sums[1]), to_sigmas), across = hn::Mul(load(rows.sums[2]), to_sigmas);
-  const VjpV strain_11 = hn::Mul(load(rows.sums[3]), to_sigmas_squared),
-             strain_12 = hn::Mul(load(rows.sums[4]), to_sigmas_squared),
-             strain_22 = hn::Mul(load(rows.sums[5]), to_sigmas_squared);
-  const VjpV v_x = hn::Mul(hn::Mul(l1, inverse_unit), along);
-  const VjpV v_y = hn::Mul(hn::MulAdd(l2, along, hn::Mul(l3, across)), inverse_unit);
-
-  const V3 rest = Cross(vs, normal);
-  const VjpV l1_over_yy = hn::Mul(l1, inverse_yy), l1_px = hn::Mul(l1, inverse_unit), l2_px = hn::Mul(l2, inverse_unit),
-             l3_px = hn::Mul(l3, inverse_unit);
-  const auto row_u = [&](VjpV rest_j, VjpV u_j, VjpV v_j, VjpV& v_u, VjpV& v_v) {
-    const VjpV e1 = hn::Mul(l1_over_yy, hn::MulAdd(low_pass, u_j, rest_j)), e2 = hn::Mul(l3, v_j);
-    const VjpV v_e1 = hn::MulAdd(strain_11, e1, hn::Mul(strain_12, e2));
-    const VjpV v_e2 = hn::MulAdd(strain_12, e1, hn::Mul(strain_22, e2));
-    v_u = hn::Mul(l1_px, v_e1);
-    v_v = hn::MulAdd(l2_px, v_e1, hn::Mul(l3_px, v_e2));
-  };
-  VjpV v_u[3], v_v[3];
-  row_u(rest.x, us.x, vs.x, v_u[0], v_v[0]);
-  row_u(rest.y, us.y, vs.y, v_u[1], v_v[1]);
-  row_u(rest.z, us.z, vs.z, v_u[2], v_v[2]);
-
-  VjpV v_tx = zero, v_ty = zero, v_size = zero;
-  V3 v_columns[3];
-  for (std::size_t j = 0; j < 3; ++j) {
-    const VjpV v_axis_x = hn::Mul(jx, v_u[j]), v_axis_y = hn::Mul(jy, v_v[j]);
-    v_tx = hn::NegMulAdd(v_axis_x, axes[j].z, v_tx);
-    v_ty = hn::NegMulAdd(v_axis_y, axes[j].z, v_ty);
-    v_size = hn::MulAdd(v_u[j], u[j], hn::MulAdd(v_v[j], v[j], v_size));
-    const V3 v_axis{v_axis_x, v_axis_y, hn::Neg(hn::MulAdd(tx, v_axis_x, hn::Mul(ty, v_axis_y)))};
-    const auto inside = hn::Le(hn::Abs(load(rows.log_scale[j])), set(max_log_scale));
-    store(hn::IfThenElseZero(inside, Dot(v_axis, axes[j])), rows.v_log_scale[j]);
-    v_columns[j] = Scaled(rotated_back(v_axis), sigma[j]);
-  }
-
-  // rotation_matrix_vjp(); v_r[row][column] is component `row` of v_columns[column].
-  const V3 &a = v_columns[0], &b = v_columns[1], &c = v_columns[2];
-  const VjpV sxy = hn::Add(b.x, a.y), sxz = hn::Add(c.x, a.z), syz = hn::Add(c.y, b.z);
-  const VjpV dx = hn::Sub(b.z, c.y), dy = hn::Sub(c.x, a.z), dz = hn::Sub(a.y, b.x);
-  const VjpV q[4] = {w, x, y, z};
-  VjpV v_q[4] = {hn::MulAdd(x, dx, hn::MulAdd(y, dy, hn::Mul(z, dz))),
-                 hn::NegMulAdd(x2, hn::Add(b.y, c.z), hn::MulAdd(y, sxy, hn::MulAdd(z, sxz, hn::Mul(w, dx)))),
-                 hn::NegMulAdd(y2, hn::Add(a.x, c.z), hn::MulAdd(x, sxy, hn::MulAdd(z, syz, hn::Mul(w, dy)))),
-                 hn::NegMulAdd(z2, hn::Add(a.x, b.y), hn::MulAdd(x, sxz, hn::MulAdd(y, syz, hn::Mul(w, dz))))};
-  const VjpV along_q = hn::MulAdd(v_q[0], w, hn::MulAdd(v_q[1], x, hn::MulAdd(v_q[2], y, hn::Mul(v_q[3], z))));
-  const VjpV q_scale = hn::Mul(two, inverse_length);
-  for (std::size_t k = 0; k < 4; ++k) {
-    const VjpV tangent = hn::Mul(hn::Mul(hn::NegMulAdd(along_q, q[k], v_q[k]), q_scale), inverse_largest);
-    store(hn::IfThenElseZero(has_direction, tangent), rows.v_rotation[k]);
-  }
-
-  const VjpV v_x_over_z = hn::MulAdd(set(view.fx), v_x, hn::IfThenElseZero(hn::Eq(tx, x_over_z), v_tx));
-  const VjpV v_y_over_z = hn::MulAdd(set(view.fy), v_y, hn::IfThenElseZero(hn::Eq(ty, y_over_z), v_ty));
-  const VjpV shrinking = hn::MulAdd(v_x_over_z, x_over_z, hn::MulAdd(v_y_over_z, y_over_z, v_size));
-  const V3 v_mean = rotated_back({hn::Mul(v_x_over_z, inverse_z), hn::Mul(v_y_over_z, inverse_z),
-                                  hn::NegMulAdd(shrinking, inverse_z, load(rows.sums[9]))});
-  store(v_mean.x, rows.v_mean[0]);
-  store(v_mean.y, rows.v_mean[1]);
-  store(v_mean.z, rows.v_mean[2]);
-  store(v_x, rows.v_x);
-  store(v_y, rows.v_y);
-
-  const VjpV logit = load(rows.logit), bound = set(max_opacity_logit);
-  const VjpV clear = hn::Div(one, hn::Add(one, hn::Exp(d, hn::Clamp(logit, hn::Neg(bound), bound))));  // 1 - opacity
-  store(hn::IfThenElseZero(hn::Le(hn::Abs(logit), bound), hn::Mul(load(rows.sums[0]), clear)), rows.v_logit);
-
-  const VjpV inverse_distance = hn::Div(one, hn::Sqrt(Dot(from_camera, from_camera)));
-  const V3 to = Scaled(from_camera, inverse_distance);
-  store(to.x, rows.to[0]);
-  store(to.y, rows.to[1]);
-  store(to.z, rows.to[2]);
+  const auto [to, inverse_distance] = direction(of.d);
+  for (std::size_t k = 0; k < 3; ++k) store(to[k], rows.to[k]);
   store(inverse_distance, rows.inverse_distance);
 }
 
@@ -203,11 +85,10 @@ struct Bases {
 template <int kDegree>
 HWY_INLINE void EachBasisVjp(const Bases& bases, VjpRows& rows) {
   for (std::size_t i = 0; i < rows.count; ++i) {
-    const float to[3] = {rows.to[0][i], rows.to[1][i], rows.to[2][i]};
+    const std::array<float, 3> to{rows.to[0][i], rows.to[1][i], rows.to[2][i]};
     const auto v_to = scene::sh_basis_vjp(kDegree, to[0], to[1], to[2], bases.v_basis[i]);
-    const float along = v_to[0] * to[0] + v_to[1] * to[1] + v_to[2] * to[2];
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      rows.v_mean[axis][i] += (v_to[axis] - along * to[axis]) * rows.inverse_distance[i];
+    const auto v_mean = direction_vjp(to, rows.inverse_distance[i], v_to);
+    for (std::size_t axis = 0; axis < 3; ++axis) rows.v_mean[axis][i] += v_mean[axis];
   }
 }
 
@@ -310,8 +191,8 @@ HWY_INLINE void LoadRows(const scene::GaussianCloud& cloud, std::size_t first_ro
 }
 
 /// What fills up the last vector: rows that are not seen.
-HWY_INLINE void FillUp(VjpD d, VjpRows& rows) {
-  for (std::size_t i = rows.count; i % hn::Lanes(d) != 0; ++i) {
+HWY_INLINE void FillUp(VjpRows& rows) {
+  for (std::size_t i = rows.count; i % hn::Lanes(LanesD()) != 0; ++i) {
     for (auto& column : rows.mean) column[i] = 0;
     for (auto& column : rows.log_scale) column[i] = 0;
     for (auto& column : rows.rotation) column[i] = 0;
@@ -323,7 +204,6 @@ HWY_INLINE void FillUp(VjpD d, VjpRows& rows) {
 void ProjectRowsVjp(const scene::GaussianCloud& cloud, std::size_t first_row, const ViewParams<float>& view,
                     int sh_degree, const std::uint32_t* row_of, const RowPairs& v_rows, std::size_t begin,
                     std::size_t end, Gradients& out) {
-  const VjpD d;
   VjpRows rows;
   rows.count = end - begin;
   row_of += begin;
@@ -340,8 +220,8 @@ void ProjectRowsVjp(const scene::GaussianCloud& cloud, std::size_t first_row, co
     return;
   }
   LoadRows(cloud, first_row, row_of, rows);
-  FillUp(d, rows);
-  for (std::size_t i = 0; i < rows.count; i += hn::Lanes(d)) ProjectVjpVector(d, view, i, rows);
+  FillUp(rows);
+  for (std::size_t i = 0; i < rows.count; i += hn::Lanes(LanesD())) ProjectVjpVector(view, i, rows);
   WithDegree(sh_degree, [&](auto degree) { ColorVjp<degree>(cloud, first_row, row_of, begin, rows, out); });
   const auto add = [&](const float* from, std::vector<float>& to) {
     for (std::size_t i = 0; i < rows.count; ++i) to[begin + i] += from[i];
