@@ -35,8 +35,8 @@ struct VjpRows {
 /// From K d as Splat has it, with |K d|^2 = q log2(e) / 2, to standard deviations: sqrt(2 ln 2), and its square.
 constexpr double sigmas_of_splat = 1.1774100225154747, square_sigmas_of_splat = 1.3862943611198906;
 
-/// dL/d(projection) from the sums over pixels, which GroupGradient has in the units of Splat: see projection_gradient() in
-/// blend.h.
+/// dL/d(projection) from the sums over pixels, which GroupGradient has in the units of Splat: see projection_gradient()
+/// in blend.h.
 ///   load  load(k) is sum k of GroupGradient
 template <class LoadSum>
 HWY_INLINE ProjectionGradient<Lanes> GradientOfProjection(const Reprojection<Lanes>& of, LoadSum&& load) {
