@@ -1,5 +1,6 @@
-// One splat at one pixel: its alpha and its place in the ray's sum, and the pullbacks of both.
-// Source: Kerbl et al. 2023, eqs. 2-3.
+// One splat at one pixel: its alpha and its place in the ray's sum, and the pullbacks of both, in plain numbers.
+// Source: Kerbl et al. 2023, eqs. 2-3. The kernels (simd/composite_tile.cc, simd/composite_tile_vjp.cc) have forms of
+// their own, made for their inner loops: 2^x in place of e^x, and dL/dT in place of `behind`.
 #pragma once
 
 #include "engine/render/project_vjp.h"

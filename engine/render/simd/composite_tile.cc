@@ -22,7 +22,9 @@ struct Kept {
   static constexpr bool kColor = kColor_, kDepth = kDepth_, kWeight = kWeight_, kEnds = kEnds_;
 };
 
-/// Blends the batch into one block. False if all of the block's rays have ended.
+/// Blends the batch into one block, nearest first:
+///   w = T alpha,   C <- C + w c,   T <- T (1 - alpha)   [Kerbl 2023, eq. 3],
+/// with c a colour, a depth or a weight. False if all of the block's rays have ended.
 ///   first  number of the batch's first splat in the tile's list
 template <class K>
 HWY_INLINE bool Blend(D d, const Batch& batch, std::size_t first, std::size_t block, TilePixels& pixels,

@@ -1,4 +1,4 @@
-// The largest blending weight of each splat in one tile: the walk of composite_simd.cc with another result.
+// The largest blending weight of each splat in one tile: the walk of composite_tile.cc with another result.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "engine/render/simd/largest_tile_weights.cc"
 #include <hwy/foreach_target.h>

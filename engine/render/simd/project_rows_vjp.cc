@@ -92,7 +92,9 @@ HWY_INLINE void EachBasisVjp(const Bases& bases, VjpRows& rows) {
   }
 }
 
-/// color_vjp() for row i, which is seen, up to the basis: adds to v_sh and writes v_basis.
+/// color_vjp() for row i, which is seen, up to the basis: adds to v_sh and writes v_basis,
+///   v_sh_ck += v_color_c Y_k,   v_Y_k = sum_c v_color_c sh_ck,
+/// in lanes of coefficients: see shade_rows.inc.
 ///   sh, v_sh  [3 * stored]
 template <int kDegree>
 HWY_INLINE void ColorVjpRow(const float* sh, std::size_t stored, std::size_t i, const VjpRows& rows, Bases& bases,
