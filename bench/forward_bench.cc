@@ -14,7 +14,7 @@
 #include "bench/measure.h"
 #include "engine/procedural/demo_scene.h"
 #include "engine/render/forward.h"
-#include "engine/render/reference.h"
+#include "engine/render/reference/forward_reference.h"
 
 namespace {
 

@@ -8,7 +8,7 @@
 
 #include "engine/core/parallel.h"
 #include "engine/render/backward_stages.h"
-#include "engine/render/reference_backward.h"
+#include "engine/render/reference/backward_reference.h"
 
 namespace engine::render {
 namespace {

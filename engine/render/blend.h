@@ -1,5 +1,6 @@
-// One splat at one pixel: its alpha and its place in the ray's sum, and the pullbacks of both.
-// Source: Kerbl et al. 2023, eqs. 2-3.
+// One splat at one pixel: its alpha and its place in the ray's sum, and the pullbacks of both, in plain numbers.
+// Source: Kerbl et al. 2023, eqs. 2-3. The kernels (simd/composite_tile.cc, simd/composite_tile_vjp.cc) have forms of
+// their own, made for their inner loops: 2^x in place of e^x, and dL/dT in place of `behind`.
 #pragma once
 
 #include "engine/render/project_vjp.h"
@@ -68,7 +69,7 @@ ProjectionGradient<Real> projection_gradient(const Projection<Real>& splat, cons
 /// dL/dlogit from a splat's sums: opacity dL/dopacity is the sum of g.
 template <std::floating_point Real>
 Real opacity_logit_gradient(Real logit, const SplatGradient<Real>& v_splat) {
-  return std::abs(logit) <= Real(max_opacity_logit) ? v_splat.g * opacity(-logit) : Real(0);
+  return logit_vjp(logit, v_splat.g);
 }
 
 /// A ray walked back to front. Starts behind the last blended splat, with the transmittance that is left there, and

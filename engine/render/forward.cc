@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "engine/core/parallel.h"
-#include "engine/render/reference.h"
+#include "engine/render/reference/forward_reference.h"
 #include "engine/render/splats.h"
 
 namespace engine::render {

@@ -154,6 +154,57 @@ scene::Rect LocalFrame::project(const scene::GaussianCloud& changeable, const sc
   return impl_->reach = whole_tiles(reach, camera);
 }
 
+namespace {
+
+/// The frozen splats, and in the blocks after them the changeable ones as they lie. Returns where these begin.
+std::size_t lay_splats(std::span<const Splat> frozen, const ForwardBuffers& top, ForwardBuffers& merged) {
+  const std::size_t frozen_blocks = chunk_count(frozen.size(), project_block);
+  const std::size_t blocks = frozen_blocks + top.block_sizes.size();
+  // Entries are numbered in 32 bits, and so are splats.
+  if (blocks * project_block > std::numeric_limits<std::int32_t>::max()) throw std::bad_alloc();
+  Splat* const splats = merged.splats.reserve(blocks * project_block);
+  merged.tile_group = top.tile_group;
+  merged.pairs_before.assign(frozen_blocks, 0);
+  merged.pairs_before.insert(merged.pairs_before.end(), top.pairs_before.begin(), top.pairs_before.end());
+  parallel_for(frozen.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    std::copy(frozen.data() + begin, frozen.data() + end, splats + begin);
+  });
+  const std::size_t first_change = frozen_blocks * project_block;
+  for (std::size_t b = 0; b < top.block_sizes.size(); ++b)
+    std::copy_n(top.splats.data() + b * project_block, top.block_sizes[b], splats + first_change + b * project_block);
+  return first_change;
+}
+
+/// How many frozen splats lie in front of each changeable one. Of the same depth, a frozen one does, as rows of a base
+/// do.
+///   frozen  by depth
+///   out     as top.splats
+void count_frozen_before(std::span<const Splat> frozen, const ForwardBuffers& top, std::uint32_t* out) {
+  parallel_for(top.by_depth.size(), 512, [&](std::size_t begin, std::size_t end) {
+    const auto depth = [&](std::size_t t) { return top.splats[top.by_depth[t].splat].depth; };
+    auto at = std::ranges::upper_bound(frozen, depth(begin), {}, &Splat::depth);
+    for (std::size_t t = begin; t < end; ++t) {
+      while (at != frozen.end() && at->depth <= depth(t)) ++at;
+      out[top.by_depth[t].splat] = std::uint32_t(at - frozen.begin());
+    }
+  });
+}
+
+/// A tile's list of both, by depth.
+///   first_change  what is added to the numbers of `above`
+///   to            room for both
+void merge_lists(std::span<const std::uint32_t> below, std::span<const std::uint32_t> above,
+                 const std::uint32_t* frozen_before, std::size_t first_change, std::uint32_t* to) {
+  std::size_t a = 0;
+  for (const std::uint32_t change : above) {
+    for (; a < below.size() && below[a] < frozen_before[change]; ++a) *to++ = below[a];
+    *to++ = std::uint32_t(first_change) + change;
+  }
+  std::copy(below.begin() + std::ptrdiff_t(a), below.end(), to);
+}
+
+}  // namespace
+
 void LocalFrame::merge(const FrozenView& frozen) {
   Impl& frame = *impl_;
   const FrozenView::Impl& view = *frozen.impl_;
@@ -163,33 +214,9 @@ void LocalFrame::merge(const FrozenView& frozen) {
   frame.drawn = false;
   assert(top.tile_begin.size() == view.tile_begin.size() && contains(view.region, frame.reach));
 
-  // The frozen splats, and in the blocks after them the changeable ones as they lie.
-  const std::size_t frozen_blocks = chunk_count(view.splats.size(), project_block);
-  const std::size_t blocks = frozen_blocks + top.block_sizes.size();
-  const std::size_t first_change = frozen_blocks * project_block;
-  // Entries are numbered in 32 bits, and so are splats.
-  if (blocks * project_block > std::numeric_limits<std::int32_t>::max()) throw std::bad_alloc();
-  Splat* const splats = merged.splats.reserve(blocks * project_block);
-  merged.tile_group = top.tile_group;
-  merged.pairs_before.assign(frozen_blocks, 0);
-  merged.pairs_before.insert(merged.pairs_before.end(), top.pairs_before.begin(), top.pairs_before.end());
-  parallel_for(view.splats.size(), 4096, [&](std::size_t begin, std::size_t end) {
-    std::copy(view.splats.data() + begin, view.splats.data() + end, splats + begin);
-  });
-  for (std::size_t b = 0; b < top.block_sizes.size(); ++b) {
-    const std::size_t first = b * project_block, n = top.block_sizes[b];
-    std::copy_n(top.splats.data() + first, n, splats + first_change + first);
-  }
-  // By depth; a frozen splat comes before a changeable one of the same depth, as rows of a base do.
+  const std::size_t first_change = lay_splats(view.splats, top, merged);
   std::uint32_t* const frozen_before = frame.frozen_before.reserve(top.block_sizes.size() * project_block);
-  parallel_for(top.by_depth.size(), 512, [&](std::size_t begin, std::size_t end) {
-    const auto depth = [&](std::size_t t) { return top.splats[top.by_depth[t].splat].depth; };
-    auto at = std::ranges::upper_bound(view.splats, depth(begin), {}, &Splat::depth);
-    for (std::size_t t = begin; t < end; ++t) {
-      while (at != view.splats.end() && at->depth <= depth(t)) ++at;
-      frozen_before[top.by_depth[t].splat] = std::uint32_t(at - view.splats.begin());
-    }
-  });
+  count_frozen_before(view.splats, top, frozen_before);
 
   const std::size_t all_tiles = view.tile_begin.size() - 1;
   const auto list_of_change = [&](std::size_t tile) {
@@ -210,14 +237,8 @@ void LocalFrame::merge(const FrozenView& frozen) {
   parallel_for(frame.tiles.size(), 4, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t tile = frame.tiles[i];
-      const std::span<const std::uint32_t> below = view.list(tile), above = list_of_change(tile);
-      std::uint32_t* to = entries + merged.tile_begin[tile];
-      std::size_t a = 0;
-      for (const std::uint32_t change : above) {
-        for (; a < below.size() && below[a] < frozen_before[change]; ++a) *to++ = below[a];
-        *to++ = std::uint32_t(first_change) + change;
-      }
-      std::copy(below.begin() + std::ptrdiff_t(a), below.end(), to);
+      merge_lists(view.list(tile), list_of_change(tile), frozen_before, first_change,
+                  entries + merged.tile_begin[tile]);
     }
   });
 }

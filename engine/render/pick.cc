@@ -91,10 +91,14 @@ std::optional<DVec3> surface_normal(std::span<const Splat> splats, const scene::
 DVec3 shortest_axis(const scene::GaussianCloud& cloud, std::size_t row) {
   const Vec3 scale = cloud.log_scale.get(row);
   const int axis = scale.x <= scale.y ? (scale.x <= scale.z ? 0 : 2) : (scale.y <= scale.z ? 1 : 2);
-  const Quat q = cloud.rotation.get(row);
-  const auto world_from_local = rotation_matrix<double>(q.w, q.x, q.y, q.z);
-  return {world_from_local[std::size_t(axis)], world_from_local[std::size_t(3 + axis)],
-          world_from_local[std::size_t(6 + axis)]};
+  const Quat stored = cloud.rotation.get(row);
+  DQuat q(stored.w, stored.x, stored.y, stored.z);
+  // Not unit_quaternion(), which is for projection, and rounds otherwise: answers keep their last digit.
+  const double largest = std::max({std::abs(q.w), std::abs(q.x), std::abs(q.y), std::abs(q.z), 1e-30});
+  q /= largest;
+  const double length = std::sqrt(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);
+  q *= 1 / std::max(length, 1e-12 / largest);
+  return glm::mat3_cast(q)[axis];
 }
 
 }  // namespace

@@ -1,13 +1,16 @@
-// One Gaussian through one camera: the formulas of projection, for the reference pass and for tests.
-// Source: Zwicker et al. 2001, "EWA volume splatting", eqs. 24-31; Kerbl et al. 2023, section 4 and eqs. 5-6.
+// One Gaussian through one camera, in plain numbers: for the reference pass, for tests, and for whoever asks about
+// single Gaussians. The formulas are those of projection.inc, which the vector kernels share. Source: Zwicker et al.
+// 2001, "EWA volume splatting", eqs. 24-31; Kerbl et al. 2023, section 4 and eqs. 5-6.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <concepts>
+#include <cstddef>
 #include <span>
 
+#include "engine/render/numbers.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/sh.h"
 
@@ -19,6 +22,7 @@ constexpr double fov_margin = 0.3;    ///< The Jacobian is evaluated at most thi
 constexpr double max_alpha = 0.99;    ///< One splat never hides all that lies behind it.
 constexpr double min_alpha = 1.0 / 255.0;   ///< Less than one 8-bit step: not blended.
 constexpr double min_transmittance = 1e-4;  ///< A ray ends before it would fall below this.
+constexpr double far_away = 1e18;  ///< World units or pixels: what is as far is not drawn. Its square fits a float.
 constexpr double max_log_scale = 20.0;      ///< exp() of more overflows float once squared; saturates.
 constexpr double max_opacity_logit = 30.0;  ///< The sigmoid is 0 or 1 to float precision beyond; saturates.
 constexpr double max_color = 65504.0;  ///< Largest half float: colours saturate, so that sums stay finite in any file.
@@ -56,25 +60,19 @@ ViewParams<Real> view_params(const scene::Camera& camera) {
   return view;
 }
 
-/// Rotation matrix (row-major, world_from_local) of a quaternion (w, x, y, z) of any length.
-/// Divides by max(length, 1e-12), so that the zero quaternion is the identity and not NaN; the length is taken of the
-/// quaternion over its largest component, since squares of 1e-20 or 1e20 leave float's range.
+/// The camera's parameters, as formulas that compute in Real read them.
+template <Number Real>
+using View = ViewParams<Real>;
+
+#include "engine/render/projection.inc"
+
+/// Rotation matrix (row-major, world_from_local) of a quaternion (w, x, y, z) of any length; of zero, the identity.
 template <std::floating_point Real>
 std::array<Real, 9> rotation_matrix(Real w, Real x, Real y, Real z) {
-  const Real largest = std::max({std::abs(w), std::abs(x), std::abs(y), std::abs(z), Real(1e-30)});
-  w /= largest, x /= largest, y /= largest, z /= largest;
-  const Real length = std::sqrt(w * w + x * x + y * y + z * z);
-  const Real scale = Real(1) / std::max(length, Real(1e-12) / largest);
-  w *= scale, x *= scale, y *= scale, z *= scale;
-  return {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
-          2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-          2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
+  return rotation_matrix(unit_quaternion<Real>({w, x, y, z}));
 }
 
-/// A Gaussian's projection. The falloff at offset (dx, dy) from the mean is exp(-q / 2) with
-///   q = (l1 dx + l2 dy)^2 + (l3 dy)^2,
-/// the Cholesky form of q = d^T conic d. Written so, the cancellation along a needle happens before squaring: the
-/// expanded form loses a tenth of a sigma in float on a splat 1000 pixels long, this one nothing that shows.
+/// A Gaussian's projection.
 template <std::floating_point Real>
 struct Projection {
   bool visible = false;  ///< In front of the near plane, and numbers that float can hold. All else is 0 otherwise.
@@ -82,68 +80,43 @@ struct Projection {
   Real depth = 0;        ///< Along the optical axis, world units.
   Real sigma_x = 0, sigma_y = 0;  ///< Standard deviations of the marginals, pixels, low pass included.
   Real covariance_xy = 0;         ///< Pixels^2.
-  Real l1 = 0, l2 = 0, l3 = 0;    ///< 1 / pixels.
+  Real l1 = 0, l2 = 0, l3 = 0;    ///< 1 / pixels: see FalloffMatrix.
 };
 
+///   mean           world units
+///   log_scale      logarithms of the standard deviations along the local axes, world units
+///   rotation_wxyz  world_from_local, of any length
 template <std::floating_point Real>
 Projection<Real> project(const ViewParams<Real>& view, std::array<Real, 3> mean, std::array<Real, 3> log_scale,
                          std::array<Real, 4> rotation_wxyz) {
+  const Vector<Real> p = to_camera(view, from_centre(view, mean));
+  if (!(p[2] > Real(near_plane))) return {};  // also when it is NaN
+  const Perspective<Real> at = perspective(view, p);
   Projection<Real> out;
-  std::array<Real, 3> d;
-  for (std::size_t i = 0; i < 3; ++i) d[i] = (mean[i] - view.centre_high[i]) - view.centre_low[i];
-  std::array<Real, 3> p;
-  for (std::size_t i = 0; i < 3; ++i)
-    p[i] = view.rotation[3 * i] * d[0] + view.rotation[3 * i + 1] * d[1] + view.rotation[3 * i + 2] * d[2];
-  if (!(p[2] > Real(near_plane))) return out;  // also when it is NaN
-  const Real x_over_z = p[0] / p[2], y_over_z = p[1] / p[2];
-  out.x = view.fx * x_over_z + view.cx;
-  out.y = view.fy * y_over_z + view.cy;
-  constexpr Real far_away = Real(1e18);  // its square still fits a float
-  if (!(std::abs(out.x) < far_away && std::abs(out.y) < far_away && p[2] < far_away)) return Projection<Real>{};
+  out.x = pixel_x(view, at), out.y = pixel_y(view, at), out.depth = p[2];
+  const Real far = Real(far_away);
+  if (!(abs(out.x) < far && abs(out.y) < far && out.depth < far)) return {};
 
-  // Jacobian of the projection at the clamped point, times cam_from_world: two rows of 3.
-  const Real jx = view.fx / p[2], jy = view.fy / p[2];
-  const Real tx = std::clamp(x_over_z, view.min_x_over_z, view.max_x_over_z);
-  const Real ty = std::clamp(y_over_z, view.min_y_over_z, view.max_y_over_z);
-  const auto r = rotation_matrix(rotation_wxyz[0], rotation_wxyz[1], rotation_wxyz[2], rotation_wxyz[3]);
-  std::array<Real, 3> u, v;  // rows of J R_view R S: covariance = [u.u, u.v; u.v, v.v] + low pass
+  const auto r = rotation_matrix(unit_quaternion(rotation_wxyz));
+  Vector<Real> u, v;  // rows of J W R S, pixels
   for (std::size_t j = 0; j < 3; ++j) {
-    const Real sigma = std::exp(std::clamp(log_scale[j], Real(-max_log_scale), Real(max_log_scale)));
-    std::array<Real, 3> axis;  // the local axis j in camera space, one sigma long
-    for (std::size_t i = 0; i < 3; ++i)
-      axis[i] =
-          (view.rotation[3 * i] * r[j] + view.rotation[3 * i + 1] * r[3 + j] + view.rotation[3 * i + 2] * r[6 + j]) *
-          sigma;
-    u[j] = jx * (axis[0] - tx * axis[2]);
-    v[j] = jy * (axis[1] - ty * axis[2]);
+    const Real sigma = scale(log_scale[j]);
+    const auto [u_j, v_j] = on_picture(at, at.jx * sigma, at.jy * sigma, axis_in_camera(view, r, j));
+    u[j] = u_j, v[j] = v_j;
   }
-  // In units of the largest entry, so that the determinant of a splat 1e12 pixels wide does not overflow.
-  Real unit = 1;
-  for (std::size_t j = 0; j < 3; ++j) unit = std::max({unit, std::abs(u[j]), std::abs(v[j])});
-  for (std::size_t j = 0; j < 3; ++j) u[j] /= unit, v[j] /= unit;
-  const Real low_pass = Real(low_pass_px2) / (unit * unit);
-  const Real uu = u[0] * u[0] + u[1] * u[1] + u[2] * u[2];
-  const Real uv = u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
-  const Real vv = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
-  // Lagrange: uu vv - uv^2 = |u x v|^2, without the cancellation that makes a needle's determinant negative.
-  const Real cx = u[1] * v[2] - u[2] * v[1], cy = u[2] * v[0] - u[0] * v[2], cz = u[0] * v[1] - u[1] * v[0];
-  const Real determinant = (cx * cx + cy * cy + cz * cz) + low_pass * (uu + vv) + low_pass * low_pass;
-  const Real yy = vv + low_pass;
+  const Covariance<Real> cov = covariance(u, v);
+  const FalloffMatrix<Real> K = falloff_matrix(cov, Real(1));
   out.visible = true;
-  out.depth = p[2];
-  out.sigma_x = unit * std::sqrt(uu + low_pass);
-  out.sigma_y = unit * std::sqrt(yy);
-  out.covariance_xy = unit * unit * uv;
-  out.l1 = std::sqrt(yy / determinant) / unit;
-  out.l2 = -out.l1 * uv / yy;
-  out.l3 = 1 / out.sigma_y;
+  out.sigma_x = cov.unit * sqrt(cov.uu + cov.low_pass), out.sigma_y = cov.unit * sqrt(cov.yy);
+  out.covariance_xy = cov.unit * cov.unit * cov.uv;
+  out.l1 = K.l1, out.l2 = K.l2, out.l3 = K.l3;
   return out;
 }
 
-/// Opacity of a stored logit.
+/// Opacity of a stored logit: 1 / (1 + exp(-logit)).
 template <std::floating_point Real>
 Real opacity(Real logit) {
-  return 1 / (1 + std::exp(-std::clamp(logit, Real(-max_opacity_logit), Real(max_opacity_logit))));
+  return clearness(-logit);
 }
 
 /// Colour of a Gaussian seen from the camera: max(0, 0.5 + sum_k sh_k Y_k(direction)), one value per channel.
@@ -151,11 +124,9 @@ Real opacity(Real logit) {
 template <std::floating_point Real>
 std::array<Real, 3> color(const ViewParams<Real>& view, std::array<Real, 3> mean, std::span<const float> sh,
                           int degree) {
-  std::array<Real, 3> d;
-  for (std::size_t i = 0; i < 3; ++i) d[i] = (mean[i] - view.centre_high[i]) - view.centre_low[i];
-  const Real length = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+  const auto [x, y, z] = direction(from_centre(view, mean)).to;
   std::array<Real, 16> basis;
-  scene::sh_basis(degree, d[0] / length, d[1] / length, d[2] / length, basis.data());
+  scene::sh_basis(degree, x, y, z, basis.data());
   const std::size_t stored = sh.size() / 3, used = std::size_t(degree + 1) * std::size_t(degree + 1);
   std::array<Real, 3> rgb;
   for (std::size_t c = 0; c < 3; ++c) {

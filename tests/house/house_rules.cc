@@ -5,6 +5,7 @@
 #include <optional>
 #include <sstream>
 #include <string_view>
+#include <utility>
 
 namespace house {
 namespace {
@@ -146,7 +147,7 @@ std::vector<std::string> find_circle(const Arrows& arrows) {
 std::vector<std::string> violations(const Arrows& arrows, const std::string& file, const std::string& source) {
   std::vector<std::string> found;
   const std::string room = room_of(arrows, file);
-  const bool is_header = file.ends_with(".h");
+  const bool is_header = file.ends_with(".h"), is_source = file.ends_with(".cc");
   if (!arrows.contains(room)) found.push_back(file + ": lies in no room that CMake knows");
   bool once = false;
   int number = 0;
@@ -159,12 +160,33 @@ std::vector<std::string> violations(const Arrows& arrows, const std::string& fil
     if (const auto include = included(line)) {
       const bool of_project = include->quoted || !room_of(arrows, include->header).empty();
       report(of_project ? check_project_include(arrows, room, include->header)
-                        : check_library_include(room, is_header, include->header));
+                        : check_library_include(room, !is_source, include->header));
     }
-    if (is_header && is_using_namespace(line)) report("a header says `using namespace`");
+    if (!is_source && is_using_namespace(line)) report("a header says `using namespace`");
     once = once || line.starts_with("#pragma once");
   }
   if (is_header && !once) found.push_back(file + ": a header without #pragma once");
+  return found;
+}
+
+std::vector<std::string> violations(const Arrows& arrows, const std::map<std::string, std::string>& files) {
+  std::set<std::string> checked;
+  std::vector<std::string> found, next;
+  const auto check = [&](const std::string& file) {
+    if (files.contains(file) && checked.insert(file).second) next.push_back(file);
+  };
+  for (const auto& [file, source] : files)
+    if (file.ends_with(".h") || file.ends_with(".cc")) check(file);
+  while (!next.empty()) {
+    const std::string file = next.back();
+    next.pop_back();
+    for (std::string& violation : violations(arrows, file, files.at(file))) found.push_back(std::move(violation));
+    std::istringstream lines(files.at(file));
+    for (std::string line; std::getline(lines, line);)
+      if (const auto include = included(line)) check(include->header);
+  }
+  for (const auto& [file, source] : files)
+    if (file.ends_with(".inc") && !checked.contains(file)) found.push_back(file + ": nobody includes it");
   return found;
 }
 

@@ -17,9 +17,17 @@ using Arrows = std::map<std::string, std::set<std::string>>;
 /// Rooms that lie on a circle of arrows, in order, the first one repeated at the end; empty if there is no circle.
 [[nodiscard]] std::vector<std::string> find_circle(const Arrows& arrows);
 
-/// What is wrong with one source file, a sentence each: "engine/mask/mask.cc:3: ...".
+/// What is wrong with one source file, a sentence each: "engine/mask/mask.cc:3: ...". What is neither a header (.h) nor
+/// a source (.cc) is taken for a part of those that include it (.inc): it keeps the rules of a header, but needs no
+/// `#pragma once`, since some are included more than once.
 ///   file  path from the project's root
 [[nodiscard]] std::vector<std::string> violations(const Arrows& arrows, const std::string& file,
                                                   const std::string& source);
+
+/// What is wrong with all of them: headers, sources, and every other file that one of these includes. An .inc that
+/// nobody includes is wrong, too.
+///   files  contents by path from the project's root
+[[nodiscard]] std::vector<std::string> violations(const Arrows& arrows,
+                                                  const std::map<std::string, std::string>& files);
 
 }  // namespace house

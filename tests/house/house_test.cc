@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <sstream>
 
 #include "tests/house/house_rules.h"
@@ -29,18 +29,13 @@ std::size_t complaints(const std::string& file, const std::string& source) {
 
 TEST(House, EverySourceKeepsTheRules) {
   const fs::path root = SPLATDRAG_SOURCE_DIR;
-  const Arrows arrows = parse_arrows(contents(SPLATDRAG_ARROWS_FILE));
-  std::size_t files = 0;
+  std::map<std::string, std::string> files;
   for (const char* top : {"engine", "proto", "server"})
-    for (const auto& entry : fs::recursive_directory_iterator(root / top)) {
-      const std::string extension = entry.path().extension();
-      if (extension != ".h" && extension != ".cc") continue;
-      ++files;
-      for (const std::string& violation :
-           violations(arrows, fs::relative(entry.path(), root).generic_string(), contents(entry.path())))
-        ADD_FAILURE() << violation;
-    }
-  EXPECT_GT(files, 50u) << "the sources are not where this test looks for them";
+    for (const auto& entry : fs::recursive_directory_iterator(root / top))
+      if (entry.is_regular_file()) files[fs::relative(entry.path(), root).generic_string()] = contents(entry.path());
+  EXPECT_GT(files.size(), 50u) << "the sources are not where this test looks for them";
+  for (const std::string& violation : violations(parse_arrows(contents(SPLATDRAG_ARROWS_FILE)), files))
+    ADD_FAILURE() << violation;
 }
 
 TEST(House, ArrowsPointOneWay) {
@@ -95,6 +90,38 @@ TEST(HouseRules, ReportAHeaderThatIsNoGoodNeighbour) {
   EXPECT_EQ(complaints("engine/core/vec.h", "namespace engine {}\n"), 1u) << "no #pragma once";
   EXPECT_EQ(complaints("engine/core/vec.h", "#pragma once\n  using namespace std;\n"), 1u);
   EXPECT_EQ(complaints("engine/core/vec.cc", "using namespace std::chrono_literals;\n"), 0u);
+}
+
+TEST(HouseRules, HoldForWhateverIsIncluded) {
+  const auto complaints_about = [](const std::string& part, const std::string& source) {
+    return violations(sample, {{"engine/scene/sum.cc", "#include \"" + part + "\"\n"}, {part, source}});
+  };
+  const std::string part = "engine/scene/sum.inc";
+  EXPECT_TRUE(complaints_about(part, "#include \"engine/core/vec.h\"\n").empty()) << "it needs no #pragma once";
+  EXPECT_EQ(complaints_about(part, "#include \"engine/io/ply.h\"\n").size(), 1u);
+  EXPECT_EQ(complaints_about(part, "#include <zstd.h>\n").size(), 1u);
+  EXPECT_EQ(complaints_about(part, "using namespace std;\n").size(), 1u);
+  EXPECT_EQ(complaints_about("engine/scene/sums.def", "#include <zstd.h>\n").size(), 1u) << "whatever its name";
+}
+
+TEST(HouseRules, HoldForPartsOfParts) {
+  const auto found = violations(sample, {{"engine/scene/sum.cc", "#include \"engine/scene/sum.inc\"\n"},
+                                         {"engine/scene/sum.inc", "\n#include \"engine/scene/lanes.inc\"\n"},
+                                         {"engine/scene/lanes.inc", "#include <zstd.h>\n"}});
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_TRUE(found[0].starts_with("engine/scene/lanes.inc:1: ")) << found[0];
+}
+
+TEST(HouseRules, ReportAPartThatNobodyIncludes) {
+  const auto found = violations(sample, {{"engine/scene/sum.cc", "// engine/scene/sum.inc\n"},
+                                         {"engine/scene/sum.inc", ""},
+                                         {"engine/scene/notes.md", "#include <zstd.h>\n"}});
+  EXPECT_EQ(found, std::vector<std::string>{"engine/scene/sum.inc: nobody includes it"}) << "and no other file matters";
+}
+
+TEST(HouseRules, KeepTorchOutOfPartsToo) {
+  const Arrows arrows{{"engine/diffusion", {}}};
+  EXPECT_EQ(violations(arrows, "engine/diffusion/unet.inc", "#include <torch/torch.h>\n").size(), 1u);
 }
 
 TEST(HouseRules, KnowTheRoomsBelowTheServer) {

@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "engine/render/backward.h"
-#include "engine/render/reference_backward.h"
+#include "engine/render/reference/backward_reference.h"
 #include "tests/engine/render/raster_golden.h"
 
 namespace engine::render {

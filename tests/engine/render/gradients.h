@@ -11,8 +11,8 @@
 
 #include "engine/core/rng.h"
 #include "engine/render/backward.h"
-#include "engine/render/reference.h"
-#include "engine/render/reference_backward.h"
+#include "engine/render/reference/backward_reference.h"
+#include "engine/render/reference/forward_reference.h"
 #include "tests/engine/render/test_scenes.h"
 
 namespace engine::render {

@@ -8,8 +8,8 @@
 
 #include "engine/render/backward.h"
 #include "engine/render/project.h"
-#include "engine/render/reference.h"
-#include "engine/render/reference_backward.h"
+#include "engine/render/reference/backward_reference.h"
+#include "engine/render/reference/forward_reference.h"
 #include "tests/engine/render/gradients.h"
 #include "tests/engine/render/test_scenes.h"
 #include "tests/support/gradient_matches.h"

@@ -8,7 +8,7 @@
 #include "engine/core/parallel.h"
 #include "engine/core/rng.h"
 #include "engine/render/forward.h"
-#include "engine/render/reference.h"
+#include "engine/render/reference/forward_reference.h"
 #include "tests/engine/scene/random_overlay.h"
 
 namespace engine::render {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "engine/render/forward.h"
-#include "engine/render/reference.h"
+#include "engine/render/reference/forward_reference.h"
 #include "tests/engine/render/raster_golden.h"
 
 namespace engine::render {

@@ -1,10 +1,10 @@
-// The largest blending weight of each splat in one tile: the walk of composite_simd.cc with another result.
+// The largest blending weight of each splat in one tile: the walk of composite_tile.cc with another result.
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "engine/render/largest_weight_simd.cc"
+#define HWY_TARGET_INCLUDE "engine/render/simd/largest_tile_weights.cc"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 // After highway.h: compiled once per instruction set.
-#include "engine/render/tile_blocks.inc"
+#include "engine/render/simd/tile_blocks.inc"
 
 #include <algorithm>
 

@@ -14,12 +14,13 @@
 
 namespace engine::render {
 
+/// One visible Gaussian in the picture.
 template <std::floating_point Real>
 struct ReferenceSplat {
   Projection<Real> at;
-  Real opacity;
-  std::array<Real, 3> color;
-  std::uint32_t row;  ///< Of the Gaussian in its layers.
+  Real opacity;               ///< min_alpha or more.
+  std::array<Real, 3> color;  ///< Seen from the camera, clamped.
+  std::uint32_t row;          ///< Of the Gaussian in its layers.
 };
 
 /// A row of the layers: the cloud that holds it, and its number there.
@@ -45,7 +46,8 @@ struct StoredShape {
                  at.cloud.rotation.z[at.row]} {}
 };
 
-/// Nearest first; ties in row order.
+/// All splats that can reach alpha 1/255 in front of the near plane, nearest first; ties in row order. Some of them may
+/// lie beside the picture.
 template <std::floating_point Real>
 std::vector<ReferenceSplat<Real>> reference_splats(const Layers& layers, const ViewParams<Real>& view,
                                                    const ForwardOptions& options) {

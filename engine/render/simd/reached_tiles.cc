@@ -1,7 +1,7 @@
 // Which tiles splats reach, a vector of splats at a time.
 #include <hwy/cache_control.h>
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "engine/render/reached_tiles_simd.cc"
+#define HWY_TARGET_INCLUDE "engine/render/simd/reached_tiles.cc"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 

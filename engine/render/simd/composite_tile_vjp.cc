@@ -1,12 +1,12 @@
 // Pulls back the blending of one tile, a vector of pixels at a time, from where its rays ended.
 #include <hwy/cache_control.h>
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "engine/render/composite_vjp_simd.cc"
+#define HWY_TARGET_INCLUDE "engine/render/simd/composite_tile_vjp.cc"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 // After highway.h: compiled once per instruction set.
-#include "engine/render/lane_sums.inc"
-#include "engine/render/tile_blocks.inc"
+#include "engine/render/simd/lane_sums.inc"
+#include "engine/render/simd/tile_blocks.inc"
 
 #include <algorithm>
 #include <cassert>

@@ -1,10 +1,10 @@
-#include "engine/render/reference_backward.h"
+#include "engine/render/reference/backward_reference.h"
 
 #include <algorithm>
 #include <limits>
 
 #include "engine/render/blend.h"
-#include "engine/render/reference_splats.h"
+#include "engine/render/reference/reference_splats.h"
 
 namespace engine::render {
 namespace {

@@ -1,7 +1,7 @@
-#include "engine/render/reference.h"
+#include "engine/render/reference/forward_reference.h"
 
 #include "engine/render/blend.h"
-#include "engine/render/reference_splats.h"
+#include "engine/render/reference/reference_splats.h"
 
 namespace engine::render {
 

@@ -1,11 +1,11 @@
 // Blends the splats of one tile, a vector of pixels at a time.
 #include <hwy/cache_control.h>
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "engine/render/composite_simd.cc"
+#define HWY_TARGET_INCLUDE "engine/render/simd/composite_tile.cc"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 // After highway.h: compiled once per instruction set.
-#include "engine/render/tile_blocks.inc"
+#include "engine/render/simd/tile_blocks.inc"
 
 #include <algorithm>
 #include <cassert>
@@ -22,7 +22,9 @@ struct Kept {
   static constexpr bool kColor = kColor_, kDepth = kDepth_, kWeight = kWeight_, kEnds = kEnds_;
 };
 
-/// Blends the batch into one block. False if all of the block's rays have ended.
+/// Blends the batch into one block, nearest first:
+///   w = T alpha,   C <- C + w c,   T <- T (1 - alpha)   [Kerbl 2023, eq. 3],
+/// with c a colour, a depth or a weight. False if all of the block's rays have ended.
 ///   first  number of the batch's first splat in the tile's list
 template <class K>
 HWY_INLINE bool Blend(D d, const Batch& batch, std::size_t first, std::size_t block, TilePixels& pixels,
