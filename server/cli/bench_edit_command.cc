@@ -1,34 +1,24 @@
 // splatdrag bench-edit: edits whose right result is known, carried out and judged.
-#include <algorithm>
-#include <cstdint>
 #include <filesystem>
-#include <fstream>
-#include <functional>
-#include <iomanip>
-#include <iterator>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <ostream>
 #include <span>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "engine/core/atomic_file.h"
-#include "engine/core/checksum.h"
-#include "engine/correct/scene_corrector.h"
-#include "engine/edit/edit.h"
+#include "engine/edit/request.h"
 #include "engine/evaluate/cases.h"
-#include "engine/evaluate/harmonic_corrector.h"
-#include "engine/evaluate/measure.h"
-#include "engine/evaluate/round_trip.h"
+#include "engine/evaluate/result_key.h"
+#include "engine/evaluate/trial.h"
+#include "engine/evaluate/trip_trial.h"
 #include "engine/io/dataset.h"
 #include "engine/io/image_file.h"
 #include "engine/io/scene_file.h"
-#include "engine/scene/overlay.h"
-#include "proto/json_text.h"
+#include "server/cli/bench_report.h"
 #include "server/cli/commands.h"
 #include "server/cli/compute.h"
 #include "server/cli/folders.h"
@@ -58,18 +48,6 @@ struct BenchOptions {
   ComputeOptions compute;
 };
 
-ordered_json encode(const evaluate::Likeness& likeness) {
-  return {{"psnr_db", likeness.psnr_db}, {"ssim", likeness.ssim}, {"pixels", likeness.pixels}};
-}
-
-ordered_json encode(const evaluate::Quality& quality) {
-  return {{"edited", encode(quality.edited)},
-          {"vacated", encode(quality.vacated)},
-          {"arrived", encode(quality.arrived)},
-          {"outside", encode(quality.outside)},
-          {"miss", quality.miss}};
-}
-
 /// What is given on the command line, over the preset.
 void apply(const BenchOptions& options, edit::Request& request) {
   edit::Params& params = request.params;
@@ -83,198 +61,42 @@ void apply(const BenchOptions& options, edit::Request& request) {
   params.intervals = options.intervals.value_or(edits::preset_intervals(options.preset, request));
 }
 
-/// The corrector of that name; null: none.
-std::unique_ptr<engine::correct::Corrector> corrector_named(const std::string& name) {
-  if (name == "scene") return std::make_unique<engine::correct::SceneCorrector>();
-  if (name == "harmonic") return std::make_unique<evaluate::HarmonicCorrector>();
-  return nullptr;
+/// Where a result is kept.
+path kept_file(const BenchOptions& options, const Machine& machine, const std::string& subject,
+               const std::string& corrector, const edit::Request& request) {
+  static const std::uint64_t program = evaluate::checksum_of_program();
+  const std::string key = evaluate::result_key({.subject = subject,
+                                                .corrector = corrector,
+                                                .scene = options.scene,
+                                                .dataset = options.dataset,
+                                                .pictures = options.pictures,
+                                                .threads = machine.threads,
+                                                .simd = machine.simd,
+                                                .program = program},
+                                               request);
+  return path(options.out) / "results" / (key + ".json");
 }
 
-/// A field of /proc/self/status in bytes, 0 where there is no such file.
-std::uint64_t status_bytes(const std::string& field) {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);)
-    if (line.starts_with(field + ":")) return 1024 * std::stoull(line.substr(field.size() + 1));
-  return 0;
-}
-
-/// Starts the peak of memory anew, where the system lets us.
-void forget_peak() { std::ofstream("/proc/self/clear_refs") << "5"; }
-
-/// Names a result by all that it and its times depend on: the subject, the request, the machine, and this very program.
-std::string key_of(const std::string& subject, const std::string& corrector, const edit::Request& request,
-                   const BenchOptions& options, const Machine& machine) {
-  static const std::uint64_t program = [] {
-    std::ifstream file("/proc/self/exe", std::ios::binary);
-    const std::string bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-    return engine::fnv1a(std::as_bytes(std::span(bytes)));
-  }();
-  const edit::Params& p = request.params;
-  ordered_json all{subject,       corrector,        p.intervals,          p.iterations, p.annealing_steps,
-                   p.views,       p.max_image_side, int(p.interpolation), p.local_mask, options.pictures,
-                   options.scene, options.dataset,  machine.threads,      machine.simd, program};
-  all.push_back(int(request.mode));
-  for (const edit::Handle& handle : request.handles) {
-    all.push_back({handle.radius, handle.group, handle.target.has_value()});
-    for (int axis = 0; axis < 3; ++axis)
-      all.push_back({handle.source[axis], handle.target.value_or(handle.source)[axis]});
-  }
-  for (int axis = 0; request.region && axis < 3; ++axis)
-    all.push_back({request.region->center[axis], request.region->size[axis]});
-  const std::string text = all.dump();
-  std::ostringstream key;
-  key << std::hex << std::setfill('0') << std::setw(16) << engine::fnv1a(std::as_bytes(std::span(text)));
-  return subject + "-" + corrector + "-" + key.str();
-}
-
-/// What an edit came to, and how long it took.
-Result<ordered_json> judge(const evaluate::Case& the_case, const edit::Request& request,
-                           const std::string& corrector_name, scene::GaussianCloud& edited) {
-  forget_peak();
-  const std::uint64_t before = status_bytes("VmRSS");
-  const auto corrector = corrector_named(corrector_name);
-  evaluate::Agreement agreement;  // of the last correction
-  std::uint64_t peak = 0;
-  edit::Observer observer;
-  observer.moment = [&](const edit::Moment& moment) -> Result<void> {
-    peak = std::max(peak, status_bytes("VmHWM"));  // what the judge takes does not count
-    if (!moment.pictures.empty() && moment.interval == moment.intervals)
-      agreement = evaluate::agreement(the_case, moment.views, moment.pictures);
-    forget_peak();
-    return {};
+/// Writes pictures below the output folder.
+evaluate::Show picture_writer(const BenchOptions& options) {
+  return [&options](const std::string& name, const scene::Image& picture) {
+    return io::write_image(path(options.out) / (name + ".png"), picture);
   };
-  const auto outcome =
-      edit::run(the_case.before, the_case.cameras, request, observer, nullptr, nullptr, corrector.get());
-  if (!outcome) return propagate(outcome);
-  peak = std::max(peak, status_bytes("VmHWM"));
-  edited = scene::flatten(the_case.before, outcome->overlay);
-  double seconds = 0;
-  ordered_json stages = ordered_json::object();
-  for (const edit::StageTime& time : outcome->report.times) {
-    if (time.stage == "renders") continue;  // for the judge alone
-    stages[time.stage] = time.seconds;
-    seconds += time.seconds;
-  }
-  return ordered_json{{"case", the_case.name},
-                      {"what", the_case.what},
-                      {"corrector", corrector_name},
-                      {"textured", the_case.textured},
-                      {"gaussians", the_case.before.size()},
-                      {"part", the_case.part_before.size()},
-                      {"seeds", outcome->report.seeds},
-                      {"intervals", outcome->report.resolved.intervals},
-                      {"untouched", encode(evaluate::judge(the_case, the_case.before))},
-                      {"result", encode(evaluate::judge(the_case, edited))},
-                      {"corrected_views_agree", {{"psnr_db", agreement.psnr_db}, {"pixels", agreement.pixels}}},
-                      {"seconds", seconds},
-                      {"stages", std::move(stages)},
-                      {"peak_memory_bytes", peak > before ? peak - before : 0},
-                      {"warnings", outcome->report.warnings}};
 }
 
-Result<void> write_pictures(const evaluate::Case& the_case, const edit::Request& request, const std::string& corrector,
-                            const scene::GaussianCloud& edited, const BenchOptions& options) {
-  if (options.pictures == 0) return {};
-  scene::GaussianCloud deformed = edited;
-  if (request.params.iterations > 0) {
-    edit::Request deform_only = request;
-    deform_only.params.iterations = 0;
-    const auto dry = edit::run(the_case.before, the_case.cameras, deform_only);
-    if (!dry) return propagate(dry);
-    deformed = scene::flatten(the_case.before, dry->overlay);
-  }
-  for (std::size_t v = 0; v < std::min(std::size_t(options.pictures), the_case.held_out.size()); ++v) {
-    const scene::Camera& camera = the_case.held_out[v];
-    const path file = path(options.out) / (the_case.name + "_" + corrector + "_" + camera.name + ".png");
-    if (auto saved = io::write_image(file, evaluate::comparison(the_case, deformed, edited, camera)); !saved)
-      return saved;
-  }
-  return {};
-}
-
-std::string row(const ordered_json& found) {
-  std::ostringstream out;
-  out << "| " << found.at("case").get<std::string>() << " | " << found.at("corrector").get<std::string>() << std::fixed;
-  for (const char* kind : {"edited", "vacated", "arrived", "outside"})
-    out << " | " << std::setprecision(2) << found.at("result").at(kind).at("psnr_db").get<double>() << " | "
-        << std::setprecision(4) << found.at("result").at(kind).at("ssim").get<double>();
-  out << " | " << std::setprecision(4) << found.at("result").at("miss").get<double>() << " | " << std::setprecision(2);
-  const ordered_json& agreement = found.at("corrected_views_agree");
-  if (agreement.at("pixels").get<std::size_t>() > 0)
-    out << agreement.at("psnr_db").get<double>();
-  else
-    out << "-";
-  out << " | " << std::setprecision(1) << found.at("seconds").get<double>() << " |\n";
-  return out.str();
-}
-
-std::string trip_line(const ordered_json& found) {
-  const auto decibels = [&](const char* kind) { return found.at(kind).at("psnr_db").get<double>(); };
-  std::ostringstream out;
-  out << std::fixed << std::setprecision(2) << "there and back, " << found.at("corrector").get<std::string>() << ": "
-      << 100 * found.at("arrived").get<double>() << " % of the drag arrived; inside " << decibels("inside")
-      << " dB, outside " << decibels("outside") << " dB; " << std::setprecision(1) << found.at("seconds").get<double>()
-      << " s there; zero drag, inside " << decibels("zero_drag") << " dB\n";
-  return out.str();
-}
-
-/// How a result reads; throws what nlohmann::json does where a field is missing.
-using Line = std::string (*)(const ordered_json& found);
-
-/// A result of an earlier run, if it is there and whole.
-std::optional<ordered_json> kept_result(const path& file, Line line) {
-  std::ifstream in(file);
-  ordered_json kept = ordered_json::parse(in, nullptr, /*allow_exceptions=*/false);
-  if (kept.is_discarded()) return std::nullopt;
-  try {
-    static_cast<void>(line(kept));
-  } catch (const nlohmann::json::exception&) {
-    return std::nullopt;  // not what we wrote
-  }
-  return kept;
-}
-
-/// A result: kept from an earlier run, or new and then kept.
-Result<ordered_json> kept_or(const path& file, Line line, const std::function<Result<ordered_json>()>& find) {
-  if (auto kept = kept_result(file, line)) return std::move(*kept);
-  auto found = find();
-  if (!found) return found;
-  const std::string text = proto::pretty(*found) + "\n";
-  if (auto kept = engine::write_file(file, std::as_bytes(std::span(text))); !kept) return propagate(kept);
-  return found;
-}
-
-Result<ordered_json> result_of(const evaluate::Case& the_case, const std::string& corrector,
-                               const BenchOptions& options, const Machine& machine) {
+Result<evaluate::Trial> trial_of(const evaluate::Case& the_case, const std::string& corrector,
+                                 const BenchOptions& options, const Machine& machine) {
   edit::Request request = the_case.request;
   apply(options, request);
-  const std::string key = key_of(the_case.name, corrector, request, options, machine);
-  return kept_or(path(options.out) / "results" / (key + ".json"), row, [&]() -> Result<ordered_json> {
-    scene::GaussianCloud edited;
-    auto found = judge(the_case, request, corrector, edited);
-    if (!found) return found;
-    if (auto written = write_pictures(the_case, request, corrector, edited, options); !written)
-      return propagate(written);
-    return found;
+  const path file = kept_file(options, machine, the_case.name, corrector, request);
+  return kept_or<evaluate::Trial>(file, [&]() -> Result<evaluate::Trial> {
+    auto done = evaluate::carry_out(the_case, request, corrector);
+    if (!done) return propagate(done);
+    const auto shown = evaluate::show_pictures(the_case, request, corrector, done->edited,
+                                               std::size_t(options.pictures), picture_writer(options));
+    if (!shown) return propagate(shown);
+    return std::move(done->trial);
   });
-}
-
-constexpr const char* table_head =
-    "| case | corrector | edited, dB | SSIM | vacated, dB | SSIM | arrived, dB | SSIM | outside, dB | SSIM | miss "
-    "| views agree, dB | s |\n"
-    "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n";
-
-/// The cases asked for, by name.
-Result<std::vector<std::string>> chosen_cases(const BenchOptions& options) {
-  const std::vector<std::string>& all = evaluate::case_names();
-  for (const std::string& name : options.cases)
-    if (std::find(all.begin(), all.end(), name) == all.end()) return propagate(evaluate::make_case(name));
-  std::vector<std::string> chosen;
-  for (const std::string& name : options.cases.empty() ? all : options.cases)
-    if (!options.small || evaluate::is_small(name)) chosen.push_back(name);
-  if (chosen.empty())
-    return engine::fail(engine::ErrorCode::invalid_argument, "none of these cases is small", "--case, --small");
-  return chosen;
 }
 
 /// What stands at the head of every report.
@@ -295,85 +117,73 @@ ordered_json settings(const BenchOptions& options, const Machine& machine) {
             {"local_mask", params.local_mask}}}};
 }
 
-Result<void> write_text(const path& file, const std::string& text) {
-  return engine::write_file(file, std::as_bytes(std::span(text)));
-}
-
 Result<void> run_cases(const BenchOptions& options, const Machine& machine, Terminal& terminal) {
-  const auto chosen = chosen_cases(options);
-  if (!chosen) return propagate(chosen);
-  std::string table = table_head;
+  auto chosen = evaluate::choose_cases(options.cases, options.small);
+  if (!chosen) {
+    if (chosen.error().where.empty()) chosen.error().where = "--case, --small";
+    return propagate(chosen);
+  }
+  std::string table = evaluate::trial_table_head();
+  terminal.out << table << std::flush;
   ordered_json all = ordered_json::array();
-  terminal.out << table_head << std::flush;
   for (const std::string& name : *chosen) {
     const auto made = evaluate::make_case(name);
     if (!made) return propagate(made);
     for (const std::string& corrector : options.correctors) {
-      auto found = result_of(*made, corrector, options, machine);
-      if (!found) return propagate(found);
-      table += row(*found);
-      terminal.out << row(*found) << std::flush;
-      all.push_back(std::move(*found));
+      const auto trial = trial_of(*made, corrector, options, machine);
+      if (!trial) return propagate(trial);
+      const std::string row = evaluate::trial_table_row(*trial);
+      table += row;
+      terminal.out << row << std::flush;
+      all.push_back(encode(*trial));
     }
   }
   ordered_json report = settings(options, machine);
   report["cases"] = std::move(all);
-  if (auto saved = write_text(path(options.out) / "bench.json", proto::pretty(report) + "\n"); !saved) return saved;
-  return write_text(path(options.out) / "bench.md", table);
+  if (auto saved = write_json(path(options.out) / "bench.json", report); !saved) return saved;
+  return engine::write_file(path(options.out) / "bench.md", std::as_bytes(std::span(table)));
 }
 
-/// Input, half-way, and what came back, at one camera.
-scene::Image trip_picture(const scene::GaussianCloud& input, const evaluate::RoundTrip& trip,
-                          const scene::Camera& camera) {
-  scene::Image out(3 * camera.width, camera.height, 3);
-  int x = 0;
-  for (const scene::GaussianCloud* cloud : {&input, &trip.halfway, &trip.back}) {
-    scene::paste(evaluate::picture(*cloud, camera), {x, 0, x + camera.width, camera.height}, out);
-    x += camera.width;
-  }
-  return out;
-}
+/// A capture, and the drag to take there and back.
+struct Capture {
+  scene::GaussianCloud cloud;
+  std::vector<scene::Camera> cameras;
+  edit::Request request;
+};
 
-/// There and back on a capture, with each corrector.
-Result<void> run_trips(const BenchOptions& options, const Machine& machine, Terminal& terminal) {
+Result<Capture> load_capture(const BenchOptions& options) {
   const auto asked = read_request(options.request, options.name);
   if (!asked) return propagate(asked);
   auto request = edits::to_engine(asked->request);
   if (!request) return propagate(request);
   apply(options, *request);
-  const auto input = io::read_scene(options.scene);
+  auto input = io::read_scene(options.scene);
   if (!input) return propagate(input);
   const auto dataset = io::read_dataset(options.dataset, {.points = false});
   if (!dataset) return propagate(dataset);
-  std::vector<scene::Camera> cameras;
-  for (const io::View& view : dataset->views) cameras.push_back(view.camera);
+  return Capture{std::move(input->cloud), io::cameras_of(*dataset), std::move(*request)};
+}
 
+/// There and back on a capture, with each corrector.
+Result<void> run_trips(const BenchOptions& options, const Machine& machine, Terminal& terminal) {
+  const auto capture = load_capture(options);
+  if (!capture) return propagate(capture);
   ordered_json all = ordered_json::array();
   for (const std::string& corrector : options.correctors) {
-    const std::string key = key_of("trip", corrector, *request, options, machine);
-    auto found = kept_or(path(options.out) / "results" / (key + ".json"), trip_line, [&]() -> Result<ordered_json> {
-      const auto own = corrector_named(corrector);
-      const auto trip = evaluate::there_and_back(input->cloud, cameras, *request, own.get());
-      if (!trip) return propagate(trip);
-      const auto still = evaluate::zero_drag(input->cloud, cameras, *request, own.get());
-      if (!still) return propagate(still);
-      for (std::size_t v = 0; v < std::min(std::size_t(options.pictures), trip->cameras.size()); ++v) {
-        const path file = path(options.out) / ("trip_" + corrector + "_" + std::to_string(v) + ".png");
-        if (auto saved = io::write_image(file, trip_picture(input->cloud, *trip, trip->cameras[v])); !saved)
-          return propagate(saved);
-      }
-      return ordered_json{{"request", options.name},          {"corrector", corrector},
-                          {"arrived", trip->arrived},         {"inside", encode(trip->inside)},
-                          {"outside", encode(trip->outside)}, {"zero_drag", encode(*still)},
-                          {"cameras", trip->cameras.size()},  {"seconds", trip->seconds}};
+    const path file = kept_file(options, machine, "trip", corrector, capture->request);
+    const auto trial = kept_or<evaluate::TripTrial>(file, [&] {
+      auto done = evaluate::carry_out_trip(capture->cloud, capture->cameras, capture->request, corrector,
+                                           std::size_t(options.pictures), picture_writer(options));
+      if (done) done->request = options.name;
+      return done;
     });
-    if (!found) return propagate(found);
-    terminal.out << trip_line(*found) << std::flush;
-    all.push_back(std::move(*found));
+    if (!trial) return propagate(trial);
+    terminal.out << evaluate::summary(*trial) << std::flush;
+    all.push_back(encode(*trial));
   }
   ordered_json report = settings(options, machine);
   report["trips"] = std::move(all);
-  return write_text(path(options.out) / "trips.json", proto::pretty(report) + "\n");
+  return write_json(path(options.out) / "trips.json", report);
 }
 
 Result<void> run(const BenchOptions& options, Terminal& terminal) {

@@ -72,12 +72,10 @@ Result<BothRequests> load_request(const EditOptions& options) {
 }
 
 Result<std::vector<scene::Camera>> load_cameras(const std::string& dataset) {
-  std::vector<scene::Camera> cameras;
-  if (dataset.empty()) return cameras;
+  if (dataset.empty()) return std::vector<scene::Camera>();
   const auto read = io::read_dataset(dataset, {.points = false});
   if (!read) return propagate(read);
-  for (const io::View& view : read->views) cameras.push_back(view.camera);
-  return cameras;
+  return io::cameras_of(*read);
 }
 
 /// Before, after and mask of the best views.
