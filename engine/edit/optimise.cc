@@ -13,15 +13,6 @@ namespace {
 // hole nearby leaves in windows of SSIM would carry a row off at full speed, or at a hundredth of it in four intervals.
 constexpr float held_by_trust = 1.0f;
 
-/// INRIA's extent of a capture: 1.1 times the largest distance of a camera from their centre.
-double scene_extent(std::span<const scene::Camera> cameras) {
-  DVec3 middle(0.0);
-  for (const scene::Camera& camera : cameras) middle += camera.centre() / double(cameras.size());
-  double reach = 0;
-  for (const scene::Camera& camera : cameras) reach = std::max(reach, glm::distance(camera.centre(), middle));
-  return 1.1 * reach;
-}
-
 /// Writes what the trainer has made of the members back, and appends their children.
 void take_over(const train::Trainer& trainer, std::span<const std::uint32_t> members, WorkingScene& working) {
   for (std::size_t k = 0; k < members.size(); ++k) copy_row(trainer.cloud(), k, working.cloud, members[k]);
@@ -55,7 +46,8 @@ Result<OptimiseOutcome> optimise(WorkingScene& working, const scene::GaussianClo
     if (!corrected.trust.empty()) changeable.mobility.push_back(1 - held_by_trust * corrected.trust[row]);
   }
   const scene::GaussianCloud originals = as_begun(working, input, members);
-  train::Trainer trainer({&working.cloud, members}, std::move(changeable), scene_extent(views), {}, perceptual);
+  train::Trainer trainer({&working.cloud, members}, std::move(changeable), scene::capture_extent(views), {},
+                         perceptual);
   for (std::size_t v = 0; v < views.size(); ++v) {
     const bool added = trainer.add_view(in_frame_of(working, views[v]), masks[v], originals);
     if (added && !corrected.pictures.empty()) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "engine/core/half_axes.h"
+#include "engine/scene/opacity.h"
 #include "engine/scene/sh.h"
 
 namespace engine::edit {
@@ -87,7 +88,7 @@ std::size_t add_seeds(WorkingScene& working, const scene::Camera& camera, const 
     const std::size_t row = first + k;
     working.cloud.mean.set(row, Vec3(seeds[k].mean));
     set_shape(working.cloud, row, seeds[k].along_x, seeds[k].along_y);
-    working.cloud.opacity_logit[row] = float(std::log(seed_opacity / (1 - seed_opacity)));
+    working.cloud.opacity_logit[row] = float(scene::logit(seed_opacity));
     const auto sh = working.cloud.sh_row(row);
     std::fill(sh.begin(), sh.end(), 0.0f);
     for (int c = 0; c < 3; ++c)

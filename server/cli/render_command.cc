@@ -73,8 +73,7 @@ std::string some_names(const std::vector<io::View>& views) {
 Result<std::vector<Shot>> dataset_shots(const RenderOptions& options) {
   auto dataset = io::read_dataset(options.dataset, {.points = false});
   if (!dataset) return propagate(dataset);
-  std::vector<scene::Camera> cameras;
-  for (const io::View& view : dataset->views) cameras.push_back(view.camera);
+  const std::vector<scene::Camera> cameras = io::cameras_of(*dataset);
   const auto names = pictures::picture_names(cameras);
   std::vector<Shot> shots;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
