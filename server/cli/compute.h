@@ -13,12 +13,13 @@ struct ComputeOptions {
   std::string simd;  ///< Instruction set; empty: the best this processor has.
 };
 
+/// Adds --threads and --simd.
 void add_compute_options(CLI::App& command, ComputeOptions& options);
 
 /// What a computation ran on.
 struct Machine {
   int threads = 0;
-  std::string simd;
+  std::string simd;  ///< Name of the instruction set: "AVX2".
 };
 
 /// Calls `work` so that all it does in parallel stays on the threads asked for.

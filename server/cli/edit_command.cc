@@ -117,8 +117,7 @@ void summarise(std::ostream& out, const path& folder, const EditReport& report) 
 /// The edit itself, shown to the user as it goes.
 Result<edit::Outcome> run_shown(const scene::GaussianCloud& input, const std::vector<scene::Camera>& cameras,
                                 const BothRequests& request, Terminal& terminal) {
-  ProgressDisplay display(terminal.err,
-                          terminal.err_is_terminal ? ProgressDisplay::Style::bar : ProgressDisplay::Style::lines);
+  ProgressDisplay display(terminal);
   edit::Observer observer;
   observer.progress = [&](const edit::Progress& progress) { display.show(progress); };
   const auto corrector = edits::make_corrector(request.asked.request);

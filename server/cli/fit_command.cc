@@ -260,8 +260,7 @@ Result<void> run(const FitCommandOptions& options, Terminal& terminal) {
     RunningFit fitting(std::move(photos->training), *start, options, machine, terminal);
     if (auto resumed = fitting.resume(); !resumed) return resumed;
     {
-      ProgressDisplay display(terminal.err,
-                              terminal.err_is_terminal ? ProgressDisplay::Style::bar : ProgressDisplay::Style::lines);
+      ProgressDisplay display(terminal);
       if (auto ran = fitting.run(display); !ran) return ran;
     }
 

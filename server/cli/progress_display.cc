@@ -21,6 +21,9 @@ constexpr int bar_width = 28;         // characters
 ProgressDisplay::ProgressDisplay(std::ostream& out, Style style, Clock clock)
     : out_(out), style_(style), clock_(std::move(clock)), start_(clock_()), drawn_(start_ - redraw_every) {}
 
+ProgressDisplay::ProgressDisplay(const Terminal& terminal)
+    : ProgressDisplay(terminal.err, terminal.err_is_terminal ? Style::bar : Style::lines) {}
+
 ProgressDisplay::~ProgressDisplay() {
   if (style_ == Style::bar && percent_ >= 0) out_ << "\r\x1b[K" << std::flush;
 }

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "engine/edit/edit.h"
+#include "server/cli/terminal.h"
 
 namespace server::cli {
 
@@ -18,6 +19,8 @@ class ProgressDisplay {
   using Clock = std::function<std::chrono::steady_clock::time_point()>;
 
   ProgressDisplay(std::ostream& out, Style style, Clock clock = std::chrono::steady_clock::now);
+  /// On the error stream, as suits it.
+  explicit ProgressDisplay(const Terminal& terminal);
   /// Removes the bar, so that what follows starts on a fresh line.
   ~ProgressDisplay();
   ProgressDisplay(const ProgressDisplay&) = delete;

@@ -34,7 +34,7 @@ Result<void> run(const ServeCommandOptions& given, Terminal& terminal) {
   if (const auto checked = service::check_token(options, **logger); !checked) return checked;
   options.threads = given.compute.threads;
   const auto computing = compute(given.compute, [&](const Machine& machine) -> Result<void> {
-    options.computes = machine.threads;
+    options.threads_here = machine.threads;
     options.simd = machine.simd;
     return {};
   });

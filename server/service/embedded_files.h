@@ -7,6 +7,7 @@
 
 namespace server::service {
 
+/// Lives as long as the program.
 struct EmbeddedFile {
   std::string_view name;  ///< Path below its folder: "index.html", "icons/drag.svg".
   std::string_view bytes;

@@ -39,12 +39,13 @@ struct PictureOrder {
   engine::io::ImageFormat format = engine::io::ImageFormat::jpeg;
   engine::Vec3 background{0.0f};  ///< Display-referred.
   int sh_degree = engine::scene::max_sh_degree;
-  int quality = 90;  ///< Of a JPEG.
+  int quality = 90;  ///< Of a JPEG, 1 to 100.
 };
 
+/// A picture as a file.
 struct Picture {
-  std::string bytes;
-  double render_ms = 0, encode_ms = 0;
+  std::string bytes;                    ///< In the format that was ordered.
+  double render_ms = 0, encode_ms = 0;  ///< Wall time, milliseconds.
 };
 
 /// Safe to call from any thread.
@@ -56,6 +57,7 @@ class RenderService {
   /// program on this instruction set, for ever.
   [[nodiscard]] std::string etag(const scenes::LoadedVersion& version, const PictureOrder& order) const;
 
+  /// Makes the picture.
   ///   errors  invalid_argument: a camera that is none; too_large: names the limit; busy
   [[nodiscard]] Result<Picture> render(const scenes::LoadedVersion& version, const PictureOrder& order);
 

@@ -14,6 +14,7 @@
 
 namespace server::service {
 
+/// Cameras around a scene without a dataset.
 constexpr std::size_t virtual_view_count = 50;
 
 struct SceneView {

@@ -27,7 +27,7 @@ proto::ServiceInfo service_info(const ServeOptions& options) {
   info.version = SPLATDRAG_VERSION;
   info.simd = options.simd;
   info.simd_available = engine::render::simd_targets();
-  info.threads = options.computes;
+  info.threads = options.threads_here;
   info.correctors = {
       {"none", true, ""}, {"scene", true, ""}, {"sd", false, "this version cannot load a diffusion model yet"}};
   info.perceptual = {{"msssim", true, ""}, {"lpips", false, "this version has no network to compare pictures with"}};
@@ -138,7 +138,7 @@ Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& lo
             {{"url", (*server)->url()},
              {"version", std::string(SPLATDRAG_VERSION)},
              {"simd", options.simd},
-             {"threads", std::int64_t{options.computes}},
+             {"threads", std::int64_t{options.threads_here}},
              {"data_dir", options.data_dir.string()}});
   const std::string signal = signals.wait();
   http::log(logger, spdlog::level::info, "stopping", {{"signal", signal}});

@@ -18,6 +18,7 @@
 
 namespace server::service {
 
+/// What the service is started with. Folders, versions and loggers of the parts are set by serve().
 struct ServeOptions {
   std::filesystem::path data_dir;    ///< Exists. Scenes and edits get a folder of their own in it.
   std::filesystem::path token_file;  ///< Empty: no token.
@@ -30,9 +31,9 @@ struct ServeOptions {
   edits::ServiceOptions edits;
   routes::EditLimits edit_limits;
   RenderServiceOptions renders;
-  int threads = 0;   ///< That edits and renders compute with; 0: one per core.
-  int computes = 0;  ///< How many that comes to on this machine: what is said of it.
-  std::string simd;  ///< Instruction set in use.
+  int threads = 0;       ///< That edits and renders compute with; 0: one per core.
+  int threads_here = 0;  ///< How many that comes to on this machine: what the service says of itself.
+  std::string simd;      ///< Instruction set in use, likewise.
 };
 
 /// Reads the token into options.gate. Writes warnings to the log.

@@ -23,12 +23,19 @@ class Datasets {
            const PlainErrors& told)
       : options_(options), memory_(memory), catalogue_(catalogue), scratch_(scratch), told_(told) {}
 
-  /// See SceneStore::put_dataset_zip(), put_dataset_path(), dataset() and set_dataset_quality(). What changes a scene
-  /// gives its new manifest back.
+  /// Replaces the scene's dataset by what is in a zip file, which is unpacked into the store; the new manifest.
+  ///   errors  those of unzip() and io::read_dataset()
   [[nodiscard]] Result<ManifestPtr> put_zip(const Snapshot& at, const std::filesystem::path& zip,
                                             const std::string& filename);
+  /// Replaces it by a folder below the scene root, which is used where it is; the new manifest.
+  ///   errors  those of below_root() and io::read_dataset()
   [[nodiscard]] Result<ManifestPtr> put_path(const Snapshot& at, const std::string& path);
+  /// The dataset without its points; null without one.
+  ///   errors  those of io::read_dataset(); busy
   [[nodiscard]] Result<std::shared_ptr<const engine::io::Dataset>> get(const Snapshot& at);
+  /// Notes how near renders come to the photos, PSNR in dB; the new manifest.
+  ///   dataset  its number: what is found about one that has been replaced meanwhile is dropped
+  ///   errors   those of write_manifest()
   [[nodiscard]] Result<ManifestPtr> set_quality(const Snapshot& at, int dataset, std::optional<double> mean_db,
                                                 std::optional<double> worst_db, const std::string& worst_view,
                                                 std::vector<std::string> warnings);

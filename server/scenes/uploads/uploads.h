@@ -22,9 +22,14 @@ class Uploads {
           const PlainErrors& told)
       : options_(options), memory_(memory), catalogue_(catalogue), scratch_(scratch), told_(told) {}
 
-  /// See SceneStore::add_upload() and add_path().
+  /// A new scene of an uploaded file, which is moved into the store.
+  ///   filename  as its user calls it
+  ///   name      of the scene; empty: that of the file
+  ///   errors    those of io::read_scene(); too_large: too many scenes, or one that the memory can never hold; busy
   [[nodiscard]] Result<ManifestPtr> add(const std::filesystem::path& file, const std::string& filename,
                                         const std::string& name);
+  /// A new scene of a file below the scene root, which is copied.
+  ///   errors  those of below_root() and add()
   [[nodiscard]] Result<ManifestPtr> add_path(const std::string& path, const std::string& name);
 
  private:

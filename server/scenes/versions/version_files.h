@@ -22,7 +22,8 @@ class VersionFiles {
                const PlainErrors& told)
       : files_(files), memory_(memory), catalogue_(catalogue), previews_(previews), versions_(versions), told_(told) {}
 
-  /// See SceneStore::file(). Version 0 in its own format is the file as it came, byte for byte.
+  /// The file of a version or preview. Version 0 in its own format is the file as it came, byte for byte.
+  ///   errors  those of Versions::load() and io::write_scene()
   [[nodiscard]] Result<VersionFile> get(const Snapshot& at, const std::string& version, FileFormat format);
 
  private:

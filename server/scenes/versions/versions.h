@@ -29,12 +29,18 @@ class Versions {
 
   /// Version 0 with its file's layout. Errors as load().
   [[nodiscard]] Result<std::shared_ptr<const engine::io::SceneFile>> base(const Snapshot& at);
-  /// See SceneStore::load().
+  /// A version ("0", "1", ...) or a preview ("p000001"), read from disk if need be.
+  ///   errors  not_found; busy: it does not fit the memory beside what is in use; too_large: it alone does not; those
+  ///           of io
   [[nodiscard]] Result<LoadedVersion> load(const Snapshot& at, const std::string& version);
 
-  /// See SceneStore::add_version() and add_preview().
+  /// A new version, durable when this returns: its number. Called again for the same edit, it gives back the one made
+  /// before.
+  ///   overlay  over the parent
+  ///   errors   those of load() and write_manifest()
   [[nodiscard]] Result<int> add(const Snapshot& at, int parent, const std::string& edit,
                                 const engine::scene::Overlay& overlay);
+  /// A version that lives in memory only, for a while. Errors as load().
   [[nodiscard]] Result<Preview> add_preview(const Snapshot& at, int parent, const engine::scene::Overlay& overlay);
 
  private:

@@ -25,6 +25,7 @@ struct ServiceParts {
   proto::ServiceInfo info;
 };
 
+/// A router with every path of the contract, and the files of the page.
 [[nodiscard]] http::Router all_routes(const ServiceParts& parts);
 
 }  // namespace server::service::routes

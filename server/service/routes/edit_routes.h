@@ -11,7 +11,7 @@
 
 namespace server::service::routes {
 
-/// Of what a request may ask for.
+/// Most that a request may ask for.
 struct EditLimits {
   std::size_t handles = proto::max_handles;
   int views = engine::edit::max_views;
@@ -23,7 +23,8 @@ struct EditRouteOptions {
   std::chrono::milliseconds keep_alive{15'000};  ///< A stream of events without news says that it lives so often.
 };
 
-/// service  outlives the router
+/// Adds these routes.
+///   service  outlives the router
 void add_edit_routes(http::Router& router, edits::EditService& service, const EditRouteOptions& options = {});
 
 }  // namespace server::service::routes

@@ -8,7 +8,7 @@
 
 namespace server::service::routes {
 
-/// All outlive the router.
+/// Adds these routes. All of the rest outlives the router.
 void add_render_routes(http::Router& router, scenes::SceneStore& store, SceneViews& views, RenderService& renders);
 
 }  // namespace server::service::routes

@@ -17,11 +17,12 @@ struct SceneRouteParts {
   scenes::SceneStore& store;
   RenderService& renders;
   SceneViews& views;
-  /// Makes a change to a scene that no edit of it may see half-way (EditService::while_idle).
+  /// Makes a change to a scene that no edit of it may see half-way: EditService::while_idle(), whose errors it has.
   std::function<engine::Result<void>(const std::string& scene, const std::function<engine::Result<void>()>& change)>
       while_idle;
 };
 
+/// Adds these routes.
 void add_scene_routes(http::Router& router, const SceneRouteParts& parts);
 
 }  // namespace server::service::routes

@@ -15,6 +15,7 @@
 
 namespace server::service::routes {
 
+/// What these routes tell of.
 struct SystemParts {
   http::Gate& gate;  ///< Outlives the router, as the metrics do.
   const http::Metrics& metrics;
@@ -24,6 +25,7 @@ struct SystemParts {
   std::string_view contract;                              ///< openapi.yaml
 };
 
+/// Adds these routes.
 void add_system_routes(http::Router& router, const SystemParts& parts);
 
 }  // namespace server::service::routes
