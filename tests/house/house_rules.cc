@@ -17,28 +17,29 @@ struct Reserved {
 };
 
 const std::vector<Reserved>& reserved() {
-  static const std::vector<Reserved> list = {{"flann/", {"engine/neighbours"}},
-                                             {"torch/", {"engine/diffusion"}, false},
-                                             {"ATen/", {"engine/diffusion"}, false},
-                                             {"OpenImageIO/", {"engine/io"}},
-                                             {"OpenEXR/", {"engine/io"}},
-                                             {"zlib.h", {"engine/io"}},
-                                             {"zstd.h", {"engine/io"}},
-                                             {"nlohmann/", {"engine/io", "proto", "server/cli", "server/scenes/catalogue"}},
-                                             {"tbb/", {"engine/core"}},
-                                             {"oneapi/", {"engine/core"}},
-                                             {"sqlite3.h", {"engine/jobs"}},
-                                             {"httplib.h", {"server/http"}, false},
-                                             {"CLI/", {"server/cli"}},
-                                             {"toml++/", {"server/cli"}},
-                                             {"spdlog/", {"server/cli", "server/http", "server/edits", "server/service"}},
-                                             {"prometheus/", {"server/http"}, false},
-                                             {"zip.h", {"server/scenes/uploads"}, false}};
+  static const std::vector<Reserved> list = {
+      {"flann/", {"engine/neighbours"}},
+      {"torch/", {"engine/diffusion"}, false},
+      {"ATen/", {"engine/diffusion"}, false},
+      {"OpenImageIO/", {"engine/io"}},
+      {"OpenEXR/", {"engine/io"}},
+      {"zlib.h", {"engine/io"}},
+      {"zstd.h", {"engine/io"}},
+      {"nlohmann/", {"engine/io", "proto", "server/cli", "server/scenes/catalogue"}},
+      {"tbb/", {"engine/core"}},
+      {"oneapi/", {"engine/core"}},
+      {"sqlite3.h", {"engine/jobs"}},
+      {"httplib.h", {"server/http"}, false},
+      {"CLI/", {"server/cli"}},
+      {"toml++/", {"server/cli"}},
+      {"spdlog/", {"server/cli", "server/http", "server/edits", "server/service"}},
+      {"prometheus/", {"server/http"}, false},
+      {"zip.h", {"server/scenes/uploads"}, false}};
   return list;
 }
 
-/// Room that a path from the root lies in: "engine/render/forward.h" is in "engine/render"; "" if in none. The innermost
-/// folder that is declared as a room counts: "server/scenes/disk/scratch.h" is in "server/scenes/disk".
+/// Room that a path from the root lies in: "engine/render/forward.h" is in "engine/render"; "" if in none. The
+/// innermost folder that is declared as a room counts: "server/scenes/disk/scratch.h" is in "server/scenes/disk".
 std::string room_of(const Arrows& arrows, const std::string& path) {
   const std::size_t first = path.find('/');
   if (first == std::string::npos) return {};
