@@ -1,8 +1,8 @@
 # Files inside a program, so that it needs none beside it.
 #
-#   splatdrag_embed(splatdrag_server page_files ${CMAKE_SOURCE_DIR}/web index.html main.js ...)
+#   splatdrag_embed(server_service page_files ${CMAKE_SOURCE_DIR}/web index.html main.js ...)
 #
-# adds to the target a source that defines server::page_files() (declared in server/embedded_files.h): the files below
+# adds to the target a source that defines server::service::page_files() (declared in server/service/embedded_files.h): the files below
 # the folder, by the names given, with their bytes. The assembler copies the bytes, so that even large files compile at
 # once; a file that changes is copied anew.
 function(splatdrag_embed target function folder)
@@ -21,7 +21,7 @@ function(splatdrag_embed target function folder)
     math(EXPR number "${number} + 1")
   endforeach()
   file(CONFIGURE OUTPUT ${source} @ONLY CONTENT [=[
-#include "server/embedded_files.h"
+#include "server/service/embedded_files.h"
 
 asm(".pushsection .rodata\n"
 @symbols@    ".popsection\n");
@@ -29,14 +29,14 @@ asm(".pushsection .rodata\n"
 extern "C" {
 @declarations@}
 
-namespace server {
+namespace server::service {
 
 std::vector<EmbeddedFile> @function@() {
   return {
 @entries@  };
 }
 
-}  // namespace server
+}  // namespace server::service
 ]=])
   set_source_files_properties(${source} PROPERTIES OBJECT_DEPENDS "${paths}")
   target_sources(${target} PRIVATE ${source})

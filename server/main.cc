@@ -2,9 +2,9 @@
 
 #include <iostream>
 
-#include "server/program.h"
+#include "server/cli/program.h"
 
 int main(int argc, char** argv) {
-  server::Terminal terminal{std::cout, std::cerr, isatty(STDERR_FILENO) != 0};
-  return server::run_program(argc, argv, terminal);
+  server::cli::Terminal terminal{std::cout, std::cerr, isatty(STDERR_FILENO) != 0};
+  return server::cli::run_program(argc, argv, terminal);
 }

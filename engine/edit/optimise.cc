@@ -15,15 +15,6 @@ using working::Role;
 // hole nearby leaves in windows of SSIM would carry a row off at full speed, or at a hundredth of it in four intervals.
 constexpr float held_by_trust = 1.0f;
 
-/// INRIA's extent of a capture: 1.1 times the largest distance of a camera from their centre.
-double scene_extent(std::span<const scene::Camera> cameras) {
-  DVec3 middle(0.0);
-  for (const scene::Camera& camera : cameras) middle += camera.centre() / double(cameras.size());
-  double reach = 0;
-  for (const scene::Camera& camera : cameras) reach = std::max(reach, glm::distance(camera.centre(), middle));
-  return 1.1 * reach;
-}
-
 /// The rows of M, as the trainer takes them.
 train::Changeable changeable_rows(const working::WorkingScene& working, std::span<const std::uint32_t> members,
                                   const repair::Corrected& corrected) {
@@ -64,7 +55,7 @@ Result<OptimiseOutcome> optimise(working::WorkingScene& working, const scene::Ga
   const std::vector<std::uint32_t> members = working.member_rows();
   const scene::GaussianCloud originals = working.unedited(input, members);
   train::Trainer trainer({&working.cloud(), members}, changeable_rows(working, members, corrected),
-                         scene_extent(views), {}, perceptual);
+                         scene::capture_extent(views), {}, perceptual);
   for (std::size_t v = 0; v < views.size(); ++v) {
     const bool added = trainer.add_view(working.frame().edit_from_world(views[v]), masks[v], originals);
     if (added && !corrected.pictures.empty()) {

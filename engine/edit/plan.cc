@@ -1,5 +1,6 @@
 #include "engine/edit/plan.h"
 
+#include <algorithm>
 #include <array>
 
 namespace engine::edit {
@@ -29,6 +30,12 @@ void add_interval(std::vector<PlannedStage>& plan, int u, const Workload& work) 
 }  // namespace
 
 std::string_view name_of(Stage stage) { return names[std::size_t(stage)]; }
+
+std::optional<Stage> stage_named(std::string_view name) {
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end()) return std::nullopt;
+  return Stage(found - names.begin());
+}
 
 std::vector<PlannedStage> plan_of(const Workload& work) {
   std::vector<PlannedStage> plan{{Stage::assign, 0, 0.05}, {Stage::views, 0, 0.5}};

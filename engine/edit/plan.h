@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -25,6 +26,8 @@ enum class Stage : std::uint8_t {
 constexpr std::size_t stage_count = 10;
 
 [[nodiscard]] std::string_view name_of(Stage stage);
+/// The stage of that name; nothing for another text.
+[[nodiscard]] std::optional<Stage> stage_named(std::string_view name);
 
 /// What the time of an edit depends on.
 struct Workload {

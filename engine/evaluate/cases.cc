@@ -379,6 +379,17 @@ const std::vector<std::string>& case_names() {
   return names;
 }
 
+Result<std::vector<std::string>> choose_cases(const std::vector<std::string>& names, bool small_only) {
+  const std::vector<std::string>& all = case_names();
+  for (const std::string& name : names)
+    if (std::find(all.begin(), all.end(), name) == all.end()) return propagate(make_case(name));
+  std::vector<std::string> chosen;
+  for (const std::string& name : names.empty() ? all : names)
+    if (!small_only || is_small(name)) chosen.push_back(name);
+  if (chosen.empty()) return fail(ErrorCode::invalid_argument, "none of these cases is small");
+  return chosen;
+}
+
 Result<Case> make_case(const std::string& name) {
   std::string names;
   for (const Known& known : known_cases()) {

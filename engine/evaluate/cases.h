@@ -39,6 +39,11 @@ struct Case {
 /// Is it quick enough for sweeps and for every change of the code? False if there is none of that name.
 [[nodiscard]] bool is_small(const std::string& name);
 
+/// Those of `names`, in their order; of all cases, if there are none in it.
+///   small_only  leaves out those that are not small
+///   errors      not_found: as make_case(); invalid_argument: nothing is left
+[[nodiscard]] Result<std::vector<std::string>> choose_cases(const std::vector<std::string>& names, bool small_only);
+
 /// Makes one. The same bytes every time, for any number of threads.
 ///   errors  not_found: no case of that name; the message lists them
 [[nodiscard]] Result<Case> make_case(const std::string& name);

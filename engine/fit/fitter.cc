@@ -10,6 +10,7 @@
 #include "engine/optim/picture_view.h"
 #include "engine/render/largest_weight.h"
 #include "engine/scene/cloud_bytes.h"
+#include "engine/scene/opacity.h"
 #include "engine/train/chance.h"
 
 namespace engine::fit {
@@ -179,7 +180,7 @@ void Fitter::densify() {
 }
 
 void Fitter::prune() {
-  const auto faintest = float(std::log(options_.least_opacity / (1 - options_.least_opacity)));  // -inf for 0
+  const auto faintest = float(scene::logit(options_.least_opacity));  // -inf for 0
   std::vector<std::uint8_t> keep(cloud_.size());
   std::size_t kept = 0;
   for (std::size_t i = 0; i < keep.size(); ++i) kept += keep[i] = cloud_.opacity_logit[i] >= faintest;

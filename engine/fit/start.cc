@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "engine/neighbours/point_index.h"
+#include "engine/scene/opacity.h"
 #include "engine/scene/sh.h"
 
 namespace engine::fit {
@@ -71,7 +72,7 @@ scene::GaussianCloud gaussians_at(std::span<const ColoredPoint> points, int sh_d
     cloud.mean.set(i, Vec3(points[i].position));
     cloud.log_scale.set(i, Vec3(std::log(std::clamp(distance[i], smallest_part * typical, largest_part * typical))));
     cloud.rotation.set(i, Quat(1, 0, 0, 0));
-    cloud.opacity_logit[i] = float(std::log(first_opacity / (1 - first_opacity)));
+    cloud.opacity_logit[i] = float(scene::logit(first_opacity));
     for (std::size_t c = 0; c < 3; ++c)
       cloud.sh_row(i)[c * coefficients] = float((double(points[i].rgb[c]) / 255.0 - 0.5) / scene::sh_c0);
   }

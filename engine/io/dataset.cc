@@ -248,6 +248,12 @@ Result<Dataset> read_dataset(const fs::path& folder, const DatasetOptions& optio
   }
 }
 
+std::vector<scene::Camera> cameras_of(const Dataset& dataset) {
+  std::vector<scene::Camera> cameras;
+  for (const View& view : dataset.views) cameras.push_back(view.camera);
+  return cameras;
+}
+
 Result<scene::Image> load_photo(const View& view) {
   if (view.photo.empty())
     return fail(ErrorCode::not_found, "view " + view.camera.name + " has no photo", view.camera.name);

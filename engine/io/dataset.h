@@ -53,6 +53,9 @@ struct DatasetOptions {
 ///           unprocessable: no views
 [[nodiscard]] Result<Dataset> read_dataset(const std::filesystem::path& folder, const DatasetOptions& options = {});
 
+/// Those of all views, in order.
+[[nodiscard]] std::vector<scene::Camera> cameras_of(const Dataset& dataset);
+
 /// The view's photo, undistorted: camera.width x camera.height, 3 channels. Reads the file each time it is called.
 ///   errors  not_found: the view has no photo; those of read_image(); corrupt_data: it changed its size meanwhile
 [[nodiscard]] Result<scene::Image> load_photo(const View& view);

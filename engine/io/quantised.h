@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "engine/scene/opacity.h"
 #include "engine/scene/sh.h"
 
 namespace engine::io {
@@ -16,10 +17,7 @@ inline std::uint8_t nearest_byte(double value) { return std::uint8_t(std::clamp(
 
 /// The logit of opacity u / 255. 0 and 255 would be infinite; they are taken as a quarter step inside, logit -6.93 and
 /// 6.93: an opacity of 0.001 is still below the 1/255 that is drawn, and both come back as the byte they were.
-inline float logit_of_byte(std::uint8_t u) {
-  const double opacity = std::clamp(double(u), 0.25, 254.75) / 255.0;
-  return float(std::log(opacity / (1.0 - opacity)));
-}
+inline float logit_of_byte(std::uint8_t u) { return float(scene::logit(std::clamp(double(u), 0.25, 254.75) / 255.0)); }
 
 inline std::uint8_t byte_of_logit(float logit) { return nearest_byte(255.0 / (1.0 + std::exp(-double(logit)))); }
 

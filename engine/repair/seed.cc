@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "engine/core/half_axes.h"
+#include "engine/scene/opacity.h"
 #include "engine/scene/sh.h"
 
 namespace engine::repair {
@@ -88,7 +89,7 @@ std::vector<std::uint32_t> nearest_rows(std::span<const Seed> seeds, const neigh
 void set_gaussian(scene::GaussianCloud& cloud, std::size_t row, const Seed& seed) {
   cloud.mean.set(row, Vec3(seed.mean));
   set_shape(cloud, row, seed.along_x, seed.along_y);
-  cloud.opacity_logit[row] = float(std::log(seed_opacity / (1 - seed_opacity)));
+  cloud.opacity_logit[row] = float(scene::logit(seed_opacity));
   const auto sh = cloud.sh_row(row);
   std::fill(sh.begin(), sh.end(), 0.0f);
   for (int c = 0; c < 3; ++c)

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cmath>
 #include <numeric>
 #include <utility>
 
 #include "engine/scene/cloud_arrays.h"
+#include "engine/scene/opacity.h"
 #include "engine/working/mode.h"
 
 namespace engine::working {
@@ -30,7 +30,7 @@ bool is_whole(const Members& members) {
 
 }  // namespace
 
-float keep_logit(Mode mode) { return mode == Mode::move ? float(std::log(0.01 / 0.99)) : 0.0f; }
+float keep_logit(Mode mode) { return mode == Mode::move ? float(scene::logit(0.01)) : 0.0f; }
 
 WorkingScene::WorkingScene(const scene::GaussianCloud& input, const Frame& frame, HandleColumn handle)
     : frame_(frame),

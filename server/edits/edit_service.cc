@@ -19,7 +19,7 @@
 #include "server/edits/gate.h"
 #include "server/edits/interval_pictures.h"
 #include "server/edits/status.h"
-#include "server/scenes/plain_error.h"
+#include "server/scenes/disk/plain_error.h"
 
 namespace server::edits {
 namespace {

@@ -4,15 +4,15 @@
 #include <system_error>
 #include <utility>
 
-#include "server/scenes/bounded_cache.h"
-#include "server/scenes/catalogue.h"
-#include "server/scenes/datasets.h"
-#include "server/scenes/names.h"
-#include "server/scenes/plain_error.h"
-#include "server/scenes/previews.h"
-#include "server/scenes/uploads.h"
-#include "server/scenes/version_files.h"
-#include "server/scenes/versions.h"
+#include "server/scenes/catalogue/catalogue.h"
+#include "server/scenes/catalogue/names.h"
+#include "server/scenes/disk/bounded_cache.h"
+#include "server/scenes/disk/plain_error.h"
+#include "server/scenes/uploads/datasets.h"
+#include "server/scenes/uploads/uploads.h"
+#include "server/scenes/versions/previews.h"
+#include "server/scenes/versions/version_files.h"
+#include "server/scenes/versions/versions.h"
 
 namespace server::scenes {
 namespace {

@@ -23,9 +23,9 @@
 #include "engine/core/vec.h"
 #include "engine/io/dataset.h"
 #include "engine/scene/overlay.h"
-#include "server/scenes/scene_info.h"
-#include "server/scenes/scratch.h"
-#include "server/scenes/store_options.h"
+#include "server/scenes/catalogue/scene_info.h"
+#include "server/scenes/catalogue/store_options.h"
+#include "server/scenes/disk/scratch.h"
 
 namespace server::scenes {
 

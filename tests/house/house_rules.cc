@@ -18,45 +18,46 @@ struct Reserved {
 };
 
 const std::vector<Reserved>& reserved() {
-  static const std::vector<Reserved> list = {{"flann/", {"engine/neighbours"}},
-                                             {"torch/", {"engine/diffusion"}, false},
-                                             {"ATen/", {"engine/diffusion"}, false},
-                                             {"OpenImageIO/", {"engine/io"}},
-                                             {"OpenEXR/", {"engine/io"}},
-                                             {"zlib.h", {"engine/io"}},
-                                             {"zstd.h", {"engine/io"}},
-                                             {"nlohmann/", {"engine/io", "proto", "server", "server/scenes"}},
-                                             {"tbb/", {"engine/core"}},
-                                             {"oneapi/", {"engine/core"}},
-                                             {"sqlite3.h", {"engine/jobs"}},
-                                             {"httplib.h", {"server/http"}, false},
-                                             {"CLI/", {"server"}},
-                                             {"toml++/", {"server"}},
-                                             {"spdlog/", {"server", "server/http", "server/edits"}},
-                                             {"prometheus/", {"server/http"}, false},
-                                             {"zip.h", {"server/scenes"}, false}};
+  static const std::vector<Reserved> list = {
+      {"flann/", {"engine/neighbours"}},
+      {"torch/", {"engine/diffusion"}, false},
+      {"ATen/", {"engine/diffusion"}, false},
+      {"OpenImageIO/", {"engine/io"}},
+      {"OpenEXR/", {"engine/io"}},
+      {"zlib.h", {"engine/io"}},
+      {"zstd.h", {"engine/io"}},
+      {"nlohmann/", {"engine/io", "proto", "server/cli", "server/scenes/catalogue"}},
+      {"tbb/", {"engine/core"}},
+      {"oneapi/", {"engine/core"}},
+      {"sqlite3.h", {"engine/jobs"}},
+      {"httplib.h", {"server/http"}, false},
+      {"CLI/", {"server/cli"}},
+      {"toml++/", {"server/cli"}},
+      {"spdlog/", {"server/cli", "server/http", "server/edits", "server/service"}},
+      {"prometheus/", {"server/http"}, false},
+      {"zip.h", {"server/scenes/uploads"}, false}};
   return list;
 }
 
-/// Room that a path from the root lies in: "engine/render/forward.h" is in "engine/render"; "" if in none. A folder
-/// below `server` is a room of its own if it is declared as one, else a part of `server`.
+/// Room that a path from the root lies in: "engine/render/forward.h" is in "engine/render"; "" if in none. The
+/// innermost folder that is declared as a room counts: "server/scenes/disk/scratch.h" is in "server/scenes/disk".
 std::string room_of(const Arrows& arrows, const std::string& path) {
   const std::size_t first = path.find('/');
   if (first == std::string::npos) return {};
   const std::string top = path.substr(0, first);
+  if (top != "engine" && top != "proto" && top != "server") return {};
+  for (std::size_t end = path.rfind('/'); end != std::string::npos; end = path.rfind('/', end - 1))
+    if (arrows.contains(path.substr(0, end))) return path.substr(0, end);
   const std::size_t second = path.find('/', first + 1);
-  const std::string folder = second == std::string::npos ? std::string() : path.substr(0, second);
-  if (top == "engine") return folder;
-  if (top != "proto" && top != "server") return {};
-  return arrows.contains(folder) ? folder : top;
+  if (top == "engine") return second == std::string::npos ? std::string() : path.substr(0, second);
+  return top;
 }
 
-/// "engine_render" is the library of "engine/render", "server_http" that of "server/http", "splatdrag_proto" that of
-/// "proto".
-std::string folder_of(const std::string& target) {
-  for (const std::string house : {"engine", "server"})
-    if (target.starts_with(house + "_")) return house + "/" + target.substr(house.size() + 1);
+/// "engine_render" is the library of "engine/render", "server_scenes_disk" that of "server/scenes/disk",
+/// "splatdrag_proto" that of "proto".
+std::string folder_of(std::string target) {
   if (target.starts_with("splatdrag_")) return target.substr(10);
+  std::replace(target.begin(), target.end(), '_', '/');
   return target;
 }
 

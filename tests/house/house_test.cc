@@ -125,9 +125,18 @@ TEST(HouseRules, KeepTorchOutOfPartsToo) {
 }
 
 TEST(HouseRules, KnowTheRoomsBelowTheServer) {
-  const Arrows arrows = parse_arrows("server/http: engine_core\nserver: server_http engine_core\nengine/core: \n");
-  EXPECT_EQ(violations(arrows, "server/routes/info.cc", "#include \"server/http/router.h\"\n").size(), 0u);
-  EXPECT_EQ(violations(arrows, "server/http/router.cc", "#include \"server/routes/info.h\"\n").size(), 1u);
+  const Arrows arrows = parse_arrows(
+      "server/http: engine_core\nserver/service: server_http engine_core\nserver: server_service\nengine/core: \n");
+  EXPECT_EQ(violations(arrows, "server/service/routes/info.cc", "#include \"server/http/router.h\"\n").size(), 0u);
+  EXPECT_EQ(violations(arrows, "server/http/router.cc", "#include \"server/service/routes/info.h\"\n").size(), 1u);
+  EXPECT_EQ(violations(arrows, "server/main.cc", "#include \"server/service/serve.h\"\n").size(), 0u);
+  EXPECT_EQ(violations(arrows, "server/main.cc", "#include \"server/http/router.h\"\n").size(), 1u);
+}
+
+TEST(HouseRules, KnowARoomWithinARoom) {
+  const Arrows arrows = parse_arrows("server/scenes/disk: \nserver/scenes: server_scenes_disk\n");
+  EXPECT_EQ(violations(arrows, "server/scenes/store.cc", "#include \"server/scenes/disk/disk.h\"\n").size(), 0u);
+  EXPECT_EQ(violations(arrows, "server/scenes/disk/disk.cc", "#include \"server/scenes/store.h\"\n").size(), 1u);
 }
 
 TEST(HouseRules, SayWhere) {

@@ -1,5 +1,5 @@
 // The contract itself: it is sound, and the program serves it. (That it lists the very routes of the program is checked
-// in tests/server/routes/all_routes_test.cc.)
+// in tests/server/service/routes/all_routes_test.cc.)
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { after, before, describe, test } from 'node:test';

@@ -1,0 +1,77 @@
+#include "engine/evaluate/result_key.h"
+
+#include <fstream>
+#include <iomanip>
+#include <iterator>
+#include <limits>
+#include <span>
+#include <sstream>
+
+#include "engine/core/checksum.h"
+
+namespace engine::evaluate {
+namespace {
+
+std::uint64_t checksum(const std::string& text) { return fnv1a(std::as_bytes(std::span(text))); }
+
+/// Fields one after the other, so that no two lists of them read the same: texts are quoted, numbers have all digits.
+class Fields {
+ public:
+  Fields() { out_ << std::setprecision(std::numeric_limits<double>::max_digits10); }
+  void add(const std::string& text) { out_ << std::quoted(text) << ','; }
+  template <class Number>
+  void add(Number number) {
+    out_ << number << ',';
+  }
+  void add(DVec3 v) {
+    for (int axis = 0; axis < 3; ++axis) add(v[axis]);
+  }
+  [[nodiscard]] std::string text() const { return out_.str(); }
+
+ private:
+  std::ostringstream out_;
+};
+
+void add(const edit::Params& params, Fields& fields) {
+  fields.add(params.intervals);
+  fields.add(params.iterations);
+  fields.add(params.annealing_steps);
+  fields.add(params.views);
+  fields.add(params.max_image_side);
+  fields.add(int(params.interpolation));
+  fields.add(params.local_mask);
+}
+
+}  // namespace
+
+std::string result_key(const ResultOf& of, const edit::Request& request) {
+  Fields fields;
+  for (const std::string* text : {&of.subject, &of.corrector, &of.scene, &of.dataset, &of.simd}) fields.add(*text);
+  fields.add(of.pictures);
+  fields.add(of.threads);
+  fields.add(of.program);
+  add(request.params, fields);
+  fields.add(int(request.mode));
+  for (const edit::Handle& handle : request.handles) {
+    fields.add(handle.radius);
+    fields.add(handle.group);
+    fields.add(handle.target.has_value());
+    fields.add(handle.source);
+    fields.add(handle.target.value_or(handle.source));
+  }
+  if (request.region) {
+    fields.add(request.region->center);
+    fields.add(request.region->size);
+  }
+  std::ostringstream key;
+  key << of.subject << '-' << of.corrector << '-' << std::hex << std::setfill('0') << std::setw(16)
+      << checksum(fields.text());
+  return key.str();
+}
+
+std::uint64_t checksum_of_program() {
+  std::ifstream file("/proc/self/exe", std::ios::binary);
+  return checksum({std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()});
+}
+
+}  // namespace engine::evaluate

@@ -1,0 +1,257 @@
+// splatdrag bench-edit: edits whose right result is known, carried out and judged.
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <ostream>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/core/atomic_file.h"
+#include "engine/edit/request.h"
+#include "engine/evaluate/cases.h"
+#include "engine/evaluate/result_key.h"
+#include "engine/evaluate/trial.h"
+#include "engine/evaluate/trip_trial.h"
+#include "engine/io/dataset.h"
+#include "engine/io/image_file.h"
+#include "engine/io/scene_file.h"
+#include "server/cli/bench_report.h"
+#include "server/cli/commands.h"
+#include "server/cli/compute.h"
+#include "server/cli/folders.h"
+#include "server/cli/request_file.h"
+#include "server/edits/convert.h"
+
+namespace server::cli {
+namespace {
+
+namespace edit = engine::edit;
+namespace evaluate = engine::evaluate;
+namespace io = engine::io;
+namespace scene = engine::scene;
+using engine::propagate;
+using nlohmann::ordered_json;
+using std::filesystem::path;
+
+struct BenchOptions {
+  std::vector<std::string> cases, correctors{"scene"};
+  std::string out;
+  proto::Preset preset = proto::Preset::draft;
+  std::optional<edit::Interpolation> interpolation;
+  std::string scene, dataset, request, name;  // a real capture, there and back
+  bool small = false, whole_picture = false;
+  std::optional<int> intervals, iterations, annealing_steps, views, image_side;
+  int pictures = 1;
+  ComputeOptions compute;
+};
+
+/// What is given on the command line, over the preset.
+void apply(const BenchOptions& options, edit::Request& request) {
+  edit::Params& params = request.params;
+  params = edits::preset_params(options.preset, request);
+  if (options.interpolation) params.interpolation = *options.interpolation;
+  if (options.iterations) params.iterations = *options.iterations;
+  if (options.annealing_steps) params.annealing_steps = *options.annealing_steps;
+  if (options.views) params.views = *options.views;
+  if (options.image_side) params.max_image_side = *options.image_side;
+  params.local_mask = !options.whole_picture;
+  params.intervals = options.intervals.value_or(edits::preset_intervals(options.preset, request));
+}
+
+/// Where a result is kept.
+path kept_file(const BenchOptions& options, const Machine& machine, const std::string& subject,
+               const std::string& corrector, const edit::Request& request) {
+  static const std::uint64_t program = evaluate::checksum_of_program();
+  const std::string key = evaluate::result_key({.subject = subject,
+                                                .corrector = corrector,
+                                                .scene = options.scene,
+                                                .dataset = options.dataset,
+                                                .pictures = options.pictures,
+                                                .threads = machine.threads,
+                                                .simd = machine.simd,
+                                                .program = program},
+                                               request);
+  return path(options.out) / "results" / (key + ".json");
+}
+
+/// Writes pictures below the output folder.
+evaluate::Show picture_writer(const BenchOptions& options) {
+  return [&options](const std::string& name, const scene::Image& picture) {
+    return io::write_image(path(options.out) / (name + ".png"), picture);
+  };
+}
+
+Result<evaluate::Trial> trial_of(const evaluate::Case& the_case, const std::string& corrector,
+                                 const BenchOptions& options, const Machine& machine) {
+  edit::Request request = the_case.request;
+  apply(options, request);
+  const path file = kept_file(options, machine, the_case.name, corrector, request);
+  return kept_or<evaluate::Trial>(file, [&]() -> Result<evaluate::Trial> {
+    auto done = evaluate::carry_out(the_case, request, corrector);
+    if (!done) return propagate(done);
+    const auto shown = evaluate::show_pictures(the_case, request, corrector, done->edited,
+                                               std::size_t(options.pictures), picture_writer(options));
+    if (!shown) return propagate(shown);
+    return std::move(done->trial);
+  });
+}
+
+/// What stands at the head of every report.
+ordered_json settings(const BenchOptions& options, const Machine& machine) {
+  edit::Request any;
+  apply(options, any);
+  const edit::Params& params = any.params;
+  return {{"splatdrag", SPLATDRAG_VERSION},
+          {"threads", machine.threads},
+          {"simd", machine.simd},
+          {"params",
+           {{"preset", proto::name_of(options.preset)},
+            {"intervals", options.intervals ? ordered_json(*options.intervals) : ordered_json(nullptr)},
+            {"iterations", params.iterations},
+            {"annealing_steps", params.annealing_steps},
+            {"views", params.views},
+            {"max_image_side", params.max_image_side},
+            {"local_mask", params.local_mask}}}};
+}
+
+Result<void> run_cases(const BenchOptions& options, const Machine& machine, Terminal& terminal) {
+  auto chosen = evaluate::choose_cases(options.cases, options.small);
+  if (!chosen) {
+    if (chosen.error().where.empty()) chosen.error().where = "--case, --small";
+    return propagate(chosen);
+  }
+  std::string table = evaluate::trial_table_head();
+  terminal.out << table << std::flush;
+  ordered_json all = ordered_json::array();
+  for (const std::string& name : *chosen) {
+    const auto made = evaluate::make_case(name);
+    if (!made) return propagate(made);
+    for (const std::string& corrector : options.correctors) {
+      const auto trial = trial_of(*made, corrector, options, machine);
+      if (!trial) return propagate(trial);
+      const std::string row = evaluate::trial_table_row(*trial);
+      table += row;
+      terminal.out << row << std::flush;
+      all.push_back(encode(*trial));
+    }
+  }
+  ordered_json report = settings(options, machine);
+  report["cases"] = std::move(all);
+  if (auto saved = write_json(path(options.out) / "bench.json", report); !saved) return saved;
+  return engine::write_file(path(options.out) / "bench.md", std::as_bytes(std::span(table)));
+}
+
+/// A capture, and the drag to take there and back.
+struct Capture {
+  scene::GaussianCloud cloud;
+  std::vector<scene::Camera> cameras;
+  edit::Request request;
+};
+
+Result<Capture> load_capture(const BenchOptions& options) {
+  const auto asked = read_request(options.request, options.name);
+  if (!asked) return propagate(asked);
+  auto request = edits::to_engine(asked->request);
+  if (!request) return propagate(request);
+  apply(options, *request);
+  auto input = io::read_scene(options.scene);
+  if (!input) return propagate(input);
+  const auto dataset = io::read_dataset(options.dataset, {.points = false});
+  if (!dataset) return propagate(dataset);
+  return Capture{std::move(input->cloud), io::cameras_of(*dataset), std::move(*request)};
+}
+
+/// There and back on a capture, with each corrector.
+Result<void> run_trips(const BenchOptions& options, const Machine& machine, Terminal& terminal) {
+  const auto capture = load_capture(options);
+  if (!capture) return propagate(capture);
+  ordered_json all = ordered_json::array();
+  for (const std::string& corrector : options.correctors) {
+    const path file = kept_file(options, machine, "trip", corrector, capture->request);
+    const auto trial = kept_or<evaluate::TripTrial>(file, [&] {
+      auto done = evaluate::carry_out_trip(capture->cloud, capture->cameras, capture->request, corrector,
+                                           std::size_t(options.pictures), picture_writer(options));
+      if (done) done->request = options.name;
+      return done;
+    });
+    if (!trial) return propagate(trial);
+    terminal.out << evaluate::summary(*trial) << std::flush;
+    all.push_back(encode(*trial));
+  }
+  ordered_json report = settings(options, machine);
+  report["trips"] = std::move(all);
+  return write_json(path(options.out) / "trips.json", report);
+}
+
+Result<void> run(const BenchOptions& options, Terminal& terminal) {
+  if (auto made = make_folder(path(options.out) / "results"); !made) return made;
+  return compute(options.compute, [&](const Machine& machine) -> Result<void> {
+    return options.scene.empty() ? run_cases(options, machine, terminal) : run_trips(options, machine, terminal);
+  });
+}
+
+}  // namespace
+
+void add_bench_edit_command(CLI::App& program, Action& action) {
+  CLI::App* const command =
+      program.add_subcommand("bench-edit", "Carries out edits whose right result is known, and judges them");
+  const auto options = std::make_shared<BenchOptions>();
+  std::string known;
+  for (const std::string& name : evaluate::case_names()) known += (known.empty() ? "" : ", ") + name;
+  command->add_option("--case", options->cases, "Which; may be repeated; all if none is named. There are " + known)
+      ->default_str("")
+      ->type_name("NAME");
+  command->add_flag("--small", options->small, "Only those that are quick");
+  command
+      ->add_option("--out", options->out,
+                   "Folder for bench.json, bench.md, pictures, and results by request: those that are there are not "
+                   "worked out again")
+      ->required()
+      ->type_name("DIR");
+  command->add_option("--corrector", options->correctors, "Which; may be repeated, harmonic is a baseline")
+      ->check(CLI::IsMember({"none", "harmonic", "scene"}))
+      ->default_str("scene")
+      ->type_name("NAME");
+  command->add_option("--preset", options->preset, "Whose parameters, where none are given here")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, proto::Preset>{{"preview", proto::Preset::preview},
+                                                                               {"draft", proto::Preset::draft},
+                                                                               {"standard", proto::Preset::standard},
+                                                                               {"paper", proto::Preset::paper}}))
+      ->default_str("draft")
+      ->type_name("NAME");
+  const auto override_with = [&](const char* flag, std::optional<int>& value, int low, int high, const char* what) {
+    command->add_option(flag, value, what)->check(CLI::Range(low, high))->type_name("N");
+  };
+  override_with("--intervals", options->intervals, 0, 20, "Of each edit; 0: by the length of the drag");
+  override_with("--iterations", options->iterations, 0, 1'000'000, "Of the optimisation per correction; 0: none");
+  override_with("--annealing-steps", options->annealing_steps, 1, 100, "Corrections per interval");
+  override_with("--views", options->views, 1, edit::max_views, "Most views an edit looks through");
+  override_with("--image-side", options->image_side, 16, 16384, "Longer side of the pictures it works on, pixels");
+  command->add_option("--interpolation", options->interpolation, "In place of the preset's")
+      ->transform(
+          CLI::CheckedTransformer(std::map<std::string, edit::Interpolation>{{"paper", edit::Interpolation::paper},
+                                                                             {"smooth", edit::Interpolation::smooth},
+                                                                             {"rigid", edit::Interpolation::rigid}}))
+      ->type_name("NAME");
+  command->add_flag("--whole-picture", options->whole_picture, "Without the local mask: everything counts as edited");
+  command
+      ->add_option("--pictures", options->pictures,
+                   "Held-out views to show per case: before, deformed, result, truth, four times the difference")
+      ->check(CLI::Range(0, 1000))
+      ->type_name("N");
+  const auto capture = command->add_option("--scene", options->scene,
+                                           "In place of the cases a real capture, without truth: the drag and the one "
+                                           "that undoes it, judged at cameras between those of the capture");
+  capture->type_name("FILE");
+  CLI::Option* const dataset = command->add_option("--dataset", options->dataset, "Its cameras")->type_name("DIR");
+  CLI::Option* const request = command->add_option("--request", options->request, "The drag")->type_name("FILE");
+  command->add_option("--name", options->name, "Which request of a file of several")->type_name("NAME");
+  capture->needs(dataset)->needs(request);
+  add_compute_options(*command, options->compute);
+  command->callback([options, &action] { action = [options](Terminal& terminal) { return run(*options, terminal); }; });
+}
+
+}  // namespace server::cli

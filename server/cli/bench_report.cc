@@ -1,0 +1,128 @@
+#include "server/cli/bench_report.h"
+
+#include <fstream>
+#include <span>
+#include <string>
+
+#include "engine/core/atomic_file.h"
+#include "proto/json_text.h"
+
+namespace server::cli {
+namespace {
+
+namespace evaluate = engine::evaluate;
+using nlohmann::ordered_json;
+
+ordered_json encode(const evaluate::Likeness& likeness) {
+  return {{"psnr_db", likeness.psnr_db}, {"ssim", likeness.ssim}, {"pixels", likeness.pixels}};
+}
+
+ordered_json encode(const evaluate::Quality& quality) {
+  return {{"edited", encode(quality.edited)},
+          {"vacated", encode(quality.vacated)},
+          {"arrived", encode(quality.arrived)},
+          {"outside", encode(quality.outside)},
+          {"miss", quality.miss}};
+}
+
+ordered_json encode(const std::vector<engine::edit::StageTime>& times) {
+  ordered_json stages = ordered_json::object();
+  for (const auto& time : times) stages[std::string(name_of(time.stage))] = time.seconds;
+  return stages;
+}
+
+void decode(const ordered_json& from, evaluate::Likeness& likeness) {
+  from.at("psnr_db").get_to(likeness.psnr_db);
+  from.at("ssim").get_to(likeness.ssim);
+  from.at("pixels").get_to(likeness.pixels);
+}
+
+void decode(const ordered_json& from, evaluate::Quality& quality) {
+  decode(from.at("edited"), quality.edited);
+  decode(from.at("vacated"), quality.vacated);
+  decode(from.at("arrived"), quality.arrived);
+  decode(from.at("outside"), quality.outside);
+  from.at("miss").get_to(quality.miss);
+}
+
+}  // namespace
+
+ordered_json encode(const evaluate::Trial& trial) {
+  const evaluate::Agreement& agreement = trial.corrected_views;
+  return {{"case", trial.name},
+          {"what", trial.what},
+          {"corrector", trial.corrector},
+          {"textured", trial.textured},
+          {"gaussians", trial.gaussians},
+          {"part", trial.part},
+          {"seeds", trial.seeds},
+          {"intervals", trial.intervals},
+          {"untouched", encode(trial.untouched)},
+          {"result", encode(trial.result)},
+          {"corrected_views_agree", {{"psnr_db", agreement.psnr_db}, {"pixels", agreement.pixels}}},
+          {"seconds", trial.seconds},
+          {"stages", encode(trial.stages)},
+          {"peak_memory_bytes", trial.peak_memory_bytes},
+          {"warnings", trial.warnings}};
+}
+
+ordered_json encode(const evaluate::TripTrial& trial) {
+  return {{"request", trial.request},       {"corrector", trial.corrector},     {"arrived", trial.arrived},
+          {"inside", encode(trial.inside)}, {"outside", encode(trial.outside)}, {"zero_drag", encode(trial.zero_drag)},
+          {"cameras", trial.cameras},       {"seconds", trial.seconds}};
+}
+
+void decode(const ordered_json& from, evaluate::Trial& trial) {
+  from.at("case").get_to(trial.name);
+  from.at("what").get_to(trial.what);
+  from.at("corrector").get_to(trial.corrector);
+  from.at("textured").get_to(trial.textured);
+  from.at("gaussians").get_to(trial.gaussians);
+  from.at("part").get_to(trial.part);
+  from.at("seeds").get_to(trial.seeds);
+  from.at("intervals").get_to(trial.intervals);
+  decode(from.at("untouched"), trial.untouched);
+  decode(from.at("result"), trial.result);
+  from.at("corrected_views_agree").at("psnr_db").get_to(trial.corrected_views.psnr_db);
+  from.at("corrected_views_agree").at("pixels").get_to(trial.corrected_views.pixels);
+  from.at("seconds").get_to(trial.seconds);
+  for (const auto& [name, seconds] : from.at("stages").items())
+    if (const auto stage = engine::edit::stage_named(name))
+      trial.stages.push_back({*stage, seconds.template get<double>()});
+  from.at("peak_memory_bytes").get_to(trial.peak_memory_bytes);
+  from.at("warnings").get_to(trial.warnings);
+}
+
+void decode(const ordered_json& from, evaluate::TripTrial& trial) {
+  from.at("request").get_to(trial.request);
+  from.at("corrector").get_to(trial.corrector);
+  from.at("arrived").get_to(trial.arrived);
+  decode(from.at("inside"), trial.inside);
+  decode(from.at("outside"), trial.outside);
+  decode(from.at("zero_drag"), trial.zero_drag);
+  from.at("cameras").get_to(trial.cameras);
+  from.at("seconds").get_to(trial.seconds);
+}
+
+template <class Found>
+std::optional<Found> kept_result(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  const ordered_json kept = ordered_json::parse(in, nullptr, /*allow_exceptions=*/false);
+  if (kept.is_discarded()) return std::nullopt;
+  try {
+    Found found;
+    decode(kept, found);
+    return found;
+  } catch (const nlohmann::json::exception&) {
+    return std::nullopt;  // not what we wrote
+  }
+}
+template std::optional<evaluate::Trial> kept_result(const std::filesystem::path& file);
+template std::optional<evaluate::TripTrial> kept_result(const std::filesystem::path& file);
+
+engine::Result<void> write_json(const std::filesystem::path& file, const ordered_json& what) {
+  const std::string text = proto::pretty(what) + "\n";
+  return engine::write_file(file, std::as_bytes(std::span(text)));
+}
+
+}  // namespace server::cli

@@ -1,0 +1,207 @@
+// splatdrag edit: a scene and a drag in, the edited scene and what there is to know about it out.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "engine/core/atomic_file.h"
+#include "engine/edit/edit.h"
+#include "engine/io/dataset.h"
+#include "engine/io/image_file.h"
+#include "engine/io/scene_file.h"
+#include "engine/render/forward.h"
+#include "engine/scene/overlay.h"
+#include "server/cli/commands.h"
+#include "server/cli/compute.h"
+#include "server/cli/edit_report.h"
+#include "server/cli/folders.h"
+#include "server/cli/progress_display.h"
+#include "server/cli/request_file.h"
+#include "server/edits/convert.h"
+#include "server/pictures/picture_names.h"
+#include "server/pictures/pictures.h"
+
+namespace server::cli {
+namespace {
+
+namespace edit = engine::edit;
+namespace io = engine::io;
+namespace scene = engine::scene;
+using engine::ErrorCode;
+using engine::fail;
+using engine::propagate;
+using std::filesystem::path;
+
+struct EditOptions {
+  std::string scene, dataset, request, name, out;
+  int pictures = 3;
+  ComputeOptions compute;
+};
+
+/// Errors of the engine name a field of the request; the user knows that field by its place in the file.
+void locate_in_file(engine::Error& error, const EditOptions& options, const proto::RequestFile& file) {
+  for (const char* field : {"handles", "region", "params"})
+    if (error.where.starts_with(field)) {
+      error.where = path(options.request).filename().string() + ":" + file.address_of(error.where);
+      return;
+    }
+}
+
+/// The request in both forms: as asked, and for the engine.
+struct BothRequests {
+  proto::RequestFile asked;
+  edit::Request engine;
+};
+
+Result<BothRequests> load_request(const EditOptions& options) {
+  auto asked = read_request(options.request, options.name);
+  if (!asked) return propagate(asked);
+  auto request = edits::to_engine(asked->request);
+  if (request)
+    if (const auto valid = edit::validate(*request); !valid) request = propagate(valid);
+  if (!request) {
+    locate_in_file(request.error(), options, *asked);
+    return propagate(request);
+  }
+  return BothRequests{std::move(*asked), std::move(*request)};
+}
+
+Result<std::vector<scene::Camera>> load_cameras(const std::string& dataset) {
+  if (dataset.empty()) return std::vector<scene::Camera>();
+  const auto read = io::read_dataset(dataset, {.points = false});
+  if (!read) return propagate(read);
+  return io::cameras_of(*read);
+}
+
+/// Before, after and mask of the best views.
+Result<std::vector<ViewPictures>> write_pictures(const path& folder, const scene::GaussianCloud& before,
+                                                 const scene::GaussianCloud& after, const edit::Outcome& outcome,
+                                                 std::size_t count) {
+  const auto names = pictures::picture_names(outcome.views);
+  std::vector<ViewPictures> written;
+  for (std::size_t v = 0; v < std::min(count, outcome.views.size()); ++v) {
+    const scene::Image was = engine::render::forward(before, outcome.views[v]).color;
+    const scene::Image is = engine::render::forward(after, outcome.views[v]).color;
+    ViewPictures pictures{outcome.views[v].name, "before_" + names[v] + ".png", "after_" + names[v] + ".png",
+                          "mask_" + names[v] + ".png", pictures::psnr_outside(was, is, outcome.masks[v])};
+    for (const auto& [name, picture] : {std::pair<std::string&, scene::Image>{pictures.before, was},
+                                        {pictures.after, is},
+                                        {pictures.mask, pictures::with_mask_shown(was, outcome.masks[v])}})
+      if (const auto saved = io::write_image(folder / name, picture); !saved) return propagate(saved);
+    written.push_back(std::move(pictures));
+  }
+  return written;
+}
+
+void summarise(std::ostream& out, const path& folder, const EditReport& report) {
+  const edit::Report& edit = report.edit;
+  out << (folder / "scene.ply").string() << ": " << edit.output_gaussians << " Gaussians, "
+      << edit.input_gaussians - edit.removed << " of the " << edit.input_gaussians << " before and " << edit.copies
+      << " new ones\n";
+  for (std::size_t i = 0; i < edit.handles.size(); ++i)
+    out << "handle " << i + 1 << ": " << edit.handles[i].gaussians << " Gaussians\n";
+  for (const ViewPictures& pictures : report.pictures) {
+    out << (folder / pictures.after).string() << ": outside the mask ";
+    if (std::isfinite(pictures.psnr_outside_db))
+      out << std::round(10 * pictures.psnr_outside_db) / 10 << " dB against " << pictures.before << '\n';
+    else
+      out << "the same as " << pictures.before << '\n';
+  }
+}
+
+/// The edit itself, shown to the user as it goes.
+Result<edit::Outcome> run_shown(const scene::GaussianCloud& input, const std::vector<scene::Camera>& cameras,
+                                const BothRequests& request, Terminal& terminal) {
+  ProgressDisplay display(terminal);
+  edit::Observer observer;
+  observer.progress = [&](const edit::Progress& progress) { display.show(progress); };
+  const auto corrector = edits::make_corrector(request.asked.request);
+  return edit::run(input, cameras, request.engine, {.corrector = corrector.get()}, observer);
+}
+
+std::vector<std::string> all_warnings(const edit::Report& report, const proto::EditRequest& asked) {
+  std::vector<std::string> warnings = report.warnings;
+  for (std::string& warning : edits::warnings_about(asked)) warnings.push_back(std::move(warning));
+  return warnings;
+}
+
+/// Everything in the output folder; the scene first, because it is what nobody wants to lose.
+Result<void> write_results(const path& folder, std::size_t pictured_views, const io::SceneFile& input,
+                           const edit::Outcome& outcome, EditReport& report) {
+  const io::SceneFile edited{scene::flatten(input.cloud, outcome.overlay), input.layout};
+  if (auto saved = io::write_scene(folder / "scene.ply", edited, io::SceneFormat::ply); !saved) return saved;
+  auto pictures = write_pictures(folder, input.cloud, edited.cloud, outcome, pictured_views);
+  if (!pictures) return propagate(pictures);
+  report.pictures = std::move(*pictures);
+  const std::string json = to_json(report);
+  return engine::write_file(folder / "report.json", std::as_bytes(std::span(json)));
+}
+
+Result<void> run(const EditOptions& options, Terminal& terminal) {
+  const path folder = options.out;
+  const auto request = load_request(options);
+  if (!request) return propagate(request);
+  if (auto safe = keep_input_safe(options.scene, folder / "scene.ply"); !safe) return safe;
+  if (auto made = make_folder(folder); !made) return made;
+
+  return compute(options.compute, [&](const Machine& machine) -> Result<void> {
+    const auto input = io::read_scene(options.scene);
+    if (!input) return propagate(input);
+    const auto cameras = load_cameras(options.dataset);
+    if (!cameras) return propagate(cameras);
+    const auto start = std::chrono::steady_clock::now();
+    auto outcome = run_shown(input->cloud, *cameras, *request, terminal);
+    if (!outcome) {
+      locate_in_file(outcome.error(), options, request->asked);
+      return propagate(outcome);
+    }
+    EditReport report;
+    report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    report.scene_file = path(options.scene).filename().string();
+    report.machine = machine;
+    report.request = edits::resolved(request->asked.request, outcome->report.resolved);
+    report.edit = outcome->report;
+    report.edit.warnings = all_warnings(outcome->report, request->asked.request);
+    for (const std::string& warning : report.edit.warnings) terminal.err << "warning: " << warning << '\n';
+    auto written = write_results(folder, std::size_t(options.pictures), *input, *outcome, report);
+    if (written) summarise(terminal.out, folder, report);
+    return written;
+  });
+}
+
+}  // namespace
+
+void add_edit_command(CLI::App& program, Action& action) {
+  CLI::App* const command = program.add_subcommand("edit", "Drags parts of a scene and writes the edited scene");
+  const auto options = std::make_shared<EditOptions>();
+  command->add_option("--scene", options->scene, "Scene to edit: .ply, .splat or .spz")->required()->type_name("FILE");
+  command
+      ->add_option("--dataset", options->dataset,
+                   "Folder with the scene's cameras (COLMAP, transforms.json or an INRIA model); without it, cameras "
+                   "are placed around the handles")
+      ->type_name("DIR");
+  command
+      ->add_option("--request", options->request,
+                   "Edit request, a 3DGS-Drag configuration, or a file of several by name (JSON)")
+      ->required()
+      ->type_name("FILE");
+  command->add_option("--name", options->name, "Which request of a file of several")->type_name("NAME");
+  command
+      ->add_option("--out", options->out,
+                   "Folder for scene.ply, report.json and pictures of the best views; files of these names are "
+                   "replaced")
+      ->required()
+      ->type_name("DIR");
+  command->add_option("--pictures", options->pictures, "Views to show before, after and with the mask")
+      ->check(CLI::Range(0, 1000))
+      ->type_name("N");
+  add_compute_options(*command, options->compute);
+  command->callback([options, &action] { action = [options](Terminal& terminal) { return run(*options, terminal); }; });
+}
+
+}  // namespace server::cli

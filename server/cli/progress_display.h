@@ -1,0 +1,44 @@
+// Shows long work to the person who waits for it.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <optional>
+#include <ostream>
+#include <string>
+
+#include "engine/edit/edit.h"
+#include "server/cli/terminal.h"
+
+namespace server::cli {
+
+/// On a terminal, one line that redraws itself; otherwise a line every few percent.
+class ProgressDisplay {
+ public:
+  enum class Style { bar, lines };
+  using Clock = std::function<std::chrono::steady_clock::time_point()>;
+
+  ProgressDisplay(std::ostream& out, Style style, Clock clock = std::chrono::steady_clock::now);
+  /// On the error stream, as suits it.
+  explicit ProgressDisplay(const Terminal& terminal);
+  /// Removes the bar, so that what follows starts on a fresh line.
+  ~ProgressDisplay();
+  ProgressDisplay(const ProgressDisplay&) = delete;
+  ProgressDisplay& operator=(const ProgressDisplay&) = delete;
+
+  /// How far it is, 0 to 1, and what is being done.
+  void show(double fraction, const std::string& doing);
+  void show(const engine::edit::Progress& progress);
+
+ private:
+  [[nodiscard]] std::string time_left(double fraction) const;
+
+  std::ostream& out_;
+  Style style_;
+  Clock clock_;
+  std::chrono::steady_clock::time_point start_, drawn_;
+  std::optional<double> begun_at_;  ///< The first fraction shown.
+  int percent_ = -1;                ///< As last shown.
+};
+
+}  // namespace server::cli

@@ -1,0 +1,139 @@
+// splatdrag serve: the options of the service, and its start.
+#include <spdlog/logger.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "engine/edit/request.h"
+#include "proto/camera.h"
+#include "proto/edit_request.h"
+#include "server/cli/commands.h"
+#include "server/cli/compute.h"
+#include "server/cli/folders.h"
+#include "server/http/log.h"
+#include "server/service/serve.h"
+
+namespace server::cli {
+namespace {
+
+using engine::propagate;
+using service::ServeOptions;
+
+/// What the command line says beyond what the service needs to know.
+struct ServeCommandOptions : ServeOptions {
+  std::string log_level = "info", log_format = "json";
+  ComputeOptions compute;
+};
+
+Result<void> run(const ServeCommandOptions& given, Terminal& terminal) {
+  service::EndSignals signals;  // before any thread is started
+  ServeOptions options = given;
+  const auto format = given.log_format == "text" ? http::LogFormat::text : http::LogFormat::json;
+  const auto logger = http::make_logger(terminal.err, given.log_level, format);
+  if (!logger) return propagate(logger);
+  if (const auto checked = service::check_token(options, **logger); !checked) return checked;
+  options.threads = given.compute.threads;
+  const auto computing = compute(given.compute, [&](const Machine& machine) -> Result<void> {
+    options.threads_here = machine.threads;
+    options.simd = machine.simd;
+    return {};
+  });
+  if (!computing) return computing;
+  if (const auto made = make_folder(options.data_dir); !made) return made;
+  return service::serve(std::move(options), signals, **logger, terminal.out);
+}
+
+template <class Number>
+CLI::Option* add_bytes(CLI::App& command, const std::string& name, Number& value, const std::string& description) {
+  return command.add_option(name, value, description + " (a number of bytes, or such as 512MiB)")
+      ->transform(CLI::AsSizeValue(/*kb_is_1000=*/true))
+      ->check(CLI::PositiveNumber)
+      ->type_name("BYTES");
+}
+
+template <class Number>
+CLI::Option* add_count(CLI::App& command, const std::string& name, Number& value, const std::string& description,
+                       std::int64_t low = 1, std::int64_t high = 1'000'000'000) {
+  return command.add_option(name, value, description)->check(CLI::Range(low, high))->type_name("N");
+}
+
+void add_http_options(CLI::App& command, http::ServerOptions& options, http::GateOptions& gate) {
+  command.add_option("--host", options.host, "Address to listen on")->type_name("HOST");
+  command
+      .add_option("--port", options.port, "Port to listen on; 0: any that is free, named in the first line of output")
+      ->check(CLI::Range(0, 65535))
+      ->type_name("N");
+  command
+      .add_option("--allowed-host", gate.allowed_hosts,
+                  "A name the service goes by, beside --host and the loopback names; several may be given")
+      ->type_name("NAME");
+  command
+      .add_option("--allowed-origin", gate.allowed_origins,
+                  "Requests whose Origin is this one are taken, as those of the service's own page are: for a proxy "
+                  "that puts the service under another name (https://name); several may be given")
+      ->type_name("ORIGIN");
+  add_count(command, "--max-connections", options.threads, "Connections served at a time");
+  add_count(command, "--max-waiting", options.max_waiting, "Connections that may wait; more are turned away", 0);
+  add_count(command, "--max-streams", options.dispatcher.max_streams, "Streams of events at a time", 0);
+  add_count(command, "--max-sessions", gate.max_sessions, "Pages signed in at a time; the oldest makes room");
+  add_bytes(command, "--max-header-bytes", options.connection.max_head_bytes, "Head of a request");
+  add_bytes(command, "--max-json-bytes", options.dispatcher.max_json_bytes, "JSON body of a request, up to 1MiB")
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{proto::JsonLimits().max_bytes}));
+  add_bytes(command, "--max-upload-bytes", options.dispatcher.max_upload_bytes, "Uploaded file");
+  add_count(command, "--min-bytes-per-second", options.connection.min_bytes_per_second,
+            "Slower clients are cut off, after ten seconds of patience", 0);
+}
+
+void add_store_options(CLI::App& command, ServeOptions& options) {
+  command.add_option("--data-dir", options.data_dir, "Folder for scenes and edits; nothing is written anywhere else")
+      ->required()
+      ->type_name("DIR");
+  command.add_option("--scene-root", options.scenes.scene_root, "Folder below which clients may open files by path")
+      ->check(CLI::ExistingDirectory)
+      ->type_name("DIR");
+  add_bytes(command, "--scene-memory", options.scenes.memory_bytes, "Memory for scenes and previews");
+  add_count(command, "--max-gaussians", options.scenes.read.max_gaussians, "Gaussians of a scene");
+  add_count(command, "--max-scenes", options.scenes.max_scenes, "Scenes held");
+  add_count(command, "--max-previews", options.scenes.max_previews, "Previews in memory");
+  add_count(command, "--preview-seconds", options.preview_seconds,
+            "A preview nobody looks at is forgotten after so long");
+  add_bytes(command, "--max-dataset-bytes", options.scenes.max_dataset_bytes, "Dataset, unpacked");
+  add_count(command, "--max-dataset-files", options.scenes.max_dataset_files, "Files of a dataset");
+  add_count(command, "--max-queued", options.edits.max_queued, "Edits that may wait");
+  add_count(command, "--max-edit-records", options.edits.retention.max_count, "Ended edits that are remembered");
+  add_count(command, "--pictured-views", options.edits.pictured_views, "Views rendered after each interval", 0);
+  add_count(command, "--max-handles", options.edit_limits.handles, "Handles of an edit", 1, proto::max_handles);
+  add_count(command, "--max-views", options.edit_limits.views, "Views that an edit looks through", 1,
+            engine::edit::max_views);
+  add_count(command, "--max-image-side", options.edit_limits.image_side,
+            "Pixels along a side of the pictures that an edit works on", 16, proto::max_camera_side);
+  add_count(command, "--max-waiting-renders", options.renders.max_waiting, "Renders that may wait for a thread", 0);
+  add_count(command, "--max-render-side", options.renders.max_side, "Pixels along a side of a render", 1,
+            proto::max_camera_side);
+}
+
+}  // namespace
+
+void add_serve_command(CLI::App& program, Action& action) {
+  CLI::App* const command = program.add_subcommand("serve", "Serves edits over HTTP, with a page to place points on");
+  const auto options = std::make_shared<ServeCommandOptions>();
+  add_http_options(*command, options->http, options->gate);
+  add_store_options(*command, *options);
+  command
+      ->add_option("--token-file", options->token_file,
+                   "File with a token that every request must carry (\"Authorization: Bearer ...\")")
+      ->type_name("FILE");
+  command->add_flag("--insecure", options->insecure, "Listen to other machines without a token");
+  add_count(*command, "--drain-seconds", options->drain_seconds,
+            "When the service is stopped, a running edit may go on for so long to finish its interval", 0);
+  command->add_option("--log-level", options->log_level, "Least level that is logged")
+      ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
+      ->type_name("LEVEL");
+  command->add_option("--log-format", options->log_format, "For programs (json) or people (text)")
+      ->check(CLI::IsMember({"json", "text"}))
+      ->type_name("FORMAT");
+  add_compute_options(*command, options->compute);
+  command->callback([options, &action] { action = [options](Terminal& terminal) { return run(*options, terminal); }; });
+}
+
+}  // namespace server::cli

@@ -1,0 +1,217 @@
+#include "server/scenes/catalogue/catalogue.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <set>
+#include <span>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "engine/core/atomic_file.h"
+#include "engine/core/numbers.h"
+#include "engine/io/read_bytes.h"
+
+namespace server::scenes {
+namespace {
+
+namespace fs = std::filesystem;
+using engine::ErrorCode;
+using engine::fail;
+using engine::propagate;
+
+constexpr const char* lock_name = ".lock";
+constexpr const char* counter_name = "next_scene";  ///< Holds the number of the next scene.
+constexpr char id_kind = 's';
+
+}  // namespace
+
+Result<void> Catalogue::lock_folder() {
+  folder_lock_ = engine::FileDescriptor(::open((folder_ / lock_name).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644));
+  if (folder_lock_.get() < 0) return tl::make_unexpected(engine::file_error(errno, "open", folder_ / lock_name));
+  if (::flock(folder_lock_.get(), LOCK_EX | LOCK_NB) != 0)
+    return fail(ErrorCode::conflict, "another service uses this data folder: stop it, or choose another folder",
+                folder_.string());
+  return {};
+}
+
+Result<void> Catalogue::read_counter() {
+  const auto bytes = engine::io::read_bytes(folder_ / counter_name, 64);
+  if (!bytes && bytes.error().code == ErrorCode::not_found) return {};
+  if (!bytes) return propagate(bytes);
+  std::string_view text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+  if (text.ends_with('\n')) text.remove_suffix(1);
+  const auto number = engine::number_in<std::uint64_t>(text);
+  if (!number || *number == 0)
+    return fail(ErrorCode::corrupt_data,
+                "expected the number of the next scene: write one above all scenes there have been", counter_name);
+  next_scene_ = std::max(next_scene_, *number);
+  return {};
+}
+
+/// A scene as it was left, without what a crash left beside it.
+void Catalogue::take_up(const fs::path& folder) {
+  std::error_code ignored;
+  if (fs::exists(folder / removed_manifest_name, ignored)) return remove_renamed(folder);
+  auto manifest = read_manifest(folder);
+  if (!manifest &&
+      manifest.error().code == ErrorCode::not_found)  // as in half a backup: nobody removes it but a person
+    manifest = fail(ErrorCode::corrupt_data, "the scene's folder has no " + std::string(manifest_name),
+                    (folder.filename() / manifest_name).string());
+  if (manifest && manifest->scene.id != folder.filename())
+    manifest = fail(ErrorCode::corrupt_data, "the folder holds scene " + manifest->scene.id, folder.filename());
+  if (manifest && !fs::is_regular_file(folder / manifest->base, ignored))
+    manifest = fail(ErrorCode::corrupt_data, "the scene's file is gone", folder.filename() / manifest->base);
+  if (!manifest) return damaged_.push_back(manifest.error());  // left as it is: somebody may want to save it
+
+  std::set<fs::path> named{manifest_name, manifest->base};
+  for (const VersionInfo& version : manifest->scene.versions)
+    if (version.version > 0) named.insert(overlay_name(version.version));
+  fs::path unpacked;
+  if (manifest->dataset && !manifest->dataset->below_root) {
+    unpacked = *fs::path(manifest->dataset->folder).begin();
+    named.insert(unpacked);
+  }
+  std::vector<fs::path> leftovers;
+  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+    const fs::path name = entry.path().filename();
+    if (name != "versions" && !named.contains(name)) leftovers.push_back(entry.path());
+  }
+  for (const auto& entry : fs::directory_iterator(folder / "versions", ignored))
+    if (!named.contains("versions" / entry.path().filename())) leftovers.push_back(entry.path());
+  for (const fs::path& leftover : leftovers) remove_quietly(leftover);
+
+  auto lease = unpacked.empty() ? nullptr : std::make_shared<Lease>(folder / unpacked);
+  const std::string id = manifest->scene.id;
+  scenes_[id] = std::make_shared<Scene>(std::move(*manifest), folder, std::move(lease));
+}
+
+Result<void> Catalogue::open() {
+  if (auto made = make_folder(folder_); !made) return made;
+  if (auto synced = engine::sync_folder(folder_.parent_path()); !synced) return synced;
+  if (auto locked = lock_folder(); !locked) return locked;
+  if (auto read = read_counter(); !read) return read;
+  std::vector<fs::path> folders, removed;
+  std::error_code error;
+  for (auto entry = fs::directory_iterator(folder_, error); !error && entry != fs::end(entry); entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (name.starts_with(removed_prefix)) removed.push_back(entry->path());
+    const auto number = engine::number_of_id(id_kind, name);
+    if (!number) continue;
+    next_scene_ = std::max(next_scene_, *number + 1);
+    folders.push_back(entry->path());
+  }
+  if (error) return tl::make_unexpected(engine::file_error(error.value(), "read", folder_));
+  for (const fs::path& folder : removed) remove_quietly(folder);
+  for (const fs::path& folder : folders) take_up(folder);
+  return {};
+}
+
+Result<Snapshot> Catalogue::snapshot(const std::string& id) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = scenes_.find(id);
+  if (found == scenes_.end()) return fail(ErrorCode::not_found, "there is no scene " + id, "scene");
+  return Snapshot{found->second, found->second->manifest, found->second->dataset_folder};
+}
+
+bool Catalogue::has(const Snapshot& at) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = scenes_.find(at.scene->id);
+  return found != scenes_.end() && found->second == at.scene;
+}
+
+std::vector<ManifestPtr> Catalogue::manifests() const {
+  std::vector<ManifestPtr> all;
+  const std::lock_guard lock(mutex_);
+  for (const auto& [id, scene] : scenes_) all.push_back(scene->manifest);
+  return all;
+}
+
+std::size_t Catalogue::size() const {
+  const std::lock_guard lock(mutex_);
+  return scenes_.size();
+}
+
+Catalogue::Place::~Place() {
+  if (catalogue_ == nullptr) return;
+  const std::lock_guard lock(catalogue_->mutex_);
+  --catalogue_->adding_;
+}
+
+Result<Catalogue::Place> Catalogue::reserve() {
+  const std::lock_guard lock(mutex_);
+  if (scenes_.size() + adding_ >= max_scenes_)
+    return fail(ErrorCode::too_large, "there are " + std::to_string(scenes_.size()) +
+                                          " scenes, as many as the limit (--max-scenes) allows: delete one first");
+  ++adding_;
+  return Place(*this);
+}
+
+Result<std::uint64_t> Catalogue::next_number() {
+  const std::lock_guard lock(counter_writer_);
+  const std::string text = std::to_string(next_scene_ + 1) + "\n";
+  if (auto written = engine::write_file(folder_ / counter_name, std::as_bytes(std::span(text))); !written)
+    return propagate(written);
+  return next_scene_++;
+}
+
+Result<Snapshot> Catalogue::add(Manifest manifest, const fs::path& base_file, const fs::path& staging) {
+  const auto number = next_number();
+  if (!number) return told_(number);
+  const std::string id = manifest.scene.id = engine::numbered_id(id_kind, *number);
+  // Everything is on disk before the folder gets its name.
+  const fs::path whole = staging / "scene", folder = folder_ / id;
+  if (auto made = make_folder(whole); !made) return told_(made, staging);
+  if (auto moved = move_durably(base_file, whole / manifest.base); !moved) return told_(moved, staging);
+  if (auto synced = sync_file(whole / manifest.base); !synced) return told_(synced, staging);
+  if (auto written = write_manifest(whole, manifest); !written) return told_(written, staging);
+  if (auto moved = move_durably(whole, folder); !moved) {
+    remove_renamed(folder);
+    return told_(moved, staging);
+  }
+  const auto made = std::make_shared<Scene>(std::move(manifest), folder, nullptr);
+  const Snapshot at{made, made->manifest, nullptr};
+  const std::lock_guard lock(mutex_);
+  scenes_[id] = made;
+  return at;
+}
+
+Result<ManifestPtr> Catalogue::change(const Snapshot& at, const std::function<Result<void>(Manifest&)>& change,
+                                      std::shared_ptr<Lease>* dataset_folder) {
+  const std::lock_guard writer(at.scene->writer);
+  const auto current = snapshot(at.scene->id);  // not removed meanwhile, and nobody else changes it now
+  if (!current) return propagate(current);
+  auto manifest = std::make_shared<Manifest>(*current->manifest);
+  if (auto changed = change(*manifest); !changed) return propagate(changed);
+  const auto written = write_manifest(at.scene->folder->path(), *manifest);
+  // What the next start would find is what counts, even if it was not known to be on disk.
+  if (!written && !is_written(at.scene->folder->path(), *manifest)) return told_(written);
+  {
+    const std::lock_guard lock(mutex_);
+    at.scene->manifest = manifest;
+    if (dataset_folder) std::swap(at.scene->dataset_folder, *dataset_folder);
+  }
+  if (!written) return told_(written);
+  return manifest;
+}
+
+Result<void> Catalogue::remove(const std::string& id) {
+  const auto at = snapshot(id);
+  if (!at) return propagate(at);
+  const std::lock_guard writer(at->scene->writer);
+  if (const auto still = snapshot(id); !still) return propagate(still);
+  // Marked by its manifest's name: should we be killed now, the next start removes it.
+  const fs::path folder = at->scene->folder->path();
+  if (auto marked = move_durably(folder / manifest_name, folder / removed_manifest_name); !marked) return told_(marked);
+  {
+    const std::lock_guard lock(mutex_);
+    scenes_.erase(id);
+  }
+  at->scene->folder->end();
+  return {};
+}
+
+}  // namespace server::scenes

@@ -1,0 +1,121 @@
+// Which scenes there are: a folder and a manifest each, on disk, and a list of them in memory. Knows no Gaussians.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "engine/core/file_descriptor.h"
+#include "engine/core/result.h"
+#include "server/scenes/catalogue/manifest.h"
+#include "server/scenes/disk/disk.h"
+#include "server/scenes/disk/plain_error.h"
+
+namespace server::scenes {
+
+using engine::Result;
+using ManifestPtr = std::shared_ptr<const Manifest>;
+
+struct Scene {
+  Scene(Manifest about, const std::filesystem::path& path, std::shared_ptr<Lease> unpacked)
+      : id(about.scene.id),
+        folder(std::make_shared<Lease>(path)),
+        manifest(std::make_shared<const Manifest>(std::move(about))),
+        dataset_folder(std::move(unpacked)) {}
+
+  const std::string id;
+  const std::shared_ptr<Lease> folder;
+  /// Whoever changes the manifest holds this from reading the old one until the new one is on disk, against the rule
+  /// that no lock is held over I/O: two changes at once would lose one of them. Nobody who only reads ever waits for
+  /// it.
+  std::mutex writer;
+  // Under the lock of the catalogue:
+  ManifestPtr manifest;
+  std::shared_ptr<Lease> dataset_folder;  ///< Of an unpacked dataset.
+};
+
+/// A scene as it was at some moment. Holding it keeps its files, even if it is removed or changed meanwhile.
+struct Snapshot {
+  std::shared_ptr<Scene> scene;
+  ManifestPtr manifest;
+  std::shared_ptr<Lease> dataset_folder;
+};
+
+/// Safe to call from any thread once it is open. Its lock is never held over I/O.
+class Catalogue {
+ public:
+  /// folder  absolute
+  /// told    how errors are called outside; outlives this
+  Catalogue(std::filesystem::path folder, std::size_t max_scenes, const PlainErrors& told)
+      : folder_(std::move(folder)), max_scenes_(max_scenes), told_(told) {}
+
+  /// Makes the folder or takes up what is in it, without what a crash left there.
+  ///   errors  conflict: another process has it; corrupt_data: its counter; those of file_error(), with full paths
+  [[nodiscard]] Result<void> open();
+  /// Scenes that could not be taken up; their folders are left as they are.
+  [[nodiscard]] const std::vector<engine::Error>& damaged() const { return damaged_; }
+
+  ///   errors  not_found: `where` is "scene"
+  [[nodiscard]] Result<Snapshot> snapshot(const std::string& id) const;
+  /// Whether it has not been removed. What is put into a cache for a snapshot may be too late: whoever removes forgets
+  /// first, and once. So whoever has put something there asks this, and forgets it again.
+  [[nodiscard]] bool has(const Snapshot& at) const;
+  [[nodiscard]] std::vector<ManifestPtr> manifests() const;  ///< By id.
+  [[nodiscard]] std::size_t size() const;
+
+  /// Counts a scene on its way in, as long as it lives: a thousand uploads at once do not pass the limit together.
+  class Place {
+   public:
+    explicit Place(Catalogue& catalogue) : catalogue_(&catalogue) {}
+    Place(Place&& other) noexcept : catalogue_(std::exchange(other.catalogue_, nullptr)) {}
+    Place& operator=(Place&&) = delete;
+    ~Place();
+
+   private:
+    Catalogue* catalogue_;
+  };
+  ///   errors  too_large: as many scenes as there may be
+  [[nodiscard]] Result<Place> reserve();
+  /// A new scene, on disk when this returns: it appears whole or not at all.
+  ///   manifest   without id
+  ///   base_file  what becomes its version 0; moved
+  ///   staging    a folder to put things together in, on the same file system
+  [[nodiscard]] Result<Snapshot> add(Manifest manifest, const std::filesystem::path& base_file,
+                                     const std::filesystem::path& staging);
+  /// Replaces a scene's manifest by one that `change` has changed.
+  ///   dataset_folder  if given: that of the changed manifest, swapped for the one before
+  ///   returns         the new manifest
+  ///   errors          not_found: removed meanwhile; those of `change` and of write_manifest()
+  [[nodiscard]] Result<ManifestPtr> change(const Snapshot& at, const std::function<Result<void>(Manifest&)>& change,
+                                           std::shared_ptr<Lease>* dataset_folder = nullptr);
+  /// Its files go once nobody reads from them any more.
+  [[nodiscard]] Result<void> remove(const std::string& id);
+
+ private:
+  [[nodiscard]] Result<void> lock_folder();
+  [[nodiscard]] Result<void> read_counter();
+  void take_up(const std::filesystem::path& folder);
+  [[nodiscard]] Result<std::uint64_t> next_number();
+
+  const std::filesystem::path folder_;
+  const std::size_t max_scenes_;
+  const PlainErrors& told_;
+  engine::FileDescriptor folder_lock_;
+  std::vector<engine::Error> damaged_;  ///< Written by open() alone.
+
+  mutable std::mutex mutex_;  ///< Guards what follows, and the scenes' own manifests.
+  std::map<std::string, std::shared_ptr<Scene>> scenes_;
+  std::size_t adding_ = 0;  ///< Scenes on their way in.
+
+  /// Held while the number of the next scene goes to disk: it must not be written twice, nor go back.
+  std::mutex counter_writer_;
+  std::uint64_t next_scene_ = 1;
+};
+
+}  // namespace server::scenes

@@ -1,0 +1,255 @@
+#include "server/scenes/catalogue/manifest.h"
+
+#include <algorithm>
+#include <initializer_list>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string_view>
+
+#include "engine/core/atomic_file.h"
+#include "engine/io/read_bytes.h"
+
+namespace server::scenes {
+namespace {
+
+using engine::Error;
+using engine::ErrorCode;
+using engine::fail;
+using engine::propagate;
+using nlohmann::json;
+using nlohmann::ordered_json;
+
+constexpr int manifest_format = 1;
+constexpr std::uint64_t max_manifest_bytes = std::uint64_t{64} << 20;
+
+/// The first thing wrong with a manifest. Thrown and caught in this file only: a manifest has dozens of fields, none of
+/// which can be done without.
+struct Wrong {
+  std::string what, where;
+};
+
+/// An object of the file, whose every member has to be read.
+class Object {
+ public:
+  Object(const json& value, std::string where, std::initializer_list<std::string_view> names)
+      : value_(value), where_(std::move(where)) {
+    if (!value.is_object()) throw Wrong{"expected an object", where_};
+    for (const auto& member : value.items())
+      if (std::find(names.begin(), names.end(), member.key()) == names.end())
+        throw Wrong{"unknown field; was this written by a newer version?", address(member.key())};
+  }
+
+  [[nodiscard]] const json& any(std::string_view name) const {
+    const auto member = value_.find(name);
+    if (member == value_.end()) throw Wrong{"the field is missing", address(name)};
+    return *member;
+  }
+  [[nodiscard]] std::string text(std::string_view name) const {
+    if (!any(name).is_string()) throw Wrong{"expected a string", address(name)};
+    return any(name).get<std::string>();
+  }
+  /// A file's name or a relative path that stays where it is.
+  [[nodiscard]] std::filesystem::path relative(std::string_view name) const {
+    const std::filesystem::path path = text(name);
+    const bool leaves = path.is_absolute() || std::find(path.begin(), path.end(), "..") != path.end();
+    if (path.empty() || leaves) throw Wrong{"expected a path within the folder", address(name)};
+    return path;
+  }
+  [[nodiscard]] std::uint64_t count(std::string_view name) const {
+    if (!any(name).is_number_unsigned()) throw Wrong{"expected a whole number from 0 up", address(name)};
+    return any(name).get<std::uint64_t>();
+  }
+  [[nodiscard]] int whole(std::string_view name, int low, int high) const {
+    const std::uint64_t value = count(name);
+    if (value < std::uint64_t(low) || value > std::uint64_t(high)) throw Wrong{"out of range", address(name)};
+    return int(value);
+  }
+  [[nodiscard]] double number(std::string_view name) const { return number_at(any(name), address(name)); }
+  [[nodiscard]] engine::DVec3 point(std::string_view name) const {
+    const json& value = any(name);
+    if (!value.is_array() || value.size() != 3) throw Wrong{"expected three numbers", address(name)};
+    engine::DVec3 point{0.0};
+    for (int i = 0; i < 3; ++i) point[i] = number_at(value[std::size_t(i)], address(name));
+    return point;
+  }
+  [[nodiscard]] Time time(std::string_view name) const {
+    if (!any(name).is_number_integer()) throw Wrong{"expected milliseconds since 1970", address(name)};
+    return Time(std::chrono::milliseconds(any(name).get<std::int64_t>()));
+  }
+  [[nodiscard]] bool boolean(std::string_view name) const {
+    if (!any(name).is_boolean()) throw Wrong{"expected true or false", address(name)};
+    return any(name).get<bool>();
+  }
+  [[nodiscard]] const json& array(std::string_view name) const {
+    if (!any(name).is_array()) throw Wrong{"expected an array", address(name)};
+    return any(name);
+  }
+  /// What `read` makes of a member that may be null.
+  template <class Read>
+  [[nodiscard]] auto maybe(std::string_view name, Read read) const -> std::optional<decltype(read())> {
+    if (any(name).is_null()) return std::nullopt;
+    return read();
+  }
+  [[nodiscard]] std::string address(std::string_view name) const {
+    return where_ + (where_.empty() ? "" : ".") + std::string(name);
+  }
+
+ private:
+  static double number_at(const json& value, const std::string& where) {
+    if (!value.is_number()) throw Wrong{"expected a number", where};
+    return value.get<double>();
+  }
+
+  const json& value_;
+  std::string where_;
+};
+
+ordered_json encoded(engine::DVec3 point) { return {point.x, point.y, point.z}; }
+std::int64_t encoded(Time time) { return time.time_since_epoch().count(); }
+template <class T>
+ordered_json or_null(const std::optional<T>& value) {
+  return value ? ordered_json(*value) : ordered_json(nullptr);
+}
+
+ordered_json encoded(const DatasetInfo& info, const DatasetPlace& place) {
+  return {{"kind", info.kind},
+          {"folder", place.folder},
+          {"below_root", place.below_root},
+          {"disk_bytes", place.disk_bytes},
+          {"views", info.views},
+          {"photos", info.photos},
+          {"psnr_mean_db", or_null(info.psnr_mean_db)},
+          {"psnr_worst_db", or_null(info.psnr_worst_db)},
+          {"psnr_worst_view", info.psnr_worst_view},
+          {"warnings", info.warnings}};
+}
+
+void read_dataset(const json& value, Manifest& manifest) {
+  const Object in(value, "dataset",
+                  {"kind", "folder", "below_root", "disk_bytes", "views", "photos", "psnr_mean_db", "psnr_worst_db",
+                   "psnr_worst_view", "warnings"});
+  DatasetInfo info;
+  info.kind = in.text("kind");
+  info.views = in.count("views"), info.photos = in.count("photos");
+  info.psnr_mean_db = in.maybe("psnr_mean_db", [&] { return in.number("psnr_mean_db"); });
+  info.psnr_worst_db = in.maybe("psnr_worst_db", [&] { return in.number("psnr_worst_db"); });
+  info.psnr_worst_view = in.text("psnr_worst_view");
+  for (const json& warning : in.array("warnings")) {
+    if (!warning.is_string()) throw Wrong{"expected a string", in.address("warnings")};
+    info.warnings.push_back(warning.get<std::string>());
+  }
+  manifest.dataset = DatasetPlace{in.relative("folder"), in.boolean("below_root"), in.count("disk_bytes")};
+  manifest.scene.dataset = std::move(info);
+}
+
+ordered_json encoded(const VersionInfo& version, std::uint64_t memory_bytes) {
+  return {{"version", version.version},     {"parent", or_null(version.parent)},
+          {"edit", version.edit},           {"created", encoded(version.created)},
+          {"gaussians", version.gaussians}, {"disk_bytes", version.disk_bytes},
+          {"memory_bytes", memory_bytes}};
+}
+
+void read_version(const json& value, Manifest& manifest) {
+  const int number = int(manifest.scene.versions.size());
+  const Object in(value, "versions[" + std::to_string(number) + "]",
+                  {"version", "parent", "edit", "created", "gaussians", "disk_bytes", "memory_bytes"});
+  VersionInfo version;
+  version.version = in.whole("version", number, number);
+  version.parent = in.maybe("parent", [&] { return in.whole("parent", 0, std::max(number - 1, 0)); });
+  if (version.parent.has_value() != (number > 0)) throw Wrong{"only version 0 has no parent", in.address("parent")};
+  version.edit = in.text("edit");
+  version.created = in.time("created");
+  version.gaussians = in.count("gaussians");
+  version.disk_bytes = in.count("disk_bytes");
+  manifest.overlay_memory_bytes.push_back(in.count("memory_bytes"));
+  manifest.scene.versions.push_back(std::move(version));
+}
+
+Manifest decode(const json& document) {
+  const Object in(
+      document, "",
+      {"manifest", "id", "nonce", "name", "created", "format", "base", "base_disk_bytes", "base_memory_bytes",
+       "sh_degree", "low", "high", "centre", "radius", "up", "dataset", "next_dataset", "versions"});
+  (void)in.whole("manifest", manifest_format, manifest_format);
+  Manifest manifest;
+  SceneInfo& scene = manifest.scene;
+  scene.id = in.text("id");
+  manifest.nonce = in.text("nonce");
+  scene.name = in.text("name");
+  scene.created = in.time("created");
+  scene.format = in.text("format");
+  manifest.base = in.relative("base");
+  manifest.base_disk_bytes = in.count("base_disk_bytes");
+  manifest.base_memory_bytes = in.count("base_memory_bytes");
+  scene.sh_degree = in.whole("sh_degree", 0, engine::scene::max_sh_degree);
+  scene.low = in.point("low"), scene.high = in.point("high");
+  scene.centre = in.point("centre");
+  scene.radius = in.number("radius");
+  scene.up = in.maybe("up", [&] { return in.point("up"); });
+  if (!in.any("dataset").is_null()) read_dataset(in.any("dataset"), manifest);
+  manifest.next_dataset = in.whole("next_dataset", 1, 1'000'000'000);
+  for (const json& version : in.array("versions")) read_version(version, manifest);
+  if (scene.versions.empty()) throw Wrong{"expected at least version 0", "versions"};
+  return manifest;
+}
+
+ordered_json encoded(const Manifest& manifest) {
+  const SceneInfo& scene = manifest.scene;
+  ordered_json out{{"manifest", manifest_format},
+                   {"id", scene.id},
+                   {"nonce", manifest.nonce},
+                   {"name", scene.name},
+                   {"created", encoded(scene.created)},
+                   {"format", scene.format},
+                   {"base", manifest.base},
+                   {"base_disk_bytes", manifest.base_disk_bytes},
+                   {"base_memory_bytes", manifest.base_memory_bytes},
+                   {"sh_degree", scene.sh_degree},
+                   {"low", encoded(scene.low)},
+                   {"high", encoded(scene.high)},
+                   {"centre", encoded(scene.centre)},
+                   {"radius", scene.radius},
+                   {"up", scene.up ? encoded(*scene.up) : ordered_json(nullptr)},
+                   {"dataset", nullptr},
+                   {"next_dataset", manifest.next_dataset}};
+  if (scene.dataset) out["dataset"] = encoded(*scene.dataset, *manifest.dataset);
+  ordered_json& versions = out["versions"] = ordered_json::array();
+  for (std::size_t i = 0; i < scene.versions.size(); ++i)
+    versions.push_back(encoded(scene.versions[i], manifest.overlay_memory_bytes[i]));
+  return out;
+}
+
+std::string text_of(const Manifest& manifest) {
+  return encoded(manifest).dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace
+
+Result<Manifest> read_manifest(const std::filesystem::path& folder) {
+  const auto bytes = engine::io::read_bytes(folder / manifest_name, max_manifest_bytes);
+  if (!bytes) return propagate(bytes);
+  const std::string file = (folder.filename() / manifest_name).string();
+  const auto* text = reinterpret_cast<const char*>(bytes->data());
+  try {
+    return decode(json::parse(text, text + bytes->size()));
+  } catch (const Wrong& wrong) {
+    return fail(ErrorCode::corrupt_data, wrong.what, file + ":" + wrong.where);
+  } catch (const json::exception& failure) {
+    return fail(ErrorCode::corrupt_data, std::string("not valid JSON: ") + failure.what(), file);
+  }
+}
+
+Result<void> write_manifest(const std::filesystem::path& folder, const Manifest& manifest) {
+  const std::string text = text_of(manifest);
+  return engine::write_file(folder / manifest_name, std::as_bytes(std::span(text)));
+}
+
+bool is_written(const std::filesystem::path& folder, const Manifest& manifest) {
+  const auto bytes = engine::io::read_bytes(folder / manifest_name, max_manifest_bytes);
+  const std::string text = text_of(manifest);
+  return bytes && std::ranges::equal(*bytes, std::as_bytes(std::span(text)));
+}
+
+std::string overlay_name(int version) { return "versions/" + std::to_string(version) + ".overlay"; }
+
+}  // namespace server::scenes

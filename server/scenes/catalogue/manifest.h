@@ -1,0 +1,51 @@
+// What a scene's folder holds, in one small file: scene.json.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "server/scenes/catalogue/scene_info.h"
+
+namespace server::scenes {
+
+using engine::Result;
+
+/// Where a dataset is.
+struct DatasetPlace {
+  std::string folder;  ///< With the cameras. Below the scene's folder, or below the scene root. Relative.
+  bool below_root = false;
+  std::uint64_t disk_bytes = 0;  ///< In the scene's folder.
+};
+
+struct Manifest {
+  SceneInfo scene;    ///< memory_bytes and disk_bytes are not kept here.
+  std::string nonce;  ///< Random: a scene of the same id in another data folder is another one.
+  std::string base;   ///< File name of version 0.
+  std::uint64_t base_disk_bytes = 0, base_memory_bytes = 0;
+  std::vector<std::uint64_t> overlay_memory_bytes;  ///< Per version; 0 for version 0.
+  std::optional<DatasetPlace> dataset;              ///< There iff scene.dataset is.
+  int next_dataset = 1;                             ///< Number of the next dataset's folder.
+};
+
+constexpr const char* manifest_name = "scene.json";
+/// What the manifest of a removed scene is called, until nobody reads its files any more.
+constexpr const char* removed_manifest_name = "scene.json.removed";
+
+/// Strict: every field must be there, be of its type and be within what makes sense.
+///   errors  not_found: no such file; corrupt_data: `where` is "<folder>/scene.json:field"
+[[nodiscard]] Result<Manifest> read_manifest(const std::filesystem::path& folder);
+
+/// Replaces the file as a whole; on disk when this returns.
+///   errors  no_space, unavailable: the old one is unchanged, unless is_written()
+[[nodiscard]] Result<void> write_manifest(const std::filesystem::path& folder, const Manifest& manifest);
+/// Is this what the folder's manifest says? After an error it may: its name was changed, but not known to be on disk.
+[[nodiscard]] bool is_written(const std::filesystem::path& folder, const Manifest& manifest);
+
+/// File name of what version `version` changes.
+[[nodiscard]] std::string overlay_name(int version);
+
+}  // namespace server::scenes

@@ -1,0 +1,24 @@
+#include "server/scenes/disk/scratch.h"
+
+#include <string>
+
+#include "server/scenes/disk/disk.h"
+
+namespace server::scenes {
+
+Scratch::~Scratch() {
+  if (!folder_.empty()) remove_quietly(folder_);
+}
+
+Result<void> ScratchFolders::open() {
+  remove_quietly(folder_);
+  return make_folder(folder_);
+}
+
+Result<Scratch> ScratchFolders::make() {
+  const std::filesystem::path folder = folder_ / std::to_string(++last_);
+  if (auto made = make_folder(folder); !made) return told_(made, folder);
+  return Scratch(folder);
+}
+
+}  // namespace server::scenes

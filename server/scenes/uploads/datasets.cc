@@ -1,0 +1,157 @@
+#include "server/scenes/uploads/datasets.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <set>
+#include <system_error>
+#include <utility>
+
+#include "server/scenes/catalogue/names.h"
+#include "server/scenes/disk/disk.h"
+#include "server/scenes/uploads/scene_root.h"
+#include "server/scenes/uploads/zip_folder.h"
+
+namespace server::scenes {
+namespace {
+
+namespace fs = std::filesystem;
+namespace io = engine::io;
+using engine::ErrorCode;
+using engine::fail;
+using engine::propagate;
+
+/// A dataset and what keeps its photos on disk.
+struct HeldDataset {
+  io::Dataset dataset;
+  std::shared_ptr<Lease> folder;
+};
+
+std::uint64_t dataset_memory_bytes(std::size_t views) { return 1024 * std::uint64_t(views); }  // names and paths
+
+/// The folder with the dataset in an unpacked zip file: people pack a folder, or what is in it.
+fs::path dataset_root(fs::path folder) {
+  static const std::set<std::string> parts{"sparse", "colmap", "images"};
+  for (;;) {
+    std::vector<fs::path> entries;
+    std::error_code error;
+    for (auto entry = fs::directory_iterator(folder, error); !error && entry != fs::end(entry);
+         entry.increment(error)) {
+      const std::string name = entry->path().filename().string();
+      if (name != "__MACOSX" && !name.starts_with(".")) entries.push_back(entry->path());
+    }
+    if (entries.size() != 1 || !fs::is_directory(entries[0], error) || parts.contains(entries[0].filename().string()))
+      return folder;
+    folder = entries[0];
+  }
+}
+
+DatasetInfo about(const io::Dataset& found) {
+  DatasetInfo about;
+  about.kind = found.kind;
+  about.views = found.views.size();
+  about.photos = std::size_t(std::ranges::count_if(found.views, [](const auto& view) { return !view.photo.empty(); }));
+  return about;
+}
+
+}  // namespace
+
+Result<ManifestPtr> Datasets::put_zip(const Snapshot& at, const fs::path& zip, const std::string& filename) {
+  const auto staging = scratch_.make();
+  if (!staging) return propagate(staging);
+  const fs::path into = staging->folder() / "dataset";
+  if (auto made = make_folder(into); !made) return told_(made, staging->folder());
+  const ZipLimits limits{.max_bytes = options_.max_dataset_bytes, .max_files = options_.max_dataset_files};
+  if (auto unpacked = unzip(zip, safe_file_name(filename), into, limits); !unpacked) return told_(unpacked, into);
+  const fs::path root = dataset_root(into);
+  const auto found = io::read_dataset(root, {.points = false});
+  if (!found) return told_(found, into);
+  if (auto synced = sync_file_system(into); !synced) return told_(synced, staging->folder());
+  return replace(at, *found, {root.lexically_relative(into).string(), false, bytes_below(into)}, into);
+}
+
+Result<ManifestPtr> Datasets::put_path(const Snapshot& at, const std::string& path) {
+  const fs::path& scene_root = options_.scene_root;
+  const auto folder = below_root(scene_root, path);
+  if (!folder) return propagate(folder);
+  if (auto links = check_links(scene_root, *folder, options_.max_dataset_files); !links) return propagate(links);
+  auto found = io::read_dataset(*folder, {.points = false});
+  if (!found) {
+    if (found.error().where == folder->string()) found.error().where = "path";
+    return told_(found);
+  }
+  for (const io::View& view : found->views)
+    if (!view.photo.empty() && !lies_below(scene_root, view.photo))
+      return fail(ErrorCode::invalid_argument, "the photo " + view.camera.name + " lies outside of the scene root",
+                  "path");
+  std::error_code error;
+  const fs::path relative = folder->lexically_relative(fs::canonical(scene_root, error));
+  return replace(at, *found, {relative.string(), true, 0}, std::nullopt);
+}
+
+Result<ManifestPtr> Datasets::replace(const Snapshot& at, const io::Dataset& found, DatasetPlace place,
+                                      const std::optional<fs::path>& unpacked) {
+  std::shared_ptr<Lease> lease;  // of the new folder; once that is the scene's, of the one before
+  std::shared_ptr<Lease> fresh;
+  auto replaced = catalogue_.change(
+      at,
+      [&](Manifest& manifest) -> Result<void> {
+        if (unpacked) {
+          const fs::path name = "dataset." + std::to_string(manifest.next_dataset);
+          const fs::path folder = at.scene->folder->path() / name;
+          fresh = lease = std::make_shared<Lease>(folder);
+          if (auto moved = move_durably(*unpacked, folder); !moved) return told_(moved, unpacked->parent_path());
+          place.folder = (name / place.folder).lexically_normal().string();
+        }
+        ++manifest.next_dataset;
+        manifest.dataset = place;
+        manifest.scene.dataset = about(found);
+        return {};
+      },
+      &lease);
+  // After a change that failed, the new one goes, unless the manifest on disk names it: then both stay, since it may
+  // still turn out that the old manifest is the one that is left.
+  if (lease && (replaced || lease == fresh)) lease->end();
+  memory_.forget(at.scene->id + "/dataset");
+  return replaced;
+}
+
+Result<std::shared_ptr<const io::Dataset>> Datasets::get(const Snapshot& at) {
+  const Manifest& manifest = *at.manifest;
+  if (!manifest.dataset) return std::shared_ptr<const io::Dataset>();
+  const std::uint64_t bytes = dataset_memory_bytes(manifest.scene.dataset->views);
+  const auto read = [&]() -> Result<BoundedCache::Made> {
+    fs::path folder = at.scene->folder->path() / manifest.dataset->folder;
+    if (manifest.dataset->below_root) {
+      auto below = below_root(options_.scene_root, manifest.dataset->folder);
+      if (!below) return fail(below.error().code, "the dataset cannot be read: " + below.error().message, "dataset");
+      folder = std::move(*below);
+    }
+    auto found = io::read_dataset(folder, {.points = false});
+    if (!found) return told_(found);
+    return BoundedCache::Made{std::make_shared<const HeldDataset>(HeldDataset{std::move(*found), at.dataset_folder}),
+                              bytes};
+  };
+  const std::string& id = at.scene->id;
+  const std::string name = id + "/dataset." + std::to_string(manifest.next_dataset);
+  const auto held = memory_.get<HeldDataset>(name, bytes, read);
+  const auto now = catalogue_.snapshot(id);  // what is put into a cache too late is forgotten again, see has()
+  if (!now || now->manifest->next_dataset != manifest.next_dataset) memory_.forget(name);
+  if (!held) return propagate(held);
+  return std::shared_ptr<const io::Dataset>(*held, &(*held)->dataset);
+}
+
+Result<ManifestPtr> Datasets::set_quality(const Snapshot& at, int dataset, std::optional<double> mean_db,
+                                          std::optional<double> worst_db, const std::string& worst_view,
+                                          std::vector<std::string> warnings) {
+  return catalogue_.change(at, [&](Manifest& manifest) -> Result<void> {
+    if (!manifest.scene.dataset) return fail(ErrorCode::not_found, "the scene has no dataset", "dataset");
+    if (manifest.next_dataset - 1 != dataset) return {};
+    DatasetInfo& about = *manifest.scene.dataset;
+    about.psnr_mean_db = mean_db, about.psnr_worst_db = worst_db;
+    about.psnr_worst_view = worst_view;
+    about.warnings = std::move(warnings);
+    return {};
+  });
+}
+
+}  // namespace server::scenes

@@ -1,0 +1,104 @@
+#include "server/scenes/uploads/uploads.h"
+
+#include <cstdint>
+#include <optional>
+#include <system_error>
+#include <utility>
+
+#include "server/scenes/catalogue/names.h"
+#include "server/scenes/disk/disk.h"
+#include "server/scenes/disk/scene_format.h"
+#include "server/scenes/uploads/scene_root.h"
+#include "server/scenes/uploads/scene_statistics.h"
+
+namespace server::scenes {
+
+namespace fs = std::filesystem;
+namespace io = engine::io;
+using engine::propagate;
+
+/// The file, in memory that is counted before it is taken.
+Result<Uploads::Upload> Uploads::read(const fs::path& file) {
+  const auto no_room = [&](engine::Error error) {
+    if (error.code == engine::ErrorCode::too_large) error.where = file.filename().string();
+    return tl::make_unexpected(std::move(error));
+  };
+  const std::uint64_t expected = expected_memory_bytes(file);
+  auto room = std::make_optional(memory_.room(expected));
+  if (!*room) return no_room(room->error());
+  // One at a time: what an .spz file unpacks to shows only when it is there.
+  const std::lock_guard one_at_a_time(reading_);
+  auto scene = io::read_scene(file, options_.read);
+  if (!scene) return told_(scene, file.parent_path());
+  const std::uint64_t bytes = memory_bytes(*scene);
+  if (bytes > expected) {
+    room.reset();
+    room.emplace(memory_.room(bytes));
+    if (!*room) return no_room(room->error());
+  }
+  return Upload{std::make_shared<const io::SceneFile>(std::move(*scene)), std::move(**room)};
+}
+
+Result<ManifestPtr> Uploads::add_staged(const fs::path& file, const fs::path& staging, const std::string& name) {
+  const auto called = name_for(name, file.filename().string());
+  if (!called) return propagate(called);
+  auto upload = read(file);
+  if (!upload) return propagate(upload);
+  const auto format = detect_format(file);
+  if (!format) return told_(format, file.parent_path());
+  const auto& cloud = upload->file->cloud;
+
+  Manifest manifest;
+  manifest.nonce = random_nonce();
+  manifest.base = std::string("base.") + format->extension;
+  manifest.base_disk_bytes = bytes_below(file);
+  manifest.base_memory_bytes = memory_bytes(*upload->file);
+  manifest.overlay_memory_bytes = {0};
+  SceneInfo& scene = manifest.scene;
+  const SceneStatistics measured = statistics(cloud);
+  scene.name = *called;
+  scene.created = options_.clock();
+  scene.format = format->name;
+  scene.sh_degree = cloud.sh_degree;
+  scene.low = measured.low, scene.high = measured.high;
+  scene.centre = measured.centre, scene.radius = measured.radius;
+  VersionInfo& uploaded_version = scene.versions.emplace_back();
+  uploaded_version.created = scene.created;
+  uploaded_version.gaussians = cloud.size();
+
+  const auto at = catalogue_.add(std::move(manifest), file, staging);
+  if (!at) return propagate(at);
+  const std::string& id = at->scene->id;
+  memory_.put(id + "/base", {upload->file, at->manifest->base_memory_bytes}, std::move(upload->room));
+  if (!catalogue_.has(*at)) memory_.forget(id + "/");
+  return at->manifest;
+}
+
+Result<ManifestPtr> Uploads::add(const fs::path& file, const std::string& filename, const std::string& name) {
+  const auto place = catalogue_.reserve();
+  if (!place) return propagate(place);
+  const auto staging = scratch_.make();
+  if (!staging) return propagate(staging);
+  // Under its user's name: that is what error addresses begin with.
+  const fs::path folder = staging->folder() / "upload", uploaded = folder / safe_file_name(filename);
+  if (auto made = make_folder(folder); !made) return told_(made, folder);
+  std::error_code error;
+  fs::rename(file, uploaded, error);
+  if (error) return told_(engine::file_error(error.value(), "take", uploaded), folder);
+  return add_staged(uploaded, staging->folder(), name);
+}
+
+Result<ManifestPtr> Uploads::add_path(const std::string& path, const std::string& name) {
+  const auto found = below_root(options_.scene_root, path);
+  if (!found) return propagate(found);
+  const auto staging = scratch_.make();
+  if (!staging) return propagate(staging);
+  const fs::path copy = staging->folder() / "copy";
+  if (auto copied = scenes::copy_file(*found, copy); !copied) {
+    if (copied.error().where == found->string()) copied.error().where = "path";
+    return told_(copied, staging->folder());
+  }
+  return add(copy, fs::path(path).filename().string(), name);
+}
+
+}  // namespace server::scenes

@@ -1,0 +1,77 @@
+#include "server/scenes/versions/version_files.h"
+
+#include <memory>
+#include <utility>
+
+#include "engine/io/scene_file.h"
+#include "server/scenes/disk/disk.h"
+
+namespace server::scenes {
+namespace {
+
+namespace fs = std::filesystem;
+namespace io = engine::io;
+using engine::propagate;
+
+constexpr std::uint64_t most_packed_bytes = 64;  ///< Per Gaussian, of a .splat or .spz file.
+
+/// A file in a scene's folder that goes when nobody holds it.
+struct HeldFile {
+  HeldFile(std::shared_ptr<Lease> in, const fs::path& path) : scene(std::move(in)), file(path) { file.end(); }
+  std::shared_ptr<Lease> scene;
+  Lease file;
+};
+
+const char* extension_of(FileFormat format) {
+  return format == FileFormat::ply ? "ply" : format == FileFormat::splat ? "splat" : "spz";
+}
+io::SceneFormat to_io(FileFormat format) {
+  return format == FileFormat::ply     ? io::SceneFormat::ply
+         : format == FileFormat::splat ? io::SceneFormat::splat
+                                       : io::SceneFormat::spz;
+}
+
+}  // namespace
+
+Result<VersionFile> VersionFiles::get(const Snapshot& at, const std::string& version, FileFormat format) {
+  const Manifest& manifest = *at.manifest;
+  const std::string extension = extension_of(format);
+  const std::string suffix = version == "0" ? "" : (is_preview(version) ? "-" : "-v") + version;
+  const std::string download_name = manifest.scene.name + suffix + "." + extension;
+  if (version == "0" && manifest.scene.format == extension)
+    return VersionFile{at.scene->folder->path() / manifest.base,
+                       at.scene->id + "-" + manifest.nonce + "-0-" + extension, download_name, at.scene->folder};
+  auto file = written(at, version, format);
+  if (file) file->download_name = download_name;
+  return file;
+}
+
+Result<VersionFile> VersionFiles::written(const Snapshot& at, const std::string& version, FileFormat format) {
+  const auto loaded = versions_.load(at, version);
+  if (!loaded) return propagate(loaded);
+  const auto base = versions_.base(at);  // in memory, since `loaded` holds its cloud
+  if (!base) return propagate(base);
+  const io::PlyLayout& layout = (*base)->layout;
+  const std::string extension = extension_of(format);
+  const auto write = [&]() -> Result<BoundedCache::Made> {
+    const fs::path folder = at.scene->folder->path() / "files";
+    if (auto made = make_folder(folder); !made) return told_(made);
+    // A name of its own: one of the same version that was dropped may be about to be removed.
+    const fs::path path = folder / (version + "-" + std::to_string(++last_) + "." + extension);
+    const std::uint64_t flat_bytes = engine::scene::memory_bytes(*loaded->cloud.base) +
+                                     (loaded->cloud.overlay ? engine::scene::memory_bytes(*loaded->cloud.overlay) : 0);
+    const auto room = memory_.room(flat_bytes);
+    if (!room) return propagate(room);
+    const io::SceneFile file{engine::scene::flatten(loaded->cloud), layout};
+    if (auto saved = io::write_scene(path, file, to_io(format)); !saved) return told_(saved);
+    return BoundedCache::Made{std::make_shared<const HeldFile>(at.scene->folder, path), bytes_below(path)};
+  };
+  const std::string name = at.scene->id + "/" + version + "." + extension;
+  const std::uint64_t row_bytes = format == FileFormat::ply ? layout.vertex().stride : most_packed_bytes;
+  const auto held = files_.get<HeldFile>(name, loaded->cloud.size() * row_bytes, write);
+  if (!catalogue_.has(at) || (is_preview(version) && !previews_.has(version))) files_.forget(name);
+  if (!held) return propagate(held);
+  return VersionFile{(*held)->file.path(), loaded->key + "-" + extension, {}, *held};
+}
+
+}  // namespace server::scenes

@@ -1,0 +1,181 @@
+#include "server/scenes/versions/versions.h"
+
+#include <cstdint>
+#include <optional>
+#include <utility>
+
+#include "engine/core/atomic_file.h"
+#include "engine/core/numbers.h"
+#include "engine/io/overlay_file.h"
+#include "server/scenes/catalogue/names.h"
+#include "server/scenes/disk/disk.h"
+#include "server/scenes/disk/scene_format.h"
+
+namespace server::scenes {
+namespace {
+
+namespace fs = std::filesystem;
+namespace io = engine::io;
+using engine::ErrorCode;
+using engine::fail;
+using engine::propagate;
+using engine::scene::GaussianCloud;
+using engine::scene::LayeredCloud;
+using engine::scene::Overlay;
+
+/// A poisoned version is never kept.
+Result<void> check_overlay(const Overlay& overlay, const GaussianCloud& base) {
+  if (overlay.rows.sh_degree != base.sh_degree || overlay.rows.extra_stride != base.extra_stride)
+    return fail(ErrorCode::internal, "the overlay was made for another scene", "rows");
+  if (const auto bad = engine::scene::first_not_finite(overlay.rows))
+    return fail(ErrorCode::internal, "the result holds NaN or infinity and is not kept", "rows" + *bad);
+  return {};
+}
+
+Result<int> known_version(const Snapshot& at, const std::string& version) {
+  const auto number = engine::number_in<std::uint64_t>(version);
+  const auto& versions = at.manifest->scene.versions;
+  if (number && *number < versions.size() && std::to_string(*number) == version) return int(*number);
+  return fail(ErrorCode::not_found,
+              "scene " + at.scene->id + " has no version " + safe_file_name(version) + "; there are 0 to " +
+                  std::to_string(versions.size() - 1),
+              "version");
+}
+
+/// The version that an edit has made.
+std::optional<int> made_by(const std::string& edit, const Manifest& manifest) {
+  for (const VersionInfo& version : manifest.scene.versions)
+    if (version.version > 0 && !edit.empty() && version.edit == edit) return version.version;
+  return std::nullopt;
+}
+
+std::shared_ptr<const GaussianCloud> cloud_of(const std::shared_ptr<const io::SceneFile>& file) {
+  return {file, &file->cloud};
+}
+
+}  // namespace
+
+void Versions::forget_if_removed(const Snapshot& at) {
+  if (!catalogue_.has(at)) memory_.forget(at.scene->id + "/");
+}
+
+Result<std::shared_ptr<const io::SceneFile>> Versions::base(const Snapshot& at) {
+  const Manifest& manifest = *at.manifest;
+  const auto read = [&]() -> Result<BoundedCache::Made> {
+    auto file = io::read_scene(at.scene->folder->path() / manifest.base, options_.read);
+    if (!file) return told_(file);
+    const std::uint64_t bytes = memory_bytes(*file);
+    if (file->cloud.size() != manifest.scene.versions[0].gaussians || bytes > manifest.base_memory_bytes)
+      return fail(ErrorCode::corrupt_data, "the scene's file is not the one that was uploaded", manifest.base);
+    return BoundedCache::Made{std::make_shared<const io::SceneFile>(std::move(*file)), bytes};
+  };
+  auto held = memory_.get<io::SceneFile>(at.scene->id + "/base", manifest.base_memory_bytes, read);
+  forget_if_removed(at);
+  return held;
+}
+
+Result<std::shared_ptr<const Overlay>> Versions::overlay(const Snapshot& at, int version, const GaussianCloud& base) {
+  if (version == 0) return std::shared_ptr<const Overlay>();
+  const std::uint64_t expected = at.manifest->overlay_memory_bytes[std::size_t(version)];
+  const auto read = [&]() -> Result<BoundedCache::Made> {
+    auto rows = io::read_overlay(at.scene->folder->path() / overlay_name(version), base);
+    if (!rows) return told_(rows);
+    const std::uint64_t bytes = engine::scene::memory_bytes(*rows);
+    return BoundedCache::Made{std::make_shared<const Overlay>(std::move(*rows)), bytes};
+  };
+  auto held = memory_.get<Overlay>(at.scene->id + "/" + std::to_string(version), expected, read);
+  forget_if_removed(at);
+  return held;
+}
+
+Result<LoadedVersion> Versions::load(const Snapshot& at, const std::string& version) {
+  if (is_preview(version)) return load_preview(at, version);
+  const auto number = known_version(at, version);
+  if (!number) return propagate(number);
+  const auto file = base(at);
+  if (!file) return propagate(file);
+  auto rows = overlay(at, *number, (*file)->cloud);
+  if (!rows) return propagate(rows);
+  const std::string& program = options_.program_version;
+  return LoadedVersion{
+      {cloud_of(*file), std::move(*rows)},
+      at.scene->id + "-" + at.manifest->nonce + "-" + version + (program.empty() ? "" : "-") + program};
+}
+
+Result<LoadedVersion> Versions::load_preview(const Snapshot& at, const std::string& preview) {
+  auto held = previews_.find(at.scene->id, preview);
+  if (!held)
+    return fail(
+        ErrorCode::not_found,
+        "scene " + at.scene->id + " has no preview " + safe_file_name(preview) + ": it has expired, ask for a new one",
+        "version");
+  const auto file = base(at);
+  if (!file) return propagate(file);
+  return LoadedVersion{{cloud_of(*file), std::move(held->overlay)}, std::move(held->key)};
+}
+
+/// An overlay over a version as one over version 0.
+Result<Versions::OverBase> Versions::over_base(const Snapshot& at, int parent, const Overlay& overlay) {
+  const auto lower = load(at, std::to_string(parent));
+  if (!lower) return propagate(lower);
+  const LayeredCloud& below = lower->cloud;
+  if (auto sound = check_overlay(overlay, *below.base); !sound) return propagate(sound);
+  // The rows of both at most, and as many lists of rows.
+  auto room = memory_.room(engine::scene::memory_bytes(overlay) +
+                           (below.overlay ? engine::scene::memory_bytes(*below.overlay) : 0));
+  if (!room) return propagate(room);
+  auto composed = below.overlay ? engine::scene::compose(below.base->size(), *below.overlay, overlay) : overlay;
+  const std::uint64_t bytes = engine::scene::memory_bytes(composed);
+  return OverBase{std::make_shared<const Overlay>(std::move(composed)), bytes, below.base, std::move(*room)};
+}
+
+Result<int> Versions::add(const Snapshot& at, int parent, const std::string& edit, const Overlay& overlay) {
+  if (const auto before = made_by(edit, *at.manifest)) return *before;
+  auto composed = over_base(at, parent, overlay);
+  if (!composed) return propagate(composed);
+  const Overlay& rows = *composed->overlay;
+  const auto staging = scratch_.make();
+  if (!staging) return propagate(staging);
+  const fs::path staged = staging->folder() / "overlay", folder = at.scene->folder->path();
+  if (auto written = io::write_overlay(staged, rows, *composed->base); !written)
+    return told_(written, staging->folder());
+  int number = 0;
+  const auto changed = catalogue_.change(at, [&](Manifest& manifest) -> Result<void> {
+    if (const auto before = made_by(edit, manifest)) {  // by another thread meanwhile
+      number = *before;
+      return {};
+    }
+    number = int(manifest.scene.versions.size());
+    const fs::path file = folder / overlay_name(number);
+    if (auto ready = make_folder(file.parent_path()); !ready) return told_(ready);
+    if (auto moved = move_durably(staged, file); !moved) return told_(moved, staging->folder());
+    if (auto synced = engine::sync_folder(folder); !synced) return told_(synced);
+    manifest.scene.versions.push_back({.version = number,
+                                       .parent = parent,
+                                       .edit = edit,
+                                       .created = options_.clock(),
+                                       .gaussians = composed->base->size() - rows.removed.size() + rows.added(),
+                                       .disk_bytes = bytes_below(file)});
+    manifest.overlay_memory_bytes.push_back(composed->bytes);
+    return {};
+  });
+  if (!changed) return propagate(changed);
+  memory_.put(at.scene->id + "/" + std::to_string(number), {composed->overlay, composed->bytes},
+              std::move(composed->room));
+  forget_if_removed(at);
+  return number;
+}
+
+Result<Preview> Versions::add_preview(const Snapshot& at, int parent, const Overlay& overlay) {
+  previews_.expire();
+  auto composed = over_base(at, parent, overlay);
+  if (!composed) return propagate(composed);
+  auto preview = previews_.add(at, {composed->overlay, composed->bytes}, std::move(composed->room));
+  if (const auto still = catalogue_.snapshot(at.scene->id); !still) {  // removed meanwhile
+    previews_.forget(at.scene->id, preview.version);
+    return propagate(still);
+  }
+  return preview;
+}
+
+}  // namespace server::scenes

@@ -1,0 +1,69 @@
+// Versions in memory: read from disk when somebody asks for one, and new ones made.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "engine/io/scene_file.h"
+#include "engine/scene/overlay.h"
+#include "server/scenes/catalogue/catalogue.h"
+#include "server/scenes/catalogue/store_options.h"
+#include "server/scenes/disk/bounded_cache.h"
+#include "server/scenes/disk/scratch.h"
+#include "server/scenes/versions/previews.h"
+
+namespace server::scenes {
+
+/// Keeps clouds and overlays in `memory`. Safe to call from any thread.
+class Versions {
+ public:
+  /// All outlive this.
+  Versions(const StoreOptions& options, BoundedCache& memory, Catalogue& catalogue, Previews& previews,
+           ScratchFolders& scratch, const PlainErrors& told)
+      : options_(options),
+        memory_(memory),
+        catalogue_(catalogue),
+        previews_(previews),
+        scratch_(scratch),
+        told_(told) {}
+
+  /// Version 0 with its file's layout. Errors as load().
+  [[nodiscard]] Result<std::shared_ptr<const engine::io::SceneFile>> base(const Snapshot& at);
+  /// A version ("0", "1", ...) or a preview ("p000001"), read from disk if need be.
+  ///   errors  not_found; busy: it does not fit the memory beside what is in use; too_large: it alone does not; those
+  ///           of io
+  [[nodiscard]] Result<LoadedVersion> load(const Snapshot& at, const std::string& version);
+
+  /// A new version, durable when this returns: its number. Called again for the same edit, it gives back the one made
+  /// before.
+  ///   overlay  over the parent
+  ///   errors   those of load() and write_manifest()
+  [[nodiscard]] Result<int> add(const Snapshot& at, int parent, const std::string& edit,
+                                const engine::scene::Overlay& overlay);
+  /// A version that lives in memory only, for a while. Errors as load().
+  [[nodiscard]] Result<Preview> add_preview(const Snapshot& at, int parent, const engine::scene::Overlay& overlay);
+
+ private:
+  /// An overlay over version 0, and the room it takes until the cache takes that over.
+  struct OverBase {
+    std::shared_ptr<const engine::scene::Overlay> overlay;
+    std::uint64_t bytes = 0;
+    std::shared_ptr<const engine::scene::GaussianCloud> base;
+    BoundedCache::Room room;
+  };
+
+  [[nodiscard]] Result<std::shared_ptr<const engine::scene::Overlay>> overlay(const Snapshot& at, int version,
+                                                                              const engine::scene::GaussianCloud& base);
+  [[nodiscard]] Result<LoadedVersion> load_preview(const Snapshot& at, const std::string& preview);
+  [[nodiscard]] Result<OverBase> over_base(const Snapshot& at, int parent, const engine::scene::Overlay& overlay);
+  void forget_if_removed(const Snapshot& at);
+
+  const StoreOptions& options_;
+  BoundedCache& memory_;
+  Catalogue& catalogue_;
+  Previews& previews_;
+  ScratchFolders& scratch_;
+  const PlainErrors& told_;
+};
+
+}  // namespace server::scenes

@@ -1,0 +1,156 @@
+#include "server/service/render_service.h"
+
+#include <algorithm>
+#include <chrono>
+#include <new>
+#include <sstream>
+
+#include "server/http/negotiation.h"
+
+namespace server::service {
+namespace {
+
+namespace io = engine::io;
+namespace render = engine::render;
+using engine::ErrorCode;
+using engine::fail;
+using engine::propagate;
+using engine::scene::Camera;
+using Clock = std::chrono::steady_clock;
+
+/// Larger pictures give their memory back: a canvas keeps what its largest picture needed.
+constexpr std::int64_t max_kept_pixels = std::int64_t{1} << 22;
+
+double milliseconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+}
+
+/// 1 for each row that the version changed or added against version 0: all that lie on top.
+std::vector<float> weights_of_changes(const render::Layers& layers) {
+  std::vector<float> weights(layers.size(), 0.0f);
+  std::fill(weights.begin() + std::ptrdiff_t(layers.base->size()), weights.end(), 1.0f);
+  return weights;
+}
+
+}  // namespace
+
+RenderService::RenderService(const RenderServiceOptions& options)
+    : options_(options),
+      arena_(options.threads, engine::Priority::high),
+      gate_(arena_.threads(), options.max_waiting) {}
+
+std::string RenderService::etag(const scenes::LoadedVersion& version, const PictureOrder& order) const {
+  const Camera& camera = order.camera;
+  std::ostringstream text;
+  text << std::hexfloat << version.key << ' ' << options_.program << ' ' << render::simd_target() << ' '
+       << int(order.shown) << ' ' << int(order.format) << ' ' << order.sh_degree << ' ' << order.quality << ' '
+       << camera.width << ' ' << camera.height;
+  for (const double value : {camera.fx, camera.fy, camera.cx, camera.cy}) text << ' ' << value;
+  for (int i = 0; i < 3; ++i) {
+    text << ' ' << camera.translation[i] << ' ' << order.background[i];
+    for (int j = 0; j < 3; ++j) text << ' ' << camera.rotation[i][j];
+  }
+  return http::etag_of(text.str());
+}
+
+Result<void> RenderService::check(const Camera& camera) const {
+  if (auto valid = engine::scene::validate(camera); !valid) return valid;
+  if (camera.width <= options_.max_side && camera.height <= options_.max_side) return {};
+  return fail(ErrorCode::too_large,
+              "the picture would have " + std::to_string(camera.width) + "x" + std::to_string(camera.height) +
+                  " pixels; the service's option --max-render-side allows " + std::to_string(options_.max_side) +
+                  " a side: ask for a smaller one with max_side",
+              "max_side");
+}
+
+Result<void> RenderService::run(const std::function<void()>& work) {
+  const auto place = gate_.enter();
+  if (!place) return propagate(place);
+  try {
+    arena_.run(work);
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::too_large, "this does not fit into the memory of the machine: ask for a smaller picture");
+  }
+  return {};
+}
+
+Result<void> RenderService::on_canvas(const Camera& camera, const std::function<void(Canvas&)>& work) {
+  if (auto sound = check(camera); !sound) return sound;
+  const auto place = gate_.enter();
+  if (!place) return propagate(place);
+  std::unique_ptr<Canvas> canvas;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!canvases_.empty()) {
+      canvas = std::move(canvases_.back());
+      canvases_.pop_back();
+    }
+  }
+  try {
+    if (!canvas) canvas = std::make_unique<Canvas>();
+    work(*canvas);
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::too_large, "the picture does not fit into the memory of the machine: ask for a smaller one");
+  }
+  if (std::int64_t{camera.width} * camera.height > max_kept_pixels) return {};
+  const std::lock_guard lock(mutex_);
+  canvases_.push_back(std::move(canvas));
+  return {};
+}
+
+Result<Picture> RenderService::render(const scenes::LoadedVersion& version, const PictureOrder& order) {
+  render::ForwardOptions forward;
+  forward.background = order.background;
+  forward.max_sh_degree = order.sh_degree;
+  forward.color = pictures::needs_color(order.shown);
+  forward.depth = pictures::needs_depth(order.shown, order.format);
+  Picture picture;
+  Result<std::vector<std::byte>> encoded;
+  auto done = on_canvas(order.camera, [&](Canvas& canvas) {
+    const auto begin = Clock::now();
+    arena_.run([&] {
+      const render::DrawnVersion drawn(version.cloud);
+      const render::Layers layers = drawn.layers();
+      const auto weights = order.shown == Shown::mask ? weights_of_changes(layers) : std::vector<float>();
+      render::forward(layers, order.camera, forward, weights, canvas.workspace, canvas.rendering);
+    });
+    picture.render_ms = milliseconds_since(begin);
+    // Still at this place, since it takes a core as rendering does, but not in the arena: one thread does it.
+    const auto rendered = Clock::now();
+    encoded = pictures::encode_shown(canvas.rendering, order.shown, order.format,
+                                     {.jpeg_quality = order.quality, .png_bits = 8});
+    picture.encode_ms = milliseconds_since(rendered);
+  });
+  if (!done) return propagate(done);
+  if (!encoded) return propagate(encoded);
+  picture.bytes.assign(reinterpret_cast<const char*>(encoded->data()), encoded->size());
+  return picture;
+}
+
+Result<engine::scene::Image> RenderService::colors(const scenes::LoadedVersion& version, const Camera& camera) {
+  engine::scene::Image colors;
+  auto done = on_canvas(camera, [&](Canvas& canvas) {
+    arena_.run([&] {
+      const render::DrawnVersion drawn(version.cloud);
+      render::forward(drawn.layers(), camera, {}, {}, canvas.workspace, canvas.rendering);
+    });
+    colors = canvas.rendering.color;
+  });
+  if (!done) return propagate(done);
+  return colors;
+}
+
+Result<std::optional<render::PixelHit>> RenderService::pick(const scenes::LoadedVersion& version, const Camera& camera,
+                                                            engine::DVec2 pixel) {
+  std::optional<render::PixelHit> hit;
+  auto done = on_canvas(camera, [&](Canvas& canvas) {
+    arena_.run([&] {
+      const render::DrawnVersion drawn(version.cloud);
+      hit = render::pick(drawn.layers(), camera, pixel, canvas.workspace);
+    });
+  });
+  if (!done) return propagate(done);
+  return hit;
+}
+
+}  // namespace server::service

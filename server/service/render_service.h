@@ -1,0 +1,100 @@
+// Pictures for people who wait for them: fair, bounded, and ahead of edits that run for minutes.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/core/parallel.h"
+#include "engine/core/result.h"
+#include "engine/core/vec.h"
+#include "engine/io/image_file.h"
+#include "engine/render/forward.h"
+#include "engine/render/pick.h"
+#include "engine/scene/camera.h"
+#include "server/pictures/shown_picture.h"
+#include "server/scenes/scene_store.h"
+#include "server/service/fair_gate.h"
+
+namespace server::service {
+
+using engine::Result;
+using pictures::Shown;
+
+struct RenderServiceOptions {
+  int threads = 0;               ///< 0: as many as the machine has cores. So many pictures are made at once.
+  std::size_t max_waiting = 64;  ///< Requests; more are busy.
+  int max_side = 4096;           ///< Pixels of a picture.
+  std::string program = {};      ///< Which makes the pictures: another one may make other bytes.
+};
+
+/// A picture that somebody wants.
+struct PictureOrder {
+  engine::scene::Camera camera;
+  Shown shown = Shown::color;
+  engine::io::ImageFormat format = engine::io::ImageFormat::jpeg;
+  engine::Vec3 background{0.0f};  ///< Display-referred.
+  int sh_degree = engine::scene::max_sh_degree;
+  int quality = 90;  ///< Of a JPEG, 1 to 100.
+};
+
+/// A picture as a file.
+struct Picture {
+  std::string bytes;                    ///< In the format that was ordered.
+  double render_ms = 0, encode_ms = 0;  ///< Wall time, milliseconds.
+};
+
+/// Safe to call from any thread.
+class RenderService {
+ public:
+  explicit RenderService(const RenderServiceOptions& options);
+
+  /// Names the bytes of a picture before it is made: the same order of the same version has the same bytes by this
+  /// program on this instruction set, for ever.
+  [[nodiscard]] std::string etag(const scenes::LoadedVersion& version, const PictureOrder& order) const;
+
+  /// Makes the picture.
+  ///   errors  invalid_argument: a camera that is none; too_large: names the limit; busy
+  [[nodiscard]] Result<Picture> render(const scenes::LoadedVersion& version, const PictureOrder& order);
+
+  /// Linear floats of the version's colours. Errors as render().
+  [[nodiscard]] Result<engine::scene::Image> colors(const scenes::LoadedVersion& version,
+                                                    const engine::scene::Camera& camera);
+
+  /// As engine::render::pick(). Errors as render().
+  [[nodiscard]] Result<std::optional<engine::render::PixelHit>> pick(const scenes::LoadedVersion& version,
+                                                                     const engine::scene::Camera& camera,
+                                                                     engine::DVec2 pixel);
+
+  /// Other work that somebody waits for, in its turn and on the same threads.
+  ///   errors  busy; too_large: it does not fit into memory
+  [[nodiscard]] Result<void> run(const std::function<void()>& work);
+
+  /// How many wait for their turn.
+  [[nodiscard]] std::size_t waiting() const { return gate_.waiting(); }
+  [[nodiscard]] const RenderServiceOptions& options() const { return options_; }
+
+ private:
+  /// What a picture is made in.
+  struct Canvas {
+    engine::render::Workspace workspace;
+    engine::render::Rendering rendering;
+  };
+
+  Result<void> check(const engine::scene::Camera& camera) const;
+  /// Calls `work` with a canvas that nobody else uses.
+  Result<void> on_canvas(const engine::scene::Camera& camera, const std::function<void(Canvas&)>& work);
+
+  const RenderServiceOptions options_;
+  engine::WorkArena arena_;
+  FairGate gate_;
+  std::mutex mutex_;  ///< Guards canvases_.
+  /// Not one per thread: while a thread waits within a rendering, oneTBB may have it begin another one.
+  std::vector<std::unique_ptr<Canvas>> canvases_;
+};
+
+}  // namespace server::service

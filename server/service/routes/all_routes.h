@@ -1,0 +1,31 @@
+// All routes of the service: what proto/openapi.yaml describes.
+#pragma once
+
+#include "proto/service_info.h"
+#include "server/edits/edit_service.h"
+#include "server/http/gate.h"
+#include "server/http/metrics.h"
+#include "server/http/router.h"
+#include "server/scenes/scene_store.h"
+#include "server/service/render_service.h"
+#include "server/service/routes/edit_routes.h"
+#include "server/service/scene_views.h"
+
+namespace server::service::routes {
+
+/// What the routes are made over. All of it outlives the router.
+struct ServiceParts {
+  scenes::SceneStore& scenes;
+  edits::EditService& edits;
+  EditLimits edit_limits;
+  RenderService& renders;
+  SceneViews& views;
+  http::Gate& gate;
+  http::Metrics& metrics;
+  proto::ServiceInfo info;
+};
+
+/// A router with every path of the contract, and the files of the page.
+[[nodiscard]] http::Router all_routes(const ServiceParts& parts);
+
+}  // namespace server::service::routes

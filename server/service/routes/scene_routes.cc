@@ -1,0 +1,265 @@
+#include "server/service/routes/scene_routes.h"
+
+#include <array>
+#include <optional>
+#include <utility>
+
+#include "proto/scene.h"
+#include "proto/time_text.h"
+#include "server/edits/points.h"
+#include "server/pictures/photo_comparison.h"
+
+namespace server::service::routes {
+namespace {
+
+using edits::to_point;
+using edits::to_vec;
+using engine::ErrorCode;
+using engine::fail;
+using engine::propagate;
+using engine::Result;
+using http::Call;
+using http::Reply;
+using scenes::FileFormat;
+using scenes::SceneInfo;
+using scenes::SceneStore;
+
+constexpr const char* upload_name = "upload";  // of a file that its client does not name
+
+proto::SceneVersion to_proto(const scenes::VersionInfo& version) {
+  return {version.version,   version.parent,    version.edit, proto::rfc3339(version.created),
+          version.gaussians, version.disk_bytes};
+}
+
+proto::SceneDataset to_proto(const scenes::DatasetInfo& dataset) {
+  return {dataset.kind,          dataset.views,           dataset.photos,  dataset.psnr_mean_db,
+          dataset.psnr_worst_db, dataset.psnr_worst_view, dataset.warnings};
+}
+
+proto::Scene to_proto(const SceneInfo& scene) {
+  proto::Scene out;
+  out.id = scene.id, out.name = scene.name;
+  out.created = proto::rfc3339(scene.created);
+  out.format = scene.format;
+  out.gaussians = scene.versions[0].gaussians;
+  out.sh_degree = scene.sh_degree;
+  out.low = to_point(scene.low), out.high = to_point(scene.high), out.centre = to_point(scene.centre);
+  out.radius = scene.radius;
+  if (scene.up) out.up = to_point(*scene.up);
+  out.disk_bytes = scene.disk_bytes, out.memory_bytes = scene.memory_bytes;
+  out.views = scene.dataset ? scene.dataset->views : virtual_view_count;
+  if (scene.dataset) out.dataset = to_proto(*scene.dataset);
+  for (const auto& version : scene.versions) out.versions.push_back(to_proto(version));
+  return out;
+}
+
+Result<Reply> shown(const Result<SceneInfo>& scene) {
+  if (!scene) return propagate(scene);
+  return Reply::json(proto::to_json(to_proto(*scene)));
+}
+
+/// Hands an uploaded file, and its name, to `take`.
+template <class Take>
+Result<SceneInfo> with_upload(const Call& call, SceneStore& store, Take take) {
+  const auto scratch = store.scratch();
+  if (!scratch) return propagate(scratch);
+  const auto file = scratch->folder() / upload_name;
+  const auto received = call.receive(file);
+  if (!received) return propagate(received);
+  return take(file, received->filename.empty() ? std::string(upload_name) : received->filename);
+}
+
+Result<SceneInfo> add_scene(const Call& call, SceneStore& store) {
+  const auto name = call.query("name");
+  if (name && name->empty()) return fail(ErrorCode::invalid_argument, "expected a name, or none at all", "name");
+  if (!call.is_json())
+    return with_upload(call, store, [&](const std::filesystem::path& file, const std::string& filename) {
+      return store.add_upload(file, filename, name.value_or(""));
+    });
+  const auto source = proto::parse_scene_source(call.body());
+  if (!source) return propagate(source);
+  if (name && !source->name.empty())
+    return fail(ErrorCode::invalid_argument, "the name is given twice: in the query and in the body", "name");
+  return store.add_path(source->path, name.value_or(source->name));
+}
+
+Result<Reply> post_scene(const Call& call, SceneStore& store) {
+  const auto added = add_scene(call, store);
+  if (!added) return propagate(added);
+  Reply reply = Reply::json(proto::to_json(to_proto(*added)), 201);
+  reply.headers.emplace_back("Location", "/v1/scenes/" + added->id);
+  return reply;
+}
+
+Result<Reply> list_scenes(SceneStore& store) {
+  std::vector<proto::Scene> all;
+  for (const SceneInfo& scene : store.list()) all.push_back(to_proto(scene));
+  return Reply::json(proto::to_json(all));
+}
+
+Result<Reply> patch_scene(const Call& call, const SceneRouteParts& parts) {
+  const auto wanted = proto::parse_scene_patch(call.body());
+  if (!wanted) return propagate(wanted);
+  SceneStore::Patch patch;
+  patch.name = wanted->name;
+  if (wanted->up) patch.up = *wanted->up ? std::optional(to_vec(**wanted->up)) : std::nullopt;
+  const std::string& id = call.path("id");
+  if (!patch.up) return shown(parts.store.patch(id, patch));
+  // Which views an edit chooses depends on what is up: it must not change while one waits or is carried out.
+  std::optional<Result<SceneInfo>> patched;
+  const auto done = parts.while_idle(id, [&]() -> Result<void> {
+    patched = parts.store.patch(id, patch);
+    return {};
+  });
+  return done ? shown(*patched) : propagate(done);
+}
+
+Result<pictures::PhotoComparison> compare_photos(const SceneInfo& scene, const SceneRouteParts& parts) {
+  const auto dataset = parts.store.dataset(scene.id);
+  if (!dataset) return propagate(dataset);
+  if (!*dataset) return pictures::PhotoComparison{};
+  const auto version = parts.store.load(scene.id, "0");
+  if (!version) return propagate(version);
+  return pictures::compare_with_photos(
+      **dataset, [&](const engine::scene::Camera& camera) { return parts.renders.colors(*version, camera); });
+}
+
+/// Notes how well renders of version 0 agree with the photos of a dataset that has just been put. Put it is, whatever
+/// becomes of this: a failure is a warning.
+SceneInfo with_quality(SceneInfo scene, const SceneRouteParts& parts) {
+  if (scene.dataset->photos == 0) return scene;
+  auto found = compare_photos(scene, parts);
+  if (!found) {
+    const std::string why = found.error().message;
+    found.emplace();
+    found->warnings.push_back("the photos could not be compared with renders of the scene: " + why);
+  }
+  const auto noted = parts.store.set_dataset_quality(scene.id, scene.dataset->number, found->mean_db, found->worst_db,
+                                                     found->worst_view, found->warnings);
+  if (noted) return *noted;
+  scene.dataset->warnings = found->warnings;
+  scene.dataset->warnings.push_back("what the comparison with its photos found could not be kept: " +
+                                    noted.error().message);
+  return scene;
+}
+
+Result<Reply> put_dataset(const Call& call, const SceneRouteParts& parts) {
+  const std::string& id = call.path("id");
+  if (const auto known = parts.store.find(id); !known) return propagate(known);  // before gigabytes are received
+  // An edit that is interrupted goes on with the cameras it began with.
+  const auto change = [&](const std::function<Result<SceneInfo>()>& replace) {
+    Result<SceneInfo> scene;
+    const auto done = parts.while_idle(id, [&]() -> Result<void> {
+      scene = replace();
+      if (!scene) return propagate(scene);
+      return {};
+    });
+    return done ? scene : propagate(done);
+  };
+  const auto put = [&]() -> Result<SceneInfo> {
+    if (!call.is_json())
+      return with_upload(call, parts.store, [&](const std::filesystem::path& file, const std::string& filename) {
+        return change([&] { return parts.store.put_dataset_zip(id, file, filename); });
+      });
+    const auto source = proto::parse_dataset_source(call.body());
+    if (!source) return propagate(source);
+    return change([&] { return parts.store.put_dataset_path(id, source->path); });
+  }();
+  if (!put) return propagate(put);
+  return shown(with_quality(*put, parts));
+}
+
+Result<Reply> get_views(const Call& call, SceneViews& views) {
+  const auto set = views.of(call.path("id"));
+  if (!set) return propagate(set);
+  std::vector<proto::View> out;
+  for (const SceneView& view : (*set)->views)
+    out.push_back({view.camera.name, service::to_proto(view.camera), view.photo});
+  return Reply::json(proto::to_json(out, (*set)->is_virtual ? "virtual" : "dataset"));
+}
+
+Result<FileFormat> file_format(const Call& call) {
+  const std::string format = call.query("format").value_or("ply");
+  constexpr std::array<std::pair<const char*, FileFormat>, 3> formats{
+      std::pair{"ply", FileFormat::ply}, {"splat", FileFormat::splat}, {"spz", FileFormat::spz}};
+  for (const auto& [name, value] : formats)
+    if (format == name) return value;
+  return fail(ErrorCode::invalid_argument, "expected one of ply, splat, spz", "format");
+}
+
+/// As RFC 6266 wants it: a name in ASCII for all, and the true one for those who understand it.
+std::string attachment(const std::string& name) {
+  std::string plain, encoded;
+  for (const char c : name) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool harmless =
+        (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || c == '.' || c == '-' || c == '_';
+    constexpr const char* digits = "0123456789ABCDEF";
+    plain += harmless || c == ' ' ? c : '_';
+    encoded += harmless ? std::string(1, c) : std::string{'%', digits[byte >> 4], digits[byte & 15]};
+  }
+  return "attachment; filename=\"" + plain + "\"; filename*=UTF-8''" + encoded;
+}
+
+Result<Reply> get_file(const Call& call, SceneStore& store) {
+  const auto format = file_format(call);
+  if (!format) return propagate(format);
+  auto file = store.file(call.path("id"), call.path("v"), *format);
+  if (!file) return propagate(file);
+  Reply reply;
+  reply.media_type = "application/octet-stream";
+  reply.etag = std::move(file->etag);
+  reply.headers.emplace_back("Content-Disposition", attachment(file->download_name));
+  reply.file = std::move(file->path);
+  reply.hold = std::move(file->hold);
+  return reply;
+}
+
+}  // namespace
+
+void add_scene_routes(http::Router& router, const SceneRouteParts& parts) {
+  SceneStore& store = parts.store;
+  SceneViews& views = parts.views;
+  router.add({.method = "GET",
+              .path = "/v1/scenes",
+              .handler = [&store](const Call&) { return list_scenes(store); },
+              .queries = {}});
+  router.add({.method = "POST",
+              .path = "/v1/scenes",
+              .handler = [&store](const Call& call) { return post_scene(call, store); },
+              .body = http::Body::upload,
+              .queries = {"name"}});
+  router.add({.method = "GET",
+              .path = "/v1/scenes/{id}",
+              .handler = [&store](const Call& call) { return shown(store.find(call.path("id"))); },
+              .queries = {}});
+  router.add({.method = "PATCH",
+              .path = "/v1/scenes/{id}",
+              .handler = [parts](const Call& call) { return patch_scene(call, parts); },
+              .body = http::Body::json,
+              .queries = {}});
+  router.add({.method = "DELETE",
+              .path = "/v1/scenes/{id}",
+              .handler = [parts](const Call& call) -> Result<Reply> {
+                const std::string& id = call.path("id");
+                const auto removed = parts.while_idle(id, [&] { return parts.store.remove(id); });
+                if (!removed) return propagate(removed);
+                return Reply::no_content();
+              },
+              .queries = {}});
+  router.add({.method = "PUT",
+              .path = "/v1/scenes/{id}/dataset",
+              .handler = [parts](const Call& call) { return put_dataset(call, parts); },
+              .body = http::Body::upload,
+              .queries = {}});
+  router.add({.method = "GET",
+              .path = "/v1/scenes/{id}/views",
+              .handler = [&views](const Call& call) { return get_views(call, views); },
+              .queries = {}});
+  router.add({.method = "GET",
+              .path = "/v1/scenes/{id}/versions/{v}/file",
+              .handler = [&store](const Call& call) { return get_file(call, store); },
+              .queries = {"format"}});
+}
+
+}  // namespace server::service::routes

@@ -1,0 +1,108 @@
+#include "server/service/routes/system_routes.h"
+
+#include <memory>
+#include <string>
+
+#include "server/http/negotiation.h"
+
+namespace server::service::routes {
+namespace {
+
+using engine::Result;
+using http::Access;
+using http::Body;
+using http::Call;
+using http::Reply;
+
+/// The page runs its own scripts and nothing else; pictures may also come from memory (a render as a blob).
+constexpr const char* page_policy =
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
+    "font-src 'self'; worker-src 'self'; manifest-src 'self'; form-action 'none'; base-uri 'none'; "
+    "frame-ancestors 'none'";
+
+void get(http::Router& router, const std::string& path, http::Handler handler, Access access) {
+  router.add({"GET", path, std::move(handler), Body::none, {}, access});
+}
+
+Reply file_reply(const std::string& name, std::string_view bytes, const std::string& etag) {
+  Reply reply;
+  reply.media_type = http::media_type_of_file(name);
+  reply.etag = etag;
+  reply.body = bytes;
+  return reply;
+}
+
+void add_page(http::Router& router, const std::vector<EmbeddedFile>& page) {
+  for (const EmbeddedFile& file : page) {
+    const auto handler = [name = std::string(file.name), bytes = file.bytes,
+                          etag = http::etag_of(file.bytes)](const Call&) -> Result<Reply> {
+      Reply reply = file_reply(name, bytes, etag);
+      reply.headers = {{"Content-Security-Policy", page_policy},
+                       {"Referrer-Policy", "no-referrer"},
+                       {"X-Frame-Options", "DENY"},
+                       {"Cross-Origin-Opener-Policy", "same-origin"}};
+      return reply;
+    };
+    get(router, "/" + std::string(file.name), handler, Access::open);
+    if (file.name == "index.html") get(router, "/", handler, Access::open);
+  }
+}
+
+/// A cookie that scripts cannot read and that no other site's request carries.
+std::string cookie(const std::string& value, const std::string& more) {
+  return std::string(http::Gate::cookie_name) + "=" + value + "; HttpOnly; SameSite=Strict; Path=/" + more;
+}
+
+void add_session(http::Router& router, http::Gate& gate) {
+  const auto open = [&gate](const Call& call) -> Result<Reply> {
+    Reply reply = Reply::no_content();
+    if (!gate.needs_token()) return reply;
+    if (!gate.is_token(call.header("authorization")))
+      return Reply::refusal(
+          {401, "unauthorized", "that is not this service's token (\"Authorization: Bearer ...\")", ""},
+          call.request_id());
+    reply.headers.emplace_back("Set-Cookie", cookie(gate.open_session(), ""));
+    return reply;
+  };
+  const auto close = [&gate](const Call& call) -> Result<Reply> {
+    gate.close_session(call.header("cookie"));
+    Reply reply = Reply::no_content();
+    reply.headers.emplace_back("Set-Cookie", cookie("", "; Max-Age=0"));
+    return reply;
+  };
+  router.add({"POST", "/v1/session", open, Body::none, {}, Access::open});
+  router.add({"DELETE", "/v1/session", close, Body::none, {}, Access::open});
+}
+
+}  // namespace
+
+void add_system_routes(http::Router& router, const SystemParts& parts) {
+  get(
+      router, "/healthz", [](const Call&) -> Result<Reply> { return Reply::json(R"({"status":"ok"})"); }, Access::open);
+  const auto ready = [trouble = parts.trouble](const Call&) -> Result<Reply> {
+    if (const auto error = trouble())
+      return engine::fail(engine::ErrorCode::unavailable, "the service cannot work: " + error->message, error->where);
+    return Reply::json(R"({"ready":true})");
+  };
+  get(router, "/readyz", ready, Access::open);
+  const auto metrics = [&metrics = parts.metrics](const Call&) -> Result<Reply> {
+    Reply reply;
+    reply.media_type = http::Metrics::media_type;
+    reply.body = metrics.text();
+    return reply;
+  };
+  get(router, "/metrics", metrics, Access::protected_);
+  const auto contract = [bytes = parts.contract, etag = http::etag_of(parts.contract)](const Call&) -> Result<Reply> {
+    return file_reply("openapi.yaml", bytes, etag);
+  };
+  get(router, "/openapi.yaml", contract, Access::protected_);
+  // Who gets as far as the handler is authorised.
+  const auto info = [text = proto::to_json(parts.info, true)](const Call&) -> Result<Reply> {
+    return Reply::json(text);
+  };
+  get(router, "/v1/info", info, Access::protected_);
+  add_session(router, parts.gate);
+  add_page(router, parts.page);
+}
+
+}  // namespace server::service::routes

@@ -1,0 +1,151 @@
+#include "server/service/serve.h"
+
+#include <unistd.h>
+
+#include <chrono>
+#include <fstream>
+#include <map>
+#include <utility>
+
+#include "engine/render/forward.h"
+#include "proto/edit_request.h"
+#include "server/http/log.h"
+#include "server/http/metrics.h"
+#include "server/service/scene_views.h"
+#include "server/service/token.h"
+
+namespace server::service {
+
+using engine::ErrorCode;
+using engine::propagate;
+using engine::Result;
+
+namespace {
+
+proto::ServiceInfo service_info(const ServeOptions& options) {
+  proto::ServiceInfo info;
+  info.version = SPLATDRAG_VERSION;
+  info.simd = options.simd;
+  info.simd_available = engine::render::simd_targets();
+  info.threads = options.threads_here;
+  info.correctors = {
+      {"none", true, ""}, {"scene", true, ""}, {"sd", false, "this version cannot load a diffusion model yet"}};
+  info.perceptual = {{"msssim", true, ""}, {"lpips", false, "this version has no network to compare pictures with"}};
+  info.read_formats = {"ply", "compressed_ply", "splat", "spz"};
+  info.write_formats = {"ply", "splat", "spz"};
+  info.picture_formats = {"png", "jpeg", "exr"};
+  for (const auto preset :
+       {proto::Preset::preview, proto::Preset::draft, proto::Preset::standard, proto::Preset::paper})
+    info.presets.emplace_back(proto::name_of(preset));
+  info.limits = {.upload_bytes = options.http.dispatcher.max_upload_bytes,
+                 .json_bytes = options.http.dispatcher.max_json_bytes,
+                 .gaussians = options.scenes.read.max_gaussians,
+                 .handles = options.edit_limits.handles,
+                 .views = std::uint64_t(options.edit_limits.views),
+                 .render_side = std::uint64_t(options.renders.max_side),
+                 .image_side = std::uint64_t(options.edit_limits.image_side),
+                 .queued_edits = options.edits.max_queued,
+                 .scene_memory_bytes = options.scenes.memory_bytes,
+                 .streams = options.http.dispatcher.max_streams,
+                 .scenes = options.scenes.max_scenes,
+                 .dataset_bytes = options.scenes.max_dataset_bytes};
+  info.token_required = !options.gate.token.empty();
+  info.scene_root = !options.scenes.scene_root.empty();
+  return info;
+}
+
+/// Of this process; 0 where the system does not tell.
+double resident_bytes() {
+  std::ifstream statm("/proc/self/statm");
+  double total = 0, resident = 0;
+  statm >> total >> resident;
+  return resident * double(::sysconf(_SC_PAGESIZE));
+}
+
+void add_gauges(http::Metrics& metrics, scenes::SceneStore& scenes, edits::EditService& edits, RenderService& renders) {
+  metrics.add_gauge("process_resident_memory_bytes", "Resident memory of the process.", resident_bytes);
+  metrics.add_gauge("splatdrag_scenes", "Scenes held.", [&] { return double(scenes.usage().scenes); });
+  metrics.add_gauge("splatdrag_scenes_damaged", "Scenes on disk that cannot be used.",
+                    [&] { return double(scenes.damaged().size()); });
+  metrics.add_gauge("splatdrag_previews", "Previews in memory.", [&] { return double(scenes.usage().previews); });
+  metrics.add_gauge("splatdrag_scene_memory_bytes", "Memory that scenes and previews take.",
+                    [&] { return double(scenes.usage().memory_bytes); });
+  metrics.add_gauge("splatdrag_scene_memory_budget_bytes", "Memory that scenes and previews may take.",
+                    [&] { return double(scenes.usage().memory_budget); });
+  metrics.add_gauge("splatdrag_renders_waiting", "Renders that wait for a thread.",
+                    [&] { return double(renders.waiting()); });
+  metrics.add_gauges("splatdrag_edits", "Edits on record, by state.", "state", [&] {
+    std::map<std::string, double> values;
+    for (const auto& [state, count] : edits.counts()) values[state] = double(count);
+    return values;
+  });
+}
+
+/// Tells the parts what they have to know of the whole.
+void share_out(ServeOptions& options, spdlog::logger& logger) {
+  options.scenes.folder = options.data_dir / "scenes";
+  options.scenes.program_version = SPLATDRAG_VERSION;
+  options.scenes.preview_lifetime = std::chrono::seconds(options.preview_seconds);
+  options.edits.folder = options.data_dir / "edits";
+  options.edits.threads = options.threads;
+  options.edits.logger = &logger;
+  options.renders.threads = options.threads;
+  options.renders.program = SPLATDRAG_VERSION;
+}
+
+}  // namespace
+
+Result<void> check_token(ServeOptions& options, spdlog::logger& logger) {
+  if (!options.token_file.empty()) {
+    std::string warning;
+    auto token = read_token(options.token_file, warning);
+    if (!token) return propagate(token);
+    if (!warning.empty()) http::log(logger, spdlog::level::warn, warning);
+    options.gate.token = std::move(*token);
+  }
+  if (options.gate.token.empty() && !is_loopback(options.http.host)) {
+    if (!options.insecure)
+      return engine::fail(ErrorCode::invalid_argument,
+                          "a service that other machines can reach needs a token: give --token-file, or --insecure to "
+                          "let everybody in",
+                          "--host");
+    http::log(logger, spdlog::level::warn, "everybody who can reach this service may use it (--insecure)");
+  }
+  return {};
+}
+
+Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& logger, std::ostream& out) {
+  share_out(options, logger);
+  auto scenes = scenes::SceneStore::open(options.scenes);
+  if (!scenes && scenes.error().code == ErrorCode::conflict)  // another service has it
+    return engine::fail(ErrorCode::unavailable, scenes.error().message, options.data_dir.string());
+  if (!scenes) return propagate(scenes);
+  for (const engine::Error& damage : (*scenes)->damaged())
+    http::log(logger, spdlog::level::err, "a scene cannot be used: " + damage.message, {{"where", damage.where}});
+  auto edits = edits::EditService::open(**scenes, options.edits);
+  if (!edits) return propagate(edits);
+  RenderService renders(options.renders);
+  SceneViews views(**scenes, renders);
+  http::Gate gate(options.gate);
+  http::Metrics metrics;
+  add_gauges(metrics, **scenes, **edits, renders);
+  http::Router router = routes::all_routes(
+      {**scenes, **edits, options.edit_limits, renders, views, gate, metrics, service_info(options)});
+  auto server = http::HttpServer::start(options.http, std::move(router), gate, metrics, logger);
+  if (!server) return propagate(server);
+  out << "splatdrag " << SPLATDRAG_VERSION << " is listening on " << (*server)->url() << std::endl;
+  http::log(logger, spdlog::level::info, "listening",
+            {{"url", (*server)->url()},
+             {"version", std::string(SPLATDRAG_VERSION)},
+             {"simd", options.simd},
+             {"threads", std::int64_t{options.threads_here}},
+             {"data_dir", options.data_dir.string()}});
+  const std::string signal = signals.wait();
+  http::log(logger, spdlog::level::info, "stopping", {{"signal", signal}});
+  (*server)->stop();
+  (*edits)->drain(std::chrono::seconds(options.drain_seconds));
+  http::log(logger, spdlog::level::info, "stopped");
+  return {};
+}
+
+}  // namespace server::service

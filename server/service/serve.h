@@ -1,0 +1,49 @@
+// The service as a whole: the parts, wired up, from the start until a signal comes.
+#pragma once
+
+#include <spdlog/logger.h>
+
+#include <filesystem>
+#include <ostream>
+#include <string>
+
+#include "engine/core/result.h"
+#include "server/edits/edit_service.h"
+#include "server/http/gate.h"
+#include "server/http/http_server.h"
+#include "server/scenes/scene_store.h"
+#include "server/service/end_signals.h"
+#include "server/service/render_service.h"
+#include "server/service/routes/all_routes.h"
+
+namespace server::service {
+
+/// What the service is started with. Folders, versions and loggers of the parts are set by serve().
+struct ServeOptions {
+  std::filesystem::path data_dir;    ///< Exists. Scenes and edits get a folder of their own in it.
+  std::filesystem::path token_file;  ///< Empty: no token.
+  bool insecure = false;             ///< Other machines may come in without a token.
+  int drain_seconds = 30;            ///< So long may a running edit finish its interval.
+  int preview_seconds = 600;         ///< So long does a preview live that nobody looks at.
+  http::ServerOptions http;
+  http::GateOptions gate;
+  scenes::StoreOptions scenes;
+  edits::ServiceOptions edits;
+  routes::EditLimits edit_limits;
+  RenderServiceOptions renders;
+  int threads = 0;       ///< That edits and renders compute with; 0: one per core.
+  int threads_here = 0;  ///< How many that comes to on this machine: what the service says of itself.
+  std::string simd;      ///< Instruction set in use, likewise.
+};
+
+/// Reads the token into options.gate. Writes warnings to the log.
+///   errors  those of read_token(); invalid_argument: a host that others can reach, no token, and not `insecure`
+[[nodiscard]] engine::Result<void> check_token(ServeOptions& options, spdlog::logger& logger);
+
+/// Serves until a signal comes, then lets what runs come to its end.
+///   out     gets the line that says where the service listens
+///   errors  unavailable: another service has the data folder; those of the parts
+[[nodiscard]] engine::Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& logger,
+                                         std::ostream& out);
+
+}  // namespace server::service

@@ -1,0 +1,104 @@
+#include "server/cli/bench_report.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/data.h"
+
+namespace server::cli {
+namespace {
+
+namespace evaluate = engine::evaluate;
+
+evaluate::Trial sample_trial() {
+  evaluate::Trial trial;
+  trial.name = "slide", trial.what = "A crate.", trial.corrector = "scene", trial.textured = false;
+  trial.gaussians = 12, trial.part = 3, trial.seeds = 1, trial.intervals = 4;
+  trial.untouched.edited = {20.1, 0.5, 7};
+  trial.result.edited = {30.1, 0.25, 7};
+  trial.result.vacated = {31.1, 0.125, 8};
+  trial.result.arrived = {32.1, 0.75, 9};
+  trial.result.outside = {33.1, 1, 10};
+  trial.result.miss = 1e-9;
+  trial.corrected_views = {40, 11};
+  trial.seconds = 0.1 + 0.2;
+  trial.stages = {{"views", 0.1}, {"assign", 0.2}};
+  trial.peak_memory_bytes = std::uint64_t{1} << 40;
+  trial.warnings = {"one", "two"};
+  return trial;
+}
+
+TEST(BenchReport, ATrialComesBackAsItWas) {
+  const auto written = encode(sample_trial());
+  evaluate::Trial read;
+  decode(nlohmann::ordered_json::parse(written.dump()), read);
+  EXPECT_EQ(encode(read).dump(), written.dump());
+  EXPECT_EQ(read.seconds, 0.1 + 0.2);
+  EXPECT_EQ(read.stages.front().stage, "views");
+}
+
+TEST(BenchReport, ATripComesBackAsItWas) {
+  const evaluate::TripTrial trip{.request = "ear_up",
+                                 .corrector = "none",
+                                 .arrived = 0.9,
+                                 .inside = {30, 0.5, 3},
+                                 .outside = {40, 1, 4},
+                                 .zero_drag = {50, 1, 5},
+                                 .cameras = 6,
+                                 .seconds = 1.5};
+  const auto written = encode(trip);
+  evaluate::TripTrial read;
+  decode(nlohmann::ordered_json::parse(written.dump()), read);
+  EXPECT_EQ(encode(read).dump(), written.dump());
+  EXPECT_EQ(read.request, "ear_up");
+}
+
+TEST(BenchReport, HasTheFieldsThatOthersRead) {
+  const auto written = encode(sample_trial());
+  std::vector<std::string> names;
+  for (const auto& [name, value] : written.items()) names.push_back(name);
+  EXPECT_EQ(names, (std::vector<std::string>{"case", "what", "corrector", "textured", "gaussians", "part", "seeds",
+                                             "intervals", "untouched", "result", "corrected_views_agree", "seconds",
+                                             "stages", "peak_memory_bytes", "warnings"}));
+}
+
+TEST(KeptResult, IsNotFoundAgain) {
+  const support::TempDir folder;
+  const auto file = folder.path() / "slide.json";
+  int found = 0;
+  const auto find = [&]() -> engine::Result<evaluate::Trial> {
+    ++found;
+    return sample_trial();
+  };
+  ASSERT_TRUE(kept_or<evaluate::Trial>(file, find));
+  const auto again = kept_or<evaluate::Trial>(file, find);
+  ASSERT_TRUE(again);
+  EXPECT_EQ(encode(*again).dump(), encode(sample_trial()).dump());
+  EXPECT_EQ(found, 1);
+}
+
+TEST(KeptResult, ThatIsDamagedIsFoundAgain) {
+  const support::TempDir folder;
+  const auto file = folder.path() / "slide.json";
+  ASSERT_TRUE(write_json(file, encode(sample_trial())));
+  const std::string whole = support::read_file(file);
+  for (const std::string& bytes :
+       {std::string(), whole.substr(0, whole.size() / 2), std::string("{}"), std::string("[1]"), std::string("null")}) {
+    support::write_file(file, bytes);
+    EXPECT_FALSE(kept_result<evaluate::Trial>(file)) << bytes;
+  }
+  support::write_file(file, whole);
+  EXPECT_TRUE(kept_result<evaluate::Trial>(file));
+}
+
+TEST(KeptResult, IsNotMadeOfAFailure) {
+  const support::TempDir folder;
+  const auto file = folder.path() / "slide.json";
+  const auto failed = kept_or<evaluate::Trial>(
+      file, []() -> engine::Result<evaluate::Trial> { return engine::fail(engine::ErrorCode::cancelled, "stopped"); });
+  ASSERT_FALSE(failed);
+  EXPECT_EQ(failed.error().code, engine::ErrorCode::cancelled);
+  EXPECT_FALSE(std::filesystem::exists(file));
+}
+
+}  // namespace
+}  // namespace server::cli

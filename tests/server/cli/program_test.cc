@@ -1,0 +1,111 @@
+#include "server/cli/program.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "tests/support/data.h"
+
+namespace server::cli {
+namespace {
+
+struct Finished {
+  int status = 0;
+  std::string out, err;
+};
+
+Finished splatdrag(std::vector<std::string> arguments) {
+  std::ostringstream out, err;
+  Terminal terminal{out, err};
+  arguments.insert(arguments.begin(), "splatdrag");
+  std::vector<const char*> argv;
+  for (const std::string& argument : arguments) argv.push_back(argument.c_str());
+  const int status = run_program(int(argv.size()), argv.data(), terminal);
+  return {status, out.str(), err.str()};
+}
+
+void expect_error(const std::vector<std::string>& arguments, int status, const std::string& part) {
+  const Finished run = splatdrag(arguments);
+  EXPECT_EQ(run.status, status) << run.err;
+  EXPECT_TRUE(run.err.starts_with("error: ")) << run.err;
+  EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << run.err;
+  EXPECT_NE(run.err.find(part), std::string::npos) << run.err;
+}
+
+TEST(Program, ListsExactlyTheSubcommandsThereAre) {
+  const Finished run = splatdrag({"--help"});
+  EXPECT_EQ(run.status, 0);
+  std::size_t listed = 0;
+  for (const char* name : {"serve", "edit", "fit", "render", "info", "convert", "demo-scene", "bench-edit"}) {
+    EXPECT_NE(run.out.find("\n  " + std::string(name) + " "), std::string::npos) << name;
+    ++listed;
+  }
+  const std::string commands = run.out.substr(run.out.find("Subcommands:\n"));
+  const auto lines = commands.substr(0, commands.find("\n\n"));
+  EXPECT_EQ(std::size_t(std::count(lines.begin(), lines.end(), '\n')), listed) << lines;
+  EXPECT_NE(run.out.find("Exit status"), std::string::npos);
+}
+
+TEST(Program, HelpShowsDefaultsUnitsAndVariables) {
+  const Finished run = splatdrag({"render", "--help"});
+  EXPECT_EQ(run.status, 0);
+  for (const char* part : {"=800x600", "degrees", "=50", "SPLATDRAG_MAX_SIDE", "=color"})
+    EXPECT_NE(run.out.find(part), std::string::npos) << part << "\n" << run.out;
+}
+
+TEST(Program, SaysItsVersion) {
+  const Finished run = splatdrag({"--version"});
+  EXPECT_EQ(run.status, 0);
+  EXPECT_NE(run.out.find('.'), std::string::npos);
+}
+
+TEST(Program, RefusesAWrongCommandLineInOneLine) {
+  expect_error({}, 2, "a subcommand is required: serve edit fit render info convert demo-scene bench-edit");
+  expect_error({"bake"}, 2, "\"bake\" is no subcommand");
+  expect_error({"serve"}, 2, "--data-dir is required");
+  expect_error({"edit"}, 2, "--scene is required");
+  expect_error({"info", "--scene", "a.ply", "--frob"}, 2, "--frob");
+  expect_error({"edit", "--threads", "-1"}, 2, "--threads");
+  expect_error({"--config", "/nonexistent.toml", "info", "--scene", "a.ply"}, 2, "/nonexistent.toml");
+}
+
+TEST(Program, RefusesContradictingRenderOptions) {
+  const std::vector<std::string> base = {"render", "--scene", "a.ply"};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), base.begin(), base.end());
+    return more;
+  };
+  expect_error(base, 2, "--out");
+  expect_error(with({"--out", "o"}), 2, "--view");
+  expect_error(with({"--out", "o", "--all"}), 2, "--dataset");
+  expect_error(with({"--out", "o", "--all", "--view", "v", "--dataset", "d"}), 2, "choose one");
+  expect_error(with({"--out", "o", "--eye", "0,0,0"}), 2, "--target");
+  expect_error(with({"--out", "o", "--eye", "1,1,1", "--target", "1,1,1"}), 2, "--eye");
+  expect_error(with({"--out", "o", "--eye", "0,0,0", "--target", "0,1,0", "--up", "0,0,0"}), 2, "--up");
+  expect_error(with({"--out", "o", "--eye", "0,0,0", "--target", "0,0,1", "--size", "big"}), 2, "--size");
+  expect_error(with({"--compare", "--eye", "0,0,0", "--target", "0,0,1"}), 2, "--compare");
+}
+
+TEST(Program, EachKindOfFailureHasItsStatus) {
+  const support::TempDir folder;
+  const auto file = [&](const std::string& name, const std::string& bytes) {
+    support::write_file(folder.path() / name, bytes);
+    return (folder.path() / name).string();
+  };
+  expect_error({"info", "--scene", "/nonexistent.ply"}, 3, "nonexistent.ply");
+  expect_error({"info", "--scene", file("cut.ply", "ply\nformat binary_little_endian 1.0\n")}, 4, "cut.ply");
+  expect_error({"info", "--scene", file("note.txt", "hello")}, 5, "note.txt");
+  expect_error({"convert", "--in", "a.ply", "--out", "a.obj"}, 5, ".obj");
+  expect_error({"edit", "--scene", "a.ply", "--out", "o", "--request", file("r.json", "{\"handles\": 3}")}, 2,
+               "r.json:handles");
+  expect_error({"edit", "--scene", "a.ply", "--out", "o", "--request",
+                file("sd.json", R"({"handles": [{"source": [0, 0, 0], "radius": 1}], "params": {"corrector": "sd"}})")},
+               5, "sd.json:params.corrector");
+  expect_error({"demo-scene", "--out", folder.path().string(), "--gaussians", "7"}, 2, "gaussians");
+}
+
+}  // namespace
+}  // namespace server::cli

@@ -1,0 +1,183 @@
+// `splatdrag serve` as its users run it.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "tests/server/http/raw_client.h"
+#include "tests/support/data.h"
+
+namespace server::cli {
+namespace {
+
+using http::ask;
+using nlohmann::json;
+using namespace std::chrono_literals;
+
+/// A running program; killed with the object if it still runs.
+class Program {
+ public:
+  Program(const support::TempDir& folder, std::vector<std::string> arguments)
+      : out_(folder.path() / "stdout"), err_(folder.path() / "stderr") {
+    arguments.insert(arguments.begin(), SPLATDRAG_PROGRAM);
+    std::vector<char*> pointers;
+    for (std::string& argument : arguments) pointers.push_back(argument.data());
+    pointers.push_back(nullptr);
+    for (const auto& file : {out_, err_}) support::write_file(file, "");
+    pid_ = ::fork();
+    if (pid_ != 0) return;
+    for (const auto& [file, target] : {std::pair{out_, STDOUT_FILENO}, std::pair{err_, STDERR_FILENO}})
+      ::dup2(::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), target);
+    ::execv(pointers.front(), pointers.data());
+    ::_exit(127);
+  }
+  ~Program() {
+    if (pid_ <= 0) return;
+    ::kill(pid_, SIGKILL);
+    ::waitpid(pid_, nullptr, 0);
+  }
+  Program(const Program&) = delete;
+  Program& operator=(const Program&) = delete;
+
+  /// From the line that says so; 0 if it never comes.
+  [[nodiscard]] int port() const {
+    for (int i = 0; i < 500; ++i) {
+      const std::string text = out();
+      const std::size_t colon = text.rfind(':');
+      if (text.ends_with('\n') && colon != std::string::npos) return std::atoi(text.c_str() + colon + 1);
+      std::this_thread::sleep_for(20ms);
+    }
+    return 0;
+  }
+  void signal(int number) const { ::kill(pid_, number); }
+  /// Exit status; -1 if it does not end within ten seconds, or ends by a signal.
+  int wait() {
+    for (int i = 0; i < 500; ++i) {
+      int status = 0;
+      if (::waitpid(pid_, &status, WNOHANG) == pid_) {
+        pid_ = 0;
+        return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+      }
+      std::this_thread::sleep_for(20ms);
+    }
+    return -1;
+  }
+  [[nodiscard]] std::string out() const { return support::read_file(out_); }
+  [[nodiscard]] std::string err() const { return support::read_file(err_); }
+
+ private:
+  const std::filesystem::path out_, err_;
+  pid_t pid_ = 0;
+};
+
+class Serve : public testing::Test {
+ protected:
+  std::vector<std::string> arguments(std::vector<std::string> more = {}) const {
+    more.insert(more.begin(), {"serve", "--port", "0", "--data-dir", (data_.path() / "data").string()});
+    return more;
+  }
+
+  support::TempDir data_, first_, second_;
+};
+
+TEST_F(Serve, SaysWhereItListensAndEndsWellWhenToldTo) {
+  for (const int number : {SIGTERM, SIGINT}) {
+    Program program(first_, arguments());
+    const int port = program.port();
+    ASSERT_NE(port, 0) << program.err();
+    EXPECT_TRUE(program.out().starts_with("splatdrag ")) << program.out();
+    EXPECT_NE(program.out().find(" is listening on http://127.0.0.1:"), std::string::npos);
+    EXPECT_EQ(ask(port, "GET", "/healthz").status, 200);
+    EXPECT_EQ(ask(port, "GET", "/readyz").status, 200);
+    EXPECT_NE(ask(port, "GET", "/").body.find("</html>"), std::string::npos);
+    EXPECT_EQ(json::parse(ask(port, "GET", "/v1/scenes").body), json::parse(R"({"scenes":[]})"));
+    EXPECT_EQ(json::parse(ask(port, "GET", "/v1/edits").body), json::parse(R"({"edits":[]})"));
+    EXPECT_NE(ask(port, "GET", "/metrics").body.find("\nsplatdrag_scenes 0\n"), std::string::npos);
+    program.signal(number);
+    EXPECT_EQ(program.wait(), 0) << program.err();
+    const std::string log = program.err();
+    EXPECT_EQ(json::parse(log.substr(0, log.find('\n')))["message"], "listening") << log;
+  }
+}
+
+TEST_F(Serve, SaysEveryLimitItKeeps) {
+  Program program(first_, arguments({"--max-json-bytes", "2KiB", "--max-streams", "3", "--max-render-side", "777",
+                                     "--max-queued", "5", "--max-upload-bytes", "1MiB", "--threads", "1",
+                                     "--max-handles", "6", "--max-views", "7", "--max-image-side", "64"}));
+  const int port = program.port();
+  ASSERT_NE(port, 0) << program.err();
+  const json info = json::parse(ask(port, "GET", "/v1/info").body);
+  EXPECT_EQ(info["limits"]["json_bytes"], 2048);
+  EXPECT_EQ(info["limits"]["streams"], 3);
+  EXPECT_EQ(info["limits"]["render_side"], 777);
+  EXPECT_EQ(info["limits"]["queued_edits"], 5);
+  EXPECT_EQ(info["limits"]["upload_bytes"], 1 << 20);
+  EXPECT_EQ(info["limits"]["handles"], 6);
+  EXPECT_EQ(info["limits"]["views"], 7);
+  EXPECT_EQ(info["limits"]["image_side"], 64);
+  EXPECT_EQ(info["threads"], 1);
+  EXPECT_EQ(ask(port, "POST", "/v1/edits", "Content-Type: application/json\r\n", std::string(2049, ' ')).status, 413);
+}
+
+TEST_F(Serve, TakesJsonUpToTheLimitItSays) {
+  Program program(first_, arguments({"--max-json-bytes", "1MiB"}));
+  const int port = program.port();
+  ASSERT_NE(port, 0) << program.err();
+  const auto limit = json::parse(ask(port, "GET", "/v1/info").body)["limits"]["json_bytes"].get<std::size_t>();
+  EXPECT_EQ(limit, 1u << 20);
+  const auto status = [&](std::size_t bytes) {
+    return ask(port, "POST", "/v1/edits", "Content-Type: application/json\r\n", "{" + std::string(bytes - 2, ' ') + "}")
+        .status;
+  };
+  EXPECT_EQ(status(limit), 400) << "handles are missing; the size is right";
+  EXPECT_EQ(status(limit + 1), 413);
+}
+
+TEST_F(Serve, WantsItsToken) {
+  support::write_file(first_.path() / "token", "hush\n");
+  Program program(first_, arguments({"--token-file", (first_.path() / "token").string()}));
+  const int port = program.port();
+  ASSERT_NE(port, 0) << program.err();
+  EXPECT_EQ(ask(port, "GET", "/v1/scenes").status, 401);
+  EXPECT_EQ(ask(port, "GET", "/v1/scenes", "Authorization: Bearer hush\r\n").status, 200);
+  program.signal(SIGTERM);
+  EXPECT_EQ(program.wait(), 0);
+  EXPECT_EQ(program.err().find("hush"), std::string::npos);
+}
+
+TEST_F(Serve, RefusesWhatWouldGoWrong) {
+  Program program(first_, arguments());
+  const int port = program.port();
+  ASSERT_NE(port, 0) << program.err();
+  const auto refused = [&](std::vector<std::string> more, const std::string& expected) {
+    Program other(second_, std::move(more));
+    const int status = other.wait();
+    EXPECT_NE(other.err().find(expected), std::string::npos) << other.err();
+    EXPECT_EQ(other.out(), "");
+    return status;
+  };
+  EXPECT_EQ(refused(arguments(), "another service uses this data folder"), 12);
+  EXPECT_NE(support::read_file(second_.path() / "stderr").find("(" + (data_.path() / "data").string() + ")"),
+            std::string::npos);
+  const std::string elsewhere = (second_.path() / "data").string();
+  EXPECT_EQ(refused({"serve", "--port", std::to_string(port), "--data-dir", elsewhere}, "is taken"), 12);
+  EXPECT_EQ(refused({"serve", "--port", "0", "--host", "0.0.0.0", "--data-dir", elsewhere}, "--token-file"), 2);
+  support::write_file(second_.path() / "empty", "\n");
+  EXPECT_EQ(refused({"serve", "--port", "0", "--data-dir", elsewhere, "--token-file", second_.path() / "empty"},
+                    "the token file is empty"),
+            2);
+  EXPECT_EQ(refused({"serve"}, "--data-dir"), 2);
+  EXPECT_EQ(refused({"serve", "--data-dir", elsewhere, "--max-handles", "257"}, "--max-handles"), 2);
+  EXPECT_EQ(refused({"serve", "--data-dir", elsewhere, "--max-scenes", "2.5"}, "--max-scenes"), 2);
+  EXPECT_EQ(refused({"serve", "--data-dir", elsewhere, "--max-json-bytes", "2MiB"}, "--max-json-bytes"), 2);
+  EXPECT_EQ(refused({"serve", "--data-dir", elsewhere, "--simd", "ABACUS"}, "--simd"), 2);
+}
+
+}  // namespace
+}  // namespace server::cli
