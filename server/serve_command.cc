@@ -82,16 +82,13 @@ proto::ServiceInfo service_info(const ServeOptions& options, const Machine& mach
   info.simd = machine.simd;
   info.simd_available = engine::render::simd_targets();
   info.threads = machine.threads;
-  info.correctors = {{"none", true, ""},
-                     {"scene", true, ""},
-                     {"sd", false, "this version cannot load a diffusion model yet"}};
+  info.correctors = {
+      {"none", true, ""}, {"scene", true, ""}, {"sd", false, "this version cannot load a diffusion model yet"}};
   info.perceptual = {{"msssim", true, ""}, {"lpips", false, "this version has no network to compare pictures with"}};
   info.read_formats = {"ply", "compressed_ply", "splat", "spz"};
   info.write_formats = {"ply", "splat", "spz"};
   info.picture_formats = {"png", "jpeg", "exr"};
-  for (const auto preset :
-       {proto::Preset::preview, proto::Preset::draft, proto::Preset::standard, proto::Preset::paper})
-    info.presets.emplace_back(proto::name_of(preset));
+  for (const auto& preset : engine::names<proto::Preset>) info.presets.emplace_back(preset.text);
   info.limits = {.upload_bytes = options.http.dispatcher.max_upload_bytes,
                  .json_bytes = options.http.dispatcher.max_json_bytes,
                  .gaussians = options.scenes.read.max_gaussians,
@@ -276,7 +273,7 @@ void add_store_options(CLI::App& command, ServeOptions& options) {
   add_count(command, "--pictured-views", options.edits.pictured_views, "Views rendered after each interval", 0);
   add_count(command, "--max-handles", options.edit_limits.handles, "Handles of an edit", 1, proto::max_handles);
   add_count(command, "--max-views", options.edit_limits.views, "Views that an edit looks through", 1,
-            engine::edit::max_views);
+            engine::params::max_views);
   add_count(command, "--max-image-side", options.edit_limits.image_side,
             "Pixels along a side of the pictures that an edit works on", 16, proto::max_camera_side);
   add_count(command, "--max-waiting-renders", options.renders.max_waiting, "Renders that may wait for a thread", 0);

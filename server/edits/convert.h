@@ -12,7 +12,7 @@
 
 namespace server::edits {
 
-/// What a preset stands for. How the numbers were found: docs/tradeoff.md.
+/// What a preset stands for (engine/params/params.h), its intervals as the drag asks for them.
 ///   drag  its mode and handles, on which intervals depend; its parameters do not count
 [[nodiscard]] engine::edit::Params preset_params(proto::Preset preset, const engine::edit::Request& drag = {});
 /// The intervals of a preset, for a drag whose other parameters are settled.
@@ -24,9 +24,8 @@ namespace server::edits {
 /// The corrector of a request: that of its preset if it names none.
 [[nodiscard]] proto::Corrector corrector_of(const proto::EditRequest& request);
 
-/// Does a corrector do anything in this edit? It works for the optimisation only. Precondition: `params` are those of
-/// to_engine(request).
-[[nodiscard]] bool corrects(const proto::EditRequest& request, const engine::edit::Params& params);
+/// Does a corrector do anything in this edit? It works for the optimisation only.
+[[nodiscard]] bool corrects(const engine::edit::Params& params);
 
 /// A new one of that kind; null: `none`. Precondition: to_engine(request) succeeds.
 [[nodiscard]] std::unique_ptr<engine::correct::Corrector> make_corrector(const proto::EditRequest& request);

@@ -63,6 +63,30 @@ TEST(Checkpoint, IsReadAsItWasWritten) {
   EXPECT_EQ(encode(*read), bytes) << "so nothing else was lost either";
 }
 
+/// A value that a parameter does not have by itself.
+void alter(int& value) { ++value; }
+void alter(double& value) { value /= 2; }
+void alter(std::uint64_t& value) { value += 1; }
+void alter(bool& value) { value = !value; }
+void alter(std::vector<std::string>& value) { value.emplace_back("another"); }
+template <Named Enum>
+void alter(Enum& value) {
+  const auto& all = names<Enum>;
+  value = all.back().value == value ? all.front().value : all.back().value;
+}
+
+TEST(Checkpoint, HoldsEveryParameter) {
+  Checkpoint written = sample();
+  params::for_each_parameter([&](const auto& parameter) {
+    const Params before = written.report.resolved;
+    alter(written.report.resolved.*parameter.value);
+    ASSERT_NE(written.report.resolved, before) << parameter.name;
+    const auto read = decode(encode(written));
+    ASSERT_TRUE(read) << parameter.name;
+    EXPECT_EQ(read->report.resolved, written.report.resolved) << parameter.name;
+  });
+}
+
 TEST(Checkpoint, HoldsTheMembersAndNotTheFrozenRows) {
   const Checkpoint checkpoint = sample();
   EXPECT_EQ(checkpoint.members.inputs.size(), 6u);
