@@ -7,25 +7,20 @@
 #include "server/edits/points.h"
 
 namespace server::edits {
-namespace {
 
 namespace edit = engine::edit;
 
 static_assert(proto::max_handles == edit::max_handles && proto::max_coordinate == edit::max_coordinate);
 
-/// Intervals are filled in from the drag, once the other parameters are.
 edit::Params filled_in(const proto::Params& given, proto::Preset preset, const edit::Request& drag) {
   edit::Request settled = drag;
   settled.params = engine::params::filled_in(given, preset);
-  settled.params.intervals = given.intervals.value_or(preset_intervals(preset, settled));
+  if (!given.intervals) {
+    const bool extends = drag.mode == edit::Mode::extend;
+    settled.params.intervals = engine::params::preset_intervals(
+        preset, {.extends = extends, .one_piece = edit::one_interval_is_exact(settled)});
+  }
   return settled.params;
-}
-
-}  // namespace
-
-int preset_intervals(proto::Preset preset, const edit::Request& drag) {
-  return engine::params::preset_intervals(
-      preset, {.extends = drag.mode == edit::Mode::extend, .one_piece = edit::one_interval_is_exact(drag)});
 }
 
 edit::Params preset_params(proto::Preset preset, const edit::Request& drag) { return filled_in({}, preset, drag); }
@@ -45,20 +40,23 @@ std::unique_ptr<engine::correct::Corrector> make_corrector(const proto::EditRequ
   return nullptr;
 }
 
+engine::Result<void> available(const edit::Params& params) {
+  const auto unsupported = [](const char* message, const char* where) {
+    return engine::fail(engine::ErrorCode::unsupported, message, where);
+  };
+  if (params.corrector == proto::Corrector::sd)
+    return unsupported("this build has no corrector \"sd\"; available: \"scene\", which is the default, and \"none\"",
+                       "params.corrector");
+  if (params.perceptual == proto::Perceptual::lpips)
+    return unsupported("this build has no perceptual loss \"lpips\"; available: \"msssim\", which is the default",
+                       "params.perceptual");
+  if (params.background == proto::Background::photo)
+    return unsupported("this build does not hold the background to photos; available: \"render\", which is the default",
+                       "params.background");
+  return {};
+}
+
 engine::Result<edit::Request> to_engine(const proto::EditRequest& request) {
-  if (corrector_of(request) == proto::Corrector::sd)
-    return engine::fail(engine::ErrorCode::unsupported,
-                        "this build has no corrector \"sd\"; available: \"scene\", which is the default, and \"none\"",
-                        "params.corrector");
-  if (request.params.perceptual == proto::Perceptual::lpips)
-    return engine::fail(engine::ErrorCode::unsupported,
-                        "this build has no perceptual loss \"lpips\"; available: \"msssim\", which is the default",
-                        "params.perceptual");
-  if (request.params.background == proto::Background::photo)
-    return engine::fail(
-        engine::ErrorCode::unsupported,
-        "this build does not hold the background to photos; available: \"render\", which is the default",
-        "params.background");
   edit::Request out;
   out.mode = request.mode;
   for (const proto::Handle& handle : request.handles) {
@@ -70,6 +68,7 @@ engine::Result<edit::Request> to_engine(const proto::EditRequest& request) {
   }
   if (request.region) out.region = {to_vec(request.region->center), to_vec(request.region->size)};
   out.params = filled_in(request.params, preset_of(request), out);
+  if (auto all = available(out.params); !all) return engine::propagate(all);
   return out;
 }
 

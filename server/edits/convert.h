@@ -12,11 +12,12 @@
 
 namespace server::edits {
 
-/// What a preset stands for (engine/params/params.h), its intervals as the drag asks for them.
-///   drag  its mode and handles, on which intervals depend; its parameters do not count
+/// Every parameter: what is given, else what the preset says (engine/params/params.h).
+///   drag  its mode and handles, on which the intervals depend; its own parameters do not count
+[[nodiscard]] engine::edit::Params filled_in(const proto::Params& given, proto::Preset preset,
+                                             const engine::edit::Request& drag);
+/// What a preset alone stands for.
 [[nodiscard]] engine::edit::Params preset_params(proto::Preset preset, const engine::edit::Request& drag = {});
-/// The intervals of a preset, for a drag whose other parameters are settled.
-[[nodiscard]] int preset_intervals(proto::Preset preset, const engine::edit::Request& drag);
 
 /// The preset of a request: `standard` if it names none.
 [[nodiscard]] proto::Preset preset_of(const proto::EditRequest& request);
@@ -30,9 +31,12 @@ namespace server::edits {
 /// A new one of that kind; null: `none`. Precondition: to_engine(request) succeeds.
 [[nodiscard]] std::unique_ptr<engine::correct::Corrector> make_corrector(const proto::EditRequest& request);
 
+/// Does this build have the corrector, the perceptual loss and the background that these parameters name?
+///   errors  unsupported: no (`where` is "params.corrector", say)
+[[nodiscard]] engine::Result<void> available(const engine::edit::Params& params);
+
 /// The engine's request, with what was left open filled in from the preset.
-///   errors  unsupported: a corrector, perceptual loss or background this build does not have (`where` is
-///           "params.corrector")
+///   errors  as available()
 [[nodiscard]] engine::Result<engine::edit::Request> to_engine(const proto::EditRequest& request);
 
 /// The request as it was carried out: `asked`, with every parameter that the edit used filled in.
