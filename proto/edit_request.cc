@@ -7,6 +7,7 @@
 #include "proto/json_document.h"
 #include "proto/json_fields.h"
 #include "proto/json_text.h"
+#include "proto/params_fields.h"
 
 namespace proto {
 namespace {
@@ -18,25 +19,7 @@ using engine::propagate;
 using nlohmann::json;
 using nlohmann::ordered_json;
 
-constexpr std::array mode_names{Name{Mode::move, "move"}, Name{Mode::extend, "extend"}};
-constexpr std::array preset_names{Name{Preset::preview, "preview"}, Name{Preset::draft, "draft"},
-                                  Name{Preset::standard, "standard"}, Name{Preset::paper, "paper"}};
-constexpr std::array annealing_names{Name{Annealing::linear, "linear"}, Name{Annealing::paper, "paper"}};
-constexpr std::array corrector_names{Name{Corrector::none, "none"}, Name{Corrector::scene, "scene"},
-                                     Name{Corrector::sd, "sd"}};
-constexpr std::array perceptual_names{Name{Perceptual::msssim, "msssim"}, Name{Perceptual::lpips, "lpips"}};
-constexpr std::array rotation_names{Name{Rotation::shortest_arc, "shortest_arc"}, Name{Rotation::paper, "paper"},
-                                    Name{Rotation::none, "none"}};
-constexpr std::array interpolation_names{Name{Interpolation::paper, "paper"}, Name{Interpolation::smooth, "smooth"},
-                                         Name{Interpolation::rigid, "rigid"}};
-constexpr std::array background_names{Name{Background::render, "render"}, Name{Background::photo, "photo"}};
-
 constexpr int no_limit = std::numeric_limits<int>::max();
-
-template <class E, std::size_t N>
-std::string_view name_in(const std::array<Name<E>, N>& names, E value) {
-  return std::find_if(names.begin(), names.end(), [&](const Name<E>& name) { return name.value == value; })->text;
-}
 
 Handle read_handle(const Field& field) {
   const Members members(field, {"source", "target", "radius", "group"});
@@ -56,43 +39,13 @@ Region read_region(const Field& field, std::string_view size_name) {
   return region;
 }
 
-std::vector<std::string> read_names(const Field& field) {
-  std::vector<std::string> names;
-  for (const Field& name : field.elements(0, max_excluded_views, "names of views")) names.push_back(name.text());
-  return names;
-}
-
-Params read_params(const Field& field) {
-  const Members members(field, {"intervals", "annealing_steps", "strength_initial", "strength_final", "annealing",
-                                "iterations", "views", "exclude_views", "max_image_side", "corrector", "perceptual",
-                                "rotation", "interpolation", "rotate_sh", "background", "seed"});
-  Params params;
-  if (const auto f = members.optional("intervals")) params.intervals = f->whole(1, 20);
-  if (const auto f = members.optional("annealing_steps")) params.annealing_steps = f->whole(1, 100);
-  if (const auto f = members.optional("strength_initial")) params.strength_initial = f->number(0, 1);
-  if (const auto f = members.optional("strength_final")) params.strength_final = f->number(0, 1);
-  if (const auto f = members.optional("annealing")) params.annealing = f->one_of(annealing_names);
-  if (const auto f = members.optional("iterations")) params.iterations = f->whole(0, 1'000'000);
-  if (const auto f = members.optional("views")) params.views = f->whole(1, 1000);
-  if (const auto f = members.optional("exclude_views")) params.exclude_views = read_names(*f);
-  if (const auto f = members.optional("max_image_side")) params.max_image_side = f->whole(16, 16384);
-  if (const auto f = members.optional("corrector")) params.corrector = f->one_of(corrector_names);
-  if (const auto f = members.optional("perceptual")) params.perceptual = f->one_of(perceptual_names);
-  if (const auto f = members.optional("rotation")) params.rotation = f->one_of(rotation_names);
-  if (const auto f = members.optional("interpolation")) params.interpolation = f->one_of(interpolation_names);
-  if (const auto f = members.optional("rotate_sh")) params.rotate_sh = f->boolean();
-  if (const auto f = members.optional("background")) params.background = f->one_of(background_names);
-  if (const auto f = members.optional("seed")) params.seed = f->unsigned_number();
-  return params;
-}
-
 EditRequest read_edit_request(const Field& field) {
   const Members members(field, {"scene", "version", "mode", "preset", "prompt", "handles", "region", "params"});
   EditRequest request;
   if (const auto f = members.optional("scene")) request.scene = f->text();
   if (const auto f = members.optional("version")) request.version = f->whole(0, no_limit);
-  if (const auto f = members.optional("mode")) request.mode = f->one_of(mode_names);
-  if (const auto f = members.optional("preset")) request.preset = f->one_of(preset_names);
+  if (const auto f = members.optional("mode")) request.mode = f->one_of(engine::names<Mode>);
+  if (const auto f = members.optional("preset")) request.preset = f->one_of(engine::names<Preset>);
   if (const auto f = members.optional("prompt"); f && !f->is_null()) request.prompt = f->text();
   if (const auto handles = members.required("handles"))
     for (const Field& handle : handles->elements(1, max_handles, "handles"))
@@ -130,7 +83,7 @@ EditRequest read_released_config(const Field& field) {
     for (std::size_t i = 0; i < groups.size(); ++i) request.handles[i].group = groups[i].whole(0, no_limit);
   }
   if (const auto f = members.optional("local_mask")) request.region = read_region(*f, "xyz");
-  if (const auto f = members.optional("mode")) request.mode = f->one_of(mode_names);
+  if (const auto f = members.optional("mode")) request.mode = f->one_of(engine::names<Mode>);
   return request;
 }
 
@@ -186,33 +139,6 @@ ordered_json encode(const Handle& handle) {
   if (handle.target) out["target"] = *handle.target;
   out["radius"] = handle.radius;
   out["group"] = handle.group;
-  return out;
-}
-
-ordered_json encode(const Params& params) {
-  ordered_json out = ordered_json::object();
-  const auto put = [&](const char* name, const auto& value) {
-    if (value) out[name] = *value;
-  };
-  const auto put_name = [&](const char* name, const auto& value, const auto& names) {
-    if (value) out[name] = name_in(names, *value);
-  };
-  put("intervals", params.intervals);
-  put("annealing_steps", params.annealing_steps);
-  put("strength_initial", params.strength_initial);
-  put("strength_final", params.strength_final);
-  put_name("annealing", params.annealing, annealing_names);
-  put("iterations", params.iterations);
-  put("views", params.views);
-  put("exclude_views", params.exclude_views);
-  put("max_image_side", params.max_image_side);
-  put_name("corrector", params.corrector, corrector_names);
-  put_name("perceptual", params.perceptual, perceptual_names);
-  put_name("rotation", params.rotation, rotation_names);
-  put_name("interpolation", params.interpolation, interpolation_names);
-  put("rotate_sh", params.rotate_sh);
-  put_name("background", params.background, background_names);
-  put("seed", params.seed);
   return out;
 }
 
@@ -280,9 +206,5 @@ std::string to_json(const EditRequest& request) {
   out["params"] = encode(request.params);
   return pretty(out);
 }
-
-std::string_view name_of(Mode value) { return name_in(mode_names, value); }
-std::string_view name_of(Preset value) { return name_in(preset_names, value); }
-std::string_view name_of(Corrector value) { return name_in(corrector_names, value); }
 
 }  // namespace proto

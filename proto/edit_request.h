@@ -3,13 +3,13 @@
 
 #include <array>
 #include <cstddef>
-#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/params/params.h"
 
 namespace proto {
 
@@ -17,17 +17,20 @@ using engine::Result;
 
 using Point = std::array<double, 3>;  ///< World units, the file's own frame.
 
-enum class Mode { move, extend };
-enum class Preset { preview, draft, standard, paper };
-enum class Annealing { linear, paper };
-enum class Corrector { none, scene, sd };
-enum class Perceptual { msssim, lpips };
-enum class Rotation { shortest_arc, paper, none };
-enum class Interpolation { paper, smooth, rigid };
-enum class Background { render, photo };
+using engine::name_of;  // of an enumerator, such as "shortest_arc"
+using engine::params::Annealing;
+using engine::params::Background;
+using engine::params::Corrector;
+using engine::params::Interpolation;
+using engine::params::Mode;
+using engine::params::Perceptual;
+using engine::params::Preset;
+using engine::params::Rotation;
+
+/// What is not given is left to the preset.
+using Params = engine::params::GivenParams;
 
 constexpr std::size_t max_handles = 256;
-constexpr std::size_t max_excluded_views = 1000;
 constexpr std::size_t max_text_bytes = 4096;  ///< Of a prompt, a name.
 constexpr double max_coordinate = 1e12;       ///< World units.
 
@@ -42,27 +45,6 @@ struct Handle {
 struct Region {
   Point center{}, size{};  ///< World units; full edge lengths, above 0.
   bool operator==(const Region&) const = default;
-};
-
-/// What is not given is left to the preset and to the defaults of the engine.
-struct Params {
-  std::optional<int> intervals;            ///< T, 1 to 20
-  std::optional<int> annealing_steps;      ///< A, 1 to 100
-  std::optional<double> strength_initial;  ///< 0 to 1
-  std::optional<double> strength_final;    ///< 0 to 1
-  std::optional<Annealing> annealing;
-  std::optional<int> iterations;                          ///< Per correction, 0 to 1,000,000
-  std::optional<int> views;                               ///< 1 to 1000
-  std::optional<std::vector<std::string>> exclude_views;  ///< Names of views
-  std::optional<int> max_image_side;                      ///< Pixels, 16 to 16384
-  std::optional<Corrector> corrector;
-  std::optional<Perceptual> perceptual;
-  std::optional<Rotation> rotation;
-  std::optional<Interpolation> interpolation;
-  std::optional<bool> rotate_sh;
-  std::optional<Background> background;
-  std::optional<std::uint64_t> seed;
-  bool operator==(const Params&) const = default;
 };
 
 struct EditRequest {
@@ -120,10 +102,5 @@ struct RequestFile {
 
 /// The request as indented JSON that parse_edit_request() reads back; what is not given is left out.
 [[nodiscard]] std::string to_json(const EditRequest& request);
-
-/// The name that a value has on the wire, such as "shortest_arc".
-[[nodiscard]] std::string_view name_of(Mode value);
-[[nodiscard]] std::string_view name_of(Preset value);
-[[nodiscard]] std::string_view name_of(Corrector value);
 
 }  // namespace proto

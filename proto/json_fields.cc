@@ -105,7 +105,7 @@ std::vector<Field> Field::elements(std::size_t low, std::size_t high, const std:
   return fields;
 }
 
-Members::Members(const Field& object, std::initializer_list<std::string_view> known) : object_(object) {
+Members::Members(const Field& object, std::span<const std::string_view> known) : object_(object) {
   if (!object_.is_object()) {
     object_.expected("an object");
     return;

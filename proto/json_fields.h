@@ -8,20 +8,17 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "engine/core/names.h"
 #include "proto/edit_request.h"
 
 namespace proto {
 
-/// The names of an enumeration's values on the wire.
-template <class E>
-struct Name {
-  E value;
-  std::string_view text;
-};
+using engine::Name;
 
 /// A place in a document: a value and its address. The first failure below a document is noted in its error; after one,
 /// reading goes on with harmless values.
@@ -64,7 +61,9 @@ class Field {
 /// The members of an object; those not in `known` are refused at once.
 class Members {
  public:
-  Members(const Field& object, std::initializer_list<std::string_view> known);
+  Members(const Field& object, std::span<const std::string_view> known);
+  Members(const Field& object, std::initializer_list<std::string_view> known)
+      : Members(object, std::span(known.begin(), known.size())) {}
 
   /// Refuses the object if the member is missing.
   [[nodiscard]] std::optional<Field> required(std::string_view name) const;

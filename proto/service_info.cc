@@ -2,6 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "proto/params_fields.h"
+
 namespace proto {
 namespace {
 
@@ -43,6 +45,7 @@ std::string to_json(const ServiceInfo& info, bool session) {
       {"perceptual", list(info.perceptual)},
       {"formats", {{"read", info.read_formats}, {"write", info.write_formats}, {"pictures", info.picture_formats}}},
       {"presets", info.presets},
+      {"parameters", describe_parameters()},
       {"limits", object(info.limits)},
       {"token_required", info.token_required},
       {"session", session},

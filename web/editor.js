@@ -403,7 +403,7 @@ export class Editor {
     const { scene, handles, preview, problem, autoPreview, dragging } = this.state;
     if (!scene) return;
     const request = this.request();
-    const key = previewKey(request);
+    const key = previewKey(request, this.state.info?.parameters);
     if (problem && problem.key !== JSON.stringify(request)) this.store.set({ problem: null });
     if (!handles.some((h) => h.target)) {
       this.#later("preview", 0, () => {});
@@ -418,7 +418,7 @@ export class Editor {
   /** Whether the preview on the screen shows what is asked for now. */
   get previewIsCurrent() {
     const { preview } = this.state;
-    return preview !== null && preview.key === previewKey(this.request());
+    return preview !== null && preview.key === previewKey(this.request(), this.state.info?.parameters);
   }
 
   async preview() {
@@ -427,7 +427,7 @@ export class Editor {
     this.#previewing?.abort();
     const abort = (this.#previewing = new AbortController());
     const request = this.request();
-    const key = previewKey(request);
+    const key = previewKey(request, this.state.info?.parameters);
     this.store.set({ previewing: true });
     try {
       const preview = await api.createPreview(request, abort.signal);

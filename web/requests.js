@@ -32,23 +32,21 @@ export function requestOf({ scene, version, mode, preset, prompt, handles, regio
   };
 }
 
-/** What of the screen decides how a preview looks: two equal texts, the same preview. */
-export function previewKey(request) {
+/** What of the screen decides how a preview looks: two equal texts, the same preview. It shows where Gaussians go, so of
+ *  the `parameters` that the service describes those of the motion count, and any that it does not describe. */
+export function previewKey(request, parameters = []) {
   const { handles, mode, region, params = {}, preset, scene, version } = request;
-  const { intervals, rotation, interpolation, rotate_sh } = params;
-  return JSON.stringify({
-    scene,
-    version,
-    handles,
-    mode,
-    region,
-    preset,
-    intervals,
-    rotation,
-    interpolation,
-    rotate_sh,
-  });
+  const others = new Set(parameters.filter(({ part }) => part !== "motion").map(({ name }) => name));
+  const motion = Object.entries(params).filter(([name]) => !others.has(name));
+  motion.sort(([a], [b]) => (a < b ? -1 : 1));
+  return JSON.stringify({ scene, version, handles, mode, region, preset, motion });
 }
+
+/** "max_image_side" as a person reads it. */
+export const labelOf = (name) => name[0].toUpperCase() + name.slice(1).replaceAll("_", " ");
+
+/** What a parameter is if nobody gives it; null: that depends on the drag. A request without a preset is "standard". */
+export const usualValue = (parameter, preset) => parameter.defaults[preset || "standard"] ?? null;
 
 /** What an error's address points to: {part: "handle", index, field}, {part: "param", name}, {part: "region"},
  *  {part: "mode" | "preset" | ...}, or {part: "request"} for anything else. */

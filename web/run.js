@@ -2,8 +2,9 @@
 
 import { chosen, say } from "./dialogs.js";
 import { attrs, h, problemPlace, problemText, showProblem, text } from "./dom.js";
-import { choice, labelled, numberField, pointField, segments, toggle } from "./fields.js";
+import { choice, labelled, pointField, segments, toggle } from "./fields.js";
 import { bytes, count, counted, duration, gaussians } from "./format.js";
+import { paramFields } from "./params.js";
 import { partOf, readRequests } from "./requests.js";
 
 const CONSTRAINTS = [
@@ -12,18 +13,6 @@ const CONSTRAINTS = [
   ["y", "Y", "Along the y axis (Y)"],
   ["z", "Z", "Along the z axis (Z)"],
   ["normal", "Normal", "Along the surface normal where the handle was placed (N)"],
-];
-const ROTATIONS = [
-  ["", "default"],
-  ["shortest_arc", "shortest arc"],
-  ["paper", "paper"],
-  ["none", "none"],
-];
-const INTERPOLATIONS = [
-  ["", "default"],
-  ["paper", "paper"],
-  ["smooth", "smooth"],
-  ["rigid", "rigid"],
 ];
 
 /** Presets that make sense for a run: `preview` is what the Preview button does. */
@@ -81,92 +70,15 @@ export function buildRun(editor) {
     options: [["", "default"]],
     changed: (value) => store.set({ preset: value }),
   });
-  const corrector = choice({
-    label: "Corrector",
-    testid: "corrector",
-    options: [["", "default"]],
-    changed: (value) => setParam("corrector", value),
-  });
-  const params = {
-    intervals: numberField({
-      label: "Intervals",
-      testid: "param-intervals",
-      min: 1,
-      max: 20,
-      whole: true,
-      optional: true,
-      placeholder: "auto",
-      changed: (v) => setParam("intervals", v),
-    }),
-    views: numberField({
-      label: "Views",
-      testid: "param-views",
-      min: 1,
-      max: 1000,
-      whole: true,
-      optional: true,
-      placeholder: "auto",
-      changed: (v) => setParam("views", v),
-    }),
-    max_image_side: numberField({
-      label: "Image side, pixels",
-      testid: "param-image-side",
-      min: 16,
-      max: 16384,
-      whole: true,
-      optional: true,
-      placeholder: "auto",
-      changed: (v) => setParam("max_image_side", v),
-    }),
-    seed: numberField({
-      label: "Seed",
-      testid: "param-seed",
-      min: 0,
-      whole: true,
-      optional: true,
-      placeholder: "0",
-      changed: (v) => setParam("seed", v),
-    }),
-    rotation: choice({
-      label: "Rotation",
-      testid: "param-rotation",
-      options: ROTATIONS,
-      changed: (v) => setParam("rotation", v),
-    }),
-    interpolation: choice({
-      label: "Interpolation",
-      testid: "param-interpolation",
-      options: INTERPOLATIONS,
-      changed: (v) => setParam("interpolation", v),
-    }),
-  };
-  const rotateSh = toggle({
-    label: "Colours turn with what they are on",
-    testid: "param-rotate-sh",
-    title: "rotate_sh: view-dependent colour turns with its Gaussian",
-    changed: (on) => setParam("rotate_sh", on ? null : false),
-  });
+  const params = paramFields(setParam);
   const also = h("p", { class: "note", hidden: true, testid: "other-params" });
   const paramProblem = problemPlace("param-problem");
-  const correctorNote = h("p", { class: "note", hidden: true });
   const settings = h(
     "details",
     { class: "settings", testid: "settings" },
     h("summary", {}, "Settings"),
-    h(
-      "div",
-      { class: "grid2" },
-      labelled("Preset", preset.element),
-      labelled("Corrector", corrector.element),
-      labelled("Intervals", params.intervals.element),
-      labelled("Views", params.views.element),
-      labelled("Image side, px", params.max_image_side.element),
-      labelled("Seed", params.seed.element),
-      labelled("Rotation", params.rotation.element),
-      labelled("Interpolation", params.interpolation.element),
-    ),
-    correctorNote,
-    rotateSh.element,
+    labelled("Preset", preset.element),
+    params.element,
     regionOn.element,
     regionFields,
     regionProblem,
@@ -257,25 +169,9 @@ export function buildRun(editor) {
       }
       preset.options([["", "default"], ...runPresets(state.info).map((name) => [name, name])]);
       preset.update(state.preset);
-      corrector.options([
-        ["", "default"],
-        ...(state.info?.correctors ?? []).map(({ name, available, reason }) => [
-          name,
-          name,
-          reason ?? undefined,
-          !available,
-        ]),
-      ]);
-      corrector.update(state.params.corrector ?? "");
-      const missing = (state.info?.correctors ?? []).filter((c) => !c.available);
-      correctorNote.hidden = missing.length === 0;
-      text(correctorNote, missing.map((c) => `${c.name}: ${c.reason ?? "not available"}`).join(" · "));
-      for (const name of ["intervals", "views", "max_image_side", "seed"]) params[name].update(state.params[name]);
-      for (const name of ["rotation", "interpolation"]) params[name].update(state.params[name] ?? "");
-      rotateSh.update(state.params.rotate_sh !== false);
+      params.update(state.info, state.params, state.preset);
       auto.update(state.autoPreview);
-      const shown = [...Object.keys(params), "corrector", "rotate_sh"];
-      const others = Object.keys(state.params).filter((name) => !shown.includes(name));
+      const others = Object.keys(state.params).filter((name) => !params.shows(name));
       if (state.prompt) others.push(`prompt “${state.prompt}”`);
       also.hidden = others.length === 0;
       text(also, `Also set, by the imported request: ${others.join(", ")}`);

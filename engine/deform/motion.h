@@ -11,22 +11,9 @@
 #include <vector>
 
 #include "engine/core/vec.h"
+#include "engine/deform/choices.h"
 
 namespace engine::deform {
-
-/// How the rotation of a pair of handles becomes a quaternion.
-enum class Rotation {
-  shortest_arc,  ///< The least rotation that turns the pair to where it goes.
-  paper,         ///< The quaternion as the paper prints it, which turns by twice the angle.
-  none,
-};
-
-/// How a Gaussian follows the handles near it.
-enum class Interpolation {
-  paper,   ///< Weighted sum over the K nearest handles. Jumps where the set of nearest handles changes.
-  smooth,  ///< The same with weights that are continuous in space.
-  rigid,   ///< The weights of `smooth`, and each handle also turns the space around it (see rigid.h, too).
-};
 
 /// K of the paper: how many handles a handle or a Gaussian looks at.
 constexpr int neighbours = 2;

@@ -137,33 +137,33 @@ void read(ByteReader& in, scene::Mask& mask) {
     mask.data[i] = std::uint8_t(std::to_integer<unsigned>(packed[i / 8]) >> i % 8 & 1u);
 }
 
+// The parameters' types.
+void write(ByteWriter& out, int value) { out.write(std::int32_t(value)); }
+void write(ByteWriter& out, double value) { out.write(value); }
+void write(ByteWriter& out, std::uint64_t value) { out.write(value); }
+void write(ByteWriter& out, bool value) { out.write(std::uint8_t(value)); }
+void write(ByteWriter& out, const std::vector<std::string>& names) { write_list(out, names); }
+template <Named Enum>
+void write(ByteWriter& out, Enum value) {
+  out.write(std::uint8_t(value));
+}
+
+void read(ByteReader& in, int& value) { value = in.read<std::int32_t>(); }
+void read(ByteReader& in, double& value) { value = in.read<double>(); }
+void read(ByteReader& in, std::uint64_t& value) { value = in.read<std::uint64_t>(); }
+void read(ByteReader& in, bool& value) { value = in.read<std::uint8_t>() != 0; }
+void read(ByteReader& in, std::vector<std::string>& names) { read_list(in, names); }
+template <Named Enum>
+void read(ByteReader& in, Enum& value) {
+  read(in, value, names<Enum>.back().value);
+}
+
 void write(ByteWriter& out, const Params& params) {
-  out.write(std::int32_t(params.intervals));
-  out.write(std::uint8_t(params.rotation)), out.write(std::uint8_t(params.interpolation));
-  out.write(std::uint8_t(params.rotate_sh));
-  out.write(std::int32_t(params.views));
-  write_list(out, params.exclude_views);
-  out.write(std::int32_t(params.iterations)), out.write(std::int32_t(params.annealing_steps));
-  out.write(params.strength_initial), out.write(params.strength_final);
-  out.write(std::uint8_t(params.annealing));
-  out.write(std::int32_t(params.max_image_side));
-  out.write(params.seed);
-  out.write(std::uint8_t(params.local_mask)), out.write(std::uint8_t(params.optimise_unmoved));
+  params::for_each_parameter([&](const auto& parameter) { write(out, params.*parameter.value); });
 }
 
 void read(ByteReader& in, Params& params) {
-  params.intervals = in.read<std::int32_t>();
-  read(in, params.rotation, Rotation::none), read(in, params.interpolation, Interpolation::rigid);
-  params.rotate_sh = in.read<std::uint8_t>() != 0;
-  params.views = in.read<std::int32_t>();
-  read_list(in, params.exclude_views);
-  params.iterations = in.read<std::int32_t>(), params.annealing_steps = in.read<std::int32_t>();
-  params.strength_initial = in.read<double>(), params.strength_final = in.read<double>();
-  read(in, params.annealing, Annealing::paper);
-  params.max_image_side = in.read<std::int32_t>();
-  params.seed = in.read<std::uint64_t>();
-  params.local_mask = in.read<std::uint8_t>() != 0;
-  params.optimise_unmoved = in.read<std::uint8_t>() != 0;
+  params::for_each_parameter([&](const auto& parameter) { read(in, params.*parameter.value); });
 }
 
 void write(ByteWriter& out, const HandleReport& handle) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "engine/edit/drag.h"
+#include "engine/working/mode.h"
 #include "engine/working/working_scene.h"
 
 namespace engine::edit {

@@ -2,8 +2,6 @@
 
 #include <cmath>
 
-#include "engine/deform/intervals.h"
-
 namespace engine::edit {
 namespace {
 
@@ -34,32 +32,6 @@ Result<void> validate(const Region& region) {
   return {};
 }
 
-Result<void> validate(const Params& params) {
-  const auto outside = [](int value, int low, int high) { return value < low || value > high; };
-  const auto range = [](int value, const char* what, const std::string& allowed) {
-    return std::string(what) + " is " + allowed + ", not " + std::to_string(value);
-  };
-  if (outside(params.intervals, 0, deform::max_intervals))
-    return invalid(range(params.intervals, "the number of intervals",
-                         "1 to " + std::to_string(deform::max_intervals) + ", or 0 to choose it from the drag"),
-                   "params.intervals");
-  if (outside(params.views, 1, max_views))
-    return invalid(range(params.views, "the number of views", "1 to " + std::to_string(max_views)), "params.views");
-  if (outside(params.max_image_side, 16, 16384))
-    return invalid(range(params.max_image_side, "the longer side of a working picture", "16 to 16384 pixels"),
-                   "params.max_image_side");
-  if (outside(params.iterations, 0, 1'000'000))
-    return invalid(range(params.iterations, "the number of iterations per correction", "0 to 1,000,000"),
-                   "params.iterations");
-  if (outside(params.annealing_steps, 1, 100))
-    return invalid(range(params.annealing_steps, "the number of corrections per interval", "1 to 100"),
-                   "params.annealing_steps");
-  for (const auto& [strength, where] : {std::pair{params.strength_initial, "params.strength_initial"},
-                                        {params.strength_final, "params.strength_final"}})
-    if (!(strength >= 0 && strength <= 1)) return invalid("a strength is a number from 0 to 1", where);
-  return {};
-}
-
 }  // namespace
 
 Result<void> validate(const Request& request) {
@@ -74,7 +46,7 @@ Result<void> validate(const Request& request) {
     if (auto valid = validate(request.handles[i], "handles[" + std::to_string(i) + "]"); !valid) return valid;
   if (request.region)
     if (auto valid = validate(*request.region); !valid) return valid;
-  return validate(request.params);
+  return params::validate(request.params);
 }
 
 }  // namespace engine::edit

@@ -6,8 +6,11 @@
 #include <limits>
 #include <span>
 #include <sstream>
+#include <type_traits>
+#include <vector>
 
 #include "engine/core/checksum.h"
+#include "engine/params/params.h"
 
 namespace engine::evaluate {
 namespace {
@@ -19,9 +22,16 @@ class Fields {
  public:
   Fields() { out_ << std::setprecision(std::numeric_limits<double>::max_digits10); }
   void add(const std::string& text) { out_ << std::quoted(text) << ','; }
-  template <class Number>
-  void add(Number number) {
-    out_ << number << ',';
+  void add(const std::vector<std::string>& list) {
+    add(list.size());
+    for (const std::string& text : list) add(text);
+  }
+  template <class T>
+  void add(T value) {
+    if constexpr (std::is_enum_v<T>)
+      out_ << int(value) << ',';
+    else
+      out_ << value << ',';
   }
   void add(DVec3 v) {
     for (int axis = 0; axis < 3; ++axis) add(v[axis]);
@@ -32,14 +42,10 @@ class Fields {
   std::ostringstream out_;
 };
 
-void add(const edit::Params& params, Fields& fields) {
-  fields.add(params.intervals);
-  fields.add(params.iterations);
-  fields.add(params.annealing_steps);
-  fields.add(params.views);
-  fields.add(params.max_image_side);
-  fields.add(int(params.interpolation));
-  fields.add(params.local_mask);
+void add(const edit::Params& values, Fields& fields) {
+  params::for_each_parameter([&](const auto& parameter) {
+    if (parameter.name != "corrector") fields.add(values.*parameter.value);  // which one is tried stands in ResultOf
+  });
 }
 
 }  // namespace

@@ -1,14 +1,11 @@
 // What becomes of the place that a dragged part comes from.
 #pragma once
 
-#include <cstdint>
+#include "engine/params/choices.h"
 
 namespace engine::working {
 
-enum class Mode : std::uint8_t {
-  move,    ///< The dragged part leaves its place.
-  extend,  ///< It is drawn out: the original and the trail stay.
-};
+using params::Mode;
 
 /// Logit of the opacity an original is lowered to: 0.01 in a move (about to vanish, unless the optimisation wants it
 /// back), 0.5 in an extend. Opacity grows with its logit, so min(alpha, keep) is the smaller logit, without rounding.

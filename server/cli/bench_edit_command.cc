@@ -1,15 +1,17 @@
 // splatdrag bench-edit: edits whose right result is known, carried out and judged.
+#include <algorithm>
 #include <filesystem>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <ostream>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "engine/core/atomic_file.h"
+#include "engine/core/names.h"
 #include "engine/edit/request.h"
 #include "engine/evaluate/cases.h"
 #include "engine/evaluate/result_key.h"
@@ -18,6 +20,8 @@
 #include "engine/io/dataset.h"
 #include "engine/io/image_file.h"
 #include "engine/io/scene_file.h"
+#include "engine/params/params.h"
+#include "proto/params_fields.h"
 #include "server/cli/bench_report.h"
 #include "server/cli/commands.h"
 #include "server/cli/compute.h"
@@ -40,25 +44,24 @@ struct BenchOptions {
   std::vector<std::string> cases, correctors{"scene"};
   std::string out;
   proto::Preset preset = proto::Preset::draft;
-  std::optional<edit::Interpolation> interpolation;
+  proto::Params given;                        // over the preset
   std::string scene, dataset, request, name;  // a real capture, there and back
   bool small = false, whole_picture = false;
-  std::optional<int> intervals, iterations, annealing_steps, views, image_side;
   int pictures = 1;
   ComputeOptions compute;
 };
 
 /// What is given on the command line, over the preset.
 void apply(const BenchOptions& options, edit::Request& request) {
-  edit::Params& params = request.params;
-  params = edits::preset_params(options.preset, request);
-  if (options.interpolation) params.interpolation = *options.interpolation;
-  if (options.iterations) params.iterations = *options.iterations;
-  if (options.annealing_steps) params.annealing_steps = *options.annealing_steps;
-  if (options.views) params.views = *options.views;
-  if (options.image_side) params.max_image_side = *options.image_side;
-  params.local_mask = !options.whole_picture;
-  params.intervals = options.intervals.value_or(edits::preset_intervals(options.preset, request));
+  request.params = edits::filled_in(options.given, options.preset, request);
+  request.params.local_mask = !options.whole_picture;
+}
+
+/// Those parameters that a request could give; which corrector is not one of them here.
+ordered_json encode_params(const edit::Params& params) {
+  ordered_json out = proto::encode(engine::params::as_given(params));
+  out.erase("corrector");
+  return out;
 }
 
 /// Where a result is kept.
@@ -103,18 +106,14 @@ Result<evaluate::Trial> trial_of(const evaluate::Case& the_case, const std::stri
 ordered_json settings(const BenchOptions& options, const Machine& machine) {
   edit::Request any;
   apply(options, any);
-  const edit::Params& params = any.params;
+  ordered_json params{{"preset", proto::name_of(options.preset)}};
+  params.update(encode_params(any.params));
+  if (!options.given.intervals) params["intervals"] = nullptr;  // they depend on the drag
+  params["local_mask"] = any.params.local_mask;
   return {{"splatdrag", SPLATDRAG_VERSION},
           {"threads", machine.threads},
           {"simd", machine.simd},
-          {"params",
-           {{"preset", proto::name_of(options.preset)},
-            {"intervals", options.intervals ? ordered_json(*options.intervals) : ordered_json(nullptr)},
-            {"iterations", params.iterations},
-            {"annealing_steps", params.annealing_steps},
-            {"views", params.views},
-            {"max_image_side", params.max_image_side},
-            {"local_mask", params.local_mask}}}};
+          {"params", std::move(params)}};
 }
 
 Result<void> run_cases(const BenchOptions& options, const Machine& machine, Terminal& terminal) {
@@ -187,10 +186,51 @@ Result<void> run_trips(const BenchOptions& options, const Machine& machine, Term
 }
 
 Result<void> run(const BenchOptions& options, Terminal& terminal) {
+  edit::Request any;
+  apply(options, any);
+  if (auto all = edits::available(any.params); !all) return all;
   if (auto made = make_folder(path(options.out) / "results"); !made) return made;
   return compute(options.compute, [&](const Machine& machine) -> Result<void> {
     return options.scene.empty() ? run_cases(options, machine, terminal) : run_trips(options, machine, terminal);
   });
+}
+
+/// The values of an enumeration by their names.
+template <engine::Named Enum>
+std::map<std::string, Enum> by_name() {
+  std::map<std::string, Enum> values;
+  for (const auto& name : engine::names<Enum>) values.emplace(name.text, name.value);
+  return values;
+}
+
+/// Restricts an option to the values of a parameter.
+void limit(CLI::Option& option, const engine::params::Range<int>& range) {
+  option.check(CLI::Range(range.zero.empty() ? range.low : 0, range.high))->type_name("N");
+}
+void limit(CLI::Option& option, const engine::params::Range<double>& range) {
+  option.check(CLI::Range(range.low, range.high))->type_name("X");
+}
+void limit(CLI::Option& option, const engine::params::Range<bool>&) { option.type_name("BOOLEAN"); }
+void limit(CLI::Option& option, const engine::params::Range<std::uint64_t>&) { option.type_name("N"); }
+void limit(CLI::Option& option, const engine::params::Range<std::vector<std::string>>&) { option.type_name("NAME"); }
+template <engine::Named Enum>
+void limit(CLI::Option& option, const engine::params::Range<Enum>&) {
+  option.transform(CLI::CheckedTransformer(by_name<Enum>()))->type_name("NAME");
+}
+
+/// An option for a parameter, in place of what the preset says: "--annealing-steps".
+template <class T>
+void add_knob(CLI::App& command, const engine::params::Parameter<T>& parameter, proto::Params& given) {
+  std::string flag = "--" + std::string(parameter.name);
+  std::ranges::replace(flag, '_', '-');
+  if (flag == "--max-image-side") flag += ",--image-side";  // as it was called at first
+  std::string what(parameter.meaning);
+  if (!parameter.unit.empty()) what += " In " + std::string(parameter.unit) + ".";
+  if constexpr (std::is_same_v<T, int>)
+    if (!parameter.range.zero.empty()) what += " 0: " + std::string(parameter.range.zero) + ".";
+  limit(*command.add_option_function<T>(
+            flag, [&given, &parameter](const T& value) { given.*parameter.given = value; }, what),
+        parameter.range);
 }
 
 }  // namespace
@@ -216,26 +256,12 @@ void add_bench_edit_command(CLI::App& program, Action& action) {
       ->default_str("scene")
       ->type_name("NAME");
   command->add_option("--preset", options->preset, "Whose parameters, where none are given here")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, proto::Preset>{{"preview", proto::Preset::preview},
-                                                                               {"draft", proto::Preset::draft},
-                                                                               {"standard", proto::Preset::standard},
-                                                                               {"paper", proto::Preset::paper}}))
+      ->transform(CLI::CheckedTransformer(by_name<proto::Preset>()))
       ->default_str("draft")
       ->type_name("NAME");
-  const auto override_with = [&](const char* flag, std::optional<int>& value, int low, int high, const char* what) {
-    command->add_option(flag, value, what)->check(CLI::Range(low, high))->type_name("N");
-  };
-  override_with("--intervals", options->intervals, 0, 20, "Of each edit; 0: by the length of the drag");
-  override_with("--iterations", options->iterations, 0, 1'000'000, "Of the optimisation per correction; 0: none");
-  override_with("--annealing-steps", options->annealing_steps, 1, 100, "Corrections per interval");
-  override_with("--views", options->views, 1, edit::max_views, "Most views an edit looks through");
-  override_with("--image-side", options->image_side, 16, 16384, "Longer side of the pictures it works on, pixels");
-  command->add_option("--interpolation", options->interpolation, "In place of the preset's")
-      ->transform(
-          CLI::CheckedTransformer(std::map<std::string, edit::Interpolation>{{"paper", edit::Interpolation::paper},
-                                                                             {"smooth", edit::Interpolation::smooth},
-                                                                             {"rigid", edit::Interpolation::rigid}}))
-      ->type_name("NAME");
+  engine::params::for_each_parameter([&](const auto& parameter) {
+    if (parameter.on_wire && parameter.name != "corrector") add_knob(*command, parameter, options->given);
+  });
   command->add_flag("--whole-picture", options->whole_picture, "Without the local mask: everything counts as edited");
   command
       ->add_option("--pictures", options->pictures,

@@ -14,6 +14,7 @@
 #include "engine/io/dataset.h"
 #include "engine/io/image_file.h"
 #include "engine/io/scene_file.h"
+#include "engine/params/listing.h"
 #include "engine/render/forward.h"
 #include "engine/scene/overlay.h"
 #include "server/cli/commands.h"
@@ -201,6 +202,7 @@ void add_edit_command(CLI::App& program, Action& action) {
       ->check(CLI::Range(0, 1000))
       ->type_name("N");
   add_compute_options(*command, options->compute);
+  command->footer(engine::params::listing());
   command->callback([options, &action] { action = [options](Terminal& terminal) { return run(*options, terminal); }; });
 }
 

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "engine/edit/request.h"
+#include "engine/params/params.h"
 #include "proto/camera.h"
 #include "proto/edit_request.h"
 #include "server/cli/commands.h"
@@ -104,7 +104,7 @@ void add_store_options(CLI::App& command, ServeOptions& options) {
   add_count(command, "--pictured-views", options.edits.pictured_views, "Views rendered after each interval", 0);
   add_count(command, "--max-handles", options.edit_limits.handles, "Handles of an edit", 1, proto::max_handles);
   add_count(command, "--max-views", options.edit_limits.views, "Views that an edit looks through", 1,
-            engine::edit::max_views);
+            engine::params::max_views);
   add_count(command, "--max-image-side", options.edit_limits.image_side,
             "Pixels along a side of the pictures that an edit works on", 16, proto::max_camera_side);
   add_count(command, "--max-waiting-renders", options.renders.max_waiting, "Renders that may wait for a thread", 0);

@@ -12,11 +12,12 @@
 
 namespace server::edits {
 
-/// What a preset stands for. How the numbers were found: docs/tradeoff.md.
-///   drag  its mode and handles, on which intervals depend; its parameters do not count
+/// Every parameter: what is given, else what the preset says (engine/params/params.h).
+///   drag  its mode and handles, on which the intervals depend; its own parameters do not count
+[[nodiscard]] engine::edit::Params filled_in(const proto::Params& given, proto::Preset preset,
+                                             const engine::edit::Request& drag);
+/// What a preset alone stands for.
 [[nodiscard]] engine::edit::Params preset_params(proto::Preset preset, const engine::edit::Request& drag = {});
-/// The intervals of a preset, for a drag whose other parameters are settled.
-[[nodiscard]] int preset_intervals(proto::Preset preset, const engine::edit::Request& drag);
 
 /// The preset of a request: `standard` if it names none.
 [[nodiscard]] proto::Preset preset_of(const proto::EditRequest& request);
@@ -24,16 +25,18 @@ namespace server::edits {
 /// The corrector of a request: that of its preset if it names none.
 [[nodiscard]] proto::Corrector corrector_of(const proto::EditRequest& request);
 
-/// Does a corrector do anything in this edit? It works for the optimisation only. Precondition: `params` are those of
-/// to_engine(request).
-[[nodiscard]] bool corrects(const proto::EditRequest& request, const engine::edit::Params& params);
+/// Does a corrector do anything in this edit? It works for the optimisation only.
+[[nodiscard]] bool corrects(const engine::edit::Params& params);
 
 /// A new one of that kind; null: `none`. Precondition: to_engine(request) succeeds.
 [[nodiscard]] std::unique_ptr<engine::correct::Corrector> make_corrector(const proto::EditRequest& request);
 
+/// Does this build have the corrector, the perceptual loss and the background that these parameters name?
+///   errors  unsupported: no (`where` is "params.corrector", say)
+[[nodiscard]] engine::Result<void> available(const engine::edit::Params& params);
+
 /// The engine's request, with what was left open filled in from the preset.
-///   errors  unsupported: a corrector, perceptual loss or background this build does not have (`where` is
-///           "params.corrector")
+///   errors  as available()
 [[nodiscard]] engine::Result<engine::edit::Request> to_engine(const proto::EditRequest& request);
 
 /// The request as it was carried out: `asked`, with every parameter that the edit used filled in.

@@ -249,7 +249,7 @@ Result<proto::EditEstimate> EditService::estimate(const proto::EditRequest& requ
   work.intervals = checked->preview.intervals;
   work.iterations = std::size_t(params.iterations) * std::size_t(params.annealing_steps);
   work.rounds = std::size_t(params.annealing_steps);
-  work.corrected = corrects(*asked, params);
+  work.corrected = corrects(params);
   work.candidates = candidates->count;
   work.candidate_pixels = std::size_t(camera.width) * std::size_t(camera.height);
   work.virtual_views = candidates->are_virtual;

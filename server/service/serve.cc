@@ -34,9 +34,7 @@ proto::ServiceInfo service_info(const ServeOptions& options) {
   info.read_formats = {"ply", "compressed_ply", "splat", "spz"};
   info.write_formats = {"ply", "splat", "spz"};
   info.picture_formats = {"png", "jpeg", "exr"};
-  for (const auto preset :
-       {proto::Preset::preview, proto::Preset::draft, proto::Preset::standard, proto::Preset::paper})
-    info.presets.emplace_back(proto::name_of(preset));
+  for (const auto& preset : engine::names<proto::Preset>) info.presets.emplace_back(preset.text);
   info.limits = {.upload_bytes = options.http.dispatcher.max_upload_bytes,
                  .json_bytes = options.http.dispatcher.max_json_bytes,
                  .gaussians = options.scenes.read.max_gaussians,

@@ -197,7 +197,7 @@ TEST(EditRequest, NamesAFieldOutOfRange) {
       {"handles", json::array()},
       {"handles", std::vector<int>(max_handles + 1)},
       {"prompt", std::string(max_text_bytes + 1, 'x')},
-      {"params.exclude_views", std::vector<std::string>(max_excluded_views + 1)}};
+      {"params.exclude_views", std::vector<std::string>(engine::params::max_excluded_views + 1)}};
   for (const auto& [where, value] : values) {
     SCOPED_TRACE(where);
     std::string pointer = "/" + where;

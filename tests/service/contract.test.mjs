@@ -75,6 +75,25 @@ describe('the program keeps the contract', () => {
     }
   });
 
+  test('the parameters of an edit are in the contract as the program describes them', async () => {
+    const { parameters } = (await service.client.get('/v1/info')).json();
+    const { properties } = document.components.schemas.Params;
+    assert.deepEqual(Object.keys(properties), parameters.map(({ name }) => name));
+    for (const { name, type, minimum, maximum, values, unit, defaults, description } of parameters) {
+      const schema = properties[name];
+      const words = (text) => text.replace(/\s+/g, ' ');
+      assert.deepEqual(schema.enum ?? null, values, name);
+      assert.equal(schema.type ?? (schema.enum && 'string'), type, name);
+      const [low, high] = type === 'array' ? [schema.minItems ?? 0, schema.maxItems] : [schema.minimum, schema.maximum];
+      assert.deepEqual([low ?? null, high ?? null], [minimum, maximum], name);
+      assert.ok(words(schema.description).startsWith(description), `${name}: ${schema.description}`);
+      if (unit) assert.match(schema.description, new RegExp(`\\b${unit}\\b`, 'i'), name);
+      const [first, ...others] = Object.values(defaults).map((value) => JSON.stringify(value));
+      const common = others.every((other) => other === first) && first !== 'null' ? first : undefined;
+      assert.equal(JSON.stringify(schema.default), common, `${name}: default`);
+    }
+  });
+
   test('the version in the contract is the version of the program', async () => {
     assert.equal((await service.client.get('/v1/info')).json().version, document.info.version);
   });

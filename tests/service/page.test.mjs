@@ -115,13 +115,17 @@ describe('the page', () => {
     await id('settings').locator('summary').click();
     const offered = (testid) => id(testid).locator('option:not([disabled])').evaluateAll((options) => options.map(({ value }) => value));
     assert.deepEqual(await offered('preset'), ['', 'draft', 'standard', 'paper']);
-    assert.deepEqual(await offered('corrector'), ['', 'none', 'scene'], 'what this build has');
+    assert.deepEqual(await offered('param-corrector'), ['', 'none', 'scene'], 'what this build has');
+    const { parameters } = (await client.get('/v1/info')).json();
+    for (const { name, type } of parameters)
+      assert.equal(await id(`param-${name.replaceAll('_', '-')}`).count(), type === 'array' ? 0 : 1, `a field for ${name}`);
     await id('preset').selectOption('draft');
-    await id('corrector').selectOption('scene');
+    assert.equal(await id('param-views').getAttribute('placeholder'), '24', 'what the preset says');
+    await id('param-corrector').selectOption('scene');
     await id('param-intervals').fill('20');
     await id('param-views').fill('4');
-    await id('param-image-side').fill('160');
-    await id('param-image-side').blur();
+    await id('param-max-image-side').fill('160');
+    await id('param-max-image-side').blur();
     await id('run').click();
     await id('tab-edits').waitFor();
     await page.waitForFunction(() => document.querySelector('[data-testid=thumb-1-0] img')?.naturalWidth > 0, null, { timeout: patience });

@@ -23,6 +23,32 @@ const CSP =
   "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; " +
   "form-action 'none'; base-uri 'none'; frame-ancestors 'none'";
 
+// --- parameters: some of each kind, as /v1/info describes them ------------------------------------------------------
+
+const parameter = (name, type, part, usual, more) => ({
+  name,
+  type,
+  minimum: null,
+  maximum: null,
+  values: null,
+  unit: null,
+  part,
+  defaults: { preview: usual, draft: usual, standard: usual, paper: usual },
+  description: `${name}, made up.`,
+  ...more,
+});
+const PARAMETERS = [
+  parameter("intervals", "integer", "motion", null, { minimum: 1, maximum: 20 }),
+  parameter("strength_final", "number", "correction", 0.3, { minimum: 0, maximum: 1 }),
+  parameter("views", "integer", "views", 50, { minimum: 1, maximum: 1000 }),
+  parameter("exclude_views", "array", "views", [], { minimum: 0, maximum: 1000 }),
+  parameter("max_image_side", "integer", "views", 512, { minimum: 16, maximum: 16384, unit: "pixels" }),
+  parameter("corrector", "string", "correction", "scene", { values: ["none", "scene", "sd"] }),
+  parameter("interpolation", "string", "motion", "rigid", { values: ["paper", "smooth", "rigid"] }),
+  parameter("rotate_sh", "boolean", "motion", true),
+  parameter("seed", "integer", "optimisation", 0, { minimum: 0, maximum: 2 ** 64 }),
+];
+
 // --- a scene of points --------------------------------------------------------------------------------------------
 
 /** Points {p, c, n}: a chequered floor, a large ball and two small ones. y points down. */
@@ -397,6 +423,7 @@ export function start({ port = 0, token = null, slow = 0, empty = false, tick = 
           pictures: ["png", "jpeg", "exr"],
         },
         presets: ["preview", "draft", "standard", "paper"],
+        parameters: PARAMETERS,
         limits: {
           upload_bytes: 2e9,
           json_bytes: 1 << 20,

@@ -4,7 +4,7 @@
 #include <chrono>
 #include <cstddef>
 
-#include "engine/edit/request.h"
+#include "engine/params/params.h"
 #include "proto/camera.h"
 #include "server/edits/edit_service.h"
 #include "server/http/router.h"
@@ -14,7 +14,7 @@ namespace server::service::routes {
 /// Most that a request may ask for.
 struct EditLimits {
   std::size_t handles = proto::max_handles;
-  int views = engine::edit::max_views;
+  int views = engine::params::max_views;
   int image_side = proto::max_camera_side;  ///< Pixels, of the pictures an edit works on.
 };
 

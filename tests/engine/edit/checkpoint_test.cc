@@ -90,6 +90,32 @@ TEST(Checkpoint, IsReadAsItWasWritten) {
   EXPECT_EQ(encode(*read), bytes) << "so nothing else was lost either";
 }
 
+/// A value that a parameter does not have by itself.
+void alter(int& value) { ++value; }
+void alter(double& value) { value /= 2; }
+void alter(std::uint64_t& value) { value += 1; }
+void alter(bool& value) { value = !value; }
+void alter(std::vector<std::string>& value) { value.emplace_back("another"); }
+template <Named Enum>
+void alter(Enum& value) {
+  const auto& all = names<Enum>;
+  value = all.back().value == value ? all.front().value : all.back().value;
+}
+
+TEST(Checkpoint, HoldsEveryParameter) {
+  Sample sample;
+  Params& written = sample.state.report.resolved;
+  params::for_each_parameter([&](const auto& parameter) {
+    const Params before = written;
+    alter(written.*parameter.value);
+    ASSERT_NE(written, before) << parameter.name;
+    sample.request.params.intervals = written.intervals;  // a state of another T is refused
+    const auto read = decode(encode(sample.state), sample.input, sample.request);
+    ASSERT_TRUE(read) << parameter.name;
+    EXPECT_EQ(read->report.resolved, written) << parameter.name;
+  });
+}
+
 TEST(Checkpoint, HoldsTheMembersAndNotTheFrozenRows) {
   const Sample sample;
   const working::Members members = working::members_of(sample.state.scene);

@@ -138,9 +138,9 @@ TEST(Extend, LeavesTheOriginalAndTheTrailAtHalfOpacity) {
 
 TEST(CopyAndPaste, AnOriginalFainterThanKeepKeepsItsBytes) {
   scene::GaussianCloud scene = ball_before_wall(2);
-  const float keep = keep_logit(Mode::move);
+  const float keep = working::keep_logit(Mode::move);
   EXPECT_NEAR(render::opacity<double>(keep), 0.01, 3e-9);
-  EXPECT_EQ(render::opacity<double>(keep_logit(Mode::extend)), 0.5);
+  EXPECT_EQ(render::opacity<double>(working::keep_logit(Mode::extend)), 0.5);
   scene.opacity_logit[0] = -7.5f;
   scene.opacity_logit[2] = 2.0f;
   const Dragged result = carry_out(scene, drag(DVec3(1, 0, 0), 1));

@@ -21,7 +21,7 @@ evaluate::Trial sample_trial() {
   trial.result.miss = 1e-9;
   trial.corrected_views = {40, 11};
   trial.seconds = 0.1 + 0.2;
-  trial.stages = {{"views", 0.1}, {"assign", 0.2}};
+  trial.stages = {{engine::edit::Stage::views, 0.1}, {engine::edit::Stage::assign, 0.2}};
   trial.peak_memory_bytes = std::uint64_t{1} << 40;
   trial.warnings = {"one", "two"};
   return trial;
@@ -33,7 +33,7 @@ TEST(BenchReport, ATrialComesBackAsItWas) {
   decode(nlohmann::ordered_json::parse(written.dump()), read);
   EXPECT_EQ(encode(read).dump(), written.dump());
   EXPECT_EQ(read.seconds, 0.1 + 0.2);
-  EXPECT_EQ(read.stages.front().stage, "views");
+  EXPECT_EQ(read.stages.front().stage, engine::edit::Stage::views);
 }
 
 TEST(BenchReport, ATripComesBackAsItWas) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/params/params.h"
 #include "tests/support/data.h"
 
 namespace server::cli {
@@ -54,6 +55,17 @@ TEST(Program, HelpShowsDefaultsUnitsAndVariables) {
   EXPECT_EQ(run.status, 0);
   for (const char* part : {"=800x600", "degrees", "=50", "SPLATDRAG_MAX_SIDE", "=color"})
     EXPECT_NE(run.out.find(part), std::string::npos) << part << "\n" << run.out;
+}
+
+TEST(Program, HelpListsTheParametersOfARequest) {
+  const Finished edit = splatdrag({"edit", "--help"}), bench = splatdrag({"bench-edit", "--help"});
+  engine::params::for_each_parameter([&](const auto& parameter) {
+    EXPECT_EQ(edit.out.find("\n  " + std::string(parameter.name) + ": ") != std::string::npos, parameter.on_wire)
+        << parameter.name;
+    std::string option = "\n  --" + std::string(parameter.name);
+    std::ranges::replace(option, '_', '-');
+    EXPECT_EQ(bench.out.find(option) != std::string::npos, parameter.on_wire) << parameter.name;
+  });
 }
 
 TEST(Program, SaysItsVersion) {

@@ -196,7 +196,7 @@ engine::scene::GaussianCloud kept_after(scenes::SceneStore& store, int kept) {
     return {};
   };
   observer.keep = [&] { return done == kept; };
-  const auto outcome = value(engine::edit::run(input, {}, value(to_engine(long_edit())), observer));
+  const auto outcome = value(engine::edit::run(input, {}, value(to_engine(long_edit())), {}, observer));
   return engine::scene::flatten(input, outcome.overlay);
 }
 

@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 
-import { ImportError, partOf, previewKey, readRequests, requestOf } from "../../../web/requests.js";
+import { ImportError, labelOf, partOf, previewKey, readRequests, requestOf, usualValue } from "../../../web/requests.js";
 
 const example = (name) => readFileSync(new URL(`../../../proto/examples/${name}`, import.meta.url), "utf8");
 const only = (text) => {
@@ -127,10 +127,32 @@ test("a preview is stale when what it shows has changed, and only then", () => {
     handles: [{ source: [0, 0, 0], radius: 1, group: 0 }],
     params: {},
   };
-  assert.equal(previewKey(base), previewKey({ ...base, params: { views: 10, seed: 4, max_image_side: 256 } }));
-  assert.notEqual(previewKey(base), previewKey({ ...base, mode: "extend" }));
-  assert.notEqual(previewKey(base), previewKey({ ...base, params: { intervals: 3 } }));
-  assert.notEqual(previewKey(base), previewKey({ ...base, handles: [{ ...base.handles[0], radius: 2 }] }));
+  const parameters = [
+    { name: "intervals", part: "motion" },
+    { name: "rotation", part: "motion" },
+    { name: "views", part: "views" },
+    { name: "seed", part: "optimisation" },
+  ];
+  const key = (change) => previewKey({ ...base, ...change }, parameters);
+  assert.equal(key({}), key({ params: { views: 10, seed: 4 } }));
+  assert.notEqual(key({}), key({ mode: "extend" }));
+  assert.notEqual(key({}), key({ params: { intervals: 3 } }));
+  assert.equal(
+    key({ params: { intervals: 3, rotation: "none" } }),
+    key({ params: { rotation: "none", intervals: 3 } }),
+    "in whatever order they were chosen",
+  );
+  assert.notEqual(key({}), key({ params: { unheard_of: 1 } }), "it might be of the motion");
+  assert.notEqual(key({}), key({ handles: [{ ...base.handles[0], radius: 2 }] }));
+});
+
+test("a parameter is named for people, and its default is that of the preset", () => {
+  assert.equal(labelOf("max_image_side"), "Max image side");
+  const views = { name: "views", defaults: { preview: 50, draft: 24, standard: 50, paper: 50 } };
+  assert.equal(usualValue(views, "draft"), 24);
+  assert.equal(usualValue(views, ""), 50, "no preset is standard");
+  assert.equal(usualValue({ name: "intervals", defaults: { standard: null } }, ""), null, "as the drag asks for");
+  assert.equal(usualValue({ name: "rotate_sh", defaults: { standard: false } }, null), false);
 });
 
 test("an error's address leads to the part of the page it is about", () => {

@@ -1,0 +1,66 @@
+// What can be chosen about an edit from a few words. Each enumeration exists once, with the names it has on the wire.
+#pragma once
+
+#include <array>
+
+#include "engine/core/names.h"
+#include "engine/deform/choices.h"
+
+namespace engine::params {
+
+using deform::Interpolation;
+using deform::Rotation;
+
+enum class Mode {
+  move,    ///< The dragged part leaves its place.
+  extend,  ///< It is drawn out: the original and the trail stay.
+};
+constexpr auto names_of(Mode) { return std::array{Name{Mode::move, "move"}, Name{Mode::extend, "extend"}}; }
+
+/// A name for a set of parameters. How their numbers were found: docs/tradeoff.md.
+enum class Preset {
+  preview,   ///< Only deforms.
+  draft,     ///< Corrects and optimises, soon.
+  standard,  ///< The same, well.
+  paper,     ///< With the numbers of the paper.
+};
+constexpr auto names_of(Preset) {
+  return std::array{Name{Preset::preview, "preview"}, Name{Preset::draft, "draft"}, Name{Preset::standard, "standard"},
+                    Name{Preset::paper, "paper"}};
+}
+
+/// How the strength of a correction falls from the first of an interval to the last, number A.
+enum class Annealing {
+  linear,  ///< It reaches the final value: S_init - (a - 1) / (A - 1) (S_init - S_final).
+  paper,   ///< As printed: (a - 1) / A in its place, so that the final value is never reached.
+};
+constexpr auto names_of(Annealing) {
+  return std::array{Name{Annealing::linear, "linear"}, Name{Annealing::paper, "paper"}};
+}
+
+/// What repairs the pictures that the optimisation is to reach.
+enum class Corrector {
+  none,
+  scene,  ///< Patches of the scene's own pictures.
+  sd,     ///< A diffusion model.
+};
+constexpr auto names_of(Corrector) {
+  return std::array{Name{Corrector::none, "none"}, Name{Corrector::scene, "scene"}, Name{Corrector::sd, "sd"}};
+}
+
+/// The loss that compares pictures as people do.
+enum class Perceptual { msssim, lpips };
+constexpr auto names_of(Perceptual) {
+  return std::array{Name{Perceptual::msssim, "msssim"}, Name{Perceptual::lpips, "lpips"}};
+}
+
+/// What pixels outside of the masks are held to.
+enum class Background {
+  render,  ///< What the scene looked like there.
+  photo,   ///< The photos of the dataset.
+};
+constexpr auto names_of(Background) {
+  return std::array{Name{Background::render, "render"}, Name{Background::photo, "photo"}};
+}
+
+}  // namespace engine::params
