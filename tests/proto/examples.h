@@ -9,7 +9,7 @@
 namespace proto {
 
 inline std::string example(const std::string& name) {
-  return support::read_file(std::filesystem::path(__FILE__).parent_path() / "../../proto/examples" / name);
+  return support::read_file(std::filesystem::path(SPLATDRAG_SOURCE_DIR) / "proto/examples" / name);
 }
 
 }  // namespace proto
