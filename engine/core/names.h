@@ -20,6 +20,9 @@ struct Name {
   std::string_view text;
 };
 
+template <class E>
+Name(E, const char*) -> Name<E>;  // a compiler before aggregates' deduction (P1816) needs to be told
+
 /// An enumeration whose values have names.
 template <class E>
 concept Named = requires {

@@ -19,6 +19,11 @@ std::array<std::uint32_t, 4> philox4x32(std::array<std::uint32_t, 4> c, std::arr
   return c;
 }
 
+std::uint64_t derived_seed(std::uint64_t seed, std::array<std::uint32_t, 4> purpose) noexcept {
+  const auto words = philox4x32(purpose, {std::uint32_t(seed), std::uint32_t(seed >> 32)});
+  return std::uint64_t(words[1]) << 32 | words[0];
+}
+
 std::uint32_t Rng::next() noexcept {
   if (used_ == 4) {
     words_ = philox4x32({std::uint32_t(block_), std::uint32_t(block_ >> 32), std::uint32_t(stream_),

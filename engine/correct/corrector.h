@@ -53,7 +53,7 @@ class Corrector {
 
   /// Corrected pictures, one for each. Pixels outside the mask, and trusted ones, are those given.
   ///   strength  S, 0 to 1: how much of what is doubtful is made anew; 1 all of it, 0 nothing
-  ///   seed      same seed, same bytes, for any number of threads
+  ///   seed      same seed, same bytes, for any number of threads. The next million are this call's too.
   [[nodiscard]] virtual Result<std::vector<scene::Image>> correct(std::span<const Flawed> views, double strength,
                                                                   std::uint64_t seed) = 0;
 };

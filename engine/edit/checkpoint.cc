@@ -287,8 +287,7 @@ Result<State> decode(std::string_view text, const scene::GaussianCloud& input, c
   if (!is_of(request, *contents))
     return fail(ErrorCode::invalid_argument, "the checkpoint is of another edit", "checkpoint");
   auto scene = working::restore(contents->members, input, frame_of(request));
-  if (!scene)
-    return fail(ErrorCode::invalid_argument, "the checkpoint is of an edit of another scene", "checkpoint");
+  if (!scene) return fail(ErrorCode::invalid_argument, "the checkpoint is of an edit of another scene", "checkpoint");
   contents->state.scene = std::move(*scene);
   return std::move(contents->state);
 }

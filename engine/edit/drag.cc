@@ -45,8 +45,8 @@ DraggedAlone drag_alone(std::vector<std::uint32_t> rows, const scene::GaussianCl
   working::HandleColumn own_handle;
   for (const std::uint32_t row : rows) own_handle.push_back(handle[row]);
   const working::Frame frame = frame_of(request);
-  DraggedAlone drag{std::move(rows), WorkingScene(gaussians, frame, std::move(own_handle)),
-                    handle_sources(frame, request), {}};
+  DraggedAlone drag{
+      std::move(rows), WorkingScene(gaussians, frame, std::move(own_handle)), handle_sources(frame, request), {}};
   for (int u = 1; u <= intervals; ++u) {
     const PlannedMotion motion = plan_motion(drag.working, request, drag.positions, u, intervals);
     copy_and_paste(drag.working, motion, request.mode, rotate_sh);

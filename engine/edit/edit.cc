@@ -48,8 +48,7 @@ Result<void> show(const State& state, Edit& edit, int u, const char* moment,
   if (!edit.observer.moment) return {};
   if (auto going = edit.progress.enter(Stage::renders, u); !going) return going;
   const Published published = publish(state.scene, edit.input, edit.request.mode);
-  return edit.observer.moment(
-      {u, state.report.resolved.intervals, moment, published.overlay, state.views, pictures});
+  return edit.observer.moment({u, state.report.resolved.intervals, moment, published.overlay, state.views, pictures});
 }
 
 /// 1. Assign: P_h^i, the start of the 3D mask M. 2. Intervals: T, and the handles at their sources.
@@ -126,8 +125,12 @@ repair::Repair make_repair(const State& state, const Edit& edit) {
       out.push_back(scene::fit_within(frame.edit_from_world(camera), edit.params().max_image_side));
     return out;
   };
-  return {frame.edit_from_world(edit.input), in_frame(edit.candidates), in_frame(state.views), edit.request.mode,
-          edit.params().seed,                *edit.corrector};
+  return {frame.edit_from_world(edit.input),
+          in_frame(edit.candidates),
+          in_frame(state.views),
+          edit.request.mode,
+          edit.params().seed,
+          *edit.corrector};
 }
 
 /// 7. without a corrector: I_e is what the deformation shows. In a move that is the scene without what has left: a
@@ -153,8 +156,8 @@ Result<repair::Corrected> correct(State& state, Edit& edit, std::span<const scen
   if (edit.corrector == nullptr) return uncorrected(state, edit);
   if (auto going = edit.progress.enter(Stage::correct, round.interval); !going) return propagate(going);
   if (!edit.repair) edit.repair.emplace(make_repair(state, edit));
-  auto corrected = edit.repair->correct(state.scene, masks, round,
-                                        [&](double part) { return edit.progress.advance(part); });
+  auto corrected =
+      edit.repair->correct(state.scene, masks, round, [&](double part) { return edit.progress.advance(part); });
   if (corrected) state.report.seeds += corrected->seeds;
   return corrected;
 }
@@ -301,7 +304,11 @@ Result<Outcome> run(const scene::GaussianCloud& scene, std::span<const scene::Ca
   if (const auto valid = validate(request); !valid) return propagate(valid);
   if (const auto valid = validate_cameras(cameras); !valid) return propagate(valid);
   optim::MsSsimLoss ms_ssim;
-  Edit edit{scene, request, observer, tools.perceptual != nullptr ? *tools.perceptual : ms_ssim, tools.corrector,
+  Edit edit{scene,
+            request,
+            observer,
+            tools.perceptual != nullptr ? *tools.perceptual : ms_ssim,
+            tools.corrector,
             ProgressMeter(observer, workload_of(request, tools, observer),
                           from ? from->report.times : std::vector<StageTime>())};
   Result<State> state = begin(edit, cameras, std::move(from));

@@ -22,8 +22,8 @@ namespace engine::edit {
 
 /// What an edit works with; they outlive it.
 struct Tools {
-  correct::Corrector* corrector = nullptr;       ///< Null: `none`, the optimisation keeps what the deformation shows.
-  optim::PerceptualLoss* perceptual = nullptr;   ///< The loss inside masks; null: optim::MsSsimLoss.
+  correct::Corrector* corrector = nullptr;      ///< Null: `none`, the optimisation keeps what the deformation shows.
+  optim::PerceptualLoss* perceptual = nullptr;  ///< The loss inside masks; null: optim::MsSsimLoss.
 };
 
 struct Outcome {

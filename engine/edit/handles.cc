@@ -67,14 +67,15 @@ std::vector<deform::Drag> interval_drags(const working::Frame& frame, const Requ
     const Handle& handle = request.handles[i];
     deform::Drag drag{positions[i], positions[i], handle.group, !handle.target};
     if (handle.target)
-      drag.target = deform::interval_target(frame.edit_from_world(handle.source),
-                                            frame.edit_from_world(*handle.target), u, intervals);
+      drag.target = deform::interval_target(frame.edit_from_world(handle.source), frame.edit_from_world(*handle.target),
+                                            u, intervals);
     drags.push_back(drag);
   }
   return drags;
 }
 
-std::vector<std::size_t> relocate(const working::WorkingScene& working, const Request& request, std::vector<DVec3>& positions) {
+std::vector<std::size_t> relocate(const working::WorkingScene& working, const Request& request,
+                                  std::vector<DVec3>& positions) {
   std::vector<DVec3> moved(positions.size(), DVec3(0.0));  // weighted sums
   std::vector<double> weight(positions.size(), 0.0);
   for (std::size_t row = 0; row < working.size(); ++row) {

@@ -16,8 +16,8 @@ namespace engine::edit {
 /// T as the request sets it; or the longest drag over the radius of its handle, in an extend over the diameter.
 [[nodiscard]] int resolved_intervals(const Request& request);
 
-/// Every group is shifted and turned as one piece, no anchor holds a part of it back, and the parameters (`rigid`, by the
-/// shortest arc) keep it one piece: one step carries it there. Without handles: false.
+/// Every group is shifted and turned as one piece, no anchor holds a part of it back, and the parameters (`rigid`, by
+/// the shortest arc) keep it one piece: one step carries it there. Without handles: false.
 [[nodiscard]] bool one_interval_is_exact(const Request& request);
 
 /// The frame in which a drag is carried out: the world's own, unless the handles lie far from its origin compared with
@@ -39,6 +39,7 @@ namespace engine::edit {
 /// follow its neighbours too; the next interval starts from where the part really is.
 /// An anchor marks a place, so it stays. A handle none of whose Gaussians is left stays too.
 ///   returns  the handles that have lost all their Gaussians
-std::vector<std::size_t> relocate(const working::WorkingScene& working, const Request& request, std::vector<DVec3>& positions);
+std::vector<std::size_t> relocate(const working::WorkingScene& working, const Request& request,
+                                  std::vector<DVec3>& positions);
 
 }  // namespace engine::edit

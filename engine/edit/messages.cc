@@ -9,8 +9,8 @@ std::string no_view_sees_it() { return "no view sees the edited part"; }
 std::string no_view_to_exclude(const std::string& name) { return "there is no view \"" + name + "\" to exclude"; }
 
 std::string handle_lost(std::size_t handle, int interval) {
-  return "handle " + std::to_string(handle + 1) + " has lost all its Gaussians in interval " + std::to_string(interval) +
-         " and stays where it is";
+  return "handle " + std::to_string(handle + 1) + " has lost all its Gaussians in interval " +
+         std::to_string(interval) + " and stays where it is";
 }
 
 std::string faint_left_out(std::size_t copies) {

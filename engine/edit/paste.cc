@@ -25,8 +25,8 @@ std::vector<std::uint32_t> copy_and_paste(WorkingScene& working, const PlannedMo
       left_behind.push_back(row);
     }
   }
-  working.append(working.cloud(), left_behind,
-                 std::vector<working::Role>(left_behind.size(), working::Role::copy), left_behind);
+  working.append(working.cloud(), left_behind, std::vector<working::Role>(left_behind.size(), working::Role::copy),
+                 left_behind);
   for (const std::uint32_t row : left_behind) {
     float& logit = working.gaussians().opacity_logit[row];
     logit = std::min(logit, working::keep_logit(mode));

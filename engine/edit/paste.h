@@ -13,7 +13,8 @@ namespace engine::edit {
 
 /// Carries out a motion that was planned for this very scene:
 /// - a Gaussian that does not move is not copied and stays in P_h;
-/// - an input row that moves gets a deformed copy, which takes its place in P_h. The row stays as an original at opacity
+/// - an input row that moves gets a deformed copy, which takes its place in P_h. The row stays as an original at
+/// opacity
 ///   min(alpha, keep); if alpha is below keep its bytes stay as they are;
 /// - a copy that moves again: in a move its successor replaces it (same row); in an extend it stays as the trail, at
 ///   min(alpha, keep), and its successor is a new row.

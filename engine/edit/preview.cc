@@ -19,8 +19,8 @@ Result<PreviewOutcome> preview(const scene::LayeredCloud& scene, const Request& 
 
   std::vector<std::uint32_t> rows = dragged_rows(assignment->handle);
   const scene::GaussianCloud dragged = scene::gather(scene, rows);
-  DraggedAlone drag = drag_alone(std::move(rows), dragged, assignment->handle, request, outcome.intervals,
-                                 request.params.rotate_sh);
+  DraggedAlone drag =
+      drag_alone(std::move(rows), dragged, assignment->handle, request, outcome.intervals, request.params.rotate_sh);
   Published published = publish(drag.working, dragged, request.mode);
 
   outcome.overlay = std::move(published.overlay);

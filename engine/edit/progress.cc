@@ -13,17 +13,17 @@ ProgressMeter::ProgressMeter(const Observer& observer, const Workload& work, std
 }
 
 void ProgressMeter::go_on_after(int interval) {
-  const auto last = std::find_if(plan_.rbegin(), plan_.rend(),
-                                 [&](const PlannedStage& entry) { return entry.interval == interval; });
+  const auto last =
+      std::find_if(plan_.rbegin(), plan_.rend(), [&](const PlannedStage& entry) { return entry.interval == interval; });
   at_ = next_ = std::size_t(plan_.rend() - last);
 }
 
 Result<void> ProgressMeter::enter(Stage stage, int interval) {
   end_stage();
   entered_ = true;
-  const auto planned =
-      std::find_if(plan_.begin() + std::ptrdiff_t(next_), plan_.end(),
-                   [&](const PlannedStage& entry) { return entry.stage == stage && (entry.interval == interval || entry.interval == 0); });
+  const auto planned = std::find_if(plan_.begin() + std::ptrdiff_t(next_), plan_.end(), [&](const PlannedStage& entry) {
+    return entry.stage == stage && (entry.interval == interval || entry.interval == 0);
+  });
   if (planned != plan_.end()) at_ = std::size_t(planned - plan_.begin()), next_ = at_ + 1;
   progress_.stage = stage;
   progress_.interval = interval;

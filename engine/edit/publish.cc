@@ -15,8 +15,8 @@ namespace {
 using working::Mode;
 using working::Role;
 
-/// Opacity from which on an original was asked for by the pictures, and not lifted by noise: Adam takes no notice of how
-/// small a gradient is. What is asked for heads for the opacity it had; noise made of 0.01 at most 0.017 in 200
+/// Opacity from which on an original was asked for by the pictures, and not lifted by noise: Adam takes no notice of
+/// how small a gradient is. What is asked for heads for the opacity it had; noise made of 0.01 at most 0.017 in 200
 /// iterations, and of nine in ten less than 0.05 in 500 (the demo scene's leaf, `draft` and `standard`, without a
 /// corrector). The price: an original that was fainter than this before does not come back.
 constexpr double wanted_back = 0.05;

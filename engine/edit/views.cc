@@ -109,8 +109,8 @@ Result<ViewChoice> choose_views(const WorkingScene& begun, const scene::Gaussian
   render::Layers layers(begun.cloud());
   layers.top = &dry.top;
   layers.hidden = layers.changed = dry.changed;
-  const auto targets = covered_areas(layers, begun.frame(), dry.copies, candidates,
-                                     [&](double part) { return advance(part / 2); });
+  const auto targets =
+      covered_areas(layers, begun.frame(), dry.copies, candidates, [&](double part) { return advance(part / 2); });
   if (!targets) return propagate(targets);
   const auto sources = covered_areas(begun.cloud(), begun.frame(), dry.parents, candidates,
                                      [&](double part) { return advance((1 + part) / 2); });
@@ -119,8 +119,7 @@ Result<ViewChoice> choose_views(const WorkingScene& begun, const scene::Gaussian
   const DVec3 middle = middle_of(request);
   std::vector<views::Candidate> rated;
   for (std::size_t i = 0; i < candidates.size(); ++i)
-    rated.push_back(
-        {candidates[i].name, (*sources)[i], (*targets)[i], direction_to(candidates[i].centre(), middle)});
+    rated.push_back({candidates[i].name, (*sources)[i], (*targets)[i], direction_to(candidates[i].centre(), middle)});
   for (const std::size_t i : views::choose_views(rated, request.params.views, request.params.exclude_views))
     choice.views.push_back(scene::fit_within(candidates[i], request.params.max_image_side));
   return choice;

@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <utility>
 
+#include "engine/core/rng.h"
+#include "engine/mask/mask.h"
+#include "engine/render/forward.h"
 #include "engine/repair/seed.h"
 #include "engine/repair/surfaces.h"
 #include "engine/repair/trust.h"
 #include "engine/repair/view_order.h"
-#include "engine/mask/mask.h"
-#include "engine/render/forward.h"
 #include "engine/train/densify.h"
 #include "engine/working/footprint.h"
 
@@ -49,12 +50,10 @@ class OpaqueTrail {
   std::vector<float> lowered_;  ///< Opacities as they were; seeds appended since have none.
 };
 
-/// Where the random choices of a view in a correction begin.
-std::uint64_t key_of(std::uint64_t seed, const Round& round, std::size_t v) {
-  return seed + std::uint64_t(round.interval) * 0x10001 + std::uint64_t(round.correction) * 0x101 + v * 0x1000003;
-}
-
 }  // namespace
+
+/// What random choices are made for, in each view of each correction.
+enum class Repair::Purpose : std::uint32_t { surfaces, background, view };
 
 /// What a view shows now, without the rows that are hidden.
 struct Repair::ViewNow {
@@ -87,7 +86,7 @@ Repair::ViewNow Repair::look(const WorkingScene& working, std::span<const std::u
   render::Rendering now;
   render::forward(layers, view, options, trust_, workspace_, now);
   ViewNow seen{std::move(now.color), std::move(now.weight), std::move(now.median_depth),
-            scene::Mask(view.width, view.height)};
+               scene::Mask(view.width, view.height)};
   for (std::size_t i = 0; i < now.alpha.data.size(); ++i) {
     float& depth = seen.inverse_depth.data[i];
     depth = depth > 0 ? 1 / depth : 0;
@@ -97,15 +96,20 @@ Repair::ViewNow Repair::look(const WorkingScene& working, std::span<const std::u
   return seen;
 }
 
+std::uint64_t Repair::seed_for(Purpose purpose, std::size_t v, const Round& round) const {
+  return derived_seed(seed_, {std::uint32_t(purpose), std::uint32_t(v), std::uint32_t(round.interval),
+                              std::uint32_t(round.correction)});
+}
+
 Result<scene::Image> Repair::ask_corrector(scene::Image picture, const scene::Mask& mask, scene::Image trust,
-                                           std::size_t v, double strength, std::uint64_t key) {
+                                           std::size_t v, const Round& round, Purpose purpose) {
   const correct::Flawed flawed{std::move(picture), mask, std::move(trust), nearest_views(views_, v, most_examples)};
-  auto pictures = corrector_.correct(std::span(&flawed, 1), strength, key);
+  auto pictures = corrector_.correct(std::span(&flawed, 1), round.strength, seed_for(purpose, v, round));
   if (!pictures) return propagate(pictures);
   return std::move(pictures->front());
 }
 
-scene::Image Repair::surfaces_behind(const ViewNow& now, std::size_t v, std::uint64_t key) const {
+scene::Image Repair::surfaces_behind(const ViewNow& now, std::size_t v, const Round& round) const {
   const scene::Camera& view = views_[v];
   SurfaceView surface_view{now.inverse_depth, now.reliable, vacated_[v], scene::Mask(view.width, view.height)};
   for (std::size_t i = 0; i < now.trust.data.size(); ++i)
@@ -113,21 +117,21 @@ scene::Image Repair::surfaces_behind(const ViewNow& now, std::size_t v, std::uin
   const auto is_free_at = [&](DVec2 pixel, double inverse_depth) {
     return is_free(point_at(view, pixel, inverse_depth), unedited_, views_);
   };
-  return continued_surfaces(surface_view, is_free_at, key);
+  return continued_surfaces(surface_view, is_free_at, seed_for(Purpose::surfaces, v, round));
 }
 
 Result<Repair::Background> Repair::complete_background(WorkingScene& working, const Rows& rows, std::size_t v,
-                                                       double strength, std::uint64_t key) {
+                                                       const Round& round) {
   const scene::Camera& view = views_[v];
   ViewNow now = look(working, rows.dragged, v);
-  const scene::Image surface = surfaces_behind(now, v, key);
+  const scene::Image surface = surfaces_behind(now, v, round);
   Background background{{}, scene::Mask(view.width, view.height), 0};
   bool goes_on = false;
   for (std::size_t i = 0; i < surface.data.size(); ++i) {
     if (surface.data[i] > 0) now.trust.data[i] = 0, goes_on = true;
     background.filled.data[i] = vacated_[v].data[i] != 0 && now.trust.data[i] < correct::trusted;
   }
-  auto picture = ask_corrector(std::move(now.color), vacated_[v], std::move(now.trust), v, strength, key);
+  auto picture = ask_corrector(std::move(now.color), vacated_[v], std::move(now.trust), v, round, Purpose::background);
   if (!picture) return propagate(picture);
   background.picture = std::move(*picture);
   if (goes_on) background.seeds = add_seeds(working, view, surface, background.picture, inputs());
@@ -136,7 +140,7 @@ Result<Repair::Background> Repair::complete_background(WorkingScene& working, co
 }
 
 Result<scene::Image> Repair::correct_view(const WorkingScene& working, const Rows& rows, const Background& background,
-                                          const scene::Mask& mask, std::size_t v, double strength, std::uint64_t key) {
+                                          const scene::Mask& mask, std::size_t v, const Round& round) {
   ViewNow now = look(working, rows.gone, v);
   if (!rows.gone.empty()) {
     const scene::Image share = working::footprint(working.cloud(), rows.moved, views_[v], workspace_);
@@ -152,7 +156,7 @@ Result<scene::Image> Repair::correct_view(const WorkingScene& working, const Row
     }
   }
   for (float& trust : now.trust.data) trust = std::min(trust / half_seen, 1.0f);
-  return ask_corrector(std::move(now.color), mask, std::move(now.trust), v, strength, key);
+  return ask_corrector(std::move(now.color), mask, std::move(now.trust), v, round, Purpose::view);
 }
 
 Result<Corrected> Repair::correct(WorkingScene& working, std::span<const scene::Mask> masks, const Round& round,
@@ -167,15 +171,14 @@ Result<Corrected> Repair::correct(WorkingScene& working, std::span<const scene::
   const OpaqueTrail opaque(working, original_, mode_);
   for (std::size_t k = 0; k < order.size(); ++k) {
     const std::size_t v = order[k];
-    const std::uint64_t key = key_of(seed_, round, v);
     Background background;
     if (!rows.gone.empty()) {
-      auto completed = complete_background(working, rows, v, round.strength, key);
+      auto completed = complete_background(working, rows, v, round);
       if (!completed) return propagate(completed);
       background = std::move(*completed);
       corrected.seeds += background.seeds;
     }
-    auto picture = correct_view(working, rows, background, masks[v], v, round.strength, key + 1);
+    auto picture = correct_view(working, rows, background, masks[v], v, round);
     if (!picture) return propagate(picture);
     corrected.pictures[v] = std::move(*picture);
     if (auto going = advance(double(k + 1) / double(order.size())); !going) return propagate(going);

@@ -62,6 +62,7 @@ class Repair {
 
  private:
   struct ViewNow;
+  enum class Purpose : std::uint32_t;
   struct Rows {
     std::vector<std::uint32_t> gone;     ///< Left their place, in a move.
     std::vector<std::uint32_t> moved;    ///< Copies.
@@ -81,14 +82,16 @@ class Repair {
   /// I_e of view v: what it shows now, what was filled in as it was filled in, and the rest corrected as well.
   [[nodiscard]] Result<scene::Image> correct_view(const WorkingScene& working, const Rows& rows,
                                                   const Background& background, const scene::Mask& mask, std::size_t v,
-                                                  double strength, std::uint64_t key);
+                                                  const Round& round);
   [[nodiscard]] Result<scene::Image> ask_corrector(scene::Image picture, const scene::Mask& mask, scene::Image trust,
-                                                   std::size_t v, double strength, std::uint64_t key);
+                                                   std::size_t v, const Round& round, Purpose purpose);
+  /// The seed of these choices; a corrector counts up from it.
+  [[nodiscard]] std::uint64_t seed_for(Purpose purpose, std::size_t v, const Round& round) const;
   /// Inverse depth of the surfaces that go on behind the dragged part in view v; 0 where none does.
-  [[nodiscard]] scene::Image surfaces_behind(const ViewNow& now, std::size_t v, std::uint64_t key) const;
+  [[nodiscard]] scene::Image surfaces_behind(const ViewNow& now, std::size_t v, const Round& round) const;
   /// Lays what goes on behind the dragged part into the working scene as seeds.
   [[nodiscard]] Result<Background> complete_background(WorkingScene& working, const Rows& rows, std::size_t v,
-                                                       double strength, std::uint64_t key);
+                                                       const Round& round);
   [[nodiscard]] const neighbours::PointIndex& inputs();
 
   scene::GaussianCloud original_;

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include "engine/working/working_scene.h"
 
-
 namespace engine::repair {
 
 using working::WorkingScene;

@@ -27,8 +27,7 @@ std::vector<std::size_t> nearest_views(std::span<const scene::Camera> views, std
   for (const scene::Camera& view : views) distance.push_back(glm::distance(view.centre(), views[to].centre()));
   std::vector<std::size_t> order(views.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return distance[a] < distance[b]; });
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return distance[a] < distance[b]; });
   order.resize(std::min(order.size(), count));
   return order;
 }

@@ -52,8 +52,8 @@ scene::Rect touched_rect(const render::Layers& layers, std::span<const std::uint
   return rect.empty() ? scene::Rect{} : rect;
 }
 
-scene::Image footprint(const render::Layers& layers, std::span<const std::uint32_t> rows,
-                       const scene::Camera& camera, render::Workspace& workspace) {
+scene::Image footprint(const render::Layers& layers, std::span<const std::uint32_t> rows, const scene::Camera& camera,
+                       render::Workspace& workspace) {
   scene::Image picture(camera.width, camera.height, 1);
   const scene::Rect rect = touched_rect(layers, rows, camera);
   if (rect.empty()) return picture;

@@ -86,8 +86,7 @@ class WorkingScene {
 
  private:
   friend Members members_of(const WorkingScene& working);
-  friend Result<WorkingScene> restore(const Members& members, const scene::GaussianCloud& input,
-                                      const Frame& frame);
+  friend Result<WorkingScene> restore(const Members& members, const scene::GaussianCloud& input, const Frame& frame);
 
   Frame frame_;
   std::size_t input_rows_ = 0;

@@ -144,6 +144,10 @@ TEST(Repair, EveryCorrectionHasSeedsOfItsOwn) {
     pictures += moved.corrector.seeds.size();
   }
   EXPECT_EQ(seeds.size(), pictures);
+  std::uint64_t before = 0;
+  for (const std::uint64_t seed : seeds) {  // ascending
+    EXPECT_GT(seed - std::exchange(before, seed), 1'000'000u) << "a corrector counts up from the seed it is given";
+  }
 }
 
 TEST(Repair, TheBufferIsTheUneditedSceneWithoutTheBlockInItsPlace) {
