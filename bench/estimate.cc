@@ -83,7 +83,7 @@ class Service {
                                           std::vector<engine::scene::Camera> cameras) {
     const path there = folder_ / "root" / name;
     std::filesystem::create_directories(there / "sparse" / "0");
-    succeed(server::write_colmap_text(there / "sparse" / "0", cameras, cloud));
+    succeed(server::cli::write_colmap_text(there / "sparse" / "0", cameras, cloud));
     io::SceneFile file{std::move(cloud), {}};
     file.layout = io::inria_layout(file.cloud.sh_degree);
     succeed(io::write_scene(there / "scene.ply", file, io::SceneFormat::ply));
@@ -134,7 +134,7 @@ proto::Handle handle(proto::Point from, std::optional<proto::Point> to, double r
 
 std::vector<Sample> demo_samples(Service& service) {
   auto demo = engine::procedural::make_demo_scene();
-  const EditRequest ball = server::to_request(demo.drags[0]), leaf = server::to_request(demo.drags[1]);
+  const EditRequest ball = server::cli::to_request(demo.drags[0]), leaf = server::cli::to_request(demo.drags[1]);
   const auto [id, bare] = service.add("demo", std::move(demo.cloud), std::move(demo.cameras));
   EditRequest drawn = ball, large = ball;
   drawn.mode = proto::Mode::extend;

@@ -175,10 +175,7 @@ repair::Corrected uncorrected(const State& state, const Edit& edit) {
 /// 7. Correct: I_e of each view, and seeds where a surface goes on that nobody has seen.
 Result<repair::Corrected> correct(State& state, Edit& edit, std::span<const scene::Mask> masks,
                                   const repair::Round& round) {
-  if (edit.corrector == nullptr) {
-    if (auto going = edit.progress.enter(Stage::set_up, round.interval); !going) return propagate(going);
-    return uncorrected(state, edit);
-  }
+  if (edit.corrector == nullptr) return repair::Corrected{};
   if (!edit.repair) {
     if (auto going = edit.progress.enter(Stage::observe, round.interval); !going) return propagate(going);
     edit.repair.emplace(make_repair(state, edit));
@@ -192,8 +189,9 @@ Result<repair::Corrected> correct(State& state, Edit& edit, std::span<const scen
 
 /// 8. Optimise: M towards the corrected views inside the masks, towards the unedited scene outside.
 Result<double> optimise(State& state, Edit& edit, std::span<const scene::Mask> masks,
-                        const repair::Corrected& corrected, const repair::Round& round) {
+                        repair::Corrected corrected, const repair::Round& round) {
   if (auto going = edit.progress.enter(Stage::set_up, round.interval); !going) return propagate(going);
+  if (edit.corrector == nullptr) corrected = uncorrected(state, edit);
   const int before = (round.correction - 1) * edit.params().iterations;
   const auto advance = [&](const OptimiseProgress& at) {
     if (at.set_up < 1) return edit.progress.advance(at.set_up);
@@ -212,11 +210,11 @@ Result<void> correct_and_optimise(State& state, Edit& edit, int u) {
   const int corrections = edit.params().annealing_steps;
   for (int a = 1; a <= corrections; ++a) {
     const repair::Round round{u, a, strength_of(edit.params(), a)};
-    const auto corrected = correct(state, edit, masks, round);
+    auto corrected = correct(state, edit, masks, round);
     if (!corrected) return propagate(corrected);
     if (a == corrections && edit.corrector != nullptr)
       if (auto shown = show(state, edit, u, "corrected", corrected->pictures); !shown) return shown;
-    const auto loss = optimise(state, edit, masks, *corrected, round);
+    const auto loss = optimise(state, edit, masks, std::move(*corrected), round);
     if (!loss) return propagate(loss);
     if (a == corrections) state.report.losses.push_back(*loss);
   }

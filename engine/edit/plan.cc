@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "engine/edit/views.h"
-#include "engine/train/options.h"
 
 namespace engine::edit {
 namespace {
@@ -65,7 +64,7 @@ class Maker {
 
   void add_interval(int u) {
     const double masks = views_ * footprint(pixels_);
-    const bool again = u > 1 && work_.iterations <= train::DensifyOptions{}.every;  // what is dragged is what was pasted
+    const bool again = u > 1 && work_.iterations == 0;  // what is dragged is what was pasted
     add_pictures(u, u == 1 ? 1 : 0);
     add(Stage::deform, u, drag_row_seconds * p_h_);
     add(Stage::mask, u, again ? 0 : masks);
@@ -74,9 +73,7 @@ class Maker {
     add(Stage::mask, u, masks);
     for (int a = 1; work_.iterations > 0 && a <= work_.corrections; ++a) {
       if (work_.corrected) add_correction(u, a);
-      else if (work_.vacates)
-        add(Stage::set_up, u, views_ * frame());
-      add(Stage::set_up, u, views_ * set_up_frames * frame());
+      add(Stage::set_up, u, views_ * (set_up_frames + (work_.corrected || !work_.vacates ? 0 : 1)) * frame());
       add(Stage::optimise, u, double(work_.iterations) * (iteration_seconds + iteration_pixel_seconds * work_.covered * pixels_ + iteration_row_seconds * p_h_));
     }
     if (work_.iterations > 0) add_pictures(u, 1);
