@@ -81,7 +81,8 @@ void measure_work(const State& state, Edit& edit) {
   work.views = state.views.empty() ? views_at_most(edit.candidates, edit.params()) : state.views.size();
   work.view_pixels = view_pixels(cameras, edit.params().max_image_side);
   work.frame = measured_frames(edit.input, cameras, edit.params().max_image_side);
-  edit.progress.refine(work);
+  work.slowness = measured_slowness();
+  edit.progress.set_out(work);
 }
 
 void count_views(const State& state, Edit& edit) {

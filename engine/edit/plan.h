@@ -60,6 +60,8 @@ struct Workload {
   std::size_t pictured = 0;     ///< and pictures are made of so many views.
   bool kept = false;            ///< Checkpoints are handed out.
   FrameTime frame;              ///< Of this scene, on this machine as it is now; 0: not measured.
+  double slowness = 1;          ///< Of this machine as it is now: how many times longer work takes than where the
+                                ///< plan's figures were measured.
 };
 
 /// One stage of one interval.

@@ -39,6 +39,14 @@ void ProgressMeter::refine(const Workload& work) {
   for (std::size_t k = 0; k < plan_.size(); ++k) before_[k + 1] = before_[k] + plan_[k].seconds;
 }
 
+void ProgressMeter::set_out(const Workload& work) {
+  refine(work);
+  done_ = {};
+  if (!entered_) return;
+  add_time(seconds_in_stage());
+  since_ = clock_();
+}
+
 void ProgressMeter::go_on_after(int interval) {
   const auto last = std::find_if(plan_.rbegin(), plan_.rend(),
                                  [&](const PlannedStage& entry) { return entry.interval == interval; });
@@ -118,6 +126,10 @@ void ProgressMeter::end_stage() {
     done_[std::size_t(progress_.stage)].planned += plan_[at_].seconds;
     done_[std::size_t(progress_.stage)].took += seconds;
   }
+  add_time(seconds);
+}
+
+void ProgressMeter::add_time(double seconds) {
   const auto known =
       std::find_if(times_.begin(), times_.end(), [&](const StageTime& time) { return time.stage == progress_.stage; });
   if (known != times_.end())

@@ -32,6 +32,8 @@ class ProgressMeter {
 
   /// More is known of the same edit: another plan of the same stages.
   void refine(const Workload& work);
+  /// As refine(), and only what comes from now on is compared with the plan: so far, the edit was looked at.
+  void set_out(const Workload& work);
   [[nodiscard]] const Workload& workload() const { return work_; }
   /// What the plan has up to the end of this interval was done before.
   void go_on_after(int interval);
@@ -57,6 +59,7 @@ class ProgressMeter {
 
   [[nodiscard]] Result<void> report(double part);
   void end_stage();
+  void add_time(double seconds);
   [[nodiscard]] double seconds_in_stage() const;
   [[nodiscard]] double seconds_left(double part) const;
 

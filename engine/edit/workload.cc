@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <limits>
+#include <numbers>
 #include <vector>
 
 #include "engine/edit/views.h"
@@ -13,15 +15,23 @@ namespace engine::edit {
 namespace {
 
 constexpr int times_each = 2;  // the first one of a size also warms up
+
+// A ball of Gaussians in a picture, and how long it took where the plan's figures were measured.
+constexpr std::size_t yardstick_gaussians = 20'000;
+constexpr int yardstick_side = 256;
+constexpr int yardstick_times = 4;
+constexpr double yardstick_seconds = 1.0e-3;
+
 constexpr std::size_t most_cameras = 12, most_rows = 3000;
 
 /// Every so many of them, up to `most`.
 std::size_t step_through(std::size_t count, std::size_t most) { return (count + most - 1) / most; }
 
-double best_seconds(const scene::GaussianCloud& scene, const scene::Camera& camera, render::Workspace& workspace) {
+double best_seconds(const scene::GaussianCloud& scene, const scene::Camera& camera, render::Workspace& workspace,
+                    int times = times_each) {
   double best = std::numeric_limits<double>::infinity();
   render::Rendering rendering;
-  for (int i = 0; i < times_each; ++i) {
+  for (int i = 0; i < times; ++i) {
     const auto start = std::chrono::steady_clock::now();
     render::forward(scene, camera, {}, {}, workspace, rendering);
     best = std::min(best, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
@@ -31,7 +41,29 @@ double best_seconds(const scene::GaussianCloud& scene, const scene::Camera& came
 
 std::size_t pixels_of(const scene::Camera& camera) { return std::size_t(camera.width) * std::size_t(camera.height); }
 
+/// Evenly spread on a sphere of radius 1, by a spiral; a third as wide as they are apart.
+scene::GaussianCloud yardstick() {
+  scene::GaussianCloud ball;
+  ball.resize(yardstick_gaussians);
+  const double golden_angle = std::numbers::pi * (3 - std::sqrt(5.0));
+  const float log_scale = std::log(1.2f / std::sqrt(float(yardstick_gaussians)));
+  for (std::size_t i = 0; i < ball.size(); ++i) {
+    const double z = 1 - 2 * (double(i) + 0.5) / double(ball.size()), ring = std::sqrt(1 - z * z);
+    ball.mean.set(i, Vec3(ring * std::cos(golden_angle * double(i)), ring * std::sin(golden_angle * double(i)), z));
+    ball.log_scale.set(i, Vec3(log_scale));
+    ball.rotation.set(i, Quat(1, 0, 0, 0));
+  }
+  return ball;
+}
+
 }  // namespace
+
+double measured_slowness() {
+  const scene::Camera camera =
+      scene::look_at(DVec3(0, 0, -3), DVec3(0), DVec3(0, -1, 0), 0.8, yardstick_side, yardstick_side);
+  render::Workspace workspace;
+  return best_seconds(yardstick(), camera, workspace, yardstick_times) / yardstick_seconds;
+}
 
 FrameTime measured_frames(const scene::GaussianCloud& scene, std::span<const scene::Camera> cameras,
                           int max_image_side) {

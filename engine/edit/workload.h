@@ -16,6 +16,10 @@ namespace engine::edit {
 [[nodiscard]] FrameTime measured_frames(const scene::GaussianCloud& scene, std::span<const scene::Camera> cameras,
                                         int max_image_side);
 
+/// How many times longer this machine, as it is now, takes than the one where a plan's figures were measured: by a
+/// little scene that is the same everywhere. Takes some milliseconds.
+[[nodiscard]] double measured_slowness();
+
 /// The part of a picture, 0 to 1, that the box around these rows takes: mean over some of the cameras, found from some
 /// of the rows. Takes less than a frame.
 [[nodiscard]] double covered_part(const scene::GaussianCloud& scene, std::span<const std::uint32_t> rows,

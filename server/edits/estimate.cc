@@ -16,7 +16,7 @@ namespace scene = engine::scene;
 
 constexpr int virtual_cameras_looked_for = 8;  // they stand around the part alike: a few tell what all will see
 
-constexpr double load_seconds = 2e-3, publish_seconds = 0.02, flatten_row_seconds = 2e-8;
+constexpr double load_seconds = 1e-3, publish_seconds = 6e-3, flatten_row_seconds = 2e-8;
 
 constexpr std::size_t frame_row_bytes = 200, frame_pixel_bytes = 32, trained_pixel_bytes = 36, frozen_row_bytes = 24;
 constexpr std::size_t corrected_pixel_bytes = 30, corrected_row_bytes = 100;
@@ -66,7 +66,8 @@ Workload workload_of(const scene::LayeredCloud& version, const edit::Request& re
                .shown = true,
                .pictured = std::size_t(std::max(0, pictured)),
                .kept = true,
-               .frame = edit::measured_frames(cloud, cameras, params.max_image_side)};
+               .frame = edit::measured_frames(cloud, cameras, params.max_image_side),
+               .slowness = edit::measured_slowness()};
   work.edit.pictured = std::min(work.edit.pictured, work.edit.views);
   return work;
 }
