@@ -15,16 +15,18 @@ const STATES = {
   stop_requested: "Stopping",
   cancel_requested: "Cancelling",
 };
-const STAGES = {
+/** Each stage of the contract, as people call it. */
+export const STAGES = {
   load: "Reading the scene",
   assign: "Finding the Gaussians",
   views: "Choosing views",
   deform: "Deforming",
   mask: "Masking",
   relocate: "Relocating handles",
+  observe: "Looking at what cameras have seen",
   correct: "Correcting",
+  set_up: "Preparing views",
   optimise: "Optimising",
-  renders: "Rendering pictures",
   pictures: "Rendering pictures",
   checkpoint: "Saving",
   finish: "Finishing",

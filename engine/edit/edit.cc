@@ -15,6 +15,7 @@
 #include "engine/edit/progress.h"
 #include "engine/edit/publish.h"
 #include "engine/edit/views.h"
+#include "engine/edit/workload.h"
 #include "engine/render/forward.h"
 #include "engine/repair/repair.h"
 #include "engine/repair/stretch.h"
@@ -46,7 +47,7 @@ struct Edit {
 Result<void> show(const State& state, Edit& edit, int u, const char* moment,
                   std::span<const scene::Image> pictures = {}) {
   if (!edit.observer.moment) return {};
-  if (auto going = edit.progress.enter(Stage::renders, u); !going) return going;
+  if (auto going = edit.progress.enter(Stage::pictures, u); !going) return going;
   const Published published = publish(state.scene, edit.input, edit.request.mode);
   return edit.observer.moment({u, state.report.resolved.intervals, moment, published.overlay, state.views, pictures});
 }
@@ -66,10 +67,34 @@ Result<State> assign_and_divide(Edit& edit) {
   return state;
 }
 
+/// What the plan could not know before the dragged part was found, and cameras that may look at it.
+void measure_work(const State& state, Edit& edit) {
+  if (!edit.observer.progress) return;
+  std::vector<std::uint32_t> dragged = state.scene.dragged_rows();
+  for (std::uint32_t& row : dragged) row = state.scene.parent()[row];
+  const std::span<const scene::Camera> cameras = edit.candidates.empty() ? std::span(state.views) : edit.candidates;
+  Workload work = edit.progress.workload();
+  work.dragged = dragged.size();
+  work.covered = covered_part(edit.input, dragged, cameras);
+  work.candidates = edit.candidates.size();
+  work.views = state.views.empty() ? views_at_most(edit.candidates, edit.params()) : state.views.size();
+  work.view_pixels = view_pixels(cameras, edit.params().max_image_side);
+  work.frame = measured_frames(edit.input, cameras, edit.params().max_image_side);
+  work.slowness = measured_slowness();
+  edit.progress.set_out(work);
+}
+
+void count_views(const State& state, Edit& edit) {
+  Workload work = edit.progress.workload();
+  work.views = state.views.size();
+  edit.progress.refine(work);
+}
+
 /// 5. Views: chosen by what they see of the source and of the fully deformed target.
 Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Camera> cameras) {
   if (auto going = edit.progress.enter(Stage::views, 0); !going) return going;
   edit.candidates = candidate_cameras(edit.input, cameras, edit.request);
+  measure_work(state, edit);
   auto& warnings = state.report.warnings;
   for (const std::string& name : edit.params().exclude_views)
     if (std::ranges::none_of(edit.candidates, [&](const scene::Camera& c) { return c.name == name; }))
@@ -82,6 +107,7 @@ Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Cam
   else if (choice->views.empty())
     warnings.push_back(no_view_sees_it());
   state.views = std::move(choice->views);
+  count_views(state, edit);
   for (const scene::Camera& view : state.views) state.masks.emplace_back(view.width, view.height);
   return {};
 }
@@ -153,9 +179,12 @@ repair::Corrected uncorrected(const State& state, const Edit& edit) {
 /// 7. Correct: I_e of each view, and seeds where a surface goes on that nobody has seen.
 Result<repair::Corrected> correct(State& state, Edit& edit, std::span<const scene::Mask> masks,
                                   const repair::Round& round) {
-  if (edit.corrector == nullptr) return uncorrected(state, edit);
+  if (edit.corrector == nullptr) return repair::Corrected{};
+  if (!edit.repair) {
+    if (auto going = edit.progress.enter(Stage::observe, round.interval); !going) return propagate(going);
+    edit.repair.emplace(make_repair(state, edit));
+  }
   if (auto going = edit.progress.enter(Stage::correct, round.interval); !going) return propagate(going);
-  if (!edit.repair) edit.repair.emplace(make_repair(state, edit));
   auto corrected =
       edit.repair->correct(state.scene, masks, round, [&](double part) { return edit.progress.advance(part); });
   if (corrected) state.report.seeds += corrected->seeds;
@@ -163,11 +192,14 @@ Result<repair::Corrected> correct(State& state, Edit& edit, std::span<const scen
 }
 
 /// 8. Optimise: M towards the corrected views inside the masks, towards the unedited scene outside.
-Result<double> optimise(State& state, Edit& edit, std::span<const scene::Mask> masks,
-                        const repair::Corrected& corrected, const repair::Round& round) {
-  if (auto going = edit.progress.enter(Stage::optimise, round.interval); !going) return propagate(going);
+Result<double> optimise(State& state, Edit& edit, std::span<const scene::Mask> masks, repair::Corrected corrected,
+                        const repair::Round& round) {
+  if (auto going = edit.progress.enter(Stage::set_up, round.interval); !going) return propagate(going);
+  if (edit.corrector == nullptr) corrected = uncorrected(state, edit);
   const int before = (round.correction - 1) * edit.params().iterations;
   const auto advance = [&](const OptimiseProgress& at) {
+    if (at.set_up < 1) return edit.progress.advance(at.set_up);
+    if (at.iteration == 0) return edit.progress.enter(Stage::optimise, round.interval);
     return edit.progress.advance(double(at.iteration) / at.iterations, before + at.iteration, at.loss);
   };
   const auto outcome = edit::optimise(state.scene, edit.input, state.views, masks, corrected, edit.params(), round,
@@ -182,11 +214,11 @@ Result<void> correct_and_optimise(State& state, Edit& edit, int u) {
   const int corrections = edit.params().annealing_steps;
   for (int a = 1; a <= corrections; ++a) {
     const repair::Round round{u, a, strength_of(edit.params(), a)};
-    const auto corrected = correct(state, edit, masks, round);
+    auto corrected = correct(state, edit, masks, round);
     if (!corrected) return propagate(corrected);
     if (a == corrections && edit.corrector != nullptr)
       if (auto shown = show(state, edit, u, "corrected", corrected->pictures); !shown) return shown;
-    const auto loss = optimise(state, edit, masks, *corrected, round);
+    const auto loss = optimise(state, edit, masks, std::move(*corrected), round);
     if (!loss) return propagate(loss);
     if (a == corrections) state.report.losses.push_back(*loss);
   }
@@ -245,9 +277,10 @@ Result<State> next_interval(State state, Edit& edit) {
 /// Where the edit starts: from the state that it goes on from, or from steps 1, 2 and 5.
 Result<State> begin(Edit& edit, std::span<const scene::Camera> cameras, std::optional<State> from) {
   if (from) {
-    if (edit.corrector != nullptr) edit.candidates = candidate_cameras(edit.input, cameras, edit.request);
     edit.progress.go_on_after(from->interval);
     if (auto going = edit.progress.enter(Stage::assign, from->interval); !going) return propagate(going);
+    if (edit.corrector != nullptr) edit.candidates = candidate_cameras(edit.input, cameras, edit.request);
+    measure_work(*from, edit);
     if (edit.observer.assigned) edit.observer.assigned(from->report);
     return std::move(*from);
   }
@@ -286,13 +319,19 @@ Result<void> validate_cameras(std::span<const scene::Camera> cameras) {
   return {};
 }
 
-Workload workload_of(const Request& request, const Tools& tools, const Observer& observer) {
+/// What is known of it before anything is looked at.
+Workload workload_of(const scene::GaussianCloud& scene, const Request& request, const Tools& tools,
+                     const Observer& observer, int finished) {
   Workload work;
+  work.gaussians = scene.size();
   work.intervals = resolved_intervals(request);
+  work.finished = finished;
   work.corrections = request.params.annealing_steps;
   work.iterations = request.params.iterations;
   work.corrected = tools.corrector != nullptr;
+  work.vacates = request.mode == Mode::move;
   work.shown = bool(observer.moment);
+  work.pictured = observer.pictured;
   work.kept = bool(observer.interval_done);
   return work;
 }
@@ -309,7 +348,7 @@ Result<Outcome> run(const scene::GaussianCloud& scene, std::span<const scene::Ca
             observer,
             tools.perceptual != nullptr ? *tools.perceptual : ms_ssim,
             tools.corrector,
-            ProgressMeter(observer, workload_of(request, tools, observer),
+            ProgressMeter(observer, workload_of(scene, request, tools, observer, from ? from->interval : 0),
                           from ? from->report.times : std::vector<StageTime>())};
   Result<State> state = begin(edit, cameras, std::move(from));
   const auto is_enough = [&] { return state->interval > 0 && observer.keep && observer.keep(); };

@@ -1,6 +1,7 @@
 // How a running edit talks to whoever runs it.
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <optional>
 #include <span>
@@ -25,6 +26,7 @@ struct Progress {
   int intervals = 0;
   Stage stage = Stage::assign;
   double fraction = 0;              ///< Of the whole edit, 0..1, never falls.
+  std::optional<double> seconds_left = {};  ///< About; nothing as long as nobody has seen how fast this machine is.
   int iteration = 0;                ///< Done of the interval's optimisation; 0 outside it.
   int iterations = 0;               ///< Of each interval, all corrections together; 0: nothing is optimised.
   std::optional<double> loss = {};  ///< Of the last iteration, while it optimises.
@@ -57,6 +59,7 @@ struct Observer {
   std::function<void(const Report&)> assigned;
   std::function<void(const Progress&)> progress;
   std::function<Result<void>(const Moment&)> moment;
+  std::size_t pictured = 0;  ///< Views that `moment` makes pictures of, the first ones: what its time depends on.
   std::function<Result<void>(const IntervalDone&)> interval_done;
   std::function<bool()> keep;  ///< Asked after every interval but the last: end here, with what there is?
   std::stop_token stop;        ///< Asked between stages and iterations: the edit then ends with ErrorCode::cancelled.

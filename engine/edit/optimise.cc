@@ -62,7 +62,7 @@ Result<OptimiseOutcome> optimise(working::WorkingScene& working, const scene::Ga
       const std::size_t last = trainer.views() - 1;
       trainer.set_edited(last, scene::cut_out(corrected.pictures[v], trainer.view(last).frozen.region()));
     }
-    if (auto going = advance({.iterations = params.iterations}); !going) return propagate(going);
+    if (auto going = advance({.set_up = double(v + 1) / double(views.size())}); !going) return propagate(going);
   }
   OptimiseOutcome outcome;
   if (trainer.views() == 0) return outcome;
@@ -73,7 +73,7 @@ Result<OptimiseOutcome> optimise(working::WorkingScene& working, const scene::Ga
     const auto done = trainer.step();
     if (!done) return propagate(done);
     losses[done->view] = done->loss;
-    if (auto going = advance({i + 1, params.iterations, done->loss}); !going) return propagate(going);
+    if (auto going = advance({1, i + 1, params.iterations, done->loss}); !going) return propagate(going);
   }
   const auto seen = std::min(trainer.views(), std::size_t(params.iterations));
   outcome.loss = std::accumulate(losses.begin(), losses.end(), 0.0) / double(seen);

@@ -25,6 +25,7 @@ constexpr std::size_t frozen_memory = train::TrainOptions{}.frozen_memory;
 
 /// How far the optimisation of an interval is.
 struct OptimiseProgress {
+  double set_up = 1;                ///< Part of the views that are set up, 0 to 1.
   int iteration = 0;                ///< Done, of `iterations`; 0 while the views are set up.
   int iterations = 0;               ///< Of this correction.
   std::optional<double> loss = {};  ///< Of the last iteration.

@@ -2,30 +2,136 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+
+#include "engine/edit/views.h"
 
 namespace engine::edit {
 namespace {
 
-constexpr std::array<std::string_view, stage_count> names{"assign",   "views",    "deform",  "mask",       "correct",
-                                                          "optimise", "relocate", "renders", "checkpoint", "finish"};
+constexpr std::array<std::string_view, stage_count> names{"assign", "views",    "deform",   "mask",     "observe",    "correct",
+                                                          "set_up", "optimise", "relocate", "pictures", "checkpoint", "finish"};
 
-void add_interval(std::vector<PlannedStage>& plan, int u, const Workload& work) {
-  const auto add = [&](Stage stage, double seconds) { plan.push_back({stage, u, seconds}); };
-  if (work.shown) add(Stage::renders, 0.3);
-  add(Stage::deform, 0.05);
-  add(Stage::mask, 0.5);
-  add(Stage::deform, 0.1);
-  if (work.shown) add(Stage::renders, 0.3);
-  add(Stage::mask, 0.5);
-  for (int a = 1; work.iterations > 0 && a <= work.corrections; ++a) {
-    if (work.corrected) add(Stage::correct, 3);
-    if (work.corrected && work.shown && a == work.corrections) add(Stage::renders, 0.1);
-    add(Stage::optimise, 0.01 * work.iterations);
+// What follows was measured on edits of the demo scene (150 k Gaussians; a ball of 4,245 and a leaf of 1,279, and the
+// ball with three times its radius; with its cameras and without; presets preview, draft and standard; move and extend)
+// on two cores of an AMD EPYC with AVX-512, as the smallest of several runs of each stage. docs/estimates.md has those
+// edits, and others that had no part in it. Seconds are those of that machine: Workload::slowness says how this one
+// compares. Frames are measured where the edit runs.
+
+// A frame of a million Gaussians there, for plans without a measured one.
+constexpr double frame_of_a_million_seconds = 25e-3, frame_pixel_seconds = 8e-9;
+
+// A footprint renders the box around the part alone: what it takes of a frame's time for the Gaussians grows with the
+// side of the box, which is the root of the part of the picture it covers; pixels are those of the box.
+constexpr double footprint_part = 0.05, footprint_side_part = 1.1;
+constexpr double unite_pixel_seconds = 1e-9;                     // to make a mask of it and unite it with others
+constexpr double dilate_pixel_seconds = 4e-9;                    // the box filter of a dilation
+constexpr double row_seconds = 2e-8;                             // to copy one Gaussian, or look at it
+constexpr double dome_row_seconds = 4e-7;                        // rays of virtual cameras through a scene
+constexpr double drag_row_seconds = 2e-7;                        // to deform, paste or relocate one dragged Gaussian
+constexpr double observe_frames = 1.1;                           // largest weights, or depth beside colour
+constexpr double look_frames = 1.3;                              // depth and trust beside colour
+constexpr double index_row_seconds = 1e-6;                       // a search tree of the scene, for seeds
+constexpr double fill_seconds = 4e-5, fill_power = 0.7;          // of the pixels of the box: large holes have coarse scales
+constexpr double set_up_frames = 1.3, set_up_row_seconds = 1e-6; // a view projected, and what is dragged laid over it, twice
+constexpr double iteration_seconds = 5e-4, iteration_row_seconds = 3.1e-7, iteration_pixel_seconds = 1.05e-7;  // of the box
+constexpr double jpeg_pixel_seconds = 1.5e-8;
+constexpr double write_seconds = 2e-3;                           // until a picture or a checkpoint is on disk
+constexpr double checkpoint_pixel_seconds = 1.1e-9;              // masks, packed
+
+/// The plan as it is made.
+class Maker {
+ public:
+  explicit Maker(const Workload& work)
+      : work_(work),
+        n_(double(work.gaussians)),
+        p_h_(double(work.dragged)),
+        views_(double(work.views)),
+        pixels_(double(work.view_pixels)),
+        box_(work.covered * pixels_) {
+    if (work.frame.gaussians <= 0 && work.frame.pixel <= 0)
+      work_.frame = {frame_of_a_million_seconds * n_ / 1e6, frame_pixel_seconds};
   }
-  if (work.iterations > 0 && work.shown) add(Stage::renders, 0.3);
-  add(Stage::relocate, 0.01);
-  if (work.kept) add(Stage::checkpoint, 0.05);
-}
+
+  std::vector<PlannedStage> operator()() && {
+    add(Stage::assign, 0, slow(row_seconds * n_));
+    add(Stage::views, 0, choice());
+    for (int u = 1; u <= work_.intervals; ++u) add_interval(u);
+    add(Stage::finish, 0, slow(row_seconds * n_ + dilate_pixel_seconds * views_ * pixels_));
+    return std::move(plan_);
+  }
+
+ private:
+  void add(Stage stage, int u, double seconds) { plan_.push_back({stage, u, seconds}); }
+  /// Seconds of the machine where they were measured, on this one.
+  [[nodiscard]] double slow(double seconds) const { return work_.slowness * seconds; }
+
+  [[nodiscard]] double frame() const { return work_.frame.of(work_.view_pixels); }
+  [[nodiscard]] double footprint(double pixels) const {
+    return (footprint_part + footprint_side_part * std::sqrt(work_.covered)) * work_.frame.gaussians +
+           work_.frame.pixel * work_.covered * pixels + slow(unite_pixel_seconds * pixels);
+  }
+
+  /// Virtual cameras, the dry run of the drag, and what all cameras see of its beginning and its end.
+  [[nodiscard]] double choice() const {
+    const double small = std::min(double(comparison_side * comparison_side), pixels_);
+    const double dome = work_.virtual_views ? dome_row_seconds * n_ : 0;
+    return slow(dome + drag_row_seconds * p_h_ * work_.intervals) + 2 * double(work_.candidates) * footprint(small);
+  }
+
+  /// What a moment shows.
+  enum class Shows { as_before, given, rendered };
+  void add_pictures(int u, Shows shows) {
+    if (!work_.shown) return;
+    const double rendered = shows == Shows::rendered ? frame() : 0;
+    const double encoded = shows != Shows::as_before ? slow(jpeg_pixel_seconds * pixels_) : 0;
+    add(Stage::pictures, u, slow(row_seconds * n_) + double(work_.pictured) * (rendered + encoded + slow(write_seconds)));
+  }
+
+  void add_interval(int u) {
+    const double masks = views_ * footprint(pixels_);
+    const bool optimises = work_.iterations > 0;
+    add_pictures(u, u == 1 ? Shows::rendered : Shows::as_before);
+    add(Stage::deform, u, slow(drag_row_seconds * p_h_));
+    // Without an optimisation, what leaves its place is what the interval before has put there, and was united then.
+    add(Stage::mask, u, u == 1 || optimises ? masks : 0);
+    add(Stage::deform, u, slow(drag_row_seconds * p_h_));
+    add_pictures(u, Shows::rendered);
+    add(Stage::mask, u, masks + (optimises ? slow(dilate_pixel_seconds * views_ * pixels_) : 0));
+    for (int a = 1; optimises && a <= work_.corrections; ++a) add_round(u, a);
+    if (optimises) add_pictures(u, Shows::rendered);
+    add(Stage::relocate, u, slow(drag_row_seconds * p_h_));
+    if (work_.kept)
+      add(Stage::checkpoint, u, slow(2 * write_seconds + checkpoint_pixel_seconds * views_ * pixels_));
+  }
+
+  /// A correction, and the optimisation after it.
+  void add_round(int u, int a) {
+    if (work_.corrected) add_correction(u, a);
+    // Without a corrector, the scene without what has left is what the views should show: one more frame.
+    const double frames = set_up_frames + (!work_.corrected && work_.vacates ? 1 : 0);
+    add(Stage::set_up, u, views_ * (frames * frame() + slow(set_up_row_seconds * p_h_)));
+    add(Stage::optimise, u,
+        slow(work_.iterations * (iteration_seconds + iteration_row_seconds * p_h_ + iteration_pixel_seconds * box_)));
+  }
+
+  void add_correction(int u, int a) {
+    const bool first = u == work_.finished + 1 && a == 1;
+    if (first) add(Stage::observe, u, observe_frames * (double(work_.candidates) + views_) * frame() + slow(row_seconds * n_));
+    // In a move each view is looked at without the part as well, and filled: two footprints say where.
+    const double filled = work_.vacates ? look_frames * frame() + 2 * footprint(pixels_) +
+                                              slow(fill_seconds * std::pow(box_, fill_power))
+                                        : 0;
+    const double index = first && work_.vacates ? slow(index_row_seconds * n_) : 0;
+    add(Stage::correct, u, index + views_ * (look_frames * frame() + filled));
+    if (a == work_.corrections) add_pictures(u, Shows::given);
+  }
+
+  Workload work_;
+  double n_, p_h_, views_, pixels_;
+  double box_;  ///< Pixels of the box around the part, in one view.
+  std::vector<PlannedStage> plan_;
+};
 
 }  // namespace
 
@@ -37,11 +143,12 @@ std::optional<Stage> stage_named(std::string_view name) {
   return Stage(found - names.begin());
 }
 
-std::vector<PlannedStage> plan_of(const Workload& work) {
-  std::vector<PlannedStage> plan{{Stage::assign, 0, 0.05}, {Stage::views, 0, 0.5}};
-  for (int u = 1; u <= work.intervals; ++u) add_interval(plan, u, work);
-  plan.push_back({Stage::finish, 0, 0.05});
-  return plan;
+std::vector<PlannedStage> plan_of(const Workload& work) { return Maker(work)(); }
+
+double seconds_of(std::span<const PlannedStage> plan) {
+  double sum = 0;
+  for (const PlannedStage& stage : plan) sum += stage.seconds;
+  return sum;
 }
 
 }  // namespace engine::edit

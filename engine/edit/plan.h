@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -16,27 +17,51 @@ enum class Stage : std::uint8_t {
   views,       ///< Step 5: which cameras the edit looks through.
   deform,      ///< Steps 3 and 4: the deformation, its copies, and their extents.
   mask,        ///< Step 6: what the part covers in each view.
+  observe,     ///< Before the first correction: what cameras have seen of the unedited scene.
   correct,     ///< Step 7, and the seeds of step 4.
+  set_up,      ///< Before an optimisation: what of each view it keeps, and what it should show.
   optimise,    ///< Step 8.
   relocate,    ///< Step 9.
-  renders,     ///< The scene is shown to an observer that wants to see it (Observer::moment).
+  pictures,    ///< The scene is shown to an observer that wants to see it (Observer::moment).
   checkpoint,  ///< The state is handed to an observer that wants to keep it (Observer::interval_done).
   finish,      ///< What has become of the input is put together.
 };
-constexpr std::size_t stage_count = 10;
+constexpr std::size_t stage_count = 12;
 
 [[nodiscard]] std::string_view name_of(Stage stage);
 /// The stage of that name; nothing for another text.
 [[nodiscard]] std::optional<Stage> stage_named(std::string_view name);
 
+/// Time that a whole frame of a scene takes on a machine: a part that goes with the Gaussians, and one that goes with
+/// the pixels.
+struct FrameTime {
+  double gaussians = 0;  ///< Seconds.
+  double pixel = 0;      ///< Seconds for each.
+
+  [[nodiscard]] double of(std::size_t pixels) const { return gaussians + pixel * double(pixels); }
+};
+
 /// What the time of an edit depends on.
 struct Workload {
-  int intervals = 1;       ///< T
-  int corrections = 1;     ///< A, of each interval.
-  int iterations = 0;      ///< Of the optimisation, per correction.
-  bool corrected = false;  ///< A corrector works on the views.
-  bool shown = false;      ///< Moments are shown.
-  bool kept = false;       ///< Checkpoints are handed out.
+  std::size_t gaussians = 0;   ///< N, of the input.
+  std::size_t dragged = 0;     ///< |P_h|
+  double covered = 0.1;        ///< Of a picture, 0 to 1: the box around the dragged part.
+  int intervals = 1;           ///< T
+  int finished = 0;            ///< Of them, before the edit went on from its state.
+  int corrections = 1;         ///< A, of each interval.
+  int iterations = 0;          ///< Of the optimisation, per correction.
+  bool corrected = false;      ///< A corrector works on the views.
+  bool vacates = true;         ///< The dragged part leaves its place, which is then filled: a move.
+  std::size_t candidates = 0;  ///< C: cameras that are compared.
+  bool virtual_views = false;  ///< They have to be found first.
+  std::size_t views = 0;       ///< V, that the edit looks through.
+  std::size_t view_pixels = 0;  ///< Of one view, as the edit works on it.
+  bool shown = false;           ///< Moments are shown,
+  std::size_t pictured = 0;     ///< and pictures are made of so many views.
+  bool kept = false;            ///< Checkpoints are handed out.
+  FrameTime frame;              ///< Of this scene, on this machine as it is now; 0: not measured.
+  double slowness = 1;          ///< Of this machine as it is now: how many times longer work takes than where the
+                                ///< plan's figures were measured.
 };
 
 /// One stage of one interval.
@@ -46,7 +71,12 @@ struct PlannedStage {
   double seconds = 0;  ///< It should take.
 };
 
-/// All stages in the order in which run() enters them.
+/// All stages in the order in which run() enters them. Which stages there are depends on intervals, corrections,
+/// iterations, corrected, finished, shown and kept alone; the rest of the workload decides what they take. Where frames
+/// were not measured, those of a middling machine are taken: the stages are right to each other, not their sum.
 [[nodiscard]] std::vector<PlannedStage> plan_of(const Workload& work);
+
+/// Seconds that a plan takes, from its first stage to its last one.
+[[nodiscard]] double seconds_of(std::span<const PlannedStage> plan);
 
 }  // namespace engine::edit

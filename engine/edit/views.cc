@@ -12,10 +12,6 @@
 namespace engine::edit {
 namespace {
 
-// Longer side of the pictures on which views are compared: enough to rank them, a seventh of the pixels of a working
-// one.
-constexpr int comparison_side = 192;
-
 /// Middle of all sources and targets, world units.
 DVec3 middle_of(const Request& request) {
   DVec3 sum(0.0);
@@ -97,6 +93,13 @@ std::vector<scene::Camera> candidate_cameras(const scene::GaussianCloud& input, 
   options.up = request.up;
   options.width = options.height = request.params.max_image_side;
   return views::virtual_cameras(input, points, options);
+}
+
+std::size_t views_at_most(std::span<const scene::Camera> candidates, const Params& params) {
+  const auto usable = std::ranges::count_if(candidates, [&](const scene::Camera& camera) {
+    return std::ranges::find(params.exclude_views, camera.name) == params.exclude_views.end();
+  });
+  return std::min(std::size_t(usable), std::size_t(params.views));
 }
 
 Result<ViewChoice> choose_views(const WorkingScene& begun, const scene::GaussianCloud& input,

@@ -2,6 +2,7 @@
 // Source: 3DGS-Drag (ICLR 2025), section 4.1 for the number of views; the choice by what they see is ours.
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <span>
 #include <vector>
@@ -14,10 +15,17 @@
 
 namespace engine::edit {
 
+/// Pixels, longer side of the pictures on which views are compared: enough to rank them, a seventh of the pixels of a
+/// working one.
+constexpr int comparison_side = 192;
+
 /// The cameras an edit may choose from: the dataset's, or a dome of virtual ones around sources and targets.
 [[nodiscard]] std::vector<scene::Camera> candidate_cameras(const scene::GaussianCloud& input,
                                                            std::span<const scene::Camera> dataset,
                                                            const Request& request);
+
+/// How many of them an edit looks through, if all see something of it.
+[[nodiscard]] std::size_t views_at_most(std::span<const scene::Camera> candidates, const Params& params);
 
 /// What is to be seen: the dragged part before the edit, and after the whole drag without corrections.
 struct ViewChoice {

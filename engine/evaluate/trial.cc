@@ -16,7 +16,7 @@ namespace {
 /// Notes the times of an edit, without those of pictures that only the judge asked for.
 void add_times(const std::vector<edit::StageTime>& times, Trial& trial) {
   for (const edit::StageTime& time : times) {
-    if (time.stage == edit::Stage::renders) continue;
+    if (time.stage == edit::Stage::pictures) continue;
     trial.stages.push_back(time);
     trial.seconds += time.seconds;
   }

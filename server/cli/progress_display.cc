@@ -16,6 +16,12 @@ constexpr auto redraw_every = 100ms;  // faster than anyone reads, slow enough t
 constexpr int line_every = 5;         // percent
 constexpr int bar_width = 28;         // characters
 
+std::string time_left(double left) {
+  const auto seconds = std::int64_t(std::ceil(left));
+  if (seconds < 90) return "  about " + std::to_string(seconds) + " s left";
+  return "  about " + std::to_string((seconds + 59) / 60) + " min left";
+}
+
 }  // namespace
 
 ProgressDisplay::ProgressDisplay(std::ostream& out, Style style, Clock clock)
@@ -28,10 +34,14 @@ ProgressDisplay::~ProgressDisplay() {
   if (style_ == Style::bar && percent_ >= 0) out_ << "\r\x1b[K" << std::flush;
 }
 
-void ProgressDisplay::show(double fraction, const std::string& doing) {
+void ProgressDisplay::show(double fraction, const std::string& doing, std::optional<double> seconds_left) {
   const int percent = int(std::floor(100 * std::clamp(fraction, 0.0, 1.0)));
   if (!begun_at_) begun_at_ = fraction;
-  const auto line = [&] { return std::to_string(percent) + " %  " + doing + time_left(fraction); };
+  if (!seconds_left) seconds_left = guessed_seconds_left(fraction);
+  const auto line = [&] {
+    const std::string left = seconds_left && fraction < 1 ? time_left(*seconds_left) : "";
+    return std::to_string(percent) + " %  " + doing + left;
+  };
   if (style_ == Style::bar) {
     if (clock_() - drawn_ < redraw_every && percent < 100) return;
     drawn_ = clock_();
@@ -57,17 +67,15 @@ void ProgressDisplay::show(const engine::edit::Progress& progress) {
                   *progress.loss);
     doing += text.data();
   }
-  show(progress.fraction, doing);
+  show(progress.fraction, doing, progress.seconds_left);
 }
 
-std::string ProgressDisplay::time_left(double fraction) const {
+std::optional<double> ProgressDisplay::guessed_seconds_left(double fraction) const {
   const double elapsed = Seconds(clock_() - start_).count();
   const double done = fraction - begun_at_.value_or(0);  // since we look: work that goes on begins in its middle
   // A guess from less than this would be noise.
-  if (done < 0.05 || fraction >= 1 || elapsed < 1) return {};
-  const auto seconds = std::int64_t(std::ceil(elapsed * (1 - fraction) / done));
-  if (seconds < 90) return "  about " + std::to_string(seconds) + " s left";
-  return "  about " + std::to_string((seconds + 59) / 60) + " min left";
+  if (done < 0.05 || elapsed < 1) return std::nullopt;
+  return elapsed * (1 - fraction) / done;
 }
 
 }  // namespace server::cli

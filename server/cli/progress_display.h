@@ -27,11 +27,12 @@ class ProgressDisplay {
   ProgressDisplay& operator=(const ProgressDisplay&) = delete;
 
   /// How far it is, 0 to 1, and what is being done.
-  void show(double fraction, const std::string& doing);
+  ///   seconds_left  nothing: guessed from how far it has come since it was first shown
+  void show(double fraction, const std::string& doing, std::optional<double> seconds_left = std::nullopt);
   void show(const engine::edit::Progress& progress);
 
  private:
-  [[nodiscard]] std::string time_left(double fraction) const;
+  [[nodiscard]] std::optional<double> guessed_seconds_left(double fraction) const;
 
   std::ostream& out_;
   Style style_;

@@ -4,6 +4,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <memory>
 #include <new>
@@ -17,8 +18,10 @@
 #include "engine/render/forward.h"
 #include "proto/edit_record.h"
 #include "server/edits/convert.h"
+#include "server/edits/estimate.h"
 #include "server/edits/interval_pictures.h"
 #include "server/edits/record_keeper.h"
+#include "server/edits/stages.h"
 
 namespace server::edits {
 namespace {
@@ -75,7 +78,7 @@ class Run {
  private:
   /// The request, and what it is about.
   Result<void> load() {
-    keeper_.enter("load");
+    keeper_.enter(JobStage::load);
     auto asked = proto::parse_edit_request(context_.payload());
     if (!asked) return propagate(asked);
     asked_ = std::move(*asked);
@@ -87,8 +90,7 @@ class Run {
     if (about->up) request_.up = *about->up;
     const auto dataset = workshop_.scenes.dataset(scene_id());
     if (!dataset) return propagate(dataset);
-    if (*dataset)
-      for (const auto& view : (*dataset)->views) cameras_.push_back(view.camera);
+    cameras_ = cameras_of(dataset->get());
     auto version = workshop_.scenes.load(scene_id(), std::to_string(version_number()));
     if (!version) return propagate(version);
     input_ = version->cloud.base;
@@ -97,6 +99,7 @@ class Run {
   }
 
   Result<void> work() {
+    keeper_.expect_after(seconds_to_publish(input_->size()));
     pictures_.emplace(context_.folder(), *input_, workshop_.pictured_views);
     auto outcome = run();
     if (!outcome) return propagate(outcome);
@@ -119,7 +122,8 @@ class Run {
     edit::Observer observer;
     observer.assigned = [this](const edit::Report& report) { tell_assignment(report); };
     observer.progress = [this](const edit::Progress& progress) { keeper_.advance(progress); };
-    observer.moment = [this](const edit::Moment& moment) { return picture(moment); };
+    observer.moment = [this](const edit::Moment& moment) { return pictures_->add(moment); };
+    observer.pictured = std::size_t(std::max(0, workshop_.pictured_views));
     observer.interval_done = [this](const edit::IntervalDone& done) { return finish_interval(done); };
     // A checkpoint that could not be used is made up for first: the record promises its interval.
     observer.keep = [this] { return context_.stop_requested() && last_interval_ >= context_.finished_intervals(); };
@@ -154,14 +158,6 @@ class Run {
         "the same");
   }
 
-  Result<void> picture(const edit::Moment& moment) {
-    const std::string stage = keeper_.record().stage;
-    keeper_.enter("pictures");
-    auto added = pictures_->add(moment);
-    keeper_.enter(stage);
-    return added;
-  }
-
   Result<void> finish_interval(const edit::IntervalDone& done) {
     last_interval_ = done.interval;
     keeper_.add({.interval = done.interval,
@@ -179,7 +175,7 @@ class Run {
   }
 
   Result<void> publish(const edit::Outcome& outcome) {
-    keeper_.enter("publish");
+    keeper_.enter(JobStage::publish);
     const auto hold = workshop_.results.own(context_.id());
     // Asked once it can no longer be cancelled in between: a cancelled edit leaves no version.
     if (context_.cancel_token().stop_requested())

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "engine/edit/handles.h"
@@ -11,7 +10,6 @@
 #include "engine/jobs/durable_file.h"
 #include "engine/jobs/sqlite_store.h"
 #include "engine/jobs/worker.h"
-#include "engine/render/forward.h"
 #include "proto/time_text.h"
 #include "server/edits/convert.h"
 #include "server/edits/edit_job.h"
@@ -33,7 +31,6 @@ using engine::propagate;
 using std::chrono::steady_clock;
 
 constexpr std::size_t all_jobs = 1'000'000;
-constexpr int probe_side = 256;  // pixels
 constexpr auto result_is_recorded_within = std::chrono::seconds(2);
 
 double seconds_since(steady_clock::time_point start) {
@@ -103,48 +100,6 @@ Result<Checked> check(scenes::SceneStore& scenes, const proto::EditRequest& aske
   auto preview = edit::preview(version->cloud, *request);
   if (!preview) return propagate(preview);
   return Checked{std::move(*request), std::move(*version), std::move(*preview)};
-}
-
-/// The cameras that the edit would choose from; without a dataset, one that stands for its virtual ones.
-struct Candidates {
-  std::vector<scene::Camera> cameras;
-  std::size_t count = 0, usable = 0;
-  bool are_virtual = false;
-};
-
-Result<Candidates> candidates_for(scenes::SceneStore& scenes, const std::string& scene_id, const edit::Params& params) {
-  const auto dataset = scenes.dataset(scene_id);
-  if (!dataset) return propagate(dataset);
-  Candidates found;
-  if (*dataset) {
-    for (const auto& view : (*dataset)->views) {
-      found.cameras.push_back(view.camera);
-      const auto& excluded = params.exclude_views;
-      if (std::find(excluded.begin(), excluded.end(), view.camera.name) == excluded.end()) ++found.usable;
-    }
-    found.count = found.cameras.size();
-  }
-  if (!found.cameras.empty()) return found;
-  const auto info = scenes.find(scene_id);
-  if (!info) return propagate(info);
-  const double distance = std::max(3 * info->radius, 1.0);
-  found.cameras.push_back(scene::look_at(info->centre - engine::DVec3(0, 0, distance), info->centre,
-                                         info->up.value_or(edit::Request().up), 0.87, params.max_image_side,
-                                         params.max_image_side));
-  found.count = found.usable = std::size_t(params.views);
-  found.are_virtual = true;
-  return found;
-}
-
-/// The better of two, seconds: the first one also warms up.
-double frame_time(const scene::GaussianCloud& cloud, const scene::Camera& camera) {
-  double best = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < 2; ++i) {
-    const auto start = steady_clock::now();
-    (void)engine::render::forward(cloud, camera);
-    best = std::min(best, seconds_since(start));
-  }
-  return best;
 }
 
 }  // namespace
@@ -232,37 +187,19 @@ Result<proto::EditEstimate> EditService::estimate(const proto::EditRequest& requ
   if (!asked) return propagate(asked);
   const auto checked = check(impl_->scenes, *asked);
   if (!checked) return propagate(checked);
-  const edit::Params& params = checked->request.params;
-  const auto candidates = candidates_for(impl_->scenes, *asked->scene, params);
-  if (!candidates) return propagate(candidates);
-
-  const scene::LayeredCloud& cloud = checked->version.cloud;
-  const scene::Camera& camera = candidates->cameras[candidates->cameras.size() / 2];
-  const scene::Camera view = scene::fit_within(camera, params.max_image_side);
-  const scene::Camera probe = scene::fit_within(camera, std::min(probe_side, params.max_image_side));
-  Workload work;
-  work.gaussians = cloud.size();
-  work.row_bytes = cloud.base->size() == 0 ? 0 : scene::memory_bytes(*cloud.base) / cloud.base->size();
-  work.layered = cloud.overlay != nullptr;
-  for (const std::size_t count : checked->preview.counts) work.dragged += count;
-  work.copies = checked->preview.overlay.added();
-  work.intervals = checked->preview.intervals;
-  work.iterations = std::size_t(params.iterations) * std::size_t(params.annealing_steps);
-  work.rounds = std::size_t(params.annealing_steps);
-  work.corrected = corrects(params);
-  work.candidates = candidates->count;
-  work.candidate_pixels = std::size_t(camera.width) * std::size_t(camera.height);
-  work.virtual_views = candidates->are_virtual;
-  work.views = std::min(candidates->usable, std::size_t(params.views));
-  work.pictured = std::min(work.views, std::size_t(std::max(0, impl_->options.pictured_views)));
-  work.view_pixels = std::size_t(view.width) * std::size_t(view.height);
-  work.probe_pixels = std::size_t(probe.width) * std::size_t(probe.height);
-  work.probe_seconds = frame_time(*cloud.base, probe);
+  const auto dataset = impl_->scenes.dataset(*asked->scene);
+  if (!dataset) return propagate(dataset);
+  const auto info = impl_->scenes.find(*asked->scene);
+  if (!info) return propagate(info);
+  edit::Request request_there = checked->request;
+  if (info->up) request_there.up = *info->up;
+  const Workload work = workload_of(checked->version.cloud, request_there, checked->preview, cameras_of(dataset->get()),
+                                    corrects(request_there.params), impl_->options.pictured_views);
 
   proto::EditEstimate estimate;
   estimate.handles = checked->handles();
-  estimate.views = work.views;
-  estimate.intervals = work.intervals;
+  estimate.views = work.edit.views;
+  estimate.intervals = work.edit.intervals;
   estimate.seconds = std::round(100 * estimated_seconds(work)) / 100;
   estimate.memory_bytes = estimated_bytes(work);
   estimate.request = checked->resolved_for(*asked);

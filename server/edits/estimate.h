@@ -3,53 +3,47 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/edit/plan.h"
+#include "engine/edit/preview.h"
+#include "engine/edit/request.h"
+#include "engine/io/dataset.h"
+#include "engine/scene/camera.h"
+#include "engine/scene/overlay.h"
 
 namespace server::edits {
 
-/// What the cost of an edit depends on.
+/// What the cost of an edit as a job depends on.
 struct Workload {
-  std::size_t gaussians = 0;         ///< N, of the version.
-  std::size_t row_bytes = 0;         ///< Of one Gaussian in memory.
-  bool layered = false;              ///< The version is an overlay: it is flattened first.
-  std::size_t dragged = 0;           ///< |P_h|
-  std::size_t copies = 0;            ///< Deformed copies in the result.
-  int intervals = 1;                 ///< T
-  std::size_t iterations = 0;        ///< Of the optimisation, all corrections of an interval together.
-  std::size_t rounds = 1;            ///< A: times that an interval is optimised, and corrected before.
-  bool corrected = false;            ///< By a corrector.
-  std::size_t candidates = 0;        ///< C: cameras that are compared.
-  std::size_t candidate_pixels = 0;  ///< Of one of them, as it comes.
-  bool virtual_views = false;        ///< They have to be found first.
-  std::size_t views = 0;             ///< V, that the edit looks through.
-  std::size_t pictured = 0;          ///< Of them, those with intermediate pictures.
-  std::size_t view_pixels = 0;       ///< Of one view, as the edit works on it.
-
-  // One whole frame of this scene, rendered by this machine as it is now.
-  double probe_seconds = 0;
-  std::size_t probe_pixels = 0;
+  engine::edit::Workload edit = {};
+  std::size_t row_bytes = 0;  ///< Of one Gaussian in memory.
+  bool layered = false;       ///< The version is an overlay: it is flattened first.
+  std::size_t copies = 0;     ///< Deformed copies in the result.
 };
 
-/// Pixels of the pictures on which candidates are compared.
-constexpr std::size_t comparison_pixels = 192 * 144;
+/// Those of a dataset, in its order; none without one.
+[[nodiscard]] std::vector<engine::scene::Camera> cameras_of(const engine::io::Dataset* dataset);
 
-/// Time of a whole frame of `pixels`: nine tenths of the probe go with the Gaussians and are the same for every size,
-/// one tenth goes with the pixels.
-[[nodiscard]] double frame_seconds(const Workload& work, std::size_t pixels);
+/// Looks at the scene and the machine: renders a few frames.
+///   request    with the scene's own `up`
+///   preview    of that request
+///   dataset    its cameras; none: a few of the virtual ones are found, of which the edit will find all
+///   corrected  by a corrector
+///   pictured   views with intermediate pictures, at most
+[[nodiscard]] Workload workload_of(const engine::scene::LayeredCloud& version, const engine::edit::Request& request,
+                                   const engine::edit::PreviewOutcome& preview,
+                                   std::span<const engine::scene::Camera> dataset, bool corrected, int pictured);
 
-/// Seconds, about, with the machine to itself:
-///     masks       share (2 C frame(192 x 144) + (T + 1) V frame(view)) + pixel V view (1 + T / 10)
-///                                         only the part that moves is rendered: a tenth of the time of a frame, a
-///                                         quarter through virtual views, which are close to it
-///     pictures    (T + 1) (K (frame(view) + jpeg view) + row N) + 2 T K write
-///     iterations  T (A V + iterations min(1, 0.06 + 7 |P_h| / N)) frame(view) [iterations]
-///                                         each view is set up, each time; an iteration renders and differentiates a
-///                                         part of one, which grows with what is dragged
-///     corrections 0.7 C frame(candidate) + V frame(view) + T A V (2.5 frame(view) + synthesis view) [corrected]
-///                                         what each camera has seen, and the unedited scene in each view; then, each
-///                                         time, a view without the dragged part, the view as it is, and what fills
-///                                         them
-///     rows        row N (2 + [layered]) + dome N [virtual] + drag |P_h| T
-/// It says nothing of the time an edit waits for others.
+/// Seconds of what a job does beside the edit: before it, to read the request and put the version together, and after
+/// it, until the result is on disk as a version.
+///   gaussians  of the version that is edited
+[[nodiscard]] double seconds_to_load(std::size_t gaussians, bool layered);
+[[nodiscard]] double seconds_to_publish(std::size_t gaussians);
+
+/// Seconds, about, with the machine to itself: the engine's plan, and what the job does before and after it. It says
+/// nothing of the time an edit waits for others.
 [[nodiscard]] double estimated_seconds(const Workload& work);
 
 /// Bytes beside the scene as the service holds it, all of them given back at the end:

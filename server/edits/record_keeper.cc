@@ -22,8 +22,7 @@ RecordKeeper::RecordKeeper(proto::EditRecord record, Publish publish, Clock cloc
       publish_(std::move(publish)),
       clock_(std::move(clock)),
       since_(clock_()),
-      published_(since_ - publish_every),
-      base_time_(since_) {
+      published_(since_ - publish_every) {
   record_.eta_seconds.reset();
   leave_stage();
 }
@@ -34,11 +33,11 @@ void RecordKeeper::leave_stage() {
   record_.loss.reset();
 }
 
-void RecordKeeper::enter(const std::string& stage) {
-  if (stage == record_.stage) return;
+void RecordKeeper::enter(JobStage stage) {
   count_time();
   leave_stage();
-  record_.stage = stage;
+  record_.stage = name_of(stage);
+  if (stage == JobStage::publish) record_.eta_seconds = rounded(after_seconds_, 0.1);
   publish();
 }
 
@@ -49,26 +48,14 @@ void RecordKeeper::advance(const engine::edit::Progress& progress) {
   record_.iteration = progress.iteration;
   record_.loss = progress.loss;
   record_.progress = std::max(record_.progress, std::min(rounded(progress.fraction, 1e-4), most_before_the_end));
-  // A run that goes on with an interval jumps there: only from then on does its pace mean anything.
-  if (base_interval_ == 0 && progress.interval > 0) {
-    if (progress.interval > 1) base_time_ = clock_(), base_fraction_ = progress.fraction;
-    base_interval_ = progress.interval;
-  }
   if (const std::string_view stage = engine::edit::name_of(progress.stage); stage != record_.stage) {
     count_time();
     record_.stage = stage;
   } else if (!another_interval && clock_() - published_ < publish_every) {
     return;
   }
-  guess_time_left(progress.fraction);
+  if (progress.seconds_left) record_.eta_seconds = rounded(*progress.seconds_left + after_seconds_, 0.1);
   publish();
-}
-
-void RecordKeeper::guess_time_left(double fraction) {
-  const double elapsed = Seconds(clock_() - base_time_).count(), done = fraction - base_fraction_;
-  // A guess from less than this would be noise.
-  if (done < 0.05 || elapsed < 1) return;
-  record_.eta_seconds = rounded(elapsed * (1 - fraction) / done, 0.1);
 }
 
 void RecordKeeper::add(proto::FinishedInterval finished) {

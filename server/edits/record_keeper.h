@@ -7,6 +7,7 @@
 
 #include "engine/edit/edit.h"
 #include "proto/edit_record.h"
+#include "server/edits/stages.h"
 
 namespace server::edits {
 
@@ -23,7 +24,9 @@ class RecordKeeper {
   /// To be changed freely; readers see it after the next publish().
   [[nodiscard]] proto::EditRecord& record() { return record_; }
   /// From now on time counts for this stage.
-  void enter(const std::string& stage);
+  void enter(JobStage stage);
+  /// What the job will do after the edit takes so long: it joins the time that is left.
+  void expect_after(double seconds) { after_seconds_ = seconds; }
   /// News of the engine. `progress` of the record never falls, and stays below 1 until finish().
   void advance(const engine::edit::Progress& progress);
   /// Puts the interval in, in place of an earlier record of it.
@@ -37,14 +40,12 @@ class RecordKeeper {
 
   void count_time();  ///< For the present stage, up to now.
   void leave_stage();
-  void guess_time_left(double fraction);
 
   proto::EditRecord record_;
   Publish publish_;
   Clock clock_;
-  TimePoint since_, published_, base_time_;
-  double base_fraction_ = 0;  ///< At base_time_, from which the time left is guessed.
-  int base_interval_ = 0;
+  TimePoint since_, published_;
+  double after_seconds_ = 0;
 };
 
 }  // namespace server::edits

@@ -17,6 +17,7 @@ std::filesystem::path from_env(const char* variable, const char* below_shared) {
 
 }  // namespace
 
+std::filesystem::path source_dir() { return SPLATDRAG_SOURCE_DIR; }
 std::filesystem::path golden_dir() { return from_env("SPLATDRAG_GOLDEN", "golden"); }
 std::filesystem::path data_dir() { return from_env("SPLATDRAG_DATA", "data"); }
 

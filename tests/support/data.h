@@ -8,6 +8,8 @@
 
 namespace support {
 
+/// The project's own files.
+std::filesystem::path source_dir();
 /// Shared reference vectors: $SPLATDRAG_GOLDEN, or ../shared/golden beside the project.
 std::filesystem::path golden_dir();
 /// Shared real captures: $SPLATDRAG_DATA, or ../shared/data beside the project.

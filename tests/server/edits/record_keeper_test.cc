@@ -48,13 +48,13 @@ TEST_F(RecordKeeperTest, TellsEveryNewStageAndIntervalAtOnceAndTheRestTenTimesAS
 
 TEST_F(RecordKeeperTest, SumsTheTimeOfEachStage) {
   auto keeper = keeper_of();
-  keeper.enter("load");
+  keeper.enter(JobStage::load);
   now += 2s;
   keeper.advance({.stage = engine::edit::Stage::mask});
   now += 1s;
-  keeper.enter("pictures");
+  keeper.advance({.stage = engine::edit::Stage::pictures});
   now += 4s;
-  keeper.enter("mask");
+  keeper.advance({.stage = engine::edit::Stage::mask});
   now += 1s;
   keeper.finish();
   EXPECT_DOUBLE_EQ(timing("load"), 2);
@@ -71,7 +71,7 @@ TEST_F(RecordKeeperTest, GoesOnWithTheTimesAndTheProgressOfAnEarlierRun) {
   earlier.timings = {{"mask", 5}};
   auto keeper = keeper_of(earlier);
   now += 100s;  // nobody worked on it meanwhile
-  keeper.enter("load");
+  keeper.enter(JobStage::load);
   EXPECT_EQ(published().eta_seconds, std::nullopt);
   keeper.advance({.interval = 3, .stage = engine::edit::Stage::mask, .fraction = 0.5});
   EXPECT_EQ(published().progress, 0.7) << "it never falls";
@@ -81,25 +81,19 @@ TEST_F(RecordKeeperTest, GoesOnWithTheTimesAndTheProgressOfAnEarlierRun) {
   EXPECT_DOUBLE_EQ(timing("mask"), 6);
 }
 
-TEST_F(RecordKeeperTest, GuessesTheTimeLeftFromThePaceSoFar) {
+TEST_F(RecordKeeperTest, TellsTheTimeLeftOfTheEditAndWhatComesAfterIt) {
   auto keeper = keeper_of();
-  keeper.advance({.interval = 0, .stage = engine::edit::Stage::views, .fraction = 0});
-  now += 2s;
-  keeper.advance({.interval = 1, .stage = engine::edit::Stage::mask, .fraction = 0.02});
-  EXPECT_EQ(published().eta_seconds, std::nullopt) << "too early";
-  now += 2s;
-  keeper.advance({.interval = 1, .stage = engine::edit::Stage::mask, .fraction = 0.4});
-  EXPECT_NEAR(*published().eta_seconds, 6, 0.11);
-}
-
-TEST_F(RecordKeeperTest, GuessesFromWhereAResumedRunBeganToWork) {
-  auto keeper = keeper_of();
+  keeper.expect_after(0.5);
   keeper.advance({.interval = 0, .stage = engine::edit::Stage::assign, .fraction = 0});
-  now += 1s;
-  keeper.advance({.interval = 3, .stage = engine::edit::Stage::deform, .fraction = 0.6});
-  now += 4s;
-  keeper.advance({.interval = 4, .stage = engine::edit::Stage::deform, .fraction = 0.8});
-  EXPECT_NEAR(*published().eta_seconds, 4, 0.11);
+  EXPECT_EQ(published().eta_seconds, std::nullopt) << "nobody knows yet";
+  keeper.advance({.interval = 0, .stage = engine::edit::Stage::views, .fraction = 0, .seconds_left = 6.24});
+  EXPECT_DOUBLE_EQ(*published().eta_seconds, 6.7);
+  keeper.advance({.interval = 1, .stage = engine::edit::Stage::mask, .fraction = 0.4, .seconds_left = 0});
+  EXPECT_DOUBLE_EQ(*published().eta_seconds, 0.5);
+  keeper.enter(JobStage::publish);
+  EXPECT_DOUBLE_EQ(*published().eta_seconds, 0.5);
+  keeper.finish();
+  EXPECT_EQ(published().eta_seconds, std::nullopt);
 }
 
 TEST_F(RecordKeeperTest, TellsIterationAndLossAsLongAsItOptimises) {
@@ -107,7 +101,7 @@ TEST_F(RecordKeeperTest, TellsIterationAndLossAsLongAsItOptimises) {
   earlier.iteration = 9;
   earlier.loss = 3;
   auto keeper = keeper_of(earlier);
-  keeper.enter("load");
+  keeper.enter(JobStage::load);
   EXPECT_EQ(published().iteration, 0) << "what it was at when it was interrupted";
   EXPECT_EQ(published().loss, std::nullopt);
   for (int i = 1; i <= 3; ++i) {

@@ -1,0 +1,101 @@
+#include "engine/edit/workload.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <vector>
+
+#include "engine/edit/views.h"
+#include "engine/render/forward.h"
+#include "engine/working/footprint.h"
+
+namespace engine::edit {
+namespace {
+
+constexpr int times_each = 2;  // the first one of a size also warms up
+
+// A ball of Gaussians in a picture, and how long it took where the plan's figures were measured.
+constexpr std::size_t yardstick_gaussians = 20'000;
+constexpr int yardstick_side = 256;
+constexpr int yardstick_times = 4;
+constexpr double yardstick_seconds = 1.0e-3;
+
+constexpr std::size_t most_cameras = 12, most_rows = 3000;
+
+/// Every so many of them, up to `most`.
+std::size_t step_through(std::size_t count, std::size_t most) { return (count + most - 1) / most; }
+
+double best_seconds(const scene::GaussianCloud& scene, const scene::Camera& camera, render::Workspace& workspace,
+                    int times = times_each) {
+  double best = std::numeric_limits<double>::infinity();
+  render::Rendering rendering;
+  for (int i = 0; i < times; ++i) {
+    const auto start = std::chrono::steady_clock::now();
+    render::forward(scene, camera, {}, {}, workspace, rendering);
+    best = std::min(best, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  }
+  return best;
+}
+
+std::size_t pixels_of(const scene::Camera& camera) { return std::size_t(camera.width) * std::size_t(camera.height); }
+
+/// Evenly spread on a sphere of radius 1, by a spiral; a third as wide as they are apart.
+scene::GaussianCloud yardstick() {
+  scene::GaussianCloud ball;
+  ball.resize(yardstick_gaussians);
+  const double golden_angle = std::numbers::pi * (3 - std::sqrt(5.0));
+  const float log_scale = std::log(1.2f / std::sqrt(float(yardstick_gaussians)));
+  for (std::size_t i = 0; i < ball.size(); ++i) {
+    const double z = 1 - 2 * (double(i) + 0.5) / double(ball.size()), ring = std::sqrt(1 - z * z);
+    ball.mean.set(i, Vec3(ring * std::cos(golden_angle * double(i)), ring * std::sin(golden_angle * double(i)), z));
+    ball.log_scale.set(i, Vec3(log_scale));
+    ball.rotation.set(i, Quat(1, 0, 0, 0));
+  }
+  return ball;
+}
+
+}  // namespace
+
+double measured_slowness() {
+  const scene::Camera camera =
+      scene::look_at(DVec3(0, 0, -3), DVec3(0), DVec3(0, -1, 0), 0.8, yardstick_side, yardstick_side);
+  render::Workspace workspace;
+  return best_seconds(yardstick(), camera, workspace, yardstick_times) / yardstick_seconds;
+}
+
+FrameTime measured_frames(const scene::GaussianCloud& scene, std::span<const scene::Camera> cameras,
+                          int max_image_side) {
+  if (cameras.empty()) return {};
+  const scene::Camera large = scene::fit_within(cameras[cameras.size() / 2], std::max(max_image_side, comparison_side));
+  const scene::Camera small = scene::fit_within(large, std::max(1, std::max(large.width, large.height) / 4));
+  render::Workspace workspace;
+  const double small_seconds = best_seconds(scene, small, workspace);
+  const double large_seconds = best_seconds(scene, large, workspace);
+  const double more_pixels = double(pixels_of(large)) - double(pixels_of(small));
+  const double pixel = more_pixels > 0 ? std::max(0.0, large_seconds - small_seconds) / more_pixels : 0.0;
+  return {std::max(0.0, large_seconds - pixel * double(pixels_of(large))), pixel};
+}
+
+double covered_part(const scene::GaussianCloud& scene, std::span<const std::uint32_t> rows,
+                    std::span<const scene::Camera> cameras) {
+  if (rows.empty() || cameras.empty()) return 0;
+  std::vector<std::uint32_t> some;
+  for (std::size_t k = 0; k < rows.size(); k += step_through(rows.size(), most_rows)) some.push_back(rows[k]);
+  double sum = 0;
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < cameras.size(); k += step_through(cameras.size(), most_cameras), ++count) {
+    const scene::Rect rect = working::touched_rect(scene, some, cameras[k]);
+    sum += double(rect.width()) * double(rect.height()) / double(pixels_of(cameras[k]));
+  }
+  return sum / double(count);
+}
+
+std::size_t view_pixels(std::span<const scene::Camera> cameras, int max_image_side) {
+  std::size_t sum = 0;
+  for (const scene::Camera& camera : cameras) sum += pixels_of(scene::fit_within(camera, max_image_side));
+  return cameras.empty() ? 0 : sum / cameras.size();
+}
+
+}  // namespace engine::edit
