@@ -6,207 +6,17 @@
 #include <utility>
 
 #include "engine/edit/annealing.h"
-#include "engine/edit/drag.h"
-#include "engine/edit/handles.h"
 #include "engine/edit/masks.h"
 #include "engine/edit/messages.h"
-#include "engine/edit/optimise.h"
-#include "engine/edit/paste.h"
-#include "engine/edit/progress.h"
 #include "engine/edit/publish.h"
+#include "engine/edit/steps.h"
 #include "engine/edit/views.h"
 #include "engine/edit/workload.h"
-#include "engine/render/forward.h"
-#include "engine/repair/repair.h"
-#include "engine/repair/stretch.h"
 
 namespace engine::edit {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-using Rows = std::vector<std::uint32_t>;
-
-/// What stays the same while an edit runs, and what can be made again from that at any time.
-struct Edit {
-  const scene::GaussianCloud& input;
-  const Request& request;
-  const Observer& observer;
-  optim::PerceptualLoss& perceptual;
-  correct::Corrector* corrector;
-  ProgressMeter progress;
-  std::vector<scene::Camera> candidates = {};  ///< That views are chosen from; they have seen the scene.
-  std::optional<repair::Repair> repair = {};   ///< What the unedited scene looks like to a corrector.
-  Rows covered = {};                           ///< The rows that masks were last united with.
-
-  [[nodiscard]] const Params& params() const { return request.params; }
-  /// Step 8 takes place, and so step 7 where there is a corrector.
-  [[nodiscard]] bool optimises() const { return params().iterations > 0; }
-};
-
-/// The scene as it would be published now, for an observer that wants to see it.
-Result<void> show(const State& state, Edit& edit, int u, const char* moment,
-                  std::span<const scene::Image> pictures = {}) {
-  if (!edit.observer.moment) return {};
-  if (auto going = edit.progress.enter(Stage::pictures, u); !going) return going;
-  const Published published = publish(state.scene, edit.input, edit.request.mode);
-  return edit.observer.moment({u, state.report.resolved.intervals, moment, published.overlay, state.views, pictures});
-}
-
-/// 1. Assign: P_h^i, the start of the 3D mask M. 2. Intervals: T, and the handles at their sources.
-Result<State> assign_and_divide(Edit& edit) {
-  if (auto going = edit.progress.enter(Stage::assign, 0); !going) return propagate(going);
-  auto assignment = assign(edit.input.mean, edit.request);
-  if (!assignment) return propagate(assignment);
-  State state;
-  state.scene = WorkingScene(edit.input, frame_of(edit.request), std::move(assignment->handle));
-  state.positions = handle_sources(state.scene.frame(), edit.request);
-  state.report.resolved = edit.params();
-  state.report.resolved.intervals = resolved_intervals(edit.request);
-  state.report.input_gaussians = edit.input.size();
-  for (const std::size_t count : assignment->count) state.report.handles.push_back({count, {}});
-  return state;
-}
-
-/// What the plan could not know before the dragged part was found, and cameras that may look at it.
-void measure_work(const State& state, Edit& edit) {
-  if (!edit.observer.progress) return;
-  std::vector<std::uint32_t> dragged = state.scene.dragged_rows();
-  for (std::uint32_t& row : dragged) row = state.scene.parent()[row];
-  const std::span<const scene::Camera> cameras = edit.candidates.empty() ? std::span(state.views) : edit.candidates;
-  Workload work = edit.progress.workload();
-  work.dragged = dragged.size();
-  work.covered = covered_part(edit.input, dragged, cameras);
-  work.candidates = edit.candidates.size();
-  work.views = state.views.empty() ? views_at_most(edit.candidates, edit.params()) : state.views.size();
-  work.view_pixels = view_pixels(cameras, edit.params().max_image_side);
-  work.frame = measured_frames(edit.input, cameras, edit.params().max_image_side);
-  work.slowness = measured_slowness();
-  edit.progress.set_out(work);
-}
-
-void count_views(const State& state, Edit& edit) {
-  Workload work = edit.progress.workload();
-  work.views = state.views.size();
-  edit.progress.refine(work);
-}
-
-/// 5. Views: chosen by what they see of the source and of the fully deformed target.
-Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Camera> cameras) {
-  if (auto going = edit.progress.enter(Stage::views, 0); !going) return going;
-  edit.candidates = candidate_cameras(edit.input, cameras, edit.request);
-  measure_work(state, edit);
-  auto& warnings = state.report.warnings;
-  for (const std::string& name : edit.params().exclude_views)
-    if (std::ranges::none_of(edit.candidates, [&](const scene::Camera& c) { return c.name == name; }))
-      warnings.push_back(no_view_to_exclude(name));
-  auto choice = choose_views(state.scene, edit.input, edit.candidates, edit.request, state.report.resolved.intervals,
-                             [&](double part) { return edit.progress.advance(part); });
-  if (!choice) return propagate(choice);
-  if (!choice->moves)
-    warnings.push_back(nothing_moves());
-  else if (choice->views.empty())
-    warnings.push_back(no_view_sees_it());
-  state.views = std::move(choice->views);
-  count_views(state, edit);
-  for (const scene::Camera& view : state.views) state.masks.emplace_back(view.width, view.height);
-  return {};
-}
-
-/// 3. Deform: from the relocated handles to p_t'(u). Nothing has moved yet.
-Result<PlannedMotion> deform(const State& state, Edit& edit, int u) {
-  if (auto going = edit.progress.enter(Stage::deform, u); !going) return propagate(going);
-  return plan_motion(state.scene, edit.request, state.positions, u, state.report.resolved.intervals);
-}
-
-/// 4. Copy and paste. Where a corrector repairs what is torn, copies are drawn out with their surface.
-Result<Rows> paste(State& state, Edit& edit, int u, const PlannedMotion& motion) {
-  if (auto going = edit.progress.enter(Stage::deform, u); !going) return propagate(going);
-  Rows copies = copy_and_paste(state.scene, motion, edit.request.mode, edit.params().rotate_sh);
-  if (edit.corrector != nullptr && edit.optimises()) repair::draw_out(state.scene);
-  if (edit.params().optimise_unmoved) copies = state.scene.dragged_rows();
-  return copies;
-}
-
-/// 6. Masks: the pixels that these rows cover join the mask of each view.
-Result<void> mask(State& state, Edit& edit, int u, const Rows& rows) {
-  if (auto going = edit.progress.enter(Stage::mask, u); !going) return going;
-  edit.covered = rows;
-  return unite_masks(state.scene, rows, state.views, state.masks,
-                     [&](double part) { return edit.progress.advance(part); });
-}
-
-/// The pixels of each view that corrections may change.
-std::vector<scene::Mask> masks_to_edit(const State& state, const Edit& edit) {
-  std::vector<scene::Mask> masks = dilated(state.masks);
-  if (!edit.params().local_mask)
-    for (scene::Mask& mask : masks) std::fill(mask.data.begin(), mask.data.end(), std::uint8_t{1});
-  return masks;
-}
-
-repair::Repair make_repair(const State& state, const Edit& edit) {
-  const working::Frame& frame = state.scene.frame();
-  const auto in_frame = [&](std::span<const scene::Camera> cameras) {
-    std::vector<scene::Camera> out;
-    for (const scene::Camera& camera : cameras)
-      out.push_back(scene::fit_within(frame.edit_from_world(camera), edit.params().max_image_side));
-    return out;
-  };
-  return {frame.edit_from_world(edit.input),
-          in_frame(edit.candidates),
-          in_frame(state.views),
-          edit.request.mode,
-          edit.params().seed,
-          *edit.corrector};
-}
-
-/// 7. without a corrector: I_e is what the deformation shows. In a move that is the scene without what has left: a
-/// picture with the originals in it, however faint, would ask for them, and where there are many they came back.
-repair::Corrected uncorrected(const State& state, const Edit& edit) {
-  repair::Corrected out;
-  const Rows gone = state.scene.rows_of(working::Role::original);
-  if (edit.request.mode != Mode::move || gone.empty()) return out;
-  render::Layers layers(state.scene.cloud());
-  layers.hidden = gone;
-  render::Workspace workspace;
-  for (const scene::Camera& view : state.views) {
-    render::Rendering rendering;
-    render::forward(layers, state.scene.frame().edit_from_world(view), {}, {}, workspace, rendering);
-    out.pictures.push_back(std::move(rendering.color));
-  }
-  return out;
-}
-
-/// 7. Correct: I_e of each view, and seeds where a surface goes on that nobody has seen.
-Result<repair::Corrected> correct(State& state, Edit& edit, std::span<const scene::Mask> masks,
-                                  const repair::Round& round) {
-  if (edit.corrector == nullptr) return repair::Corrected{};
-  if (!edit.repair) {
-    if (auto going = edit.progress.enter(Stage::observe, round.interval); !going) return propagate(going);
-    edit.repair.emplace(make_repair(state, edit));
-  }
-  if (auto going = edit.progress.enter(Stage::correct, round.interval); !going) return propagate(going);
-  auto corrected =
-      edit.repair->correct(state.scene, masks, round, [&](double part) { return edit.progress.advance(part); });
-  if (corrected) state.report.seeds += corrected->seeds;
-  return corrected;
-}
-
-/// 8. Optimise: M towards the corrected views inside the masks, towards the unedited scene outside.
-Result<double> optimise(State& state, Edit& edit, std::span<const scene::Mask> masks, repair::Corrected corrected,
-                        const repair::Round& round) {
-  if (auto going = edit.progress.enter(Stage::set_up, round.interval); !going) return propagate(going);
-  if (edit.corrector == nullptr) corrected = uncorrected(state, edit);
-  const int before = (round.correction - 1) * edit.params().iterations;
-  const auto advance = [&](const OptimiseProgress& at) {
-    if (at.set_up < 1) return edit.progress.advance(at.set_up);
-    if (at.iteration == 0) return edit.progress.enter(Stage::optimise, round.interval);
-    return edit.progress.advance(double(at.iteration) / at.iterations, before + at.iteration, at.loss);
-  };
-  const auto outcome = edit::optimise(state.scene, edit.input, state.views, masks, corrected, edit.params(), round,
-                                      edit.perceptual, advance);
-  if (!outcome) return propagate(outcome);
-  return outcome->loss;
-}
 
 /// 7. and 8., as often as annealing asks.
 Result<void> correct_and_optimise(State& state, Edit& edit, int u) {
@@ -223,16 +33,6 @@ Result<void> correct_and_optimise(State& state, Edit& edit, int u) {
     if (a == corrections) state.report.losses.push_back(*loss);
   }
   return show(state, edit, u, "optimised");
-}
-
-/// 9. Relocate: each handle to where its Gaussians have gone.
-Result<void> relocate_handles(State& state, Edit& edit, int u) {
-  if (auto going = edit.progress.enter(Stage::relocate, u); !going) return going;
-  for (const std::size_t lost : relocate(state.scene, edit.request, state.positions))
-    state.report.warnings.push_back(handle_lost(lost, u));
-  for (std::size_t i = 0; i < state.positions.size(); ++i)
-    state.report.handles[i].relocated.push_back(state.scene.frame().world_from_edit(state.positions[i]));
-  return {};
 }
 
 /// Steps 3 to 9 of interval u.
@@ -280,7 +80,7 @@ Result<State> begin(Edit& edit, std::span<const scene::Camera> cameras, std::opt
     edit.progress.go_on_after(from->interval);
     if (auto going = edit.progress.enter(Stage::assign, from->interval); !going) return propagate(going);
     if (edit.corrector != nullptr) edit.candidates = candidate_cameras(edit.input, cameras, edit.request);
-    measure_work(*from, edit);
+    set_out(*from, edit);
     if (edit.observer.assigned) edit.observer.assigned(from->report);
     return std::move(*from);
   }
@@ -319,23 +119,6 @@ Result<void> validate_cameras(std::span<const scene::Camera> cameras) {
   return {};
 }
 
-/// What is known of it before anything is looked at.
-Workload workload_of(const scene::GaussianCloud& scene, const Request& request, const Tools& tools,
-                     const Observer& observer, int finished) {
-  Workload work;
-  work.gaussians = scene.size();
-  work.intervals = resolved_intervals(request);
-  work.finished = finished;
-  work.corrections = request.params.annealing_steps;
-  work.iterations = request.params.iterations;
-  work.corrected = tools.corrector != nullptr;
-  work.vacates = request.mode == Mode::move;
-  work.shown = bool(observer.moment);
-  work.pictured = observer.pictured;
-  work.kept = bool(observer.interval_done);
-  return work;
-}
-
 }  // namespace
 
 Result<Outcome> run(const scene::GaussianCloud& scene, std::span<const scene::Camera> cameras, const Request& request,
@@ -348,7 +131,8 @@ Result<Outcome> run(const scene::GaussianCloud& scene, std::span<const scene::Ca
             observer,
             tools.perceptual != nullptr ? *tools.perceptual : ms_ssim,
             tools.corrector,
-            ProgressMeter(observer, workload_of(scene, request, tools, observer, from ? from->interval : 0),
+            ProgressMeter(observer,
+                          workload_of(scene, request, tools.corrector != nullptr, observer, from ? from->interval : 0),
                           from ? from->report.times : std::vector<StageTime>())};
   Result<State> state = begin(edit, cameras, std::move(from));
   const auto is_enough = [&] { return state->interval > 0 && observer.keep && observer.keep(); };

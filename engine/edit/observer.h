@@ -25,11 +25,11 @@ struct Progress {
   int interval = 0;  ///< 1..intervals; 0 before the first.
   int intervals = 0;
   Stage stage = Stage::assign;
-  double fraction = 0;              ///< Of the whole edit, 0..1, never falls.
+  double fraction = 0;                      ///< Of the whole edit, 0..1, never falls.
   std::optional<double> seconds_left = {};  ///< About; nothing as long as nobody has seen how fast this machine is.
-  int iteration = 0;                ///< Done of the interval's optimisation; 0 outside it.
-  int iterations = 0;               ///< Of each interval, all corrections together; 0: nothing is optimised.
-  std::optional<double> loss = {};  ///< Of the last iteration, while it optimises.
+  int iteration = 0;                        ///< Done of the interval's optimisation; 0 outside it.
+  int iterations = 0;                       ///< Of each interval, all corrections together; 0: nothing is optimised.
+  std::optional<double> loss = {};          ///< Of the last iteration, while it optimises.
 };
 
 /// The scene at one moment of an interval, for those who want to see it.

@@ -7,9 +7,9 @@
 namespace engine::edit {
 namespace {
 
-// How much of a plan must have been carried out until what was seen of it counts as much as the plan itself. Frames that
-// were measured make it trustworthy; without them it knows nothing of the machine. Of one kind, little is enough: its
-// stages are alike.
+// How much of a plan must have been carried out until what was seen of it counts as much as the plan itself. Frames
+// that were measured make it trustworthy; without them it knows nothing of the machine. Of one kind, little is enough:
+// its stages are alike.
 constexpr double measured_trust = 0.1, unmeasured_trust = 0.01, kind_trust = 0.05;
 
 bool is_measured(const Workload& work) { return work.frame.gaussians > 0 || work.frame.pixel > 0; }
@@ -21,7 +21,6 @@ double slowness(double took, double planned, double expected, double trusted) {
 }
 
 }  // namespace
-
 
 ProgressMeter::ProgressMeter(const Observer& observer, const Workload& work, std::vector<StageTime> times, Clock clock)
     : observer_(observer), clock_(std::move(clock)), times_(std::move(times)) {

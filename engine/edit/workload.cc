@@ -7,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "engine/edit/handles.h"
 #include "engine/edit/views.h"
 #include "engine/render/forward.h"
 #include "engine/working/footprint.h"
@@ -96,6 +97,37 @@ std::size_t view_pixels(std::span<const scene::Camera> cameras, int max_image_si
   std::size_t sum = 0;
   for (const scene::Camera& camera : cameras) sum += pixels_of(scene::fit_within(camera, max_image_side));
   return cameras.empty() ? 0 : sum / cameras.size();
+}
+
+Workload workload_of(const scene::GaussianCloud& scene, const Request& request, bool corrected,
+                     const Observer& observer, int finished) {
+  Workload work;
+  work.gaussians = scene.size();
+  work.intervals = resolved_intervals(request);
+  work.finished = finished;
+  work.corrections = request.params.annealing_steps;
+  work.iterations = request.params.iterations;
+  work.corrected = corrected;
+  work.vacates = request.mode == Mode::move;
+  work.shown = bool(observer.moment);
+  work.pictured = observer.pictured;
+  work.kept = bool(observer.interval_done);
+  return work;
+}
+
+Workload measured(Workload work, const State& state, const scene::GaussianCloud& input,
+                  std::span<const scene::Camera> candidates, const Params& params) {
+  std::vector<std::uint32_t> dragged = state.scene.dragged_rows();
+  for (std::uint32_t& row : dragged) row = state.scene.parent()[row];
+  const std::span<const scene::Camera> cameras = candidates.empty() ? std::span(state.views) : candidates;
+  work.dragged = dragged.size();
+  work.covered = covered_part(input, dragged, cameras);
+  work.candidates = candidates.size();
+  work.views = state.views.empty() ? views_at_most(candidates, params) : state.views.size();
+  work.view_pixels = view_pixels(cameras, params.max_image_side);
+  work.frame = measured_frames(input, cameras, params.max_image_side);
+  work.slowness = measured_slowness();
+  return work;
 }
 
 }  // namespace engine::edit

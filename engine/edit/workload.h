@@ -1,10 +1,14 @@
-// Measurements that tell what an edit will cost, made before it begins: a few frames, and a look at where its part is.
+// What an edit has before it: what its request says of the work, and measurements made before it begins: a few frames,
+// and a look at where its part is.
 #pragma once
 
 #include <cstdint>
 #include <span>
 
+#include "engine/edit/observer.h"
 #include "engine/edit/plan.h"
+#include "engine/edit/request.h"
+#include "engine/edit/state.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/gaussian_cloud.h"
 
@@ -27,5 +31,16 @@ namespace engine::edit {
 
 /// Pixels of one view as the edit works on it: mean over the cameras.
 [[nodiscard]] std::size_t view_pixels(std::span<const scene::Camera> cameras, int max_image_side);
+
+/// What is known of an edit before anything is looked at.
+///   corrected  by a corrector
+///   finished   intervals that were finished before, by an edit that goes on
+[[nodiscard]] Workload workload_of(const scene::GaussianCloud& scene, const Request& request, bool corrected,
+                                   const Observer& observer, int finished);
+
+/// The same once the dragged part is found, and cameras that may look at it: measured.
+///   candidates  of which views are chosen, or were
+[[nodiscard]] Workload measured(Workload work, const State& state, const scene::GaussianCloud& input,
+                                std::span<const scene::Camera> candidates, const Params& params);
 
 }  // namespace engine::edit

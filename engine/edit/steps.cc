@@ -1,0 +1,173 @@
+#include "engine/edit/steps.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "engine/edit/handles.h"
+#include "engine/edit/masks.h"
+#include "engine/edit/messages.h"
+#include "engine/edit/optimise.h"
+#include "engine/edit/paste.h"
+#include "engine/edit/publish.h"
+#include "engine/edit/views.h"
+#include "engine/edit/workload.h"
+#include "engine/render/forward.h"
+#include "engine/repair/stretch.h"
+
+namespace engine::edit {
+namespace {
+
+/// What a corrector is to know of the unedited scene.
+repair::Repair make_repair(const State& state, const Edit& edit) {
+  const working::Frame& frame = state.scene.frame();
+  const auto in_frame = [&](std::span<const scene::Camera> cameras) {
+    std::vector<scene::Camera> out;
+    for (const scene::Camera& camera : cameras)
+      out.push_back(scene::fit_within(frame.edit_from_world(camera), edit.params().max_image_side));
+    return out;
+  };
+  return {frame.edit_from_world(edit.input),
+          in_frame(edit.candidates),
+          in_frame(state.views),
+          edit.request.mode,
+          edit.params().seed,
+          *edit.corrector};
+}
+
+/// Without a corrector I_e is what the deformation shows. In a move that is the scene without what has left: a
+/// picture with the originals in it, however faint, would ask for them, and where there are many they came back.
+repair::Corrected uncorrected(const State& state, const Edit& edit) {
+  repair::Corrected out;
+  const Rows gone = state.scene.rows_of(working::Role::original);
+  if (edit.request.mode != Mode::move || gone.empty()) return out;
+  render::Layers layers(state.scene.cloud());
+  layers.hidden = gone;
+  render::Workspace workspace;
+  for (const scene::Camera& view : state.views) {
+    render::Rendering rendering;
+    render::forward(layers, state.scene.frame().edit_from_world(view), {}, {}, workspace, rendering);
+    out.pictures.push_back(std::move(rendering.color));
+  }
+  return out;
+}
+
+}  // namespace
+
+void set_out(const State& state, Edit& edit) {
+  if (!edit.observer.progress) return;  // measuring costs about ten small frames
+  edit.progress.set_out(measured(edit.progress.workload(), state, edit.input, edit.candidates, edit.params()));
+}
+
+Result<State> assign_and_divide(Edit& edit) {
+  if (auto going = edit.progress.enter(Stage::assign, 0); !going) return propagate(going);
+  auto assignment = assign(edit.input.mean, edit.request);
+  if (!assignment) return propagate(assignment);
+  State state;
+  state.scene = WorkingScene(edit.input, frame_of(edit.request), std::move(assignment->handle));
+  state.positions = handle_sources(state.scene.frame(), edit.request);
+  state.report.resolved = edit.params();
+  state.report.resolved.intervals = resolved_intervals(edit.request);
+  state.report.input_gaussians = edit.input.size();
+  for (const std::size_t count : assignment->count) state.report.handles.push_back({count, {}});
+  return state;
+}
+
+Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Camera> cameras) {
+  if (auto going = edit.progress.enter(Stage::views, 0); !going) return going;
+  edit.candidates = candidate_cameras(edit.input, cameras, edit.request);
+  set_out(state, edit);
+  auto& warnings = state.report.warnings;
+  for (const std::string& name : edit.params().exclude_views)
+    if (std::ranges::none_of(edit.candidates, [&](const scene::Camera& c) { return c.name == name; }))
+      warnings.push_back(no_view_to_exclude(name));
+  auto choice = choose_views(state.scene, edit.input, edit.candidates, edit.request, state.report.resolved.intervals,
+                             [&](double part) { return edit.progress.advance(part); });
+  if (!choice) return propagate(choice);
+  if (!choice->moves)
+    warnings.push_back(nothing_moves());
+  else if (choice->views.empty())
+    warnings.push_back(no_view_sees_it());
+  state.views = std::move(choice->views);
+  if (Workload work = edit.progress.workload(); work.views != state.views.size()) {
+    work.views = state.views.size();
+    edit.progress.refine(work);
+  }
+  for (const scene::Camera& view : state.views) state.masks.emplace_back(view.width, view.height);
+  return {};
+}
+
+Result<PlannedMotion> deform(const State& state, Edit& edit, int u) {
+  if (auto going = edit.progress.enter(Stage::deform, u); !going) return propagate(going);
+  return plan_motion(state.scene, edit.request, state.positions, u, state.report.resolved.intervals);
+}
+
+Result<Rows> paste(State& state, Edit& edit, int u, const PlannedMotion& motion) {
+  if (auto going = edit.progress.enter(Stage::deform, u); !going) return propagate(going);
+  Rows copies = copy_and_paste(state.scene, motion, edit.request.mode, edit.params().rotate_sh);
+  if (edit.corrector != nullptr && edit.optimises()) repair::draw_out(state.scene);
+  if (edit.params().optimise_unmoved) copies = state.scene.dragged_rows();
+  return copies;
+}
+
+Result<void> mask(State& state, Edit& edit, int u, const Rows& rows) {
+  if (auto going = edit.progress.enter(Stage::mask, u); !going) return going;
+  edit.covered = rows;
+  return unite_masks(state.scene, rows, state.views, state.masks,
+                     [&](double part) { return edit.progress.advance(part); });
+}
+
+std::vector<scene::Mask> masks_to_edit(const State& state, const Edit& edit) {
+  std::vector<scene::Mask> masks = dilated(state.masks);
+  if (!edit.params().local_mask)
+    for (scene::Mask& mask : masks) std::fill(mask.data.begin(), mask.data.end(), std::uint8_t{1});
+  return masks;
+}
+
+Result<repair::Corrected> correct(State& state, Edit& edit, std::span<const scene::Mask> masks,
+                                  const repair::Round& round) {
+  if (edit.corrector == nullptr) return repair::Corrected{};
+  if (!edit.repair) {
+    if (auto going = edit.progress.enter(Stage::observe, round.interval); !going) return propagate(going);
+    edit.repair.emplace(make_repair(state, edit));
+  }
+  if (auto going = edit.progress.enter(Stage::correct, round.interval); !going) return propagate(going);
+  auto corrected =
+      edit.repair->correct(state.scene, masks, round, [&](double part) { return edit.progress.advance(part); });
+  if (corrected) state.report.seeds += corrected->seeds;
+  return corrected;
+}
+
+Result<double> optimise(State& state, Edit& edit, std::span<const scene::Mask> masks, repair::Corrected corrected,
+                        const repair::Round& round) {
+  if (auto going = edit.progress.enter(Stage::set_up, round.interval); !going) return propagate(going);
+  if (edit.corrector == nullptr) corrected = uncorrected(state, edit);
+  const int before = (round.correction - 1) * edit.params().iterations;
+  const auto advance = [&](const OptimiseProgress& at) {
+    if (at.set_up < 1) return edit.progress.advance(at.set_up);
+    if (at.iteration == 0) return edit.progress.enter(Stage::optimise, round.interval);
+    return edit.progress.advance(double(at.iteration) / at.iterations, before + at.iteration, at.loss);
+  };
+  const auto outcome = edit::optimise(state.scene, edit.input, state.views, masks, corrected, edit.params(), round,
+                                      edit.perceptual, advance);
+  if (!outcome) return propagate(outcome);
+  return outcome->loss;
+}
+
+Result<void> relocate_handles(State& state, Edit& edit, int u) {
+  if (auto going = edit.progress.enter(Stage::relocate, u); !going) return going;
+  for (const std::size_t lost : relocate(state.scene, edit.request, state.positions))
+    state.report.warnings.push_back(handle_lost(lost, u));
+  for (std::size_t i = 0; i < state.positions.size(); ++i)
+    state.report.handles[i].relocated.push_back(state.scene.frame().world_from_edit(state.positions[i]));
+  return {};
+}
+
+Result<void> show(const State& state, Edit& edit, int u, const char* moment, std::span<const scene::Image> pictures) {
+  if (!edit.observer.moment) return {};
+  if (auto going = edit.progress.enter(Stage::pictures, u); !going) return going;
+  const Published published = publish(state.scene, edit.input, edit.request.mode);
+  return edit.observer.moment({u, state.report.resolved.intervals, moment, published.overlay, state.views, pictures});
+}
+
+}  // namespace engine::edit

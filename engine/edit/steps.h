@@ -1,0 +1,93 @@
+// The steps of an edit, each a function from the state and what stays the same to the next state, in their order.
+// edit.cc puts them together.
+// Source: 3DGS-Drag (ICLR 2025), section 3; docs/method.md tells them one by one.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/correct/corrector.h"
+#include "engine/edit/drag.h"
+#include "engine/edit/observer.h"
+#include "engine/edit/progress.h"
+#include "engine/edit/request.h"
+#include "engine/edit/state.h"
+#include "engine/optim/perceptual.h"
+#include "engine/repair/repair.h"
+#include "engine/scene/camera.h"
+#include "engine/scene/gaussian_cloud.h"
+#include "engine/scene/image.h"
+
+namespace engine::edit {
+
+using Rows = std::vector<std::uint32_t>;  ///< Of a working scene, ascending.
+
+/// What stays the same while an edit runs, and what can be made again from that at any time.
+struct Edit {
+  const scene::GaussianCloud& input;
+  const Request& request;
+  const Observer& observer;
+  optim::PerceptualLoss& perceptual;
+  correct::Corrector* corrector;
+  ProgressMeter progress;
+  std::vector<scene::Camera> candidates = {};  ///< That views are chosen from; they have seen the scene.
+  std::optional<repair::Repair> repair = {};   ///< What the unedited scene looks like to a corrector.
+  Rows covered = {};                           ///< The rows that masks were last united with.
+
+  [[nodiscard]] const Params& params() const { return request.params; }
+  /// Step 8 takes place, and so step 7 where there is a corrector.
+  [[nodiscard]] bool optimises() const { return params().iterations > 0; }
+};
+
+// Each step enters its stage of the plan first. All errors are those of the observer (`cancelled` where a stop was
+// requested) and those that are named; after one the state is of no use any more.
+
+/// Steps 1 and 2. Assign: P_h^i, the start of the 3D mask M. Intervals: T, and the handles at their sources.
+///   errors  unprocessable: a handle without Gaussians; `where` names it
+[[nodiscard]] Result<State> assign_and_divide(Edit& edit);
+
+/// Step 5. Views: chosen from the candidates by what they see of the source and of the fully deformed target. A mask of
+/// each, still empty.
+///   cameras  the dataset's; empty: the candidates are virtual
+[[nodiscard]] Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Camera> cameras);
+
+/// Step 3. Deform: from the relocated handles to p_t'(u). Nothing has moved yet.
+[[nodiscard]] Result<PlannedMotion> deform(const State& state, Edit& edit, int u);
+
+/// Step 4. Copy and paste. Where a corrector repairs what is torn, copies are drawn out with their surface.
+///   returns  the rows of the copies
+[[nodiscard]] Result<Rows> paste(State& state, Edit& edit, int u, const PlannedMotion& motion);
+
+/// Step 6. Masks: the pixels that these rows cover join the mask of each view.
+[[nodiscard]] Result<void> mask(State& state, Edit& edit, int u, const Rows& rows);
+
+/// The pixels of each view that corrections may change: the masks, dilated.
+[[nodiscard]] std::vector<scene::Mask> masks_to_edit(const State& state, const Edit& edit);
+
+/// Step 7. Correct: I_e of each view, and seeds where a surface goes on that nobody has seen. Without a corrector there
+/// are no pictures yet.
+///   errors  those of the corrector
+[[nodiscard]] Result<repair::Corrected> correct(State& state, Edit& edit, std::span<const scene::Mask> masks,
+                                                const repair::Round& round);
+
+/// Step 8. Optimise: M towards the corrected views inside the masks, towards the unedited scene outside.
+///   returns  the mean loss over the views of the last epoch
+///   errors   internal: a value is not finite; `where` names it by the input's row. Those of the perceptual loss
+[[nodiscard]] Result<double> optimise(State& state, Edit& edit, std::span<const scene::Mask> masks,
+                                      repair::Corrected corrected, const repair::Round& round);
+
+/// Step 9. Relocate: each handle to where its Gaussians have gone.
+[[nodiscard]] Result<void> relocate_handles(State& state, Edit& edit, int u);
+
+/// The plan is made anew once the dragged part is known, and cameras that may look at it: for who watches progress.
+void set_out(const State& state, Edit& edit);
+
+/// Shows the scene as it would be published now to an observer that wants to see it.
+///   moment  as Moment::stage
+[[nodiscard]] Result<void> show(const State& state, Edit& edit, int u, const char* moment,
+                                std::span<const scene::Image> pictures = {});
+
+}  // namespace engine::edit
