@@ -43,18 +43,18 @@ struct FrameTime {
 
 /// What the time of an edit depends on.
 struct Workload {
-  std::size_t gaussians = 0;   ///< N, of the input.
-  std::size_t dragged = 0;     ///< |P_h|
-  double covered = 0.1;        ///< Of a picture, 0 to 1: the box around the dragged part.
-  int intervals = 1;           ///< T
-  int finished = 0;            ///< Of them, before the edit went on from its state.
-  int corrections = 1;         ///< A, of each interval.
-  int iterations = 0;          ///< Of the optimisation, per correction.
-  bool corrected = false;      ///< A corrector works on the views.
-  bool vacates = true;         ///< The dragged part leaves its place, which is then filled: a move.
-  std::size_t candidates = 0;  ///< C: cameras that are compared.
-  bool virtual_views = false;  ///< They have to be found first.
-  std::size_t views = 0;       ///< V, that the edit looks through.
+  std::size_t gaussians = 0;    ///< N, of the input.
+  std::size_t dragged = 0;      ///< |P_h|
+  double covered = 0.1;         ///< Of a picture, 0 to 1: the box around the dragged part.
+  int intervals = 1;            ///< T
+  int finished = 0;             ///< Of them, before the edit went on from its state.
+  int corrections = 1;          ///< A, of each interval.
+  int iterations = 0;           ///< Of the optimisation, per correction.
+  bool corrected = false;       ///< A corrector works on the views.
+  bool vacates = true;          ///< The dragged part leaves its place, which is then filled: a move.
+  std::size_t candidates = 0;   ///< C: cameras that are compared.
+  bool virtual_views = false;   ///< They have to be found first.
+  std::size_t views = 0;        ///< V, that the edit looks through.
   std::size_t view_pixels = 0;  ///< Of one view, as the edit works on it.
   bool shown = false;           ///< Moments are shown,
   std::size_t pictured = 0;     ///< and pictures are made of so many views.

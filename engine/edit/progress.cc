@@ -7,9 +7,9 @@
 namespace engine::edit {
 namespace {
 
-// How much of a plan must have been carried out until what was seen of it counts as much as the plan itself. Frames that
-// were measured make it trustworthy; without them it knows nothing of the machine. Of one kind, little is enough: its
-// stages are alike.
+// How much of a plan must have been carried out until what was seen of it counts as much as the plan itself. Frames
+// that were measured make it trustworthy; without them it knows nothing of the machine. Of one kind, little is enough:
+// its stages are alike.
 constexpr double measured_trust = 0.1, unmeasured_trust = 0.01, kind_trust = 0.05;
 
 bool is_measured(const Workload& work) { return work.frame.gaussians > 0 || work.frame.pixel > 0; }
@@ -21,7 +21,6 @@ double slowness(double took, double planned, double expected, double trusted) {
 }
 
 }  // namespace
-
 
 ProgressMeter::ProgressMeter(const Observer& observer, const Workload& work, std::vector<StageTime> times, Clock clock)
     : observer_(observer), clock_(std::move(clock)), times_(std::move(times)) {
@@ -48,17 +47,17 @@ void ProgressMeter::set_out(const Workload& work) {
 }
 
 void ProgressMeter::go_on_after(int interval) {
-  const auto last = std::find_if(plan_.rbegin(), plan_.rend(),
-                                 [&](const PlannedStage& entry) { return entry.interval == interval; });
-  at_ = next_ = std::size_t(plan_.rend() - last);
+  const auto last =
+      std::find_if(plan_.rbegin(), plan_.rend(), [&](const PlannedStage& entry) { return entry.interval == interval; });
+  first_ = at_ = next_ = std::size_t(plan_.rend() - last);
 }
 
 Result<void> ProgressMeter::enter(Stage stage, int interval) {
   end_stage();
   entered_ = true;
-  const auto planned =
-      std::find_if(plan_.begin() + std::ptrdiff_t(next_), plan_.end(),
-                   [&](const PlannedStage& entry) { return entry.stage == stage && (entry.interval == interval || entry.interval == 0); });
+  const auto planned = std::find_if(plan_.begin() + std::ptrdiff_t(next_), plan_.end(), [&](const PlannedStage& entry) {
+    return entry.stage == stage && (entry.interval == interval || entry.interval == 0);
+  });
   if (planned != plan_.end()) at_ = std::size_t(planned - plan_.begin()), next_ = at_ + 1;
   progress_.stage = stage;
   progress_.interval = interval;
@@ -105,14 +104,14 @@ double ProgressMeter::seconds_left(double part) const {
     present.planned += part * plan_[at_].seconds;
     present.took += seconds_in_stage();
   }
-  for (std::size_t k = 0; k < plan_.size(); ++k) {
+  for (std::size_t k = first_; k < plan_.size(); ++k) {
     of_kind[std::size_t(plan_[k].stage)] += plan_[k].seconds;
     if (k >= at_) left[std::size_t(plan_[k].stage)] += (k == at_ ? 1 - part : 1) * plan_[k].seconds;
   }
   Done all;
   for (const Done& kind : done) all.planned += kind.planned, all.took += kind.took;
   const double trust = is_measured(work_) ? measured_trust : unmeasured_trust;
-  const double expected = slowness(all.took, all.planned, 1, trust * before_.back());
+  const double expected = slowness(all.took, all.planned, 1, trust * (before_.back() - before_[first_]));
   double sum = 0;
   for (std::size_t k = 0; k < stage_count; ++k)
     sum += left[k] * slowness(done[k].took, done[k].planned, expected, kind_trust * of_kind[k]);
