@@ -13,6 +13,8 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -186,7 +188,7 @@ struct Run {
   std::map<std::string, std::pair<double, double>> stages;  ///< Planned, taken.
 };
 
-double off(double ratio) { return ratio > 0 ? std::max(ratio, 1 / ratio) : std::numeric_limits<double>::infinity(); }
+double off(double ratio) { return std::max(ratio, 1 / ratio); }
 
 /// What was told of the time left, when.
 struct Told {
@@ -203,7 +205,8 @@ void judge(const std::vector<Told>& told, Run& run) {
   };
   for (std::size_t k = 0; k < moments.size(); ++k) run.left[k] = ratio_at(moments[k] * run.seconds);
   for (double part = 0.1; part <= 0.9; part += 0.01)
-    if (const double ratio = ratio_at(part * run.seconds); off(ratio) > off(run.worst_left)) run.worst_left = ratio;
+    if (const double ratio = ratio_at(part * run.seconds); ratio > 0 && off(ratio) > off(run.worst_left))
+      run.worst_left = ratio;
 }
 
 void add_planned(const EditRequest& asked, Service& service, Run& run) {
@@ -267,10 +270,13 @@ std::string line(const char* format, Values... values) {
   return text;
 }
 
+/// A ratio, if anything was told.
+std::string cell(double ratio) { return ratio > 0 ? line("%.2f", ratio) : "none yet"; }
+
 std::string row(const Sample& sample, const Run& run) {
-  return line("| %s | %s | %.2f | %.2f | %.2f | %.2f | %.2f | %.2f | %.2f |\n", sample.name.c_str(),
-              sample.fitted ? "fitted" : "tested", run.estimated, run.seconds, run.estimated / run.seconds, run.left[0],
-              run.left[1], run.left[2], run.worst_left);
+  return line("| %s | %s | %.2f | %.2f | %.2f | %s | %s | %s | %.2f |\n", sample.name.c_str(),
+              sample.fitted ? "fitted" : "tested", run.estimated, run.seconds, run.estimated / run.seconds,
+              cell(run.left[0]).c_str(), cell(run.left[1]).c_str(), cell(run.left[2]).c_str(), run.worst_left);
 }
 
 std::string processor() {
