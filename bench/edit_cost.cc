@@ -259,7 +259,7 @@ EditCost measure_edit(Sample sample, int max_image_side) {
   for (const edit::StageTime& time : outcome->report.times) {
     if (time.stage == edit::Stage::views) cost.views_s = time.seconds;
     if (time.stage == edit::Stage::mask) cost.masks_s = time.seconds;
-    if (time.stage == edit::Stage::optimise) cost.optimise_s = time.seconds;
+    if (time.stage == edit::Stage::set_up || time.stage == edit::Stage::optimise) cost.optimise_s += time.seconds;
   }
   return cost;
 }

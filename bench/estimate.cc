@@ -1,5 +1,5 @@
-// How good the estimate of an edit is, and the time left that a running one tells: edits of many kinds are estimated and
-// carried out by the service, as its users do it, over and over.
+// How good the estimate of an edit is, and the time left that a running one tells: edits of many kinds are estimated
+// and carried out by the service, as its users do it, over and over.
 //
 //   build/release/bench/estimate docs
 //
@@ -13,6 +13,8 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -33,10 +35,10 @@
 #include "engine/procedural/demo_scene.h"
 #include "engine/render/forward.h"
 #include "server/cli/capture_files.h"
+#include "server/cli/suggested_drag.h"
 #include "server/edits/convert.h"
 #include "server/edits/edit_service.h"
 #include "server/edits/estimate.h"
-#include "server/cli/suggested_drag.h"
 
 namespace {
 
@@ -68,7 +70,8 @@ class Service {
     std::filesystem::create_directories(folder_ / "root");
     std::filesystem::create_directories(folder_ / "edits");
     store_ = value(server::scenes::SceneStore::open({.folder = folder_ / "scenes", .scene_root = folder_ / "root"}));
-    service_ = value(edits::EditService::open(*store_, {.folder = folder_ / "edits", .pictured_views = pictured_views}));
+    service_ =
+        value(edits::EditService::open(*store_, {.folder = folder_ / "edits", .pictured_views = pictured_views}));
   }
   ~Service() {
     service_.reset();
@@ -148,8 +151,7 @@ std::vector<Sample> demo_samples(Service& service) {
       {"draft, ball, no dataset", true, with(ball, bare, Preset::draft)},
       {"standard, leaf, 100 iterations", true, with(leaf, id, Preset::standard, {.iterations = 100})},
       {"draft, ball drawn out", true, with(drawn, id, Preset::draft, {.iterations = 100})},
-      {"draft, large part, corrector none", true,
-       with(large, id, Preset::draft, {.corrected = false})},
+      {"draft, large part, corrector none", true, with(large, id, Preset::draft, {.corrected = false})},
       {"standard, leaf, no dataset, 50 iterations", false,
        with(leaf, bare, Preset::standard, {.iterations = 50, .views = 30})},
       {"paper, ball, 2 x 60 iterations", false,
@@ -186,7 +188,7 @@ struct Run {
   std::map<std::string, std::pair<double, double>> stages;  ///< Planned, taken.
 };
 
-double off(double ratio) { return ratio > 0 ? std::max(ratio, 1 / ratio) : std::numeric_limits<double>::infinity(); }
+double off(double ratio) { return std::max(ratio, 1 / ratio); }
 
 /// What was told of the time left, when.
 struct Told {
@@ -203,7 +205,8 @@ void judge(const std::vector<Told>& told, Run& run) {
   };
   for (std::size_t k = 0; k < moments.size(); ++k) run.left[k] = ratio_at(moments[k] * run.seconds);
   for (double part = 0.1; part <= 0.9; part += 0.01)
-    if (const double ratio = ratio_at(part * run.seconds); off(ratio) > off(run.worst_left)) run.worst_left = ratio;
+    if (const double ratio = ratio_at(part * run.seconds); ratio > 0 && off(ratio) > off(run.worst_left))
+      run.worst_left = ratio;
 }
 
 void add_planned(const EditRequest& asked, Service& service, Run& run) {
@@ -244,9 +247,8 @@ Run run_once(const EditRequest& request, Service& service, bool with_stages) {
 }
 
 Run middle_of(std::vector<Run> runs) {
-  std::sort(runs.begin(), runs.end(), [](const Run& a, const Run& b) {
-    return a.estimated / a.seconds < b.estimated / b.seconds;
-  });
+  std::sort(runs.begin(), runs.end(),
+            [](const Run& a, const Run& b) { return a.estimated / a.seconds < b.estimated / b.seconds; });
   Run middle = runs[runs.size() / 2];
   const auto middle_of_each = [&](auto member) {
     std::vector<double> values;
@@ -268,10 +270,13 @@ std::string line(const char* format, Values... values) {
   return text;
 }
 
+/// A ratio, if anything was told.
+std::string cell(double ratio) { return ratio > 0 ? line("%.2f", ratio) : "none yet"; }
+
 std::string row(const Sample& sample, const Run& run) {
-  return line("| %s | %s | %.2f | %.2f | %.2f | %.2f | %.2f | %.2f | %.2f |\n", sample.name.c_str(),
-              sample.fitted ? "fitted" : "tested", run.estimated, run.seconds, run.estimated / run.seconds, run.left[0],
-              run.left[1], run.left[2], run.worst_left);
+  return line("| %s | %s | %.2f | %.2f | %.2f | %s | %s | %s | %.2f |\n", sample.name.c_str(),
+              sample.fitted ? "fitted" : "tested", run.estimated, run.seconds, run.estimated / run.seconds,
+              cell(run.left[0]).c_str(), cell(run.left[1]).c_str(), cell(run.left[2]).c_str(), run.worst_left);
 }
 
 std::string processor() {
@@ -299,8 +304,10 @@ std::string page_of(const std::string& rows, int runs) {
          processor() + ", " + engine::render::simd_target() +
          ". Made by\n`build/release/bench/estimate docs`; medians of " + std::to_string(runs) +
          " runs.\n\n"
-         "Each edit is estimated as `POST /v1/edits?validate_only=true` does it, a few frames of the scene included, and "
-         "then\ncarried out by the service. The demo scene has 150 k Gaussians, the fox capture 62 k. On the edits marked "
+         "Each edit is estimated as `POST /v1/edits?validate_only=true` does it, a few frames of the scene included, "
+         "and "
+         "then\ncarried out by the service. The demo scene has 150 k Gaussians, the fox capture 62 k. On the edits "
+         "marked "
          "`fitted`\nthe constants of the plan (`engine/edit/plan.cc`) were measured; the others are a test of them.\n\n"
          "The right half is about the time left that a running edit tells (`eta_seconds`), over the true one: when a "
          "tenth, a\nquarter and half of the time have passed, and where it is farthest off between a tenth and nine "

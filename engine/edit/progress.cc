@@ -49,7 +49,7 @@ void ProgressMeter::set_out(const Workload& work) {
 void ProgressMeter::go_on_after(int interval) {
   const auto last =
       std::find_if(plan_.rbegin(), plan_.rend(), [&](const PlannedStage& entry) { return entry.interval == interval; });
-  at_ = next_ = std::size_t(plan_.rend() - last);
+  first_ = at_ = next_ = std::size_t(plan_.rend() - last);
 }
 
 Result<void> ProgressMeter::enter(Stage stage, int interval) {
@@ -104,14 +104,14 @@ double ProgressMeter::seconds_left(double part) const {
     present.planned += part * plan_[at_].seconds;
     present.took += seconds_in_stage();
   }
-  for (std::size_t k = 0; k < plan_.size(); ++k) {
+  for (std::size_t k = first_; k < plan_.size(); ++k) {
     of_kind[std::size_t(plan_[k].stage)] += plan_[k].seconds;
     if (k >= at_) left[std::size_t(plan_[k].stage)] += (k == at_ ? 1 - part : 1) * plan_[k].seconds;
   }
   Done all;
   for (const Done& kind : done) all.planned += kind.planned, all.took += kind.took;
   const double trust = is_measured(work_) ? measured_trust : unmeasured_trust;
-  const double expected = slowness(all.took, all.planned, 1, trust * before_.back());
+  const double expected = slowness(all.took, all.planned, 1, trust * (before_.back() - before_[first_]));
   double sum = 0;
   for (std::size_t k = 0; k < stage_count; ++k)
     sum += left[k] * slowness(done[k].took, done[k].planned, expected, kind_trust * of_kind[k]);

@@ -68,6 +68,7 @@ class ProgressMeter {
   Workload work_;
   std::vector<PlannedStage> plan_;
   std::vector<double> before_;  ///< Of each stage of the plan: planned seconds of those before it; then of all.
+  std::size_t first_ = 0;       ///< The first stage of the plan that this run carries out.
   std::size_t at_ = 0;          ///< The stage of the plan that is being carried out.
   std::size_t next_ = 0;        ///< From where on the next one is looked for.
   std::array<Done, stage_count> done_{};

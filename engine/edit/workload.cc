@@ -15,12 +15,12 @@
 namespace engine::edit {
 namespace {
 
-constexpr int times_each = 2;  // the first one of a size also warms up
+constexpr int times_each = 3;  // the first one of a size also warms up
 
 // A ball of Gaussians in a picture, and how long it took where the plan's figures were measured.
 constexpr std::size_t yardstick_gaussians = 20'000;
 constexpr int yardstick_side = 256;
-constexpr int yardstick_times = 4;
+constexpr int yardstick_times = 5;
 constexpr double yardstick_seconds = 1.0e-3;
 
 constexpr std::size_t most_cameras = 12, most_rows = 3000;

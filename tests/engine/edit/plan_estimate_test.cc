@@ -50,8 +50,10 @@ TEST(PlanEstimate, GrowsWithEverythingThatCosts) {
 
 TEST(PlanEstimate, ShrinksWithEverythingThatIsLeftOut) {
   const std::vector<std::pair<std::string, std::function<void(Workload&)>>> savings = {
-      {"corrector", [](Workload& w) { w.corrected = false; }}, {"optimisation", [](Workload& w) { w.iterations = 0; }},
-      {"pictures", [](Workload& w) { w.shown = false; }},      {"checkpoints", [](Workload& w) { w.kept = false; }},
+      {"corrector", [](Workload& w) { w.corrected = false; }},
+      {"optimisation", [](Workload& w) { w.iterations = 0; }},
+      {"pictures", [](Workload& w) { w.shown = false; }},
+      {"checkpoints", [](Workload& w) { w.kept = false; }},
       {"places to fill", [](Workload& w) { w.vacates = false; }}};
   for (const auto& [what, save] : savings) {
     Workload less = typical();

@@ -42,6 +42,17 @@ TEST(ProgressDisplay, GuessesTheTimeLeft) {
   EXPECT_EQ(out.str().find("left", out.str().find("100 %")), std::string::npos) << out.str();
 }
 
+TEST(ProgressDisplay, TellsTheTimeLeftThatItIsGiven) {
+  std::ostringstream out;
+  Time now{};
+  ProgressDisplay display(out, ProgressDisplay::Style::lines, [&] { return now; });
+  display.show({.stage = engine::edit::Stage::views, .fraction = 0, .seconds_left = 41.2});
+  EXPECT_NE(out.str().find("0 %  views  about 42 s left"), std::string::npos) << out.str();
+  now += 10s;
+  display.show({.stage = engine::edit::Stage::mask, .fraction = 0.5, .seconds_left = 100});
+  EXPECT_NE(out.str().find("50 %  mask  about 2 min left"), std::string::npos) << out.str();
+}
+
 TEST(ProgressDisplay, RedrawsOneLineOnATerminalAndRemovesItAtTheEnd) {
   std::ostringstream out;
   Time now{};

@@ -52,8 +52,7 @@ TEST(Estimate, GrowsWithEverythingThatTakesMemory) {
 TEST(Estimate, TheTimeOfAJobIsThatOfTheEditAndWhatComesBeforeAndAfter) {
   Workload work = typical();
   const double of_edit = seconds_of(engine::edit::plan_of(work.edit));
-  EXPECT_DOUBLE_EQ(estimated_seconds(work),
-                   seconds_to_load(150'000, false) + of_edit + seconds_to_publish(150'000));
+  EXPECT_DOUBLE_EQ(estimated_seconds(work), seconds_to_load(150'000, false) + of_edit + seconds_to_publish(150'000));
   work.layered = true;
   EXPECT_GT(estimated_seconds(work), seconds_to_load(150'000, false) + of_edit + seconds_to_publish(150'000));
 }

@@ -11,7 +11,8 @@ namespace {
 
 TEST(Stages, TheContractAndThePageNameAllOfThemAndNoOthers) {
   std::string wanted = "enum: [";
-  for (const std::string_view name : stage_names()) wanted += std::string(wanted.ends_with('[') ? "" : ", ") + std::string(name);
+  for (const std::string_view name : stage_names())
+    wanted += std::string(wanted.ends_with('[') ? "" : ", ") + std::string(name);
   const std::string contract = support::read_file(support::source_dir() / "proto/openapi.yaml");
   EXPECT_NE(contract.find(wanted + "]\n"), std::string::npos) << wanted;
 
