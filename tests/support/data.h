@@ -34,10 +34,10 @@ void write_file(const std::filesystem::path& path, const std::string& bytes);
 }  // namespace support
 
 /// Skips the test, saying why, when shared data is absent. In CI (CI is set) absent data is a failure.
-#define REQUIRE_SHARED(path)                                                       \
-  do {                                                                             \
-    if (!std::filesystem::exists(path)) {                                          \
-      if (std::getenv("CI") != nullptr) FAIL() << (path) << " is absent in CI";    \
+#define REQUIRE_SHARED(path)                                                          \
+  do {                                                                                \
+    if (!std::filesystem::exists(path)) {                                             \
+      if (std::getenv("CI") != nullptr) FAIL() << (path) << " is absent in CI";       \
       GTEST_SKIP() << (path) << " is absent: the shared data is not on this machine"; \
-    }                                                                              \
+    }                                                                                 \
   } while (false)

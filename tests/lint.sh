@@ -1,0 +1,55 @@
+#!/usr/bin/env bash
+# Checks the sources without running them: their layout by clang-format, and what .clang-tidy asks for. Prints the place
+# of each finding, and on the last line how many there are; fails if there is one. Installs what is missing and asks
+# nothing.
+#
+#   lint.sh             every tracked source; of the tests only the layout, for they would double the time
+#   lint.sh FILE ...    these files only
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+if (($# > 0)); then
+  sources=("$@")
+  units=("$@")
+else
+  mapfile -t sources < <(git ls-files '*.cc' '*.h' '*.inc')
+  mapfile -t units < <(git ls-files 'engine/*.cc' 'proto/*.cc' 'server/*.cc' 'bench/*.cc')
+fi
+mapfile -t units < <(printf '%s\n' "${units[@]}" | grep '\.cc$' || true)
+
+bash deploy/install-packages.sh lint
+cmake --preset release --log-level=WARNING >/dev/null
+
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+mkdir "$work/reports"
+
+# One line for each place that clang-format would change.
+clang-format-14 --dry-run -Werror "${sources[@]}" 2>&1 | grep ': error: ' >"$work/format" || true
+
+# Highway compiles a file once for each instruction set; to read it once is enough. Clang does not know all of GCC's
+# warnings, and -Werror would stop at the first of its own: .clang-tidy decides what is an error.
+check_unit() {
+  local report="$work/reports/${1//\//_}"
+  clang-tidy-19 --quiet -p build/release --extra-arg=-DHWY_COMPILE_ONLY_STATIC \
+    --extra-arg=-Wno-unknown-warning-option --extra-arg=-Wno-error "$1" >"$report" 2>&1 && return
+  # A failure always has a line, even where clang-tidy itself broke.
+  if ! grep -qE '^/.*: (warning|error): ' "$report"; then
+    echo "$PWD/$1:1:1: error: clang-tidy failed: $(tail -n 1 "$report")" >>"$report"
+  fi
+}
+export -f check_unit
+export work
+if ((${#units[@]} > 0)); then
+  printf '%s\0' "${units[@]}" | xargs -0 -n 1 -P "$(nproc)" bash -c 'check_unit "$1"' check_unit
+  # A header's findings come with every file that includes it.
+  cat "$work/reports/"* | grep -E '^/.*: (warning|error): ' | sed -e "s|^$PWD/||" -e 's/,-warnings-as-errors\]$/]/' |
+    sort -u -t : -k 1,1 -k 2,2n -k 3,3n -k 4 >"$work/tidy" || true
+fi
+touch "$work/tidy"
+
+cat "$work/format" "$work/tidy"
+layout=$(wc -l <"$work/format")
+findings=$(wc -l <"$work/tidy")
+echo "lint: clang-format ${#sources[@]} files, $layout findings; clang-tidy ${#units[@]} files, $findings findings"
+((layout + findings == 0))
