@@ -23,7 +23,8 @@ using Time = std::chrono::sys_time<std::chrono::milliseconds>;
 ///
 /// - *stop* keeps the last finished interval: the job ends `succeeded`, with `stopped_early`. There has to be one.
 /// - *cancel* discards. It may be asked for again and again, and it wins: whatever the job still returns is dropped.
-/// - A job whose worker went away (shutdown, kill -9) keeps its state and is claimed again before younger ones; one that
+/// - A job whose worker went away (shutdown, kill -9) keeps its state and is claimed again before younger ones; one
+/// that
 ///   was to be cancelled is then `cancelled`.
 enum class State { queued, running, stop_requested, cancel_requested, succeeded, failed, cancelled };
 inline constexpr int state_count = 7;
