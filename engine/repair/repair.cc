@@ -99,7 +99,8 @@ Repair::ViewNow Repair::look(const WorkingScene& working, std::span<const std::u
 
 Result<scene::Image> Repair::ask_corrector(scene::Image picture, const scene::Mask& mask, scene::Image trust,
                                            std::size_t v, double strength, std::uint64_t key) {
-  const correct::Flawed flawed{std::move(picture), mask, std::move(trust), nearest_views(views_, v, most_examples)};
+  const correct::CorrectionTask flawed{std::move(picture), mask, std::move(trust),
+                                       nearest_views(views_, v, most_examples)};
   auto pictures = corrector_.correct(std::span(&flawed, 1), strength, key);
   if (!pictures) return propagate(pictures);
   return std::move(pictures->front());
