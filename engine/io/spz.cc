@@ -113,7 +113,7 @@ Result<Header> unpack_gzip(std::span<const std::byte> bytes, const std::string& 
   GzipReader in(bytes);
   std::array<std::byte, header_bytes> start;
   if (!in.read(start)) return damaged("no .spz header could be unpacked", file + ":header");
-  const auto header = parse_header(start, 1, 3, file + ":header");
+  auto header = parse_header(start, 1, 3, file + ":header");
   if (!header) return header;
   if (header->flags & flag_extensions)
     return fail(ErrorCode::unsupported,
@@ -142,7 +142,7 @@ Result<Header> unpack_zstd(std::span<const std::byte> bytes, const std::string& 
                            Attributes& attributes) {
   const std::string where = file + ":header";
   ByteReader in(bytes);
-  const auto header = parse_header(in.take(std::min(header_bytes, bytes.size())), 4, 4, where);
+  auto header = parse_header(in.take(std::min(header_bytes, bytes.size())), 4, 4, where);
   if (!header) return header;
   if (auto checked = check_limits(*header, options, file); !checked) return propagate(checked);
   const auto toc_offset = in.read<std::uint32_t>();
