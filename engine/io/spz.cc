@@ -21,7 +21,7 @@ namespace {
 using Bytes = std::vector<std::byte>;
 
 constexpr std::uint32_t magic = 0x5053474e;  // "NGSP"
-constexpr std::size_t grain = 4096;
+constexpr std::size_t rows_per_task = 4096;  // of a parallel task: a choice
 constexpr std::size_t header_bytes = 16;
 constexpr std::size_t max_deflate_ratio = 1032;  // of deflate: 258 bytes for every 2 bits
 constexpr double colour_scale = 0.15;            // of this format; wider than sh_c0 to keep colours beyond 0..1
@@ -301,7 +301,7 @@ Result<scene::GaussianCloud> decode_spz(std::span<const std::byte> bytes, const 
   cloud.sh_degree = header->sh_degree;
   cloud.resize(header->count);
   const std::size_t coefficients = scene::sh_coefficients(cloud.sh_degree);
-  parallel_for(cloud.size(), grain, [&](std::size_t begin, std::size_t end) {
+  parallel_for(cloud.size(), rows_per_task, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       cloud.mean.set(i, position_at(*header, in.positions, i));
       cloud.opacity_logit[i] = logit_of_byte(std::to_integer<std::uint8_t>(in.alphas[i]));

@@ -15,10 +15,10 @@ constexpr int sun_rays = 8, sky_rays = 24;
 constexpr float skin = 0.004f;  // rays start this far off a surface: more than its mesh strays from its formula
 constexpr float far = 30.0f;    // beyond every made-up scene
 
-struct Frame {
+struct Basis {
   Vec3 x, y;
 };
-Frame frame_of(Vec3 normal) {
+Basis basis_of(Vec3 normal) {
   const Vec3 axis = std::abs(normal.x) < 0.5f ? Vec3(1, 0, 0) : Vec3(0, 1, 0);
   const Vec3 x = glm::normalize(glm::cross(normal, axis));
   return {x, glm::cross(normal, x)};
@@ -49,19 +49,19 @@ LightMap::Sample gather(const Occluders& occluders, const Light& light, std::spa
   const Vec3 origin = point + skin * normal;
   const float phase = 2 * pi * float(turn) / 9, golden_angle = pi * (3 - std::sqrt(5.0f));
   if (glm::dot(normal, light.to_sun) > 0) {
-    const Frame frame = frame_of(light.to_sun);
+    const Basis basis = basis_of(light.to_sun);
     for (int k = 0; k < sun_rays; ++k) {
       const float r = light.sun_radius_rad * std::sqrt((float(k) + 0.5f) / sun_rays);
       const float a = golden_angle * float(k) + phase;
-      const Vec3 direction = light.to_sun + r * (std::cos(a) * frame.x + std::sin(a) * frame.y);
+      const Vec3 direction = light.to_sun + r * (std::cos(a) * basis.x + std::sin(a) * basis.y);
       sample.sun += occluders.any(origin, direction, far) ? 0.0f : 1.0f / sun_rays;
     }
   }
-  const Frame frame = frame_of(normal);
+  const Basis basis = basis_of(normal);
   for (int k = 0; k < sky_rays; ++k) {  // cosine-weighted: each ray stands for the same part of the irradiance
     const float height2 = 1 - (float(k) + (float(turn) + 0.5f) / 9) / sky_rays;
     const float ring = std::sqrt(1 - height2), a = golden_angle * float(k) + phase;
-    const Vec3 direction = std::sqrt(height2) * normal + ring * (std::cos(a) * frame.x + std::sin(a) * frame.y);
+    const Vec3 direction = std::sqrt(height2) * normal + ring * (std::cos(a) * basis.x + std::sin(a) * basis.y);
     const auto hit = occluders.nearest(origin, direction, far);
     sample.ambient += (hit ? bounced[hit->patch] : light.sky(direction)) / float(sky_rays);
   }
