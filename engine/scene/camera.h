@@ -12,7 +12,7 @@ namespace engine::scene {
 /// A view of the scene. Pose in double: float would lose 1e-3 world units in a scene 1e4 from its origin.
 /// Image origin: the upper left corner of the upper left pixel, whose centre is therefore (0.5, 0.5) (COLMAP).
 struct Camera {
-  std::string name;           ///< Of the view: the photo's file name, or "virtual_07".
+  std::string name;           ///< Name of the view: the photo's file name, or "virtual_07".
   DMat3 rotation{1.0};        ///< x_in_cam = rotation * x_in_world + translation
   DVec3 translation{0.0};     ///< World units.
   double fx = 0, fy = 0;      ///< Focal lengths, pixels.
