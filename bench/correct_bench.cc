@@ -40,8 +40,8 @@ std::vector<correct::Example> demo_pictures(double share) {
 }
 
 /// The square shows nothing.
-correct::Flawed flawed(const scene::Image& picture, double share) {
-  correct::Flawed out{picture, scene::Mask(width, height), scene::Image(width, height, 1), {}};
+correct::CorrectionTask flawed(const scene::Image& picture, double share) {
+  correct::CorrectionTask out{picture, scene::Mask(width, height), scene::Image(width, height, 1), {}};
   std::fill(out.trust.data.begin(), out.trust.data.end(), 1.0f);
   const scene::Rect part = square(share);
   for (int y = part.y0; y < part.y1; ++y)
@@ -59,7 +59,7 @@ void correct_512x384(benchmark::State& state) {
   one.run([&] {
     const double share = double(state.range(0)) / 100;
     std::vector<correct::Example> examples = demo_pictures(share);
-    correct::Flawed view = flawed(examples.back().picture, share);
+    correct::CorrectionTask view = flawed(examples.back().picture, share);
     examples.pop_back();
     view.examples.resize(examples.size());
     std::iota(view.examples.begin(), view.examples.end(), std::size_t{0});

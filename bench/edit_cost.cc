@@ -109,13 +109,13 @@ class Training {
   Training(scene::GaussianCloud cloud, std::vector<std::uint32_t> rows, const scene::Camera& camera,
            const scene::Mask& mask)
       : cloud_(std::move(cloud)), rows_(std::move(rows)) {
-    train::Changeable changeable;
+    train::TrainedRows changeable;
     changeable.cloud.sh_degree = cloud_.sh_degree, changeable.cloud.extra_stride = cloud_.extra_stride;
     scene::append_rows(changeable.cloud, cloud_, rows_);
     const scene::GaussianCloud original = changeable.cloud;
     train::TrainOptions options;
     options.densify.every = 0;  // the size is what is measured
-    trainer_.emplace(train::Frozen{&cloud_, rows_}, std::move(changeable), 1, options, loss_);
+    trainer_.emplace(train::FrozenScene{&cloud_, rows_}, std::move(changeable), 1, options, loss_);
     const auto start = bench::Clock::now();
     if (!trainer_->add_view(camera, mask, original)) throw std::runtime_error("the view shows nothing of the edit");
     setup_ms_ = 1e3 * bench::seconds_since(start);
@@ -206,7 +206,7 @@ Crowded measure_crowds(const Sample& sample) {
   scene::append_rows(held, sample.cloud, rows);
   engine::render::LocalFrame frame;
   const scene::Rect region =
-      train::region_around(train::united(scene::bounding_box(mask), frame.project(held, camera)), camera);
+      train::region_around(train::union_of(scene::bounding_box(mask), frame.project(held, camera)), camera);
   std::vector<std::unique_ptr<Training>> trainings;
   for (const int times : crowds) {
     scene::GaussianCloud cloud = sample.cloud;

@@ -18,8 +18,8 @@ using FileErrorOf = Error (*)(int error_number, const std::string& action, const
 constexpr const char* temporary_prefix = ".splatdrag-";
 
 /// Writes to a temporary name in the folder of `path`; commit() makes it durable and moves it to `path`, replacing what
-/// is there. Destroyed without commit(), after any error, it leaves nothing behind and `path` as it was; only if the folder
-/// cannot be synced at the very end, `path` is the new file, and a power cut may still take it back.
+/// is there. Destroyed without commit(), after any error, it leaves nothing behind and `path` as it was; only if the
+/// folder cannot be synced at the very end, `path` is the new file, and a power cut may still take it back.
 ///   errors  no_space, not_found (no such folder), invalid_argument (`path` is a folder), unavailable (not permitted)
 class AtomicFile {
  public:

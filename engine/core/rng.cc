@@ -26,9 +26,9 @@ std::uint64_t derived_seed(std::uint64_t seed, std::array<std::uint32_t, 4> purp
 
 std::uint32_t Rng::next() noexcept {
   if (used_ == 4) {
-    words_ = philox4x32({std::uint32_t(block_), std::uint32_t(block_ >> 32), std::uint32_t(stream_),
-                         std::uint32_t(stream_ >> 32)},
-                        {std::uint32_t(seed_), std::uint32_t(seed_ >> 32)});
+    words_ = philox4x32(
+        {std::uint32_t(block_), std::uint32_t(block_ >> 32), std::uint32_t(stream_), std::uint32_t(stream_ >> 32)},
+        {std::uint32_t(seed_), std::uint32_t(seed_ >> 32)});
     ++block_;
     used_ = 0;
   }

@@ -22,10 +22,10 @@ class Rng {
   explicit Rng(std::uint64_t seed, std::uint64_t stream = 0) noexcept : seed_(seed), stream_(stream) {}
 
   [[nodiscard]] std::uint32_t next() noexcept;
-  [[nodiscard]] float uniform() noexcept;                        ///< in [0, 1)
-  [[nodiscard]] float uniform(float low, float high) noexcept;   ///< in [low, high)
-  [[nodiscard]] float normal() noexcept;                         ///< mean 0, variance 1
-  [[nodiscard]] std::uint32_t below(std::uint32_t n) noexcept;   ///< in [0, n); n > 0
+  [[nodiscard]] float uniform() noexcept;                       ///< in [0, 1)
+  [[nodiscard]] float uniform(float low, float high) noexcept;  ///< in [low, high)
+  [[nodiscard]] float normal() noexcept;                        ///< mean 0, variance 1
+  [[nodiscard]] std::uint32_t below(std::uint32_t n) noexcept;  ///< in [0, n); n > 0
 
  private:
   std::uint64_t seed_, stream_;

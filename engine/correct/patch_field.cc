@@ -35,34 +35,34 @@ PatchSource patch_source(const scene::Image& picture, const scene::Mask& allowed
   return source;
 }
 
-std::vector<Match> random_field(const PatchQuery& query, std::uint64_t seed) {
-  std::vector<std::size_t> first{0};  // how many places the sources before have
+std::vector<PatchMatch> random_field(const PatchQuery& query, std::uint64_t seed) {
+  std::vector<std::size_t> first{0};  // [source] allowed centres of the sources before it
   for (const PatchSource& source : query.sources) first.push_back(first.back() + source.centres.size());
   assert(first.back() > 0);
-  std::vector<Match> field(query.centres.size());
+  std::vector<PatchMatch> field(query.centres.size());
   Rng rng(seed);
-  for (Match& match : field) {
+  for (PatchMatch& match : field) {
     const std::size_t drawn = rng.below(std::uint32_t(first.back()));
     const auto next = std::upper_bound(first.begin(), first.end(), drawn);
     match.source = std::uint32_t(next - first.begin() - 1);
     const PatchSource& source = query.sources[match.source];
-    const std::uint32_t place = source.centres[drawn - first[match.source]];
-    match.centre = {std::int16_t(place % std::uint32_t(source.picture.width)),
-                    std::int16_t(place / std::uint32_t(source.picture.width))};
+    const std::uint32_t pixel = source.centres[drawn - first[match.source]];
+    match.centre = {std::int16_t(pixel % std::uint32_t(source.picture.width)),
+                    std::int16_t(pixel / std::uint32_t(source.picture.width))};
   }
   return field;
 }
 
-std::vector<Match> doubled_field(const PatchQuery& query, const Field& coarse, std::uint64_t seed) {
-  std::vector<Match> field = random_field(query, seed);
+std::vector<PatchMatch> double_size_field(const PatchQuery& query, const PatchField& coarse, std::uint64_t seed) {
+  std::vector<PatchMatch> field = random_field(query, seed);
   const int coarse_height = int(coarse.number.size()) / coarse.width;
   for (std::size_t k = 0; k < field.size(); ++k) {
-    const Place here = query.centres[k];
+    const Pixel here = query.centres[k];
     const int x = here.x / 2, y = here.y / 2;
     if (x >= coarse.width || y >= coarse_height) continue;
     const std::uint32_t number = coarse.number[std::size_t(y) * std::size_t(coarse.width) + std::size_t(x)];
     if (number == no_centre) continue;
-    const Match& found = coarse.matches[number];
+    const PatchMatch& found = coarse.matches[number];
     const scene::Mask& allowed = query.sources[found.source].centre_allowed;
     const int there_x = 2 * found.centre.x + here.x % 2, there_y = 2 * found.centre.y + here.y % 2;
     if (there_x >= allowed.width || there_y >= allowed.height || allowed.at(there_x, there_y) == 0) continue;
@@ -71,11 +71,11 @@ std::vector<Match> doubled_field(const PatchQuery& query, const Field& coarse, s
   return field;
 }
 
-void improve(const PatchQuery& query, std::span<const Match> matches, int step, std::uint64_t seed,
-             std::span<Match> out) {
+void improve(const PatchQuery& query, std::span<const PatchMatch> matches, int step, std::uint64_t seed,
+             std::span<PatchMatch> out) {
   assert(matches.size() == query.centres.size() && out.size() == matches.size());
-  constexpr std::size_t grain = 512;  // about a millisecond
-  parallel_for(query.centres.size(), grain,
+  constexpr std::size_t centres_per_task = 512;  // about a millisecond of work
+  parallel_for(query.centres.size(), centres_per_task,
                [&](std::size_t begin, std::size_t end) { improve_range(query, matches, step, seed, begin, end, out); });
 }
 

@@ -12,12 +12,13 @@
 
 namespace engine::correct {
 
-constexpr int patch_radius = 3;  ///< Patches are squares of 7 x 7 pixels.
-constexpr int patch_side = 2 * patch_radius + 1;
+/// Pixels. Patches are squares of 7 x 7 pixels: a choice; other sizes were not measured.
+constexpr int patch_radius = 3;
+constexpr int patch_side = 2 * patch_radius + 1;  ///< Pixels.
 
 /// A colour picture, with room at the end for a vector that reads beyond a row.
 struct Planes {
-  static constexpr std::size_t spare = 8;
+  static constexpr std::size_t spare = 8;  ///< Floats: a vector of 8 begins at the last pixel at most.
 
   int width = 0, height = 0;
   std::vector<float> data;  ///< [3][height][width], then `spare` more
@@ -32,53 +33,57 @@ struct Planes {
 /// A picture to take patches from.
 struct PatchSource {
   Planes picture;
-  scene::Mask centre_allowed;          ///< Where the middle of a patch may be: wholly inside, no pixel of it excluded.
-  std::vector<std::uint32_t> centres;  ///< Those places, as indices, ascending.
+  scene::Mask centre_allowed;          ///< Pixels around which a whole patch is inside and allowed.
+  std::vector<std::uint32_t> centres;  ///< Indices of the pixels of `centre_allowed` that are set, ascending.
 };
-///   allowed  pixels that may be taken
+/// A picture made ready to take patches from.
+///   picture  [3]
+///   allowed  [height][width] pixels that a patch may hold
 [[nodiscard]] PatchSource patch_source(const scene::Image& picture, const scene::Mask& allowed);
 
-struct Place {
+/// A position in a picture, in pixels from its upper left corner.
+struct Pixel {
   std::int16_t x = 0, y = 0;
 };
 
 /// A patch of a source.
-struct Match {
+struct PatchMatch {
   std::uint32_t source = 0;
-  Place centre;
+  Pixel centre;
   float distance = 0;  ///< Weighted mean of squared differences, colour units squared, times 3.
 };
 
 /// The patches that are looked up, and where.
 struct PatchQuery {
   const Planes* target = nullptr;
-  std::span<const float> weight;          ///< [height][width] (+ Planes::spare) of the target: what a pixel counts.
-  std::span<const Place> centres;         ///< Of target patches, all wholly inside.
-  std::span<const std::uint32_t> number;  ///< [height][width] which of `centres` is at a pixel; nothing: no_centre.
+  std::span<const float> weight;   ///< [height][width], then Planes::spare more: weight of each pixel of the target.
+  std::span<const Pixel> centres;  ///< Middles of the target's patches; each patch is wholly inside.
+  std::span<const std::uint32_t> number;  ///< [height][width] index into `centres` of the pixel, or no_centre.
   std::span<const PatchSource> sources;   ///< At least one has an allowed centre.
 };
 constexpr std::uint32_t no_centre = ~std::uint32_t{0};
 
-/// Any patches at all: a field to begin with.
-[[nodiscard]] std::vector<Match> random_field(const PatchQuery& query, std::uint64_t seed);
+/// A field to begin with: patches drawn at random, each allowed centre as likely as any other.
+[[nodiscard]] std::vector<PatchMatch> random_field(const PatchQuery& query, std::uint64_t seed);
 
-/// What was found at one scale.
-struct Field {
-  int width = 0;                      ///< Of the target.
+/// The patches that were found at one scale.
+struct PatchField {
+  int width = 0;                      ///< Pixels of a row of the target.
   std::vector<std::uint32_t> number;  ///< As in PatchQuery.
-  std::vector<Match> matches;         ///< [centres]
+  std::vector<PatchMatch> matches;    ///< [centres]
 };
 
-/// A field to begin with at twice the scale of `coarse`: what was found there, and any patches where that says nothing.
-///   coarse  of the same sources, each halved
-[[nodiscard]] std::vector<Match> doubled_field(const PatchQuery& query, const Field& coarse, std::uint64_t seed);
+/// A field to begin with at twice the scale of `coarse`: the patches found there, and random ones where it has none.
+///   coarse  a field over the same sources at half their size
+[[nodiscard]] std::vector<PatchMatch> double_size_field(const PatchQuery& query, const PatchField& coarse,
+                                                        std::uint64_t seed);
 
-/// One pass over the field: distances are measured anew, then each patch looks at what its neighbours `step` pixels
-/// away have found, around its own match, and at one random patch.
+/// One pass over the field: distances are measured anew, then each patch is compared with what its neighbours `step`
+/// pixels away have found, with three patches around its own match, and with one random patch.
 ///   matches, out  [centres]
-///   seed          of this pass
-///   bytes         the same for any number of threads
-void improve(const PatchQuery& query, std::span<const Match> matches, int step, std::uint64_t seed,
-             std::span<Match> out);
+///   seed          differs from pass to pass
+/// Same bytes for any number of threads.
+void improve(const PatchQuery& query, std::span<const PatchMatch> matches, int step, std::uint64_t seed,
+             std::span<PatchMatch> out);
 
 }  // namespace engine::correct

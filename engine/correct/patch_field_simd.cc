@@ -24,7 +24,7 @@ struct Query {
   alignas(64) float color[3][patch_side][padded_side];
   alignas(64) float weight[patch_side][padded_side];  ///< Divided by their sum.
 
-  HWY_INLINE void Load(const PatchQuery& query, Place centre) {
+  HWY_INLINE void Load(const PatchQuery& query, Pixel centre) {
     const Planes& target = *query.target;
     const std::size_t corner = target.index(centre.x - patch_radius, centre.y - patch_radius);
     float sum = 0;
@@ -41,8 +41,8 @@ struct Query {
       for (float& w : row) w *= scale;
   }
 
-  /// Distance to the patch around `centre`; or something not below `bound`, if it is not.
-  HWY_INLINE float Distance(const Planes& source, Place centre, float bound) const {
+  /// Distance to the patch around `centre` if it is below `bound`; otherwise some number that is not below it.
+  HWY_INLINE float Distance(const Planes& source, Pixel centre, float bound) const {
     const D d;
     const float* const corner = source.data.data() + source.index(centre.x - patch_radius, centre.y - patch_radius);
     auto sum = hn::Zero(d);
@@ -66,21 +66,21 @@ struct Query {
   }
 };
 
-void ImproveRange(const PatchQuery& query, std::span<const Match> matches, int step, std::uint64_t seed,
-                  std::size_t begin, std::size_t end, std::span<Match> out) {
+void ImproveRange(const PatchQuery& query, std::span<const PatchMatch> matches, int step, std::uint64_t seed,
+                  std::size_t begin, std::size_t end, std::span<PatchMatch> out) {
   const Planes& target = *query.target;
   Query patch;
   for (std::size_t k = begin; k < end; ++k) {
-    const Place here = query.centres[k];
+    const Pixel here = query.centres[k];
     patch.Load(query, here);
-    Match best = matches[k];
+    PatchMatch best = matches[k];
     best.distance = patch.Distance(query.sources[best.source].picture, best.centre, hwy::HighestValue<float>());
     const auto consider = [&](std::uint32_t source_number, int x, int y) {
       const PatchSource& source = query.sources[source_number];
       if (x < patch_radius || y < patch_radius || x >= source.picture.width - patch_radius ||
           y >= source.picture.height - patch_radius || source.centre_allowed.at(x, y) == 0)
         return;
-      const Place centre{std::int16_t(x), std::int16_t(y)};
+      const Pixel centre{std::int16_t(x), std::int16_t(y)};
       const float distance = patch.Distance(source.picture, centre, best.distance);
       if (distance < best.distance) best = {source_number, centre, distance};
     };
@@ -89,7 +89,7 @@ void ImproveRange(const PatchQuery& query, std::span<const Match> matches, int s
       if (x < 0 || y < 0 || x >= target.width || y >= target.height) continue;
       const std::uint32_t neighbour = query.number[target.index(x, y)];
       if (neighbour == no_centre) continue;
-      const Match& theirs = matches[neighbour];
+      const PatchMatch& theirs = matches[neighbour];
       consider(theirs.source, theirs.centre.x - dx, theirs.centre.y - dy);
     }
     Rng rng(seed, k);
@@ -103,9 +103,9 @@ void ImproveRange(const PatchQuery& query, std::span<const Match> matches, int s
     const std::uint32_t source_number = rng.below(std::uint32_t(query.sources.size()));
     const PatchSource& source = query.sources[source_number];
     if (!source.centres.empty()) {
-      const std::uint32_t place = source.centres[rng.below(std::uint32_t(source.centres.size()))];
-      consider(source_number, int(place % std::uint32_t(source.picture.width)),
-               int(place / std::uint32_t(source.picture.width)));
+      const std::uint32_t pixel = source.centres[rng.below(std::uint32_t(source.centres.size()))];
+      consider(source_number, int(pixel % std::uint32_t(source.picture.width)),
+               int(pixel / std::uint32_t(source.picture.width)));
     }
     out[k] = best;
   }
@@ -120,8 +120,8 @@ namespace engine::correct {
 
 HWY_EXPORT(ImproveRange);
 
-void improve_range(const PatchQuery& query, std::span<const Match> matches, int step, std::uint64_t seed,
-                   std::size_t begin, std::size_t end, std::span<Match> out) {
+void improve_range(const PatchQuery& query, std::span<const PatchMatch> matches, int step, std::uint64_t seed,
+                   std::size_t begin, std::size_t end, std::span<PatchMatch> out) {
   HWY_DYNAMIC_DISPATCH(ImproveRange)(query, matches, step, seed, begin, end, out);
 }
 

@@ -10,7 +10,7 @@
 namespace engine::correct {
 
 /// improve() for centres [begin, end).
-void improve_range(const PatchQuery& query, std::span<const Match> matches, int step, std::uint64_t seed,
-                   std::size_t begin, std::size_t end, std::span<Match> out);
+void improve_range(const PatchQuery& query, std::span<const PatchMatch> matches, int step, std::uint64_t seed,
+                   std::size_t begin, std::size_t end, std::span<PatchMatch> out);
 
 }  // namespace engine::correct

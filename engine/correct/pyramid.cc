@@ -4,28 +4,29 @@
 
 namespace engine::correct {
 
-Partial halved(const Partial& fine) {
+MaskedPicture half_size(const MaskedPicture& fine) {
   const int width = (fine.picture.width + 1) / 2, height = (fine.picture.height + 1) / 2;
   const int channels = fine.picture.channels;
-  Partial coarse{scene::Image(width, height, channels), scene::Image(width, height, 1)};
+  MaskedPicture coarse{scene::Image(width, height, channels), scene::Image(width, height, 1)};
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
       const int x1 = std::min(2 * x + 2, fine.picture.width), y1 = std::min(2 * y + 2, fine.picture.height);
-      float known = 0, pixels = 0;
+      float confidence = 0, pixels = 0;
       for (int v = 2 * y; v < y1; ++v)
-        for (int u = 2 * x; u < x1; ++u) known += fine.known.at(u, v), pixels += 1;
-      coarse.known.at(x, y) = known / pixels;
+        for (int u = 2 * x; u < x1; ++u) confidence += fine.confidence.at(u, v), pixels += 1;
+      coarse.confidence.at(x, y) = confidence / pixels;
       for (int c = 0; c < channels; ++c) {
         float sum = 0;
         for (int v = 2 * y; v < y1; ++v)
-          for (int u = 2 * x; u < x1; ++u) sum += (known > 0 ? fine.known.at(u, v) : 1.0f) * fine.picture.at(u, v, c);
-        coarse.picture.at(x, y, c) = sum / (known > 0 ? known : pixels);
+          for (int u = 2 * x; u < x1; ++u)
+            sum += (confidence > 0 ? fine.confidence.at(u, v) : 1.0f) * fine.picture.at(u, v, c);
+        coarse.picture.at(x, y, c) = sum / (confidence > 0 ? confidence : pixels);
       }
     }
   return coarse;
 }
 
-scene::Mask halved_all(const scene::Mask& fine) {
+scene::Mask half_size_mask(const scene::Mask& fine) {
   scene::Mask coarse((fine.width + 1) / 2, (fine.height + 1) / 2);
   for (int y = 0; y < coarse.height; ++y)
     for (int x = 0; x < coarse.width; ++x) {
@@ -37,7 +38,7 @@ scene::Mask halved_all(const scene::Mask& fine) {
   return coarse;
 }
 
-scene::Image doubled(const scene::Image& coarse, int width, int height) {
+scene::Image double_size(const scene::Image& coarse, int width, int height) {
   scene::Image fine(width, height, coarse.channels);
   // Pixel u of the fine picture has its middle at u / 2 - 1 / 4 of the coarse one.
   for (int y = 0; y < height; ++y) {

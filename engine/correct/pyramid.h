@@ -7,23 +7,23 @@
 
 namespace engine::correct {
 
-/// A picture of which not everything is known.
-struct Partial {
-  scene::Image picture;  ///< [3]; where nothing is known, anything finite.
-  scene::Image known;    ///< [1] 0 to 1: how far a pixel is.
+/// A picture with a confidence in each of its pixels.
+struct MaskedPicture {
+  scene::Image picture;     ///< Any channels. Anything finite where the confidence is 0.
+  scene::Image confidence;  ///< [1] 0 to 1: how far a pixel is known.
 };
 
-/// Half the size, rounded up: means of up to 2 x 2 pixels, weighted by how far they are known.
-[[nodiscard]] Partial halved(const Partial& fine);
+/// Half the size, rounded up: means of up to 2 x 2 pixels, weighted by their confidence.
+[[nodiscard]] MaskedPicture half_size(const MaskedPicture& fine);
 
-/// A pixel of the half is set if all of its up to 2 x 2 pixels are.
-[[nodiscard]] scene::Mask halved_all(const scene::Mask& fine);
+/// Half the size, rounded up: a pixel is set if all of its up to 2 x 2 pixels are.
+[[nodiscard]] scene::Mask half_size_mask(const scene::Mask& fine);
 
 /// Twice the size, cut to width x height, interpolated linearly between the middles of pixels.
-[[nodiscard]] scene::Image doubled(const scene::Image& coarse, int width, int height);
+[[nodiscard]] scene::Image double_size(const scene::Image& coarse, int width, int height);
 
-/// Steps from pixel to pixel, diagonal ones too, to the nearest pixel that is not set; 0 for those; a side of the
-/// picture where all are set.
+/// [height][width] Steps from each pixel to the nearest one that is not set, diagonal steps included: 0 for a pixel
+/// that is not set; the picture's longer side where all are set.
 [[nodiscard]] std::vector<int> depth_within(const scene::Mask& mask);
 
 }  // namespace engine::correct

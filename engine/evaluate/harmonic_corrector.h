@@ -8,8 +8,8 @@ namespace engine::evaluate {
 class HarmonicCorrector final : public correct::Corrector {
  public:
   [[nodiscard]] Result<void> fine_tune(std::span<const correct::Example> buffer, int steps) override;
-  [[nodiscard]] Result<std::vector<scene::Image>> correct(std::span<const correct::Flawed> views, double strength,
-                                                          std::uint64_t seed) override;
+  [[nodiscard]] Result<std::vector<scene::Image>> correct(std::span<const correct::CorrectionTask> views,
+                                                          double strength, std::uint64_t seed) override;
 };
 
 }  // namespace engine::evaluate

@@ -12,7 +12,7 @@ namespace engine::fit {
 namespace {
 
 constexpr std::string_view magic = "splatdrag fit\n";
-constexpr std::uint32_t version = 1;
+constexpr std::uint32_t format_number = 1;  // of the bytes that encode() makes
 
 void write(ByteWriter& out, const scene::Camera& camera) {
   out.write_string(camera.name);
@@ -60,7 +60,7 @@ std::uint64_t identity_of(std::span<const Photo> photos, const scene::GaussianCl
 std::string encode(std::uint64_t identity, const History& history, const Fitter& fitter) {
   ByteWriter out;
   out.write_all(std::span(magic));
-  out.write(version);
+  out.write(format_number);
   out.write(identity);
   out.write(history.seconds);
   out.write(std::uint32_t(history.milestones.size()));
@@ -84,7 +84,7 @@ Result<History> decode(std::string_view text, std::uint64_t identity, Fitter& fi
   const std::size_t contents = bytes.size() - sizeof(checksum);
   std::memcpy(&checksum, bytes.data() + contents, sizeof(checksum));
   ByteReader in(bytes.subspan(magic.size(), contents - magic.size()));
-  if (in.read<std::uint32_t>() != version)
+  if (in.read<std::uint32_t>() != format_number)
     return wrong(ErrorCode::unsupported, "The checkpoint is that of another version of this program.");
   if (checksum != fnv1a(bytes.first(contents))) return wrong(ErrorCode::corrupt_data, "The checkpoint is damaged.");
   if (in.read<std::uint64_t>() != identity)

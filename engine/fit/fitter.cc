@@ -11,23 +11,24 @@
 #include "engine/render/largest_weight.h"
 #include "engine/scene/cloud_bytes.h"
 #include "engine/scene/opacity.h"
-#include "engine/train/chance.h"
+#include "engine/train/random_streams.h"
 
 namespace engine::fit {
 namespace {
 
-constexpr double identical_db = 100;  // infinity has no mean
-constexpr int least_side = 64;        // pixels: a smaller picture has nothing to fit to
+constexpr double identical_db = 100;  // PSNR of equal pictures in means: infinity has no mean. A choice.
+constexpr int min_side = 64;          // pixels: a smaller photo is not halved further. A choice.
 
-// Parts of the iterations after which photos are halved once less often, and after which bands are added.
+// Parts of the iterations after which photos are halved once less often. ADR 8; a choice.
 constexpr double finer_after[] = {0.1, 0.3};
-constexpr int bands_in = 10;  // one more with every tenth
+// Parts that the iterations are divided into; the SH degree grows by one with each. ADR 8; a choice.
+constexpr int bands_in = 10;
 
-// Of the distance at which the scene lies, where the cameras hardly differ in place: a single photo, a panorama. The
-// extent is what positions go by, and at 0 nothing would move.
-constexpr double least_extent = 0.1;
+// Least extent of a capture, as a part of the distance of the scene. Rates of positions go by the extent, and where the
+// cameras hardly differ in place (a single photo, a panorama) nothing would move without it. A choice.
+constexpr double min_extent = 0.1;
 
-train::Key key_of(const FitOptions& options) { return {.seed = options.seed, .interval = 0, .round = 0}; }
+train::RandomKey key_of(const FitOptions& options) { return {.seed = options.seed, .interval = 0, .correction = 0}; }
 
 std::vector<scene::Camera> cameras_of(std::span<const Photo> photos) {
   std::vector<scene::Camera> cameras;
@@ -63,15 +64,15 @@ Result<void> validate(const FitOptions& options) {
   return train::validate(options.densify);
 }
 
-Stage stage_of(const FitOptions& options, int start_degree, int iteration) {
+Phase phase_of(const FitOptions& options, int start_degree, int iteration) {
   const double progress = double(iteration) / options.iterations;
-  Stage stage{options.halvings, std::max(start_degree, 0)};
+  Phase phase{options.halvings, std::max(start_degree, 0)};
   for (const double after : finer_after)
-    if (progress >= after && stage.halvings > 0) --stage.halvings;
-  if (progress >= finer_after[1]) stage.halvings = 0;
+    if (progress >= after && phase.halvings > 0) --phase.halvings;
+  if (progress >= finer_after[1]) phase.halvings = 0;
   const auto tenths = int(std::int64_t{bands_in} * iteration / options.iterations);
-  stage.sh_degree = std::max(start_degree, std::min(options.sh_degree, tenths));
-  return stage;
+  phase.sh_degree = std::max(start_degree, std::min(options.sh_degree, tenths));
+  return phase;
 }
 
 Fitter::Fitter(std::vector<Photo> photos, scene::GaussianCloud start, const FitOptions& options)
@@ -81,39 +82,39 @@ Fitter::Fitter(std::vector<Photo> photos, scene::GaussianCloud start, const FitO
       start_degree_(cloud_.sh_degree),
       start_rows_(cloud_.size()),
       extent_(std::max(scene::capture_extent(cameras_of(photos_)),
-                       least_extent * distance_of(cloud_, photos_.front().camera))),
+                       min_extent * distance_of(cloud_, photos_.front().camera))),
       adam_(cloud_.size(), cloud_.sh_degree, options.adam) {
   assert(validate(options) && !photos_.empty() && cloud_.size() > 0 && cloud_.sh_degree <= options.sh_degree);
-  pull_.reset(cloud_.size());
+  position_gradients_.reset(cloud_.size());
 }
 
-void Fitter::enter(const Stage& stage) {
-  if (!stage_ || stage.halvings != stage_->halvings) {
+void Fitter::enter(const Phase& phase) {
+  if (!phase_ || phase.halvings != phase_->halvings) {
     halved_.clear();
-    if (stage.halvings > 0) halved_.reserve(photos_.size());
-    for (std::size_t p = 0; stage.halvings > 0 && p < photos_.size(); ++p) {
+    if (phase.halvings > 0) halved_.reserve(photos_.size());
+    for (std::size_t p = 0; phase.halvings > 0 && p < photos_.size(); ++p) {
       const auto large = [](const Photo& photo) {
-        return std::min(photo.camera.width, photo.camera.height) >= 2 * least_side;
+        return std::min(photo.camera.width, photo.camera.height) >= 2 * min_side;
       };
       if (!large(photos_[p])) {
         halved_.push_back(photos_[p]);
         continue;
       }
-      Photo photo = halved(photos_[p]);
-      for (int h = 1; h < stage.halvings && large(photo); ++h) photo = halved(photo);
+      Photo photo = half_size(photos_[p]);
+      for (int h = 1; h < phase.halvings && large(photo); ++h) photo = half_size(photo);
       halved_.push_back(std::move(photo));
     }
   }
-  if (stage.sh_degree != cloud_.sh_degree) {
-    cloud_ = with_sh_degree(cloud_, stage.sh_degree);
-    adam_ = train::CloudAdam(cloud_.size(), stage.sh_degree, options_.adam);
+  if (phase.sh_degree != cloud_.sh_degree) {
+    cloud_ = with_sh_degree(cloud_, phase.sh_degree);
+    adam_ = train::CloudAdam(cloud_.size(), phase.sh_degree, options_.adam);
   }
-  stage_ = stage;
+  phase_ = phase;
 }
 
 Result<double> Fitter::step() {
   assert(!done());
-  if (const Stage stage = stage_of(options_, start_degree_, iteration_); stage_ != stage) enter(stage);
+  if (const Phase phase = phase_of(options_, start_degree_, iteration_); phase_ != phase) enter(phase);
   const std::vector<Photo>& photos = halved_.empty() ? photos_ : halved_;
   const std::size_t in_epoch = std::size_t(iteration_) % photos.size();
   if (in_epoch == 0 || order_.empty())
@@ -154,14 +155,14 @@ Result<double> Fitter::step() {
 
   const train::DensifyOptions& densify_options = options_.densify;
   if (densify_options.every > 0 && iteration_ <= densify_options.until * options_.iterations) {
-    pull_.add(gradients_, camera);
+    position_gradients_.add(gradients_, camera);
     if (iteration_ % densify_options.every == 0) densify();
   }
   return loss;
 }
 
-/// Grows evenly until densification ends: what is fitted longest has had the most time to find its place.
-std::size_t Fitter::most_gaussians() const {
+/// The limit grows evenly until densification ends: Gaussians that are fitted longest have had the most time to settle.
+std::size_t Fitter::max_gaussians_now() const {
   const double part = std::min(1.0, iteration_ / std::max(1.0, options_.densify.until * options_.iterations));
   const double from = double(start_rows_), to = double(options_.max_gaussians);
   return to <= from ? start_rows_ : std::size_t(from + (to - from) * part);
@@ -169,14 +170,14 @@ std::size_t Fitter::most_gaussians() const {
 
 void Fitter::densify() {
   prune();
-  const std::size_t most = most_gaussians();
+  const std::size_t limit = max_gaussians_now();
   const double loss_weight = options_.loss.l1_weight + options_.loss.ssim_weight;
-  const auto rows =
-      train::rows_to_densify(pull_, options_.densify.gradient * loss_weight, most - std::min(most, cloud_.size()));
+  const auto rows = train::rows_to_densify(position_gradients_, options_.densify.gradient * loss_weight,
+                                           limit - std::min(limit, cloud_.size()));
   Rng rng = train::stream(key_of(options_), train::Purpose::split, std::size_t(iteration_));
   train::add_children(cloud_, rows, options_.densify.dense * extent_, rng);
   adam_.append_rows(rows.size());
-  pull_.reset(cloud_.size());
+  position_gradients_.reset(cloud_.size());
 }
 
 void Fitter::prune() {
@@ -187,15 +188,15 @@ void Fitter::prune() {
   if (kept == keep.size() || kept == 0) return;
   cloud_ = scene::select(cloud_, keep);
   adam_.keep_rows(keep);
-  pull_.keep_rows(keep);
+  position_gradients_.keep_rows(keep);
 }
 
 void Fitter::write(ByteWriter& out) const {
   out.write(std::int32_t(iteration_));
   scene::write_cloud(out, cloud_);
   adam_.write(out);
-  out.write_all(std::span<const double>(pull_.sum));
-  out.write_all(std::span<const std::uint32_t>(pull_.views));
+  out.write_all(std::span<const double>(position_gradients_.sum));
+  out.write_all(std::span<const std::uint32_t>(position_gradients_.views));
 }
 
 void Fitter::read(ByteReader& in) {
@@ -203,19 +204,19 @@ void Fitter::read(ByteReader& in) {
   cloud_ = scene::read_cloud(in);
   if (!in.ok() || iteration_ < 0 || iteration_ > options_.iterations || cloud_.size() == 0) return in.fail();
   order_.clear();
-  stage_.reset();
+  phase_.reset();
   adam_ = train::CloudAdam(cloud_.size(), cloud_.sh_degree, options_.adam);
   adam_.read(in);
-  pull_.reset(cloud_.size());
-  in.read_all(std::span(pull_.sum));
-  in.read_all(std::span(pull_.views));
+  position_gradients_.reset(cloud_.size());
+  in.read_all(std::span(position_gradients_.sum));
+  in.read_all(std::span(position_gradients_.views));
 }
 
-Closeness closeness(const scene::GaussianCloud& cloud, std::span<const Photo> photos, Vec3 background,
-                    std::size_t most) {
-  assert(!photos.empty() && most >= 1);
-  const std::size_t count = std::min(photos.size(), most);
-  Closeness mean;
+FitQuality quality_on(const scene::GaussianCloud& cloud, std::span<const Photo> photos, Vec3 background,
+                      std::size_t max_views) {
+  assert(!photos.empty() && max_views >= 1);
+  const std::size_t count = std::min(photos.size(), max_views);
+  FitQuality mean;
   render::Workspace workspace;
   render::Rendering rendering;
   optim::LossWorkspace loss_workspace;
@@ -237,7 +238,7 @@ Closeness closeness(const scene::GaussianCloud& cloud, std::span<const Photo> ph
   return mean;
 }
 
-std::size_t seen(const scene::GaussianCloud& cloud, std::span<const Photo> photos) {
+std::size_t visible_count(const scene::GaussianCloud& cloud, std::span<const Photo> photos) {
   std::vector<float> weight(cloud.size(), 0.0f);
   render::Workspace workspace;
   for (const Photo& photo : photos) render::raise_to_largest_weights(cloud, photo.camera, workspace, weight);

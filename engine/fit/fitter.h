@@ -23,17 +23,17 @@
 
 namespace engine::fit {
 
-/// What holds for a part of the iterations.
-struct Stage {
-  int halvings = 0;   ///< Of the photos.
-  int sh_degree = 0;  ///< Bands that are fitted.
-  bool operator==(const Stage&) const = default;
+/// A part of the schedule: photos and bands that are the same for a range of iterations.
+struct Phase {
+  int halvings = 0;   ///< Times that the photos are halved.
+  int sh_degree = 0;  ///< SH degree that is fitted.
+  bool operator==(const Phase&) const = default;
 };
 
-/// The stage that an iteration (from 0) belongs to: coarse photos and flat colours first, which is quicker by far and
-/// settles where things are before it is asked how they look.
-///   start_degree  that of the start: bands that exist are fitted from the beginning
-[[nodiscard]] Stage stage_of(const FitOptions& options, int start_degree, int iteration);
+/// The phase that an iteration (from 0) belongs to: coarse photos and flat colours first, which is quicker by far and
+/// settles where things are before how they look.
+///   start_degree  SH degree of the start: bands that it has are fitted from the beginning
+[[nodiscard]] Phase phase_of(const FitOptions& options, int start_degree, int iteration);
 
 /// One iteration: render a photo's view, compare, step all Gaussians. View by view, in shuffled epochs. Every so often
 /// Gaussians at whose place in the picture the loss pulls get children, up to a number that grows towards
@@ -59,31 +59,31 @@ class Fitter {
 
   [[nodiscard]] const scene::GaussianCloud& cloud() const { return cloud_; }
 
-  /// Everything that later iterations depend on, but photos and options.
+  /// Writes everything that later iterations depend on, but photos and options.
   void write(ByteWriter& out) const;
-  /// What write() of a fitter with the same photos, start and options wrote. Other bytes leave `in` failed, and this
-  /// fitter of no use.
+  /// Reads what write() of a fitter with the same photos, start and options wrote. Other bytes leave `in` failed, and
+  /// this fitter must not be used any more.
   void read(ByteReader& in);
 
  private:
-  void enter(const Stage& stage);
+  void enter(const Phase& phase);
   void densify();
   void prune();
-  [[nodiscard]] std::size_t most_gaussians() const;
+  [[nodiscard]] std::size_t max_gaussians_now() const;
 
   FitOptions options_;
-  std::vector<Photo> photos_;  ///< As given.
+  std::vector<Photo> photos_;  ///< The photos as given.
   scene::GaussianCloud cloud_;
   int start_degree_;
   std::size_t start_rows_;
-  double extent_;  ///< World units: how far apart things are that the capture tells apart.
+  double extent_;  ///< World units: extent of the capture, by which rates of positions go.
 
   int iteration_ = 0;
-  std::optional<Stage> stage_;  ///< None before the first iteration.
-  std::vector<Photo> halved_;   ///< Of the stage; empty if its photos are those given.
+  std::optional<Phase> phase_;  ///< None before the first iteration.
+  std::vector<Photo> halved_;   ///< Photos of the phase; empty if they are those given.
   std::vector<std::uint32_t> order_;
   train::CloudAdam adam_;
-  train::PullStatistic pull_;
+  train::PositionGradientStatistic position_gradients_;
 
   render::Frame frame_;
   render::Gradients gradients_;
@@ -91,19 +91,19 @@ class Fitter {
   optim::LossWorkspace loss_workspace_;
 };
 
-/// How near a scene comes to photos.
-struct Closeness {
+/// How near renders of a scene come to photos.
+struct FitQuality {
   double psnr_db = 0, ssim = 0;  ///< Means over the photos; pictures clamped to 0 to 1.
-  double worst_psnr_db = 0;
-  std::string worst_view;
+  double worst_psnr_db = 0;      ///< Smallest PSNR of a photo.
+  std::string worst_view;        ///< Name of its view.
 };
 
-/// Renders every view, or `most` of them that are evenly spread. PSNR of equal pictures counts as 100 dB.
-/// Precondition: there are photos; most >= 1.
-[[nodiscard]] Closeness closeness(const scene::GaussianCloud& cloud, std::span<const Photo> photos, Vec3 background,
-                                  std::size_t most = std::numeric_limits<std::size_t>::max());
+/// Renders every view, or `max_views` of them that are evenly spread. PSNR of equal pictures counts as 100 dB.
+/// Precondition: there are photos; max_views >= 1.
+[[nodiscard]] FitQuality quality_on(const scene::GaussianCloud& cloud, std::span<const Photo> photos, Vec3 background,
+                                    std::size_t max_views = std::numeric_limits<std::size_t>::max());
 
-/// How many of the Gaussians show in any of the photos' views, were they alone but for one another.
-[[nodiscard]] std::size_t seen(const scene::GaussianCloud& cloud, std::span<const Photo> photos);
+/// Number of Gaussians that have a weight above 0 in a pixel of any photo's view.
+[[nodiscard]] std::size_t visible_count(const scene::GaussianCloud& cloud, std::span<const Photo> photos);
 
 }  // namespace engine::fit

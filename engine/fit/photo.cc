@@ -11,7 +11,7 @@
 namespace engine::fit {
 namespace {
 
-constexpr std::size_t values_per_chunk = 65536;
+constexpr std::size_t values_per_chunk = 65536;  // of a parallel task: a choice
 
 /// [b] b / 255
 const std::array<float, 256>& levels() {
@@ -42,7 +42,7 @@ void to_image(const Photo& photo, scene::Image& picture) {
   });
 }
 
-Photo halved(const Photo& photo) {
+Photo half_size(const Photo& photo) {
   const scene::Camera& fine = photo.camera;
   assert(fine.width >= 2 && fine.height >= 2);
   Photo half{fine, {}};

@@ -9,6 +9,7 @@
 
 namespace engine::fit {
 
+/// A photo and its camera.
 struct Photo {
   scene::Camera camera;
   std::vector<std::uint8_t> rgb;  ///< [3][camera.height][camera.width], display-referred.
@@ -16,15 +17,15 @@ struct Photo {
   bool operator==(const Photo&) const = default;
 };
 
-/// Rounds to bytes.
+/// The photo of a picture, rounded to bytes.
 ///   picture  [3], of the camera's size
 [[nodiscard]] Photo to_photo(const scene::Camera& camera, const scene::Image& picture);
 
-/// The same, 0 to 1. Overwrites `picture`, whose memory is used again.
+/// The picture of a photo, [3], 0 to 1. Overwrites `picture`, whose memory is used again.
 void to_image(const Photo& photo, scene::Image& picture);
 
-/// Means of 2 x 2 pixels, and the camera of that picture; an odd last row or column is left out.
+/// The photo at half its size: means of 2 x 2 pixels, with the camera to match; an odd last row or column is left out.
 /// Precondition: at least 2 pixels a side.
-[[nodiscard]] Photo halved(const Photo& photo);
+[[nodiscard]] Photo half_size(const Photo& photo);
 
 }  // namespace engine::fit

@@ -13,9 +13,11 @@
 namespace engine::fit {
 namespace {
 
+// Both as in the program published with Kerbl et al. 2023.
 constexpr double first_opacity = 0.1;
 constexpr std::size_t neighbours_for_size = 3;
-// Within these factors of the median: log(0) is no size, and a lone point's splat would hide the whole scene.
+// Factors of the median that sizes stay within: log(0) is no size, and a lone point's splat would hide the whole scene.
+// Both are choices.
 constexpr float smallest_part = 1e-4f, largest_part = 30.0f;
 
 /// [n] root mean square distance to the nearest other points.

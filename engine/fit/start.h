@@ -28,7 +28,7 @@ struct ColoredPoint {
 ///   sh_degree  of the result; bands beyond 0 are zero
 [[nodiscard]] scene::GaussianCloud gaussians_at(std::span<const ColoredPoint> points, int sh_degree);
 
-/// The same Gaussians with room for more bands (zero), or without those beyond `sh_degree`.
+/// The cloud with room for more bands (zero), or without those beyond `sh_degree`.
 [[nodiscard]] scene::GaussianCloud with_sh_degree(const scene::GaussianCloud& cloud, int sh_degree);
 
 }  // namespace engine::fit

@@ -17,7 +17,7 @@ namespace engine::io {
 namespace {
 
 constexpr std::size_t chunk_rows = 256;
-constexpr std::size_t grain = 16 * chunk_rows;
+constexpr std::size_t rows_per_task = 16 * chunk_rows;  // of a parallel task: a choice
 
 constexpr std::array range_names = {
     "min_x",       "min_y",       "min_z",       "max_x", "max_y", "max_z", "min_scale_x", "min_scale_y", "min_scale_z",
@@ -104,7 +104,7 @@ class CompressedPly {
     scene::GaussianCloud cloud;
     cloud.sh_degree = sh_degree_;
     cloud.resize(vertex_->count);
-    parallel_for(cloud.size(), grain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(cloud.size(), rows_per_task, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i)
         decode(words->data() + i * vertex_->stride, (*ranges)[i / chunk_rows], i, cloud);
     });
@@ -202,7 +202,7 @@ class CompressedPly {
 
   void decode_sh(const std::vector<std::byte>& bytes, scene::GaussianCloud& cloud) const {
     const std::size_t coefficients = scene::sh_coefficients(sh_degree_);
-    parallel_for(cloud.size(), grain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(cloud.size(), rows_per_task, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i)
         for (std::size_t j = 0; j < sh_offsets_.size(); ++j)
           cloud.sh_row(i)[j / (coefficients - 1) * coefficients + j % (coefficients - 1) + 1] =

@@ -19,12 +19,12 @@ namespace engine::io {
 struct View {
   scene::Camera camera;         ///< camera.name: file name relative to the dataset's picture folder, "0001.jpg".
   std::filesystem::path photo;  ///< Empty if there is none.
-  std::optional<Lens> lens;     ///< Of the photo as taken, if it has to be undistorted.
+  std::optional<Lens> lens;     ///< Lens of the photo as taken, if it has to be undistorted.
 };
 
 struct Dataset {
-  std::vector<View> views;     ///< By name. Names are unique.
-  std::vector<Point> points;   ///< Of the sparse reconstruction; may be empty.
+  std::vector<View> views;     ///< Sorted by name. Names are unique.
+  std::vector<Point> points;   ///< Points of the sparse reconstruction; may be empty.
   std::filesystem::path root;  ///< The folder.
   std::string kind;            ///< "colmap", "transforms" or "inria".
 };

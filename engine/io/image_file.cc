@@ -327,6 +327,7 @@ Result<std::vector<std::byte>> encode_image(const Image& image, ImageFormat form
   }
   constexpr const char *grey[] = {"Y"}, *color[] = {"R", "G", "B", "A"};
   std::vector<NamedPlane> planes;
+  planes.reserve(std::size_t(image.channels));
   for (int c = 0; c < image.channels; ++c) planes.push_back({image.channels == 1 ? grey[c] : color[c], image.plane(c)});
   return encode_planes(image.width, image.height, planes);
 }

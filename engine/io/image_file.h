@@ -14,7 +14,7 @@
 namespace engine::io {
 
 enum class Orientation {
-  upright,   ///< As a viewer shows it: the EXIF orientation is applied.
+  upright,   ///< Rows as a viewer shows them: the EXIF orientation is applied.
   as_stored  ///< Rows as in the file. Cameras are calibrated on these by COLMAP and its kin, which ignore EXIF.
 };
 enum class Alpha {
@@ -26,7 +26,7 @@ struct ImageOptions {
   Orientation orientation = Orientation::upright;
   Alpha alpha = Alpha::on_black;
   int max_side = 16384;                                   ///< Pixels; larger pictures are refused (too_large).
-  std::uint64_t max_pixels = std::uint64_t{1} << 27;      ///< Of 4 channels each; more is refused (too_large).
+  std::uint64_t max_pixels = std::uint64_t{1} << 27;      ///< Pixels of 4 channels; more is refused (too_large).
   std::uint64_t max_file_bytes = std::uint64_t{1} << 30;  ///< Larger files are refused (too_large).
 };
 

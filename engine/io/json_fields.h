@@ -28,7 +28,7 @@ class JsonFields {
 
   [[nodiscard]] JsonFields at(const char* key) const {
     if (!value_->is_object()) note("an object");
-    const JsonFields member(has(key) ? (*value_)[key] : nothing(), where_ + separator() + key, *error_);
+    JsonFields member(has(key) ? (*value_)[key] : nothing(), where_ + separator() + key, *error_);
     if (!has(key)) member.fail_here("this field is missing");
     return member;
   }

@@ -19,7 +19,7 @@ namespace engine::io {
 namespace {
 
 constexpr std::string_view magic = "SDOVERLY";
-constexpr std::uint32_t version = 1;
+constexpr std::uint32_t format_number = 1;  // of the layout in overlay_file.h
 constexpr std::size_t checksum_bytes = sizeof(std::uint32_t);
 
 std::uint32_t crc_of(std::span<const std::byte> bytes, uLong before = 0) {
@@ -69,19 +69,19 @@ tl::unexpected<Error> damaged(const std::string& file, const std::string& what) 
   return fail(ErrorCode::corrupt_data, file + " is damaged: " + what, file);
 }
 
-/// The contents of a file whose magic, version and checksum are right.
+/// The contents of a file whose magic, format number and checksum are right.
 Result<std::span<const std::byte>> contents_of(std::span<const std::byte> bytes, const std::string& file) {
   ByteReader in(bytes);
   const auto found_magic = in.take(magic.size());
   if (!in.ok() || !std::ranges::equal(found_magic, std::as_bytes(std::span(magic))))
     return damaged(file, "it does not begin as a version of a scene does");
-  const auto found_version = in.read<std::uint32_t>();
+  const auto found_format = in.read<std::uint32_t>();
   (void)in.read<std::uint32_t>();  // spare
   if (!in.ok() || in.remaining() < checksum_bytes) return damaged(file, "it ends too early");
-  if (found_version != version)
+  if (found_format != format_number)
     return fail(ErrorCode::unsupported,
-                file + " is of version " + std::to_string(found_version) + "; this program reads version " +
-                    std::to_string(version),
+                file + " is of version " + std::to_string(found_format) + "; this program reads version " +
+                    std::to_string(format_number),
                 file);
   const auto checked = bytes.first(bytes.size() - checksum_bytes);
   if (ByteReader(bytes.subspan(checked.size())).read<std::uint32_t>() != crc_of(checked))
@@ -126,7 +126,7 @@ Result<void> write_overlay(const std::filesystem::path& path, const scene::Overl
     return fail(ErrorCode::internal, "the version was not written: a value is NaN or infinite", file + ":rows" + *bad);
   ByteWriter out;
   out.write_all(std::span(magic));
-  out.write(version);
+  out.write(format_number);
   out.write(std::uint32_t{0});
   write_mark(out, mark_of(base));
   out.write(std::uint64_t(overlay.removed.size()));

@@ -1,8 +1,8 @@
 // A version of a scene on disk: what it changes, beside the base.
 //
-// Little-endian: "SDOVERLY", version (u32), 0 (u32); rows, SH degree, opaque bytes a row and a CRC-32 of the means of
-// the base (u64, i32, u64, u32); number of removed and of changed rows (u64 each), the lists (u32 each), the rows
-// (scene/cloud_bytes.h); a CRC-32 of all that. It is this program's own: to be read where it was written.
+// Little-endian: "SDOVERLY", format number (u32), 0 (u32); rows, SH degree, opaque bytes a row and a CRC-32 of the
+// means of the base (u64, i32, u64, u32); number of removed and of changed rows (u64 each), the lists (u32 each), the
+// rows (scene/cloud_bytes.h); a CRC-32 of all that. It is this program's own: to be read where it was written.
 #pragma once
 
 #include <filesystem>

@@ -12,8 +12,9 @@ enum class SpzFrame {
 };
 
 struct ReadOptions {
-  std::uint64_t max_gaussians = 50'000'000;                  ///< Larger files are refused (too_large).
-  std::uint64_t max_memory_bytes = std::uint64_t(16) << 30;  ///< Of the scene in memory; more is refused (too_large).
+  std::uint64_t max_gaussians = 50'000'000;  ///< Larger files are refused (too_large).
+  std::uint64_t max_memory_bytes = std::uint64_t(16)
+                                   << 30;  ///< Size of the scene in memory; more is refused (too_large).
   SpzFrame spz_frame = SpzFrame::rub;
 };
 

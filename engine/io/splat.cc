@@ -11,7 +11,7 @@
 namespace engine::io {
 namespace {
 
-constexpr std::size_t grain = 4096;
+constexpr std::size_t rows_per_task = 4096;  // of a parallel task: a choice
 
 struct Record {
   std::array<float, 3> position;
@@ -89,7 +89,7 @@ Result<scene::GaussianCloud> decode_splat(std::span<const std::byte> bytes, cons
                     file + ":vertex[" + std::to_string(i) + "].scale_" + std::to_string(axis));
   scene::GaussianCloud cloud;
   cloud.resize(count);
-  parallel_for(count, grain, [&](std::size_t begin, std::size_t end) {
+  parallel_for(count, rows_per_task, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const Record record = record_at(bytes, i);
       cloud.mean.set(i, {record.position[0], record.position[1], record.position[2]});
@@ -106,7 +106,7 @@ Result<scene::GaussianCloud> decode_splat(std::span<const std::byte> bytes, cons
 
 std::vector<std::byte> encode_splat(const scene::GaussianCloud& cloud) {
   std::vector<std::byte> bytes(cloud.size() * splat_record_bytes);
-  parallel_for(cloud.size(), grain, [&](std::size_t begin, std::size_t end) {
+  parallel_for(cloud.size(), rows_per_task, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       Record record;
       for (int axis = 0; axis < 3; ++axis) {

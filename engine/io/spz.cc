@@ -21,7 +21,7 @@ namespace {
 using Bytes = std::vector<std::byte>;
 
 constexpr std::uint32_t magic = 0x5053474e;  // "NGSP"
-constexpr std::size_t grain = 4096;
+constexpr std::size_t rows_per_task = 4096;  // of a parallel task: a choice
 constexpr std::size_t header_bytes = 16;
 constexpr std::size_t max_deflate_ratio = 1032;  // of deflate: 258 bytes for every 2 bits
 constexpr double colour_scale = 0.15;            // of this format; wider than sh_c0 to keep colours beyond 0..1
@@ -113,7 +113,7 @@ Result<Header> unpack_gzip(std::span<const std::byte> bytes, const std::string& 
   GzipReader in(bytes);
   std::array<std::byte, header_bytes> start;
   if (!in.read(start)) return damaged("no .spz header could be unpacked", file + ":header");
-  const auto header = parse_header(start, 1, 3, file + ":header");
+  auto header = parse_header(start, 1, 3, file + ":header");
   if (!header) return header;
   if (header->flags & flag_extensions)
     return fail(ErrorCode::unsupported,
@@ -142,7 +142,7 @@ Result<Header> unpack_zstd(std::span<const std::byte> bytes, const std::string& 
                            Attributes& attributes) {
   const std::string where = file + ":header";
   ByteReader in(bytes);
-  const auto header = parse_header(in.take(std::min(header_bytes, bytes.size())), 4, 4, where);
+  auto header = parse_header(in.take(std::min(header_bytes, bytes.size())), 4, 4, where);
   if (!header) return header;
   if (auto checked = check_limits(*header, options, file); !checked) return propagate(checked);
   const auto toc_offset = in.read<std::uint32_t>();
@@ -301,7 +301,7 @@ Result<scene::GaussianCloud> decode_spz(std::span<const std::byte> bytes, const 
   cloud.sh_degree = header->sh_degree;
   cloud.resize(header->count);
   const std::size_t coefficients = scene::sh_coefficients(cloud.sh_degree);
-  parallel_for(cloud.size(), grain, [&](std::size_t begin, std::size_t end) {
+  parallel_for(cloud.size(), rows_per_task, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       cloud.mean.set(i, position_at(*header, in.positions, i));
       cloud.opacity_logit[i] = logit_of_byte(std::to_integer<std::uint8_t>(in.alphas[i]));

@@ -54,7 +54,7 @@ bool fills_picture(const Lens& lens, double zoom) {
 }
 
 Result<void> validate_coefficients(const Lens& lens) {
-  const auto check = [](double value, std::string name) -> Result<void> {
+  const auto check = [](double value, const std::string& name) -> Result<void> {
     if (std::isfinite(value)) return {};
     return fail(ErrorCode::invalid_argument, "lens " + name + ": expected a finite number", name);
   };

@@ -1,5 +1,5 @@
-// The queue's files: whole after a power cut, or not there at all. What is said of one that cannot be written names no
-// folder, and says no more than no_space or unavailable: both may be over in a moment.
+// The queue's files: after a power cut a file is whole or not there at all. The error for a file that cannot be written
+// is no_space or unavailable, both of which may pass by themselves; its message names no folder.
 #pragma once
 
 #include <filesystem>
@@ -19,6 +19,7 @@ namespace engine::jobs {
 ///   errors  no_space: what was there before is unchanged; unavailable; `where` is the file
 [[nodiscard]] Result<void> write_durably(const std::filesystem::path& file, std::string_view bytes);
 
+/// Reads a whole file.
 ///   errors  not_found, unavailable; `where` is the file
 [[nodiscard]] Result<std::string> read_bytes(const std::filesystem::path& file);
 

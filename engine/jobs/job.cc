@@ -10,17 +10,17 @@
 namespace engine::jobs {
 namespace {
 
-constexpr char id_kind = 'e';
+constexpr char id_kind = 'e';  // the letter that ids of jobs begin with: every job is an edit today
 
 constexpr std::array<std::string_view, state_count> state_names = {
     "queued", "running", "stop_requested", "cancel_requested", "succeeded", "failed", "cancelled"};
 
-using Row = std::array<std::optional<State>, event_count>;
+using Row = std::array<std::optional<JobState>, event_count>;
 
 constexpr std::array<Row, state_count> make_transitions() {
-  constexpr std::optional<State> no;
-  constexpr std::optional run(State::running), stop(State::stop_requested), cancel(State::cancel_requested),
-      good(State::succeeded), bad(State::failed), gone(State::cancelled);
+  constexpr std::optional<JobState> no;
+  constexpr std::optional run(JobState::running), stop(JobState::stop_requested), cancel(JobState::cancel_requested),
+      good(JobState::succeeded), bad(JobState::failed), gone(JobState::cancelled);
   return {{
       //  claim report finish_interval stop cancel succeed fail release
       Row{run, no, no, no, gone, no, no, no},                 // queued
@@ -37,7 +37,7 @@ constexpr auto transitions = make_transitions();
 std::string refusal(const Job& job, Event event) {
   const std::string is = job.id + " is " + std::string(to_string(job.state));
   if (event == Event::stop && !is_final(job.state)) {
-    if (job.state == State::cancel_requested) return is + ": it will be discarded, there is nothing to keep";
+    if (job.state == JobState::cancel_requested) return is + ": it will be discarded, there is nothing to keep";
     return job.id + " has no finished interval to keep yet: wait for the first one, or cancel";
   }
   if (event == Event::stop || event == Event::cancel) return is + ": it has already ended and stays as it is";
@@ -45,7 +45,7 @@ std::string refusal(const Job& job, Event event) {
 }
 
 /// The state after the event; nothing where the event does not apply.
-std::optional<State> next_state(const Job& job, Event event) {
+std::optional<JobState> next_state(const Job& job, Event event) {
   const auto next = transitions[std::size_t(job.state)][std::size_t(event)];
   if (!next) return next;
   switch (event) {
@@ -54,8 +54,8 @@ std::optional<State> next_state(const Job& job, Event event) {
     case Event::stop:
       return job.finished_intervals > 0 ? next : std::nullopt;
     case Event::cancel:
-      // With nobody at work on it there is nobody to wait for.
-      return job.claimed ? next : State::cancelled;
+      // A job that no worker holds is cancelled at once: there is nobody to wait for.
+      return job.claimed ? next : JobState::cancelled;
     default:
       return job.claimed ? next : std::nullopt;
   }
@@ -63,15 +63,17 @@ std::optional<State> next_state(const Job& job, Event event) {
 
 }  // namespace
 
-std::string_view to_string(State state) { return state_names[std::size_t(state)]; }
+std::string_view to_string(JobState state) { return state_names[std::size_t(state)]; }
 
-std::optional<State> parse_state(std::string_view name) {
+std::optional<JobState> parse_state(std::string_view name) {
   const auto found = std::find(state_names.begin(), state_names.end(), name);
   if (found == state_names.end()) return std::nullopt;
-  return State(std::distance(state_names.begin(), found));
+  return JobState(std::distance(state_names.begin(), found));
 }
 
-bool is_final(State state) { return state == State::succeeded || state == State::failed || state == State::cancelled; }
+bool is_final(JobState state) {
+  return state == JobState::succeeded || state == JobState::failed || state == JobState::cancelled;
+}
 
 std::string id_of(std::int64_t number) { return numbered_id(id_kind, std::uint64_t(number)); }
 
@@ -81,7 +83,7 @@ std::optional<std::int64_t> number_of(std::string_view id) {
   return std::int64_t(*number);
 }
 
-Result<Job> after(Job job, const Change& change, Time now) {
+Result<Job> transition(Job job, const Change& change, Time now) {
   const auto next = next_state(job, change.event);
   if (!next) return fail(ErrorCode::conflict, refusal(job, change.event), job.id);
   const bool was_final = is_final(job.state);
@@ -101,13 +103,13 @@ Result<Job> after(Job job, const Change& change, Time now) {
       job.finished_intervals = change.interval;
       break;
     case Event::succeed:
-      if (*next == State::succeeded) {
+      if (*next == JobState::succeeded) {
         job.result = change.result;
         job.stopped_early = change.stopped_early;
       }
       break;
     case Event::fail:
-      if (*next == State::failed) job.error = change.error;
+      if (*next == JobState::failed) job.error = change.error;
       break;
     case Event::release:
       job.claimed = false;

@@ -23,31 +23,32 @@ using Time = std::chrono::sys_time<std::chrono::milliseconds>;
 ///
 /// - *stop* keeps the last finished interval: the job ends `succeeded`, with `stopped_early`. There has to be one.
 /// - *cancel* discards. It may be asked for again and again, and it wins: whatever the job still returns is dropped.
-/// - A job whose worker went away (shutdown, kill -9) keeps its state and is claimed again before younger ones; one that
+/// - A job whose worker went away (shutdown, kill -9) keeps its state and is claimed again before younger ones; one
+/// that
 ///   was to be cancelled is then `cancelled`.
-enum class State { queued, running, stop_requested, cancel_requested, succeeded, failed, cancelled };
+enum class JobState { queued, running, stop_requested, cancel_requested, succeeded, failed, cancelled };
 inline constexpr int state_count = 7;
 
-[[nodiscard]] std::string_view to_string(State state);  ///< "queued", "stop_requested", ...
-[[nodiscard]] std::optional<State> parse_state(std::string_view name);
-[[nodiscard]] bool is_final(State state);
+[[nodiscard]] std::string_view to_string(JobState state);  ///< "queued", "stop_requested", ...
+[[nodiscard]] std::optional<JobState> parse_state(std::string_view name);
+[[nodiscard]] bool is_final(JobState state);
 
-/// Texts are opaque here: any bytes.
+/// The record of a job. This room does not read its texts, which may be any bytes.
 struct Job {
   std::string id;               ///< "e000001": counts up, never used twice.
   std::string lane;             ///< Jobs of one lane run one after the other, in the order of their ids.
-  std::string payload;          ///< What is asked for. Empty in a list.
+  std::string payload;          ///< The request to carry out. Empty in a list.
   std::string idempotency_key;  ///< "": none.
-  State state = State::queued;
+  JobState state = JobState::queued;
   bool claimed = false;        ///< A worker holds it.
   bool stopped_early = false;  ///< Succeeded with fewer intervals than asked for.
   int finished_intervals = 0;  ///< The last of them has its checkpoint on disk.
-  int queue_position = 0;      ///< 1: next of those that wait. 0: does not wait.
-  std::string progress;        ///< As last published.
-  std::string result;          ///< Of a job that succeeded. Empty in a list.
-  std::optional<Error> error;  ///< Of a job that failed.
+  int queue_position = 0;      ///< 1 for the next job of those that wait, 0 for one that does not wait.
+  std::string progress;        ///< The progress that was published last.
+  std::string result;          ///< Result of a job that succeeded. Empty in a list.
+  std::optional<Error> error;  ///< Why the job failed; none unless `state` is failed.
   Time created{};
-  std::optional<Time> started;  ///< First time.
+  std::optional<Time> started;  ///< When a worker first claimed it.
   std::optional<Time> ended;
 };
 
@@ -59,19 +60,19 @@ struct Job {
 enum class Event { claim, report, finish_interval, stop, cancel, succeed, fail, release };
 inline constexpr int event_count = 8;
 
-/// An event with what it carries; the rest is ignored.
+/// An event with its data; fields that do not belong to the event are ignored.
 struct Change {
   Event event = Event::report;
-  std::optional<std::string> progress = {};  ///< Any event: replaces the record's.
-  int interval = 0;                          ///< finish_interval: its number, larger than any before; the first is 1.
-  std::string result = {};                   ///< succeed
-  bool stopped_early = false;                ///< succeed
-  Error error = {};                          ///< fail
+  std::optional<std::string> progress = {};  ///< With any event: the record's new progress.
+  int interval = 0;            ///< finish_interval: number of the interval, larger than any before; the first is 1.
+  std::string result = {};     ///< succeed: the record's result.
+  bool stopped_early = false;  ///< succeed: the record's `stopped_early`.
+  Error error = {};            ///< fail: the record's error.
 };
 
-/// The record after the change: every store asks here, so the rules are the same everywhere.
+/// The record after the change. Every store calls this function, so the rules are the same everywhere.
 ///   errors  conflict: not in this state (`where` is the id; the message says what to do instead), invalid_argument:
 ///           finish_interval with a number that does not count up
-[[nodiscard]] Result<Job> after(Job job, const Change& change, Time now);
+[[nodiscard]] Result<Job> transition(Job job, const Change& change, Time now);
 
 }  // namespace engine::jobs

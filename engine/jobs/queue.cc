@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "engine/jobs/durable_file.h"
-#include "engine/jobs/live.h"
+#include "engine/jobs/running_job.h"
 
 namespace engine::jobs {
 namespace {
@@ -31,7 +31,7 @@ Result<std::unique_ptr<Queue>> Queue::open(Store& store, const QueueOptions& opt
     if (!number_of(id)) continue;  // none of ours
     const auto job = store.find(id);
     if (!job && job.error().code != ErrorCode::not_found) return propagate(job);
-    if (!job || job->state == State::cancelled) orphans.push_back(entry->path());
+    if (!job || job->state == JobState::cancelled) orphans.push_back(entry->path());
   }
   if (error) return fail(ErrorCode::unavailable, "the folder cannot be read: " + error.message(), options.folder);
   for (const fs::path& orphan : orphans) remove_files(orphan);
@@ -41,51 +41,51 @@ Result<std::unique_ptr<Queue>> Queue::open(Store& store, const QueueOptions& opt
 Result<Submission> Queue::submit(const NewJob& job) {
   auto submission = store_.submit(job, options_.max_queued);
   if (!submission) return submission;
-  if (submission->created) touch();
-  submission->job = with_live_progress(std::move(submission->job));
+  if (submission->created) bump_revision();
+  submission->job = with_latest_progress(std::move(submission->job));
   return submission;
 }
 
 Result<std::optional<Job>> Queue::find_key(const std::string& idempotency_key) {
   auto job = store_.find_key(idempotency_key);
-  if (job && *job) *job = with_live_progress(std::move(**job));
+  if (job && *job) *job = with_latest_progress(std::move(**job));
   return job;
 }
 
 Result<Job> Queue::find(const std::string& id) {
   auto job = store_.find(id);
-  if (job) *job = with_live_progress(std::move(*job));
+  if (job) *job = with_latest_progress(std::move(*job));
   return job;
 }
 
 Result<std::vector<Job>> Queue::list(const Filter& filter) {
   auto jobs = store_.list(filter);
   if (jobs)
-    for (Job& job : *jobs) job = with_live_progress(std::move(job));
+    for (Job& job : *jobs) job = with_latest_progress(std::move(job));
   return jobs;
 }
 
 Result<Job> Queue::stop(const std::string& id) {
   auto job = store_.apply(id, {.event = Event::stop});
   if (!job) return job;
-  if (const auto running = live(id)) running->stop = true;
-  touch();
-  return with_live_progress(std::move(*job));
+  if (const auto running = find_running(id)) running->stop = true;
+  bump_revision();
+  return with_latest_progress(std::move(*job));
 }
 
 Result<Job> Queue::cancel(const std::string& id) {
   auto job = store_.apply(id, {.event = Event::cancel});
   if (!job) return job;
-  if (const auto running = live(id)) running->interrupt.request_stop();
-  if (job->state == State::cancelled) remove_files(folder_of(id));
-  touch();
-  return with_live_progress(std::move(*job));
+  if (const auto running = find_running(id)) running->interrupt.request_stop();
+  if (job->state == JobState::cancelled) remove_files(folder_of(id));
+  bump_revision();
+  return with_latest_progress(std::move(*job));
 }
 
 Result<void> Queue::remove(const std::string& id) {
   if (auto removed = store_.remove(id); !removed) return removed;
   remove_files(folder_of(id));
-  touch();
+  bump_revision();
   return {};
 }
 
@@ -93,47 +93,47 @@ Result<void> Queue::expire() {
   const auto expired = store_.expire(options_.retention);
   if (!expired) return propagate(expired);
   for (const std::string& id : *expired) remove_files(folder_of(id));
-  if (!expired->empty()) touch();
+  if (!expired->empty()) bump_revision();
   return {};
 }
 
-std::uint64_t Queue::version() const {
+std::uint64_t Queue::revision() const {
   const std::lock_guard lock(mutex_);
-  return version_;
+  return revision_;
 }
 
-std::uint64_t Queue::wait_for_change(std::uint64_t seen, std::chrono::milliseconds timeout) const {
+std::uint64_t Queue::wait_for_change(std::uint64_t last_revision, std::chrono::milliseconds timeout) const {
   std::unique_lock lock(mutex_);
-  changed_.wait_for(lock, timeout, [&] { return version_ != seen; });
-  return version_;
+  changed_.wait_for(lock, timeout, [&] { return revision_ != last_revision; });
+  return revision_;
 }
 
-void Queue::touch() {
+void Queue::bump_revision() {
   {
     const std::lock_guard lock(mutex_);
-    ++version_;
+    ++revision_;
   }
   changed_.notify_all();
 }
 
-std::shared_ptr<Queue::Live> Queue::live(const std::string& id) const {
+std::shared_ptr<Queue::RunningJob> Queue::find_running(const std::string& id) const {
   const std::lock_guard lock(mutex_);
-  const auto found = live_.find(id);
-  return found == live_.end() ? nullptr : found->second;
+  const auto found = running_.find(id);
+  return found == running_.end() ? nullptr : found->second;
 }
 
-void Queue::attach(const std::string& id, std::shared_ptr<Live> live) {
+void Queue::attach(const std::string& id, std::shared_ptr<RunningJob> running) {
   const std::lock_guard lock(mutex_);
-  live_[id] = std::move(live);
+  running_[id] = std::move(running);
 }
 
 void Queue::detach(const std::string& id) {
   const std::lock_guard lock(mutex_);
-  live_.erase(id);
+  running_.erase(id);
 }
 
-Job Queue::with_live_progress(Job job) const {
-  if (const auto running = live(job.id))
+Job Queue::with_latest_progress(Job job) const {
+  if (const auto running = find_running(job.id))
     if (auto progress = running->progress()) job.progress = std::move(*progress);
   return job;
 }

@@ -17,11 +17,11 @@ namespace engine::jobs {
 
 struct QueueOptions {
   std::filesystem::path folder;  ///< Holds one folder per job that needs one, named by its id. Nothing else uses it.
-  std::size_t max_queued = 32;   ///< Jobs that may wait.
+  std::size_t max_queued = 32;   ///< Jobs that may wait. A choice.
   Retention retention = {};
 };
 
-/// The jobs of a Store, together with what their workers know of them at this moment. Safe to call from any thread.
+/// The jobs of a Store, together with the latest progress that their workers know of. Safe to call from any thread.
 /// Errors are those of Store, unless said otherwise.
 class Queue {
  public:
@@ -37,7 +37,7 @@ class Queue {
   [[nodiscard]] Result<Submission> submit(const NewJob& job);
   /// Whether submit() would answer with an earlier job: the one under this key, if there is one.
   [[nodiscard]] Result<std::optional<Job>> find_key(const std::string& idempotency_key);
-  /// The record, with the progress of this moment.
+  /// The record, with the latest progress.
   [[nodiscard]] Result<Job> find(const std::string& id);
   [[nodiscard]] Result<std::vector<Job>> list(const Filter& filter = {});
   /// Asks a job to end after its current interval and keep what it has.
@@ -52,30 +52,30 @@ class Queue {
   /// Removes records and files that need not be kept. Workers do so between jobs.
   [[nodiscard]] Result<void> expire();
 
-  /// Counts changes: of any record, of any progress.
-  [[nodiscard]] std::uint64_t version() const;
-  /// Waits until version() is not `seen`, but not longer than `timeout`.
-  ///   returns  version()
-  std::uint64_t wait_for_change(std::uint64_t seen, std::chrono::milliseconds timeout) const;
+  /// The number of changes so far of any record or any progress.
+  [[nodiscard]] std::uint64_t revision() const;
+  /// Waits until revision() is not `last_revision`, but not longer than `timeout`.
+  ///   returns  revision()
+  std::uint64_t wait_for_change(std::uint64_t last_revision, std::chrono::milliseconds timeout) const;
 
  private:
   friend class Worker;
   friend class JobContext;
-  struct Live;  ///< A claimed job: how to reach whoever works on it.
+  struct RunningJob;  ///< A claimed job, as its worker and those who ask about it share it.
 
   Queue(Store& store, QueueOptions options) : store_(store), options_(std::move(options)) {}
   [[nodiscard]] std::filesystem::path folder_of(const std::string& id) const { return options_.folder / id; }
-  void touch();
-  [[nodiscard]] std::shared_ptr<Live> live(const std::string& id) const;
-  void attach(const std::string& id, std::shared_ptr<Live> live);
+  void bump_revision();
+  [[nodiscard]] std::shared_ptr<RunningJob> find_running(const std::string& id) const;
+  void attach(const std::string& id, std::shared_ptr<RunningJob> running);
   void detach(const std::string& id);
-  [[nodiscard]] Job with_live_progress(Job job) const;
+  [[nodiscard]] Job with_latest_progress(Job job) const;
 
   Store& store_;
   const QueueOptions options_;
   mutable std::mutex mutex_;  ///< Guards the two below.
-  std::map<std::string, std::shared_ptr<Live>> live_;
-  std::uint64_t version_ = 0;
+  std::map<std::string, std::shared_ptr<RunningJob>> running_;
+  std::uint64_t revision_ = 0;
   mutable std::condition_variable changed_;
 };
 

@@ -18,7 +18,7 @@
 namespace engine::jobs {
 namespace {
 
-constexpr int schema_version = 1;
+constexpr int schema_number = 1;  // of the tables below; user_version in the file
 constexpr const char* schema = R"(
   CREATE TABLE jobs (
     number INTEGER PRIMARY KEY AUTOINCREMENT,  -- AUTOINCREMENT: a removed job's number is never given away again
@@ -109,7 +109,7 @@ class Database {
     }
   }
 
-  /// Of the write-ahead log: all that is written goes there first. (sqlite3_system_errno() is gone after a rollback.)
+  /// The errno of the write-ahead log, to which all is written first. (sqlite3_system_errno() is gone after a rollback.)
   [[nodiscard]] int last_errno() const {
     int number = 0;
     sqlite3_file* log = nullptr;
@@ -257,7 +257,7 @@ std::optional<Job> find_key_in(Database& database, const std::string& key) {
 }
 
 Job apply_in(Database& database, const std::string& id, const Change& change, Time now) {
-  const auto changed = after(find_in(database, id), change, now);
+  const auto changed = transition(find_in(database, id), change, now);
   if (!changed) throw Failure(changed.error());
   const Job& job = *changed;
   std::optional<std::string_view> code, message, where;
@@ -305,13 +305,13 @@ void prepare(Database& database, Time now, std::int64_t used_numbers) {
   if (const auto found = text_of(database, "PRAGMA quick_check(1)"); found != "ok") database.corrupt(found);
 
   Transaction transaction(database);
-  const int version = std::stoi(text_of(database, "PRAGMA user_version"));
-  if (version > schema_version)
+  const int found_schema = std::stoi(text_of(database, "PRAGMA user_version"));
+  if (found_schema > schema_number)
     throw Failure({ErrorCode::unsupported,
-                   "the job store was written by a newer version (" + std::to_string(version) + ", known is " +
-                       std::to_string(schema_version) + "): use that one, or choose another data folder",
+                   "the job store was written by a newer version (" + std::to_string(found_schema) + ", known is " +
+                       std::to_string(schema_number) + "): use that one, or choose another data folder",
                    database.file()});
-  if (version < schema_version) {
+  if (found_schema < schema_number) {
     if (text_of(database, "SELECT count(*) FROM sqlite_schema") != "0")
       throw Failure({ErrorCode::corrupt_data, "the file is no job store: move it away, or choose another data folder",
                      database.file()});

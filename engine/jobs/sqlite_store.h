@@ -11,9 +11,10 @@
 
 namespace engine::jobs {
 
+/// Where the file is, and how it is opened.
 struct SqliteOptions {
   std::filesystem::path folder;                  ///< The file is "jobs.db" in it; made if absent.
-  std::chrono::milliseconds busy_timeout{2000};  ///< Wait so long for a process that is just ending.
+  std::chrono::milliseconds busy_timeout{2000};  ///< Longest wait for a process that is just ending.
   std::int64_t used_numbers = 0;                 ///< Ids up to this one are known elsewhere and not given away, even if
                                                  ///< the file is new because an old one was lost.
   std::function<Time()> now = [] {

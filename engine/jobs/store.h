@@ -1,4 +1,4 @@
-// Where job records are kept.
+// The store of job records, as the queue and its workers see it.
 #pragma once
 
 #include <chrono>
@@ -12,27 +12,30 @@
 
 namespace engine::jobs {
 
+/// A job as it is handed in.
 struct NewJob {
   std::string lane;
   std::string payload;
   std::string idempotency_key = {};  ///< "": none.
 };
 
+/// The answer to a job that was handed in.
 struct Submission {
   Job job;
   bool created = true;  ///< false: it had been submitted before, under the same idempotency key.
 };
 
+/// Which jobs a list holds.
 struct Filter {
-  std::optional<std::string> lane = {};  ///< Only this one.
-  bool active_only = false;              ///< Leave out what has ended.
-  std::size_t limit = 100;               ///< The youngest so many.
+  std::optional<std::string> lane = {};  ///< Lists only jobs of this lane.
+  bool active_only = false;              ///< Leaves out jobs that have ended.
+  std::size_t limit = 100;               ///< Most jobs in the list; the youngest are listed.
 };
 
-/// Records of ended jobs that are kept. Their idempotency keys are forgotten with them.
+/// How long records of ended jobs are kept. A record's idempotency key is forgotten with it. Both limits are choices.
 struct Retention {
-  std::chrono::hours max_age{24 * 30};  ///< Since they ended.
-  std::size_t max_count = 1000;         ///< The youngest so many, by their end.
+  std::chrono::hours max_age{24 * 30};  ///< Longest time since the job ended: 30 days.
+  std::size_t max_count = 1000;         ///< Most records of ended jobs; those that ended last are kept.
 };
 
 /// Keeps job records. Every function is safe to call from any thread, is one transaction (all of it or nothing), and is
@@ -46,25 +49,25 @@ class Store {
   virtual ~Store() = default;
 
   /// Accepts a job.
-  ///   max_queued  so many may wait
+  ///   max_queued  most jobs that may wait
   ///   errors      busy: as many wait already; unprocessable: the idempotency key belongs to another payload or lane
   [[nodiscard]] virtual Result<Submission> submit(const NewJob& job, std::size_t max_queued) = 0;
   [[nodiscard]] virtual Result<Job> find(const std::string& id) = 0;
   /// The job that was submitted under this idempotency key; nothing if none was.
   [[nodiscard]] virtual Result<std::optional<Job>> find_key(const std::string& idempotency_key) = 0;
-  /// Youngest first, payloads and results left out.
+  /// The jobs that pass the filter, youngest first, without payloads and results.
   [[nodiscard]] virtual Result<std::vector<Job>> list(const Filter& filter) = 0;
   /// Gives the oldest job that can run to the caller; nothing if none can. A job can run if nobody holds it and no
   /// older one of its lane has yet to end.
   [[nodiscard]] virtual Result<std::optional<Job>> claim() = 0;
-  /// Changes a record by the rules of after().
+  /// Changes a record by the rules of transition().
   ///   returns  the record afterwards
-  ///   errors   those of after()
+  ///   errors   those of transition()
   [[nodiscard]] virtual Result<Job> apply(const std::string& id, const Change& change) = 0;
   /// Removes the record of an ended job.
   ///   errors  conflict: it has not ended
   [[nodiscard]] virtual Result<void> remove(const std::string& id) = 0;
-  /// Removes what need not be kept.
+  /// Removes the records that `retention` does not keep.
   ///   returns  the ids removed
   [[nodiscard]] virtual Result<std::vector<std::string>> expire(const Retention& retention) = 0;
 };

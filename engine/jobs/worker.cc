@@ -7,7 +7,7 @@
 
 #include "engine/core/atomic_file.h"
 #include "engine/jobs/durable_file.h"
-#include "engine/jobs/live.h"
+#include "engine/jobs/running_job.h"
 
 namespace engine::jobs {
 namespace {
@@ -17,12 +17,12 @@ using std::chrono::steady_clock;
 
 constexpr std::string_view checkpoint_prefix = "checkpoint-";
 
-/// Errors that may be over in a moment.
+/// Is the cause of this error one that may pass by itself?
 bool worth_retrying(const Error& error) {
   return error.code == ErrorCode::no_space || error.code == ErrorCode::unavailable || error.code == ErrorCode::busy;
 }
 
-/// Removes what in a folder is called so.
+/// Removes the files of a folder whose names begin with the prefix.
 void remove_files(const fs::path& folder, std::string_view prefix) {
   std::error_code error;
   std::vector<fs::path> found;
@@ -33,11 +33,11 @@ void remove_files(const fs::path& folder, std::string_view prefix) {
 
 }  // namespace
 
-JobContext::JobContext(Queue& queue, Job job, Queue::Live& live, const std::atomic<bool>& draining,
+JobContext::JobContext(Queue& queue, Job job, Queue::RunningJob& running, const std::atomic<bool>& draining,
                        const WorkerOptions& options)
     : queue_(queue),
       job_(std::move(job)),
-      live_(live),
+      running_(running),
       draining_(draining),
       options_(options),
       last_write_(steady_clock::now().time_since_epoch().count()) {}
@@ -52,24 +52,25 @@ Result<std::string> JobContext::load_checkpoint() const { return read_bytes(chec
 
 Result<void> JobContext::save_checkpoint(int interval, std::string_view bytes) {
   const int previous = job_.finished_intervals;
-  const Change change{.event = Event::finish_interval, .progress = live_.progress(), .interval = interval};
-  // Asked before the file is written: a wrong number must not overwrite the checkpoint that the record speaks of.
-  if (auto allowed = after(job_, change, {}); !allowed) return propagate(allowed);
+  const Change change{.event = Event::finish_interval, .progress = running_.progress(), .interval = interval};
+  // The number is checked before the file is written: a wrong one must not overwrite the checkpoint that the record
+  // speaks of.
+  if (auto allowed = transition(job_, change, {}); !allowed) return propagate(allowed);
   if (auto made = create_folder(folder()); !made) return made;
   if (auto written = write_durably(checkpoint_file(interval), bytes); !written) return written;
   if (auto recorded = queue_.store_.apply(job_.id, change); !recorded) return propagate(recorded);
   job_.finished_intervals = interval;
   std::error_code ignored;
   fs::remove(checkpoint_file(previous), ignored);
-  queue_.touch();
-  if (live_.interrupt.stop_requested() || draining_)
+  queue_.bump_revision();
+  if (running_.interrupt.stop_requested() || draining_)
     return fail(ErrorCode::cancelled, job_.id + " was interrupted after interval " + std::to_string(interval), job_.id);
   return {};
 }
 
 void JobContext::publish_progress(std::string progress) {
-  live_.set_progress(progress);
-  queue_.touch();
+  running_.set_progress(progress);
+  queue_.bump_revision();
   const auto now = steady_clock::now().time_since_epoch().count();
   auto last = last_write_.load();
   if (steady_clock::duration(now - last) < options_.progress_period) return;
@@ -78,9 +79,9 @@ void JobContext::publish_progress(std::string progress) {
   (void)queue_.store_.apply(job_.id, {.event = Event::report, .progress = std::move(progress)});
 }
 
-std::stop_token JobContext::cancel_token() const { return live_.interrupt.get_token(); }
+std::stop_token JobContext::cancel_token() const { return running_.interrupt.get_token(); }
 
-bool JobContext::stop_requested() const { return live_.stop; }
+bool JobContext::stop_requested() const { return running_.stop; }
 
 Worker::Worker(Queue& queue, JobFunction function, const WorkerOptions& options)
     : queue_(queue), function_(std::move(function)), options_(options), thread_([this] {
@@ -93,7 +94,7 @@ Worker::~Worker() { drain(std::chrono::milliseconds(0)); }
 void Worker::drain(std::chrono::milliseconds grace) {
   if (!thread_.joinable()) return;
   draining_ = true;
-  queue_.touch();
+  queue_.bump_revision();
   if (finished_.get_future().wait_for(grace) != std::future_status::ready) {
     const std::lock_guard lock(mutex_);
     out_of_time_ = true;
@@ -112,15 +113,15 @@ void Worker::set_trouble(std::optional<Error> error) {
   trouble_ = std::move(error);
 }
 
-void Worker::set_current(std::shared_ptr<Queue::Live> live) {
+void Worker::set_current(std::shared_ptr<Queue::RunningJob> running) {
   const std::lock_guard lock(mutex_);
-  if (live && out_of_time_) live->interrupt.request_stop();
-  current_ = std::move(live);
+  if (running && out_of_time_) running->interrupt.request_stop();
+  current_ = std::move(running);
 }
 
 void Worker::loop() {
-  // The version is read before all that is looked at: what happens in between ends the wait at once.
-  for (auto seen = queue_.version(); !draining_; seen = queue_.version()) {
+  // The revision is read before the store is: a change in between then ends the wait at once.
+  for (auto last_revision = queue_.revision(); !draining_; last_revision = queue_.revision()) {
     const auto expired = queue_.expire();
     const auto job = queue_.store_.claim();
     if (!expired || !job) {
@@ -131,26 +132,26 @@ void Worker::loop() {
     if (job && *job) {
       run(**job);
     } else {
-      queue_.wait_for_change(seen, job ? std::chrono::minutes(1) : options_.retry_period);
+      queue_.wait_for_change(last_revision, job ? std::chrono::minutes(1) : options_.retry_period);
     }
   }
 }
 
 void Worker::run(const Job& job) {
-  const auto live = std::make_shared<Queue::Live>();
-  queue_.attach(job.id, live);
-  set_current(live);
+  const auto running = std::make_shared<Queue::RunningJob>();
+  queue_.attach(job.id, running);
+  set_current(running);
   // A stop or cancel between the claim and attach() has reached the record only.
   const auto record = queue_.store_.find(job.id);
-  const State state = record ? record->state : job.state;
-  if (state == State::cancel_requested) live->interrupt.request_stop();
-  if (state == State::stop_requested) live->stop = true;
-  queue_.touch();
-  remove_files(queue_.folder_of(job.id), temporary_prefix);  // left by a run that was killed while it wrote
+  const JobState state = record ? record->state : job.state;
+  if (state == JobState::cancel_requested) running->interrupt.request_stop();
+  if (state == JobState::stop_requested) running->stop = true;
+  queue_.bump_revision();
+  remove_files(queue_.folder_of(job.id), temporary_prefix);  // left by an attempt that was killed while it wrote
 
-  JobContext context(queue_, job, *live, draining_, options_);
+  JobContext context(queue_, job, *running, draining_, options_);
   const auto outcome = call(context);
-  Change change{.event = Event::succeed, .progress = live->progress()};
+  Change change{.event = Event::succeed, .progress = running->progress()};
   if (outcome) {
     change.result = outcome->text;
     change.stopped_early = outcome->stopped_early;
@@ -163,7 +164,7 @@ void Worker::run(const Job& job) {
   record_end(job.id, change);
   set_current(nullptr);
   queue_.detach(job.id);
-  queue_.touch();
+  queue_.bump_revision();
 }
 
 Result<JobResult> Worker::call(JobContext& context) const {
@@ -181,10 +182,10 @@ Result<JobResult> Worker::call(JobContext& context) const {
 
 void Worker::record_end(const std::string& id, const Change& change) {
   for (;;) {
-    const auto seen = queue_.version();
+    const auto last_revision = queue_.revision();
     const auto job = queue_.store_.apply(id, change);
     if (job) {
-      if (job->state == State::cancelled) {
+      if (job->state == JobState::cancelled) {
         std::error_code ignored;
         fs::remove_all(queue_.folder_of(id), ignored);
       } else if (is_final(job->state)) {
@@ -199,7 +200,7 @@ void Worker::record_end(const std::string& id, const Change& change) {
       continue;
     // Whoever opens the store next finds the job claimed by nobody and takes it up at its last checkpoint.
     if (draining_ || !worth_retrying(job.error())) return;
-    queue_.wait_for_change(seen, options_.retry_period);
+    queue_.wait_for_change(last_revision, options_.retry_period);
   }
 }
 

@@ -1,4 +1,4 @@
-// One thread that does the jobs of a queue, oldest first.
+// A thread that carries out the jobs of a queue, oldest first.
 #pragma once
 
 #include <atomic>
@@ -20,6 +20,7 @@ namespace engine::jobs {
 
 class JobContext;
 
+/// The result of a job function.
 struct JobResult {
   std::string text;            ///< Opaque; becomes Job::result.
   bool stopped_early = false;  ///< Fewer intervals than asked for, because stop_requested().
@@ -32,9 +33,10 @@ struct JobResult {
 /// An exception that leaves it is a bug: the job ends as failed with ErrorCode::internal.
 using JobFunction = std::function<Result<JobResult>(JobContext&)>;
 
+/// Periods of a worker; both are choices.
 struct WorkerOptions {
-  std::chrono::milliseconds progress_period{1000};  ///< Progress goes to disk at most so often.
-  std::chrono::milliseconds retry_period{1000};     ///< After an error of the store.
+  std::chrono::milliseconds progress_period{1000};  ///< Shortest time between two writes of progress to disk.
+  std::chrono::milliseconds retry_period{1000};     ///< Time to wait after an error of the store.
 };
 
 /// A running job as its function sees it. All of it may be called from any thread, except save_checkpoint(): by one
@@ -43,15 +45,15 @@ class JobContext {
  public:
   [[nodiscard]] const std::string& id() const { return job_.id; }
   [[nodiscard]] const std::string& payload() const { return job_.payload; }
-  /// As last published before this run; empty at the first start.
+  /// The progress that was published last before this attempt; empty at the first one.
   [[nodiscard]] const std::string& earlier_progress() const { return job_.progress; }
-  /// For files of the job; they live as long as its record, or until it is cancelled. Absent before the first
-  /// checkpoint. Names that begin with "checkpoint-" are taken.
+  /// The folder for files of the job; they live as long as its record, or until it is cancelled. Absent before the
+  /// first checkpoint. Names that begin with "checkpoint-" are taken.
   [[nodiscard]] std::filesystem::path folder() const;
 
-  /// Intervals that need not be done again; 0 at the first start.
+  /// Number of intervals that need not be done again; 0 at the first attempt.
   [[nodiscard]] int finished_intervals() const { return job_.finished_intervals; }
-  /// Bytes of the checkpoint of interval finished_intervals().
+  /// The bytes of the checkpoint of interval finished_intervals().
   ///   errors  not_found: there is none, or its file has been taken away; unavailable
   [[nodiscard]] Result<std::string> load_checkpoint() const;
   /// Puts the state after an interval on disk, then says so in the record: kill -9 at any moment leaves either this
@@ -63,24 +65,26 @@ class JobContext {
   /// Tells readers how far the job is; they see it at once.
   void publish_progress(std::string progress);
 
-  /// To be polled at every step. When it fires, return ErrorCode::cancelled; what was done since the last checkpoint is
-  /// lost.
+  /// The function polls this token at every step. When it fires, the function returns ErrorCode::cancelled; the work
+  /// since the last checkpoint is lost.
   [[nodiscard]] std::stop_token cancel_token() const;
-  /// To be asked at the start and after every interval: end now, and make the result of the last finished interval.
-  /// There is one; it may be that of load_checkpoint(), where the job was interrupted after the request.
+  /// The function calls this at the start and after every interval. True: it is to end now and return the result of the
+  /// last finished interval. There is one; it may be that of load_checkpoint(), where the job was interrupted after the
+  /// request.
   [[nodiscard]] bool stop_requested() const;
 
  private:
   friend class Worker;
-  JobContext(Queue& queue, Job job, Queue::Live& live, const std::atomic<bool>& draining, const WorkerOptions& options);
+  JobContext(Queue& queue, Job job, Queue::RunningJob& running, const std::atomic<bool>& draining,
+             const WorkerOptions& options);
   [[nodiscard]] std::filesystem::path checkpoint_file(int interval) const;
 
   Queue& queue_;
   Job job_;
-  Queue::Live& live_;
+  Queue::RunningJob& running_;
   const std::atomic<bool>& draining_;
   const WorkerOptions options_;
-  std::atomic<std::chrono::steady_clock::rep> last_write_;  ///< Of progress to disk.
+  std::atomic<std::chrono::steady_clock::rep> last_write_;  ///< When progress last went to disk.
 };
 
 /// Runs until drained. Several workers may share a queue.
@@ -94,7 +98,7 @@ class Worker {
   /// its cancel_token(). It keeps its state and its last checkpoint, and goes on when a worker claims it again.
   /// Returns when the function has.
   void drain(std::chrono::milliseconds grace);
-  /// What keeps it from working: the error of the store that it meets again and again. Nothing if all is well.
+  /// The error of the store that keeps the worker from working. Nothing if all is well.
   [[nodiscard]] std::optional<Error> trouble() const;
 
  private:
@@ -103,7 +107,7 @@ class Worker {
   [[nodiscard]] Result<JobResult> call(JobContext& context) const;
   void record_end(const std::string& id, const Change& change);
   void set_trouble(std::optional<Error> error);
-  void set_current(std::shared_ptr<Queue::Live> live);
+  void set_current(std::shared_ptr<Queue::RunningJob> running);
 
   Queue& queue_;
   const JobFunction function_;
@@ -111,7 +115,7 @@ class Worker {
   std::atomic<bool> draining_ = false;
   mutable std::mutex mutex_;  ///< Guards the three below.
   std::optional<Error> trouble_;
-  std::shared_ptr<Queue::Live> current_;
+  std::shared_ptr<Queue::RunningJob> current_;
   bool out_of_time_ = false;
   std::promise<void> finished_;
   std::thread thread_;

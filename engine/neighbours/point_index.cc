@@ -17,7 +17,7 @@ namespace {
 
 using Tree = flann::KDTreeSingleIndex<flann::L2_Simple<float>>;
 
-constexpr std::size_t queries_per_chunk = 64;
+constexpr std::size_t queries_per_chunk = 64;  // of a parallel task: a choice
 
 /// The nearest points found so far. FLANN's own sets keep whichever of two equally far points the tree visits first.
 class Nearest final : public flann::ResultSet<float> {

@@ -13,7 +13,7 @@
 namespace engine::optim {
 namespace {
 
-constexpr std::size_t values_per_chunk = 16384;
+constexpr std::size_t values_per_chunk = 16384;  // of a parallel task: a choice
 constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
 
 /// What a step needs, in float: one rounding of each, so that every element sees the same numbers.

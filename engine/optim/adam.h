@@ -59,9 +59,10 @@ class Adam {
   /// steps of a row that joins late are up to (1 - beta1) / sqrt(1 - beta2) = 3.2 times the rate.
   void append_rows(std::size_t count);
 
-  /// Moments and number of steps, for a checkpoint.
+  /// Writes moments and number of steps, for a checkpoint.
   void write(ByteWriter& out) const;
-  /// What write() of one with the same layout and rows wrote. Other bytes leave `in` failed, and the moments anything.
+  /// Reads what write() of an Adam with this layout and rows wrote; other bytes leave `in` failed, the moments
+  /// anything.
   void read(ByteReader& in);
 
   [[nodiscard]] std::size_t rows() const { return rows_; }
@@ -79,8 +80,8 @@ class Adam {
   std::size_t rows_;
   std::uint64_t steps_ = 0;
   std::vector<Moments> groups_;
-  std::vector<float> rate_;       ///< Of each column of the group at hand, bias correction included.
-  std::vector<std::size_t> bad_;  ///< Of each chunk of the group at hand: its first value that is not finite.
+  std::vector<float> rate_;       ///< Rate of each column of the group at hand, bias correction included.
+  std::vector<std::size_t> bad_;  ///< [chunk] First value of the chunk, in the group at hand, that is not finite.
 };
 
 }  // namespace engine::optim

@@ -11,7 +11,7 @@
 namespace engine::optim {
 namespace {
 
-constexpr std::size_t l1_rows = 32;  // of one channel, per chunk
+constexpr std::size_t l1_rows = 32;  // rows of one channel in a parallel task: a choice
 
 template <class A, class B>
 bool same_shape(const A& a, const B& b) {

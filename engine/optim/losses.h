@@ -24,13 +24,13 @@
 
 namespace engine::optim {
 
-/// Memory that a sequence of losses shares. Not for two threads at once.
+/// Memory that a sequence of losses shares. One thread at a time may use it.
 struct LossWorkspace {
   std::vector<double> partial;  ///< One sum per chunk of work.
   std::vector<double> sums;     ///< One per channel.
 };
 
-/// How the kink of |d| is taken off.
+/// The ways of taking the kink off |d|.
 ///
 /// dead_zone is the default: where the target is the scene's own picture, or one stored with 8 bits, a difference of
 /// less than half a step is rounding and must not move anything. Adam divides a gradient by its own size, so that a
@@ -83,8 +83,8 @@ struct BackgroundLossOptions {
 [[nodiscard]] Result<void> validate(const BackgroundLossOptions& options);
 
 struct BackgroundLoss {
-  double l1 = 0;     ///< As smooth_l1_loss() returns it.
-  double ssim = 0;   ///< As ssim_loss() returns it: 1 - SSIM.
+  double l1 = 0;     ///< The result of smooth_l1_loss().
+  double ssim = 0;   ///< The result of ssim_loss(): 1 - SSIM.
   double total = 0;  ///< l1_weight * l1 + ssim_weight * ssim
 };
 
@@ -93,7 +93,7 @@ BackgroundLoss background_loss(PictureView rendered, PictureView target, MaskVie
                                const BackgroundLossOptions& options, LossWorkspace& workspace,
                                MutablePictureView v_rendered);
 
-/// Which of SSIM's two factors.
+/// The factors of SSIM that a map holds.
 enum class SsimTerm {
   full,                ///< Luminance times contrast-structure: SSIM.
   contrast_structure,  ///< (2 cov + C2) / (var_x + var_y + C2), what MS-SSIM takes at all scales but the last.

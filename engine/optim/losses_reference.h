@@ -30,9 +30,9 @@ Real smooth_l1_vjp(Real d, SmoothL1 kind, Real scale, Real v_out) noexcept {
   return std::abs(d) <= scale ? Real(0) : (d > 0 ? v_out : -v_out);
 }
 
-/// What SSIM knows about a window: weighted means of x, y, x^2, y^2 and xy.
+/// Statistics of a window that SSIM needs: weighted means of x, y, x^2, y^2 and xy.
 template <std::floating_point Real>
-struct Moments {
+struct WindowStatistics {
   Real x = 0, y = 0, xx = 0, yy = 0, xy = 0;
 };
 
@@ -43,7 +43,7 @@ constexpr Real ssim_c2 = Real(0.03) * Real(0.03);
 
 /// Wang 2004, eq. 13, or its contrast-structure factor alone.
 template <std::floating_point Real>
-Real ssim(const Moments<Real>& m, SsimTerm term) noexcept {
+Real ssim(const WindowStatistics<Real>& m, SsimTerm term) noexcept {
   const Real luminance = (2 * m.x * m.y + ssim_c1<Real>) / (m.x * m.x + m.y * m.y + ssim_c1<Real>);
   const Real contrast =
       (2 * (m.xy - m.x * m.y) + ssim_c2<Real>) / ((m.xx - m.x * m.x) + (m.yy - m.y * m.y) + ssim_c2<Real>);
@@ -51,14 +51,14 @@ Real ssim(const Moments<Real>& m, SsimTerm term) noexcept {
 }
 /// dL/d(moments that depend on x) for v_out = dL/d(ssim); y is constant.
 template <std::floating_point Real>
-Moments<Real> ssim_vjp(const Moments<Real>& m, SsimTerm term, Real v_out) noexcept {
+WindowStatistics<Real> ssim_vjp(const WindowStatistics<Real>& m, SsimTerm term, Real v_out) noexcept {
   const Real luminance_below = m.x * m.x + m.y * m.y + ssim_c1<Real>;
   const Real luminance = (2 * m.x * m.y + ssim_c1<Real>) / luminance_below;
   const Real contrast_below = (m.xx - m.x * m.x) + (m.yy - m.y * m.y) + ssim_c2<Real>;
   const Real contrast = (2 * (m.xy - m.x * m.y) + ssim_c2<Real>) / contrast_below;
   const Real v_luminance = term == SsimTerm::full ? v_out * contrast : Real(0);
   const Real v_contrast = term == SsimTerm::full ? v_out * luminance : v_out;
-  Moments<Real> v;
+  WindowStatistics<Real> v;
   v.xx = -v_contrast * contrast / contrast_below;
   v.xy = 2 * v_contrast / contrast_below;
   v.x = v_luminance * (2 * m.y - 2 * m.x * luminance) / luminance_below - v.xy * m.y - 2 * m.x * v.xx;
@@ -116,7 +116,7 @@ SsimPass<Real> ssim_pass(const Plane<Real>& x, const Plane<Real>& y, std::span<c
         out.map.at(column, row) = 1;
         continue;
       }
-      Moments<Real> m;
+      WindowStatistics<Real> m;
       for_window(column, row, [&](int px, int py, Real weight) {
         const Real xi = x.at(px, py), yi = y.at(px, py);
         m.x += weight * xi, m.y += weight * yi;
@@ -124,7 +124,7 @@ SsimPass<Real> ssim_pass(const Plane<Real>& x, const Plane<Real>& y, std::span<c
       });
       out.map.at(column, row) = ssim(m, term);
       out.sum += 1 - out.map.at(column, row);
-      const Moments<Real> v = ssim_vjp(m, term, Real(-1));
+      const WindowStatistics<Real> v = ssim_vjp(m, term, Real(-1));
       for_window(column, row, [&](int px, int py, Real weight) {
         out.v_x.at(px, py) += weight * (v.x + 2 * x.at(px, py) * v.xx + y.at(px, py) * v.xy);
       });

@@ -1,4 +1,4 @@
-// The vector kernels behind losses.h, chosen at run time. Nobody but losses.cc includes this.
+// The vector kernels behind losses.h, chosen at run time. Only losses.cc includes this header.
 #pragma once
 
 #include "engine/optim/losses.h"
@@ -16,7 +16,7 @@ struct SsimChannel {
   PictureView rendered, target;  ///< One channel.
   MaskView mask;
   MutablePictureView v_rendered;
-  float scale = 1;  ///< Of the gradient.
+  float scale = 1;  ///< Factor of the gradient.
 };
 
 /// Adds scale * gradient to the pixels of `tile` (the gradient of the sum over the whole picture).

@@ -12,9 +12,9 @@
 namespace engine::optim {
 namespace {
 
-constexpr int window_side = 11;
+constexpr int window_side = 11;  // pixels, as in Wang 2003
 constexpr std::array<double, max_ms_ssim_scales> wang_weights{0.0448, 0.2856, 0.3001, 0.2363, 0.1333};
-constexpr std::size_t rows_per_chunk = 32;
+constexpr std::size_t rows_per_chunk = 32;  // of a parallel task: a choice
 
 /// The picture's size, without touching memory it already has.
 void reshape(scene::Image& image, int width, int height, int channels) {
@@ -163,7 +163,7 @@ Result<double> edit_loss(PerceptualLoss& loss, PictureView rendered, PictureView
       out[x] = counts ? ours[x] - std::copysign(dead_zone, ours[x] - theirs[x]) : theirs[x];
     }
   });
-  const Result<double> value = loss.evaluate(workspace.composite, workspace.target, workspace.v_composite);
+  Result<double> value = loss.evaluate(workspace.composite, workspace.target, workspace.v_composite);
   if (!value) return value;
   const double share = double(rendered.pixels()) / double(view_pixels);
   const PictureView v_composite = view(workspace.v_composite);

@@ -14,7 +14,7 @@
 
 namespace engine::optim {
 
-/// A distance between two pictures of the same size, differentiable in the first. Not for two threads at once.
+/// A distance between two pictures of one size, differentiable in the first. One thread at a time may use an object.
 class PerceptualLoss {
  public:
   virtual ~PerceptualLoss() = default;
@@ -29,12 +29,12 @@ class PerceptualLoss {
 
 struct MsSsimOptions {
   double ms_ssim_weight = 0.84;  ///< 0 to 1: alpha of Zhao et al., eq. 14; the L1 has the rest.
-  double floor = 0.01;  ///< Above 0, below 1. A scale's mean term below this counts as this, and has no gradient.
+  double floor = 0.01;           ///< 0 to 1, exclusive: least mean term of a scale; below it, no gradient. A choice.
   L1Options l1 = {};
 };
 [[nodiscard]] Result<void> validate(const MsSsimOptions& options);
 
-constexpr int max_ms_ssim_scales = 5;
+constexpr int max_ms_ssim_scales = 5;  ///< Wang 2003, section 3.2.
 
 /// Scales for a picture of this size, 1 to 5: each halves the one before, and as long as the smaller side holds a
 /// whole window of 11 pixels there is one more.
@@ -58,7 +58,7 @@ class MsSsimLoss final : public PerceptualLoss {
  private:
   struct Scale {
     scene::Image rendered, target;  ///< Empty at the finest scale, where the caller's are used.
-    scene::Image gradient;          ///< Of the channel's mean of 1 - term; later of the loss.
+    scene::Image gradient;          ///< Gradient of the channel's mean of 1 - term; later that of the loss.
     std::vector<double> mean_loss;  ///< [channels] mean of 1 - term.
   };
   MsSsimOptions options_;
@@ -66,7 +66,7 @@ class MsSsimLoss final : public PerceptualLoss {
   std::vector<Scale> scales_;
 };
 
-/// Memory that a sequence of edit losses shares. Not for two threads at once.
+/// Memory that a sequence of edit losses shares. One thread at a time may use it.
 struct EditWorkspace {
   scene::Image composite, target, v_composite;
 };

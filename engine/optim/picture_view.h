@@ -21,7 +21,7 @@ struct PictureView {
   [[nodiscard]] std::size_t pixels() const { return std::size_t(width) * std::size_t(height); }
 };
 
-/// The same, to write to; serves as a PictureView too.
+/// A rectangle of a planar picture to write to; it converts to a PictureView.
 struct MutablePictureView {
   float* data = nullptr;
   int width = 0, height = 0, channels = 0;
@@ -66,7 +66,7 @@ struct MaskView {
   return {mask.data.data() + first, rect.width(), rect.height(), std::size_t(mask.width)};
 }
 
-/// All pixels.
+/// A view of all pixels.
 [[nodiscard]] inline PictureView view(const scene::Image& image) {
   return crop(image, whole(image.width, image.height));
 }

@@ -11,8 +11,8 @@
 
 namespace engine::optim {
 
-/// From `initial` at progress 0 to `final` at progress 1, a straight line in the logarithm. INRIA's position rate runs
-/// so over the whole training.
+/// A rate that goes from `initial` at progress 0 to `final` at progress 1, straight in the logarithm. INRIA's position
+/// rate does so over the whole training.
 ///   initial, final  above 0
 ///   progress        clamped to [0, 1]
 [[nodiscard]] inline double exponential_decay(double initial, double final, double progress) {
@@ -31,7 +31,7 @@ namespace engine::optim {
   return exponential_decay(1, last, double(iteration) / double(iterations - 1));
 }
 
-/// Steps of Adam per parameter, in the parameter's stored form. Defaults: INRIA's.
+/// Learning rates per parameter, in the parameter's stored form. Defaults: INRIA's, but for mask_radii.
 struct LearningRates {
   double position = 1.6e-4;      ///< Per unit of position_scale(); dimensionless.
   double sh_dc = 2.5e-3;         ///< SH coefficient 0.
@@ -39,12 +39,12 @@ struct LearningRates {
   double opacity_logit = 0.05;   ///< Logits.
   double log_scale = 5e-3;       ///< Natural logarithm of world units.
   double rotation = 1e-3;        ///< Quaternion components.
-  double mask_radii = 5;         ///< c: the position rate is that of a scene of c radii of the 3D mask. To be measured.
-  double last = 0.01;            ///< Factor on all of them at the end of a correction; above 0, at most 1.
+  double mask_radii = 5;         ///< c of position_scale(): radii of the 3D mask that its extent counts as. A choice.
+  double last = 0.01;            ///< Factor of all rates at the end of a correction; above 0, at most 1.
 };
 [[nodiscard]] Result<void> validate(const LearningRates& rates);
 
-/// What the position rate is multiplied by, world units: min(scene_extent, c * mask_radius). INRIA takes the extent of
+/// The factor of the position rate, world units: min(scene_extent, c * mask_radius). INRIA takes the extent of
 /// the whole scene (1.1 times the largest distance of a camera from their centre), at which the Gaussians of a small
 /// object in a large scene would jump by their own size at each step.
 ///   scene_extent  world units; 0 or less: not known, does not limit

@@ -15,10 +15,10 @@ constexpr int sun_rays = 8, sky_rays = 24;
 constexpr float skin = 0.004f;  // rays start this far off a surface: more than its mesh strays from its formula
 constexpr float far = 30.0f;    // beyond every made-up scene
 
-struct Frame {
+struct Basis {
   Vec3 x, y;
 };
-Frame frame_of(Vec3 normal) {
+Basis basis_of(Vec3 normal) {
   const Vec3 axis = std::abs(normal.x) < 0.5f ? Vec3(1, 0, 0) : Vec3(0, 1, 0);
   const Vec3 x = glm::normalize(glm::cross(normal, axis));
   return {x, glm::cross(normal, x)};
@@ -49,19 +49,19 @@ LightMap::Sample gather(const Occluders& occluders, const Light& light, std::spa
   const Vec3 origin = point + skin * normal;
   const float phase = 2 * pi * float(turn) / 9, golden_angle = pi * (3 - std::sqrt(5.0f));
   if (glm::dot(normal, light.to_sun) > 0) {
-    const Frame frame = frame_of(light.to_sun);
+    const Basis basis = basis_of(light.to_sun);
     for (int k = 0; k < sun_rays; ++k) {
       const float r = light.sun_radius_rad * std::sqrt((float(k) + 0.5f) / sun_rays);
       const float a = golden_angle * float(k) + phase;
-      const Vec3 direction = light.to_sun + r * (std::cos(a) * frame.x + std::sin(a) * frame.y);
+      const Vec3 direction = light.to_sun + r * (std::cos(a) * basis.x + std::sin(a) * basis.y);
       sample.sun += occluders.any(origin, direction, far) ? 0.0f : 1.0f / sun_rays;
     }
   }
-  const Frame frame = frame_of(normal);
+  const Basis basis = basis_of(normal);
   for (int k = 0; k < sky_rays; ++k) {  // cosine-weighted: each ray stands for the same part of the irradiance
     const float height2 = 1 - (float(k) + (float(turn) + 0.5f) / 9) / sky_rays;
     const float ring = std::sqrt(1 - height2), a = golden_angle * float(k) + phase;
-    const Vec3 direction = std::sqrt(height2) * normal + ring * (std::cos(a) * frame.x + std::sin(a) * frame.y);
+    const Vec3 direction = std::sqrt(height2) * normal + ring * (std::cos(a) * basis.x + std::sin(a) * basis.y);
     const auto hit = occluders.nearest(origin, direction, far);
     sample.ambient += (hit ? bounced[hit->patch] : light.sky(direction)) / float(sky_rays);
   }
@@ -94,11 +94,11 @@ void smooth(LightMap& map) {
         for (int i = -1; i <= 1; ++i) {
           const int v = std::clamp(y + j, 0, map.height - 1);
           const int u = map.closed_u ? (x + i + map.width) % map.width : std::clamp(x + i, 0, map.width - 1);
-          ambient += sharp.ambient[std::size_t(v * map.width + u)];
-          sun += sharp.sun[std::size_t(v * map.width + u)];
+          ambient += sharp.ambient[std::size_t(v) * std::size_t(map.width) + std::size_t(u)];
+          sun += sharp.sun[std::size_t(v) * std::size_t(map.width) + std::size_t(u)];
         }
-      map.ambient[std::size_t(y * map.width + x)] = ambient / 9.0f;
-      map.sun[std::size_t(y * map.width + x)] = sun / 9.0f;
+      map.ambient[std::size_t(y) * std::size_t(map.width) + std::size_t(x)] = ambient / 9.0f;
+      map.sun[std::size_t(y) * std::size_t(map.width) + std::size_t(x)] = sun / 9.0f;
     }
 }
 
@@ -148,7 +148,7 @@ void LightMap::want(float u, float v) {
   for (int y = y0 - 1; y <= y0 + 2; ++y)
     for (int x = x0 - 1; x <= x0 + 2; ++x) {
       const int column = closed_u ? (x + 2 * width) % width : std::clamp(x, 0, width - 1);
-      wanted[std::size_t(std::clamp(y, 0, height - 1) * width + column)] = 1;
+      wanted[std::size_t(std::clamp(y, 0, height - 1)) * std::size_t(width) + std::size_t(column)] = 1;
     }
 }
 
@@ -161,7 +161,7 @@ std::vector<LightMap> make_light_maps(std::span<const Object> objects, float tex
       map.width = std::clamp(int(length_of(patch, true) / step), 3, 512);
       map.height = std::clamp(int(length_of(patch, false) / step), 3, 512);
       map.closed_u = patch.closed_u;
-      map.ambient.resize(std::size_t(map.width * map.height));
+      map.ambient.resize(std::size_t(map.width) * std::size_t(map.height));
       map.sun.resize(map.ambient.size());
       map.wanted.resize(map.ambient.size());
       maps.push_back(std::move(map));
@@ -191,7 +191,7 @@ void bake(std::span<const Object> objects, const Occluders& occluders, const Lig
       const Placement turned{Vec3(0.0f), object->placement.turn_rad};
       const float v = (float(y) + 0.5f) / float(map->height);
       for (int x = 0; x < map->width; ++x) {
-        if (!map->wanted[std::size_t(y * map->width + x)]) continue;
+        if (!map->wanted[std::size_t(y) * std::size_t(map->width) + std::size_t(x)]) continue;
         const float u = (float(x) + 0.5f) / float(map->width);
         const Vec3 point = object->placement.world(patch->position(u, v));
         const Vec3 normal = turned.world(normal_at(*patch, u, v));
@@ -202,8 +202,8 @@ void bake(std::span<const Object> objects, const Occluders& occluders, const Lig
           sample.ambient = 0.5f * (sample.ambient + back.ambient);
           sample.sun = std::max(sample.sun, back.sun);
         }
-        map->ambient[std::size_t(y * map->width + x)] = sample.ambient;
-        map->sun[std::size_t(y * map->width + x)] = sample.sun;
+        map->ambient[std::size_t(y) * std::size_t(map->width) + std::size_t(x)] = sample.ambient;
+        map->sun[std::size_t(y) * std::size_t(map->width) + std::size_t(x)] = sample.sun;
       }
     }
   });

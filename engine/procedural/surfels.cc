@@ -37,11 +37,12 @@ struct Row {
   std::size_t begin = 0;  ///< Number of its first Gaussian.
 };
 
-struct Place {
+/// A point of a surface where a Gaussian may go.
+struct Site {
   std::uint32_t ground = 0;
   float u = 0, v = 0, step_u = 0, step_v = 0;
   float sigma_u = 0, sigma_v = 0;
-  bool wanted = false;
+  bool is_used = false;
 };
 
 struct Eye {
@@ -143,13 +144,13 @@ bool sees(const Eye& eye, const Occluders& occluders, Vec3 middle, std::span<con
 
 /// Is the Gaussian visible from some camera?
 ///   first  the camera to begin with; on success, the one that sees it: likely the one that sees its neighbour, too
-bool is_seen(const Ground& ground, const Place& place, std::span<const Eye> eyes, const Occluders& occluders, Rng& rng,
+bool is_seen(const Ground& ground, const Site& site, std::span<const Eye> eyes, const Occluders& occluders, Rng& rng,
              std::size_t& first) {
-  const Vec3 point = ground.object->placement.world(ground.patch->position(place.u, place.v));
-  const Vec3 normal = ground.turned.world(normal_at(*ground.patch, place.u, place.v));
+  const Vec3 point = ground.object->placement.world(ground.patch->position(site.u, site.v));
+  const Vec3 normal = ground.turned.world(normal_at(*ground.patch, site.u, site.v));
   const Vec3 axis = std::abs(normal.x) < 0.5f ? Vec3(1, 0, 0) : Vec3(0, 1, 0);
   const Vec3 right = glm::normalize(glm::cross(normal, axis)), up = glm::cross(normal, right);
-  const float reach = 3 * std::max(place.sigma_u, place.sigma_v);
+  const float reach = 3 * std::max(site.sigma_u, site.sigma_v);
   for (std::size_t k = 0; k < eyes.size(); ++k) {
     const std::size_t number = (first + k) % eyes.size();
     const float facing = glm::dot(normal, eyes[number].centre - point);
@@ -159,7 +160,7 @@ bool is_seen(const Ground& ground, const Place& place, std::span<const Eye> eyes
     std::array<Vec3, 3> spots;
     for (std::size_t i = 0; i < spots.size(); ++i) {
       const float a = angle + 2 * std::numbers::pi_v<float> * float(i) / float(spots.size());
-      spots[i] = middle + radius * (place.sigma_u * std::cos(a) * right + place.sigma_v * std::sin(a) * up);
+      spots[i] = middle + radius * (site.sigma_u * std::cos(a) * right + site.sigma_v * std::sin(a) * up);
     }
     if (sees(eyes[number], occluders, middle, spots, reach)) {
       first = number;
@@ -170,12 +171,12 @@ bool is_seen(const Ground& ground, const Place& place, std::span<const Eye> eyes
 }
 
 /// Is a place to be covered? Asked place by place along each row; `first` is a memory of the row's.
-using Wanted = std::function<bool(const Ground&, const Place&, Rng&, std::size_t& first)>;
+using WantedSite = std::function<bool(const Ground&, const Site&, Rng&, std::size_t& first)>;
 
-std::vector<Place> place_all(const std::vector<Ground>& grounds, float spacing, std::uint64_t seed,
-                             const Wanted& wanted) {
+std::vector<Site> sites_at_spacing(const std::vector<Ground>& grounds, float spacing, std::uint64_t seed,
+                                   const WantedSite& wanted) {
   const std::vector<Row> rows = lay_rows(grounds, spacing);
-  std::vector<Place> places(rows.empty() ? 0 : rows.back().begin + rows.back().count);
+  std::vector<Site> sites(rows.empty() ? 0 : rows.back().begin + rows.back().count);
   parallel_for(rows.size(), 8, [&](std::size_t begin, std::size_t end) {
     for (std::size_t r = begin; r < end; ++r) {
       const Row& row = rows[r];
@@ -184,41 +185,41 @@ std::vector<Place> place_all(const std::vector<Ground>& grounds, float spacing, 
       std::size_t first_eye = 0;
       const float spacing_u = row.length_u.back() / float(row.count);
       for (std::uint32_t k = 0; k < row.count; ++k) {
-        Place& place = places[row.begin + k];
-        place.ground = row.ground;
+        Site& site = sites[row.begin + k];
+        site.ground = row.ground;
         const float du = rng.uniform(-jitter, jitter), dv = rng.uniform(-jitter, jitter);
-        place.u = parameter_at(row.length_u, (float(k) + 0.5f + du) * spacing_u) + row.shift / float(row.count);
-        place.v = row.v + dv * row.step_v;
-        place.step_u = 1 / float(row.count);
-        place.step_v = row.step_v;
+        site.u = parameter_at(row.length_u, (float(k) + 0.5f + du) * spacing_u) + row.shift / float(row.count);
+        site.v = row.v + dv * row.step_v;
+        site.step_u = 1 / float(row.count);
+        site.step_v = row.step_v;
         const bool end_u = !ground.patch->closed_u && (k == 0 || k + 1 == row.count);
-        place.sigma_u = spacing_u * (end_u ? edge_overlap : overlap);
-        place.sigma_v = row.spacing_v * (row.first || row.last ? edge_overlap : overlap);
-        place.wanted = wanted(ground, place, rng, first_eye);
+        site.sigma_u = spacing_u * (end_u ? edge_overlap : overlap);
+        site.sigma_v = row.spacing_v * (row.first || row.last ? edge_overlap : overlap);
+        site.is_used = wanted(ground, site, rng, first_eye);
       }
     }
   });
-  std::erase_if(places, [](const Place& place) { return !place.wanted; });
-  return places;
+  std::erase_if(sites, [](const Site& site) { return !site.is_used; });
+  return sites;
 }
 
-/// Places for as many Gaussians as wanted, by trying spacings.
+/// Sites for `count` Gaussians, by trying spacings.
 ///
 /// At spacing s there are about a / s^2 + b / s of them: a the area that is seen, b the length of the rims around it,
 /// where Gaussians that are half hidden stay. Two smaller tries tell a and b, so that the first large one mostly fits.
-std::vector<Place> place_count(const std::vector<Ground>& grounds, std::size_t count, std::uint64_t seed,
-                               const Wanted& wanted_place) {
+std::vector<Site> sites_for_count(const std::vector<Ground>& grounds, std::size_t count, std::uint64_t seed,
+                                  const WantedSite& wanted_site) {
   const double tolerance = 0.008 * double(count);
   double last_density = 0, last_found = 0;           // density = 1 / spacing
   double density = 0.05 * std::sqrt(double(count));  // about a tenth of the Gaussians, if objects are of unit size
-  std::vector<Place> best, above;                    // the nearest to count; the fewest that are no fewer than count
-  auto miss = [&](const std::vector<Place>& p) { return std::abs(double(p.size()) - double(count)); };
+  std::vector<Site> best, above;                     // the nearest to count; the fewest that are no fewer than count
+  auto miss = [&](const std::vector<Site>& p) { return std::abs(double(p.size()) - double(count)); };
   for (int attempt = 0; attempt < 12; ++attempt) {
-    std::vector<Place> places = place_all(grounds, float(1 / density), seed, wanted_place);
-    if (places.empty()) return places;
-    const double found = double(places.size());
-    if (places.size() >= count && (above.empty() || places.size() < above.size())) above = places;
-    if (best.empty() || miss(places) < miss(best)) best = std::move(places);
+    std::vector<Site> sites = sites_at_spacing(grounds, float(1 / density), seed, wanted_site);
+    if (sites.empty()) return sites;
+    const double found = double(sites.size());
+    if (sites.size() >= count && (above.empty() || sites.size() < above.size())) above = sites;
+    if (best.empty() || miss(sites) < miss(best)) best = std::move(sites);
     if (miss(best) <= tolerance) return best;
 
     double rim = 0;
@@ -233,17 +234,17 @@ std::vector<Place> place_count(const std::vector<Ground>& grounds, std::size_t c
   // Rows come and go with the spacing, and of a few Gaussians no spacing may give the wanted number: leave out evenly
   // what is too many.
   if (above.empty()) return best;
-  std::vector<Place> thinned;
+  std::vector<Site> thinned;
   for (std::size_t i = 0; i < count; ++i) thinned.push_back(above[i * above.size() / count]);
   return thinned;
 }
 
 /// Mean finish over the footprint, so that patterns finer than the Gaussians turn into their mean, not into speckle.
-Finish finish_over(const Patch& patch, const Place& place) {
+Finish finish_over(const Patch& patch, const Site& site) {
   Finish sum{Vec3(0.0f), 0};
   for (const float j : {-0.25f, 0.25f})
     for (const float i : {-0.25f, 0.25f}) {
-      const float u = place.u + i * place.step_u, v = std::clamp(place.v + j * place.step_v, 0.0f, 1.0f);
+      const float u = site.u + i * site.step_u, v = std::clamp(site.v + j * site.step_v, 0.0f, 1.0f);
       const Finish one = patch.material({u - std::floor(u), v, patch.position(u, v)});
       sum.albedo += 0.25f * one.albedo;
       sum.gloss += 0.25f * one.gloss;
@@ -253,11 +254,11 @@ Finish finish_over(const Patch& patch, const Place& place) {
 
 /// Colour of a Gaussian as SH of degree 1: coefficient 0 holds what its cameras see on average; bands above it make it
 /// brighter towards the mirrored sun.
-void paint(const Place& place, const Ground& ground, const LightMap& map, const Light& light, std::span<const Eye> eyes,
+void paint(const Site& site, const Ground& ground, const LightMap& map, const Light& light, std::span<const Eye> eyes,
            Vec3 point, Vec3 normal, std::span<float> sh) {
   constexpr float c0 = 0.28209479177387814f, c1 = 0.4886025119029199f;  // SH constants of bands 0 and 1
-  const Finish finish = finish_over(*ground.patch, place);
-  const LightMap::Sample lit = map.at(place.u - std::floor(place.u), place.v);
+  const Finish finish = finish_over(*ground.patch, site);
+  const LightMap::Sample lit = map.at(site.u - std::floor(site.u), site.v);
   const float sun = lit.sun * light.through_window(point);
   const float incidence = glm::dot(normal, light.to_sun);
   // A leaf passes on about half as much light as it sends back.
@@ -303,39 +304,39 @@ std::vector<Eye> eyes_of(std::span<const scene::Camera> cameras) {
 }
 
 /// Puts a Gaussian at every place, in the colour that it has there.
-Surfels paint_places(std::span<const Object> objects, const Light& light, std::span<const Eye> eyes,
-                     const Occluders& occluders, const std::vector<Ground>& grounds, const std::vector<Place>& places,
-                     std::size_t count, std::uint64_t seed) {
+Surfels paint_sites(std::span<const Object> objects, const Light& light, std::span<const Eye> eyes,
+                    const Occluders& occluders, const std::vector<Ground>& grounds, const std::vector<Site>& sites,
+                    std::size_t count, std::uint64_t seed) {
   Surfels surfels;
   scene::GaussianCloud& cloud = surfels.cloud;
   cloud.sh_degree = 1;
-  cloud.resize(places.size());
-  surfels.object.resize(places.size());
-  if (places.empty()) return surfels;
+  cloud.resize(sites.size());
+  surfels.object.resize(sites.size());
+  if (sites.empty()) return surfels;
   // Shadows need no finer grid than this to look right; few Gaussians need no finer grid than themselves.
   const float texel = std::max(0.028f, 4.0f / std::sqrt(float(count)));
   std::vector<LightMap> maps = make_light_maps(objects, texel);
-  for (const Place& place : places) maps[place.ground].want(place.u - std::floor(place.u), place.v);
+  for (const Site& site : sites) maps[site.ground].want(site.u - std::floor(site.u), site.v);
   bake(objects, occluders, light, maps);
 
-  parallel_for(places.size(), 1024, [&](std::size_t begin, std::size_t end) {
+  parallel_for(sites.size(), 1024, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const Place& place = places[i];
-      const Ground& ground = grounds[place.ground];
-      const Vec3 point = ground.object->placement.world(ground.patch->position(place.u, place.v));
-      const Vec3 normal = ground.turned.world(normal_at(*ground.patch, place.u, place.v));
+      const Site& site = sites[i];
+      const Ground& ground = grounds[site.ground];
+      const Vec3 point = ground.object->placement.world(ground.patch->position(site.u, site.v));
+      const Vec3 normal = ground.turned.world(normal_at(*ground.patch, site.u, site.v));
       constexpr float h = 1e-3f;
-      Vec3 along = ground.turned.world(ground.patch->position(place.u + h, place.v) -
-                                       ground.patch->position(place.u - h, place.v));
+      Vec3 along =
+          ground.turned.world(ground.patch->position(site.u + h, site.v) - ground.patch->position(site.u - h, site.v));
       along = glm::normalize(along - glm::dot(along, normal) * normal);
       const Quat rotation = glm::quat_cast(Mat3(along, glm::cross(normal, along), normal));
       cloud.mean.set(i, point);
       cloud.rotation.set(i, rotation);
-      const float thickness = 0.06f * std::min(place.sigma_u, place.sigma_v);
-      cloud.log_scale.set(i, Vec3(std::log(place.sigma_u), std::log(place.sigma_v), std::log(thickness)));
+      const float thickness = 0.06f * std::min(site.sigma_u, site.sigma_v);
+      cloud.log_scale.set(i, Vec3(std::log(site.sigma_u), std::log(site.sigma_v), std::log(thickness)));
       Rng rng(seed, (std::uint64_t{1} << 40) + i);  // apart from the streams of the rows
       cloud.opacity_logit[i] = rng.uniform(3.6f, 4.6f);
-      paint(place, ground, maps[place.ground], light, eyes, point, normal, cloud.sh_row(i));
+      paint(site, ground, maps[site.ground], light, eyes, point, normal, cloud.sh_row(i));
       surfels.object[i] = std::uint16_t(ground.object - objects.data());
     }
   });
@@ -349,19 +350,19 @@ Surfels make_surfels(std::span<const Object> objects, const Light& light, std::s
   const std::vector<Eye> eyes = eyes_of(cameras);
   const Occluders occluders(objects);
   const std::vector<Ground> grounds = lay_ground(objects);
-  const auto places =
-      place_count(grounds, count, seed, [&](const Ground& ground, const Place& place, Rng& rng, std::size_t& first) {
-        return is_seen(ground, place, eyes, occluders, rng, first);
+  const auto sites =
+      sites_for_count(grounds, count, seed, [&](const Ground& ground, const Site& site, Rng& rng, std::size_t& first) {
+        return is_seen(ground, site, eyes, occluders, rng, first);
       });
-  return paint_places(objects, light, eyes, occluders, grounds, places, count, seed);
+  return paint_sites(objects, light, eyes, occluders, grounds, sites, count, seed);
 }
 
 Surfels cover_all(std::span<const Object> objects, const Light& light, std::span<const scene::Camera> cameras,
                   float spacing, std::uint64_t seed) {
   const std::vector<Ground> grounds = lay_ground(objects);
-  const auto places =
-      place_all(grounds, spacing, seed, [](const Ground&, const Place&, Rng&, std::size_t&) { return true; });
-  return paint_places(objects, light, eyes_of(cameras), Occluders(objects), grounds, places, places.size(), seed);
+  const auto sites =
+      sites_at_spacing(grounds, spacing, seed, [](const Ground&, const Site&, Rng&, std::size_t&) { return true; });
+  return paint_sites(objects, light, eyes_of(cameras), Occluders(objects), grounds, sites, sites.size(), seed);
 }
 
 }  // namespace engine::procedural

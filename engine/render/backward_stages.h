@@ -29,38 +29,38 @@ struct TileUpstream {
   std::ptrdiff_t stride;
 };
 
-/// Where the gradients of a tile's splats are summed.
+/// The sums of gradients that a tile adds to.
 struct TilePairs {
-  const std::uint32_t* pairs_before;      ///< As ForwardBuffers has it.
-  std::uint32_t group_column, group_row;  ///< The tile's.
+  const std::uint32_t* pairs_before;      ///< See ForwardBuffers::pairs_before.
+  std::uint32_t group_column, group_row;  ///< Position of the tile's group.
   GroupGradient* sums;
 };
 
 /// Pulls back one tile, whose first pixel is (x0, y0).
 ///   list   splats that reach the tile, nearest first
-///   asked  in front of this one of the list nothing may change
-///   background, ends  as composite_tile() had it, and left them
-///   pairs  of splats that may change are added to
+///   asked  entry of the list in front of which no splat may change
+///   background, ends  those of composite_tile()
+///   pairs  sums that the gradients of splats that may change are added to
 void composite_tile_vjp(const Splat* splats, std::span<const std::uint32_t> list, std::size_t asked, int x0, int y0,
                         const TileUpstream& upstream, Vec3 background, const RayEnds& ends, const TilePairs& pairs);
 
-/// Sums of gradients of pairs, kept from frame to frame. Whoever reads them leaves zeros, since that is when they are
-/// in the cache.
+/// Sums of gradients of pairs, kept from frame to frame. The reader of a sum sets it to zero, since it is in the cache
+/// then.
 class PairSums {
  public:
-  /// The sums of n pairs, all zero: a pass begins.
+  /// Begins a pass. Returns the sums of n pairs, all zero.
   GroupGradient* zeroed(std::size_t n);
-  /// All have been read, and are zero again: it ends.
+  /// Ends a pass: all sums have been read, and are zero again.
   void all_read() { still_zero_ = true; }
   [[nodiscard]] GroupGradient* data() const { return sums_.data(); }
 
  private:
   Buffer<GroupGradient> sums_;
-  std::size_t zeros_ = 0;   ///< So many of the first were zero when the last pass began.
-  bool still_zero_ = true;  ///< And are. Not so while a pass goes on, or once it was left by an exception.
+  std::size_t zeros_ = 0;   ///< Leading sums that were zero when the last pass began.
+  bool still_zero_ = true;  ///< Whether they are still; false during a pass, and after one that an exception left.
 };
 
-/// Where the gradients of the rows [R] that may change are: row by row, so that what a row needs lies side by side.
+/// The sums for the rows [R] that may change, row by row, so that those of one row lie side by side.
 struct RowPairs {
   const std::uint32_t* first_pair;  ///< [R + 1] Row r has the pairs [first_pair[r], first_pair[r + 1]).
   GroupGradient* pairs;

@@ -37,16 +37,16 @@ class FrozenView {
 
   [[nodiscard]] const scene::Camera& camera() const;
   [[nodiscard]] scene::Rect region() const;
-  /// The region of the picture with nothing changeable in it.
+  /// The region of the picture, drawn of the frozen Gaussians alone.
   [[nodiscard]] const scene::Image& color() const;
-  [[nodiscard]] std::size_t splats() const;  ///< That reach the region; 0 while they are let go.
+  [[nodiscard]] std::size_t splats() const;  ///< Splats that reach the region; 0 while they are let go.
   [[nodiscard]] std::size_t memory_bytes() const;
 
   /// Lets splats and lists go, most of the memory. The picture stays; LocalFrame needs them back first.
   void let_go();
   [[nodiscard]] bool is_let_go() const;
-  /// Makes them anew, as they were, at the cost of the scene.
-  ///   frozen  as given at first
+  /// Makes splats and lists anew, as they were; costs a pass over the scene.
+  ///   frozen  the layers that the constructor was given
   void restore(const Layers& frozen);
 
  private:

@@ -23,7 +23,7 @@ struct Layers {
   /// A plain cloud, the usual case: implicit, so that it can be given wherever layers are asked for.
   Layers(const scene::GaussianCloud& cloud) : base(&cloud) {}
 
-  /// Of all rows, the hidden ones included: the length of weights.
+  /// Number of rows, the hidden ones included: the length of arrays of weights.
   [[nodiscard]] std::size_t size() const { return base->size() + (top ? top->size() : 0); }
   /// The number that a row, not a hidden one, has in the merged cloud (scene::flatten()).
   [[nodiscard]] std::uint32_t merged_row(std::size_t row) const;
@@ -35,7 +35,7 @@ class DrawnVersion {
  public:
   explicit DrawnVersion(scene::LayeredCloud version);
   [[nodiscard]] const scene::LayeredCloud& version() const { return version_; }
-  /// Good as long as this object.
+  /// The layers to draw; valid as long as this object.
   [[nodiscard]] Layers layers() const;
 
  private:

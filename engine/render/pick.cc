@@ -13,8 +13,10 @@
 namespace engine::render {
 namespace {
 
-constexpr int reach = 3;  // the surface is looked at on a square of 2 reach + 1 pixels around the position
-// A surface seen at more than 80 degrees from its normal is taken for an edge between two surfaces.
+// Pixels. The surface is fitted on a square of 2 reach + 1 pixels around the position. A choice.
+constexpr int reach = 3;
+// tan(80 degrees). A surface seen at more than 80 degrees from its normal is taken for an edge between two surfaces. A
+// choice.
 constexpr double steepest = 5.67;
 
 /// What one ray blends, up to where its transmittance falls below one half and to its end.

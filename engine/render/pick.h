@@ -12,14 +12,14 @@
 namespace engine::render {
 
 struct PixelHit {
-  double depth = 0;       ///< Where transmittance falls below one half: world units along the optical axis.
+  double depth = 0;       ///< Depth at which transmittance falls below one half, world units along the optical axis.
   DVec3 point{0.0};       ///< On the pixel's ray, at that depth. World units.
-  DVec3 normal{0.0};      ///< Of the surface there: unit, towards the camera.
-  std::uint32_t row = 0;  ///< Of the Gaussian with the largest blending weight, in the merged cloud (scene::flatten()).
+  DVec3 normal{0.0};      ///< Unit normal of the surface there, towards the camera.
+  std::uint32_t row = 0;  ///< Row of the Gaussian with the largest weight, in the merged cloud (scene::flatten()).
 };
 
-/// What is seen at a position of the picture (COLMAP convention: the first pixel's centre is at 0.5). Nothing where
-/// transmittance stays at one half or more.
+/// The surface that shows at a position of the picture (COLMAP convention: the first pixel's centre is at 0.5). Nothing
+/// where transmittance stays at one half or more.
 ///   normal  of the plane that fits the median depths of the pixels around best; at silhouettes, where most of them
 ///           belong to something else, the shortest axis of the Gaussian with the largest weight
 /// Costs one pass over the means; only what reaches the 7 x 7 pixels around is blended, in scalar code: the same for

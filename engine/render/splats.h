@@ -25,18 +25,18 @@ struct TileBox {
   std::uint16_t first_column, last_column, first_row, last_row;
 };
 
-/// Tiles on a side of a group, where groups are worth it.
+/// Tiles on a side of a group of tiles. Measured against other sizes in docs/experiments/0014-groups-of-tiles.md.
 constexpr int large_tile_group = 3;
-/// Tiles are walked back in square groups, and a splat's gradients are summed over a group before they are stored. So
-/// many tiles on a side:
-///   rows  that may change. Many of them take much memory, which groups save; few may lie in tiles that make up too few
-///         groups for all threads
+/// Tiles on a side of the square groups that are walked back; a splat's gradients are summed over a group before they
+/// are stored.
+///   rows  number of rows that may change. Groups save memory, which matters where they are many; few rows may lie in
+///         tiles that make up too few groups for all threads. See docs/experiments/0014-groups-of-tiles.md
 constexpr int tile_group_side(std::size_t rows) { return rows < 20'000 ? 1 : large_tile_group; }
 
 /// Numbers of the pairs of a splat with the groups that its box meets, row by row. They begin anew with each block of
 /// splats: ForwardBuffers::pairs_before is to be added.
 struct PairsOfSplat {
-  std::uint32_t first;    ///< What group (0, 0) of the picture would have, modulo 2^32.
+  std::uint32_t first;    ///< The number that group (0, 0) of the picture would have, modulo 2^32.
   std::uint32_t columns;  ///< Groups that the box meets in a row. 0: the splat may not change.
 
   [[nodiscard]] bool any() const { return columns != 0; }
@@ -53,12 +53,12 @@ struct alignas(64) Splat {
   float l1, l2, l3;
   float log2_opacity;
   float weight;
-  std::uint32_t row;  ///< Of the Gaussian in its layers.
-  // What it looks like, in a four of its own: blending copies these as they lie.
+  std::uint32_t row;  ///< Row of the Gaussian in its layers.
+  // Its colour and depth, in a vector of four of their own: blending copies these as they lie.
   float red, green, blue;
   float depth;  ///< World units along the optical axis.
   TileBox box;
-  PairsOfSplat pairs;  ///< None, unless project() was told which rows may change.
+  PairsOfSplat pairs;  ///< None, unless project() is given the rows that may change.
 };
 static_assert(sizeof(Splat) == 64);  // one cache line: lists take splats from anywhere
 static_assert(offsetof(Splat, l3) == 4 * sizeof(float) && offsetof(Splat, red) == 8 * sizeof(float));
@@ -99,25 +99,25 @@ class Buffer {
   std::size_t capacity_ = 0;
 };
 
-/// Which tiles of a picture are wanted, and the pixels that they can reach.
+/// The tiles of a picture that are needed, and the pixels that they can reach.
 struct TileGrid {
   int columns = 0, rows = 0;         ///< Tiles of the whole picture.
-  scene::Rect pixels;                ///< Nothing outside is needed.
+  scene::Rect pixels;                ///< Pixels outside are not needed.
   std::vector<std::uint8_t> wanted;  ///< [rows * columns], or empty: all those that `pixels` meets.
 };
 
-/// Where the rays of a tile ended, in the order in which kernels of the instruction set in use store pixels: what
-/// blending leaves for the way back.
+/// The ends of the rays of a tile, which blending leaves for the way back. Pixels are in the order in which kernels of
+/// the instruction set in use store them.
 struct alignas(64) RayEnds {
   static constexpr std::size_t count = std::size_t(tile_size) * tile_size;
   float transmittance[count];  ///< What reaches the background.
   std::int32_t end[count];     ///< One past the last listed splat that its block met and that did not end it. 0: none.
 };
 
-/// Where a splat is in the order of depths.
+/// The key by which a splat is sorted.
 struct DepthKey {
   std::uint32_t key;    ///< Bits of the depth: positive floats order as their bits.
-  std::uint32_t splat;  ///< Its index.
+  std::uint32_t splat;  ///< Index of the splat.
 };
 
 /// The least and the largest of some keys; the other way round for none.
@@ -133,7 +133,7 @@ struct KeyRange {
 struct ReachedTiles {
   std::size_t count = 0;
   Buffer<std::uint32_t> tiles, splats;  ///< [count] A tile, and the index of a splat that reaches it.
-  Buffer<std::int32_t> work;            ///< Of list_reached_tiles().
+  Buffer<std::int32_t> work;            ///< Scratch memory of list_reached_tiles().
 };
 
 /// What a forward pass works in. The stages fill it from top to bottom.
@@ -141,7 +141,7 @@ struct ForwardBuffers {
   // project: block b of the rows, the base's blocks before those on top, writes its survivors from b * project_block
   // on, and leaves what is left of its room as it is
   Buffer<Splat> splats;
-  Buffer<DepthKey> keys;  ///< As splats.
+  Buffer<DepthKey> keys;  ///< In the order of `splats`.
   std::vector<std::size_t> block_sizes;
   std::vector<KeyRange> key_ranges;  ///< [blocks]
   // project, if told which rows may change: their pairs with groups of tiles, numbered row by row
@@ -213,7 +213,7 @@ inline scene::Rect part_of_tile(int x0, int y0, scene::Rect area) {
 }
 constexpr scene::Rect whole_tile{0, 0, tile_size, tile_size};
 
-/// Where pixel (x, y) of the whole picture is in a plane that holds `area` of it.
+/// The offset of pixel (x, y) of the whole picture in a plane that holds `area` of it.
 inline std::ptrdiff_t place_in(scene::Rect area, int x, int y) {
   return std::ptrdiff_t(y - area.y0) * area.width() + (x - area.x0);
 }
@@ -223,7 +223,7 @@ inline scene::Rect rect_of(const ForwardOptions& options, const scene::Camera& c
   return options.rect.value_or(scene::Rect{0, 0, camera.width, camera.height});
 }
 
-/// Which sums composite_tile() keeps.
+/// The sums that composite_tile() keeps.
 struct Channels {
   bool color = false, depth = false, weight = false;
 };

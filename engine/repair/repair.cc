@@ -103,8 +103,9 @@ std::uint64_t Repair::seed_for(Purpose purpose, std::size_t v, const Round& roun
 
 Result<scene::Image> Repair::ask_corrector(scene::Image picture, const scene::Mask& mask, scene::Image trust,
                                            std::size_t v, const Round& round, Purpose purpose) {
-  const correct::Flawed flawed{std::move(picture), mask, std::move(trust), nearest_views(views_, v, most_examples)};
-  auto pictures = corrector_.correct(std::span(&flawed, 1), round.strength, seed_for(purpose, v, round));
+  const correct::CorrectionTask task{std::move(picture), mask, std::move(trust),
+                                     nearest_views(views_, v, most_examples)};
+  auto pictures = corrector_.correct(std::span(&task, 1), round.strength, seed_for(purpose, v, round));
   if (!pictures) return propagate(pictures);
   return std::move(pictures->front());
 }

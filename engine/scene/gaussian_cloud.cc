@@ -88,9 +88,7 @@ void drop_empty_sh_bands(GaussianCloud& cloud) {
 
 std::optional<std::string> first_not_finite(const GaussianCloud& cloud) {
   std::optional<std::string> found;
-  auto report = [&](std::size_t row, const std::string& name) {
-    found = "[" + std::to_string(row) + "]." + name;
-  };
+  auto report = [&](std::size_t row, const std::string& name) { found = "[" + std::to_string(row) + "]." + name; };
   visit_columns(cloud, [&](const std::vector<float>& column, const char* name) {
     if (found) return;
     if (const auto row = engine::first_not_finite(column)) report(*row, name);

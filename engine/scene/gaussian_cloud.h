@@ -34,7 +34,9 @@ struct GaussianCloud {
 
   [[nodiscard]] std::size_t size() const { return opacity_logit.size(); }
   [[nodiscard]] std::size_t sh_stride() const { return 3 * sh_coefficients(sh_degree); }
-  [[nodiscard]] std::span<const float> sh_row(std::size_t i) const { return {sh.data() + i * sh_stride(), sh_stride()}; }
+  [[nodiscard]] std::span<const float> sh_row(std::size_t i) const {
+    return {sh.data() + i * sh_stride(), sh_stride()};
+  }
   [[nodiscard]] std::span<float> sh_row(std::size_t i) { return {sh.data() + i * sh_stride(), sh_stride()}; }
   [[nodiscard]] std::span<const std::byte> extra_row(std::size_t i) const {
     return {extra.data() + i * extra_stride, extra_stride};

@@ -13,20 +13,20 @@ namespace engine::scene {
 namespace {
 
 /// Rows that lie one after the other in their source and in the result.
-struct Run {
-  std::size_t first = 0;   ///< In the result.
-  bool from_base = false;  ///< Else from Overlay::rows.
-  std::size_t source = 0;  ///< First row there.
+struct RowRange {
+  std::size_t first = 0;   ///< First row in the result.
+  bool from_base = false;  ///< Whether the source is the base; otherwise it is Overlay::rows.
+  std::size_t source = 0;  ///< First row in the source.
   std::size_t count = 0;
 };
 
-/// Where the rows of the result come from, in their order.
-std::vector<Run> runs_of(std::size_t base_rows, const Overlay& overlay) {
-  std::vector<Run> runs;
+/// The ranges of rows that the result is made of, in its order.
+std::vector<RowRange> ranges_of(std::size_t base_rows, const Overlay& overlay) {
+  std::vector<RowRange> ranges;
   std::size_t result = 0;
   const auto add = [&](bool from_base, std::size_t source, std::size_t count) {
     if (count == 0) return;
-    runs.push_back({result, from_base, source, count});
+    ranges.push_back({result, from_base, source, count});
     result += count;
   };
   std::size_t next = 0, removed = 0, changed = 0;  // next: first row of the base that has not been dealt with
@@ -43,24 +43,24 @@ std::vector<Run> runs_of(std::size_t base_rows, const Overlay& overlay) {
   }
   add(true, next, base_rows - next);
   add(false, overlay.changed.size(), overlay.added());
-  return runs;
+  return ranges;
 }
 
 template <class T>
-void copy_rows(const std::vector<T>& from, std::vector<T>& to, const Run& run, std::size_t stride = 1) {
-  std::copy_n(from.begin() + std::ptrdiff_t(run.source * stride), run.count * stride,
-              to.begin() + std::ptrdiff_t(run.first * stride));
+void copy_rows(const std::vector<T>& from, std::vector<T>& to, const RowRange& range, std::size_t stride = 1) {
+  std::copy_n(from.begin() + std::ptrdiff_t(range.source * stride), range.count * stride,
+              to.begin() + std::ptrdiff_t(range.first * stride));
 }
 
 /// Fills a cloud of the right size, array by array.
-GaussianCloud assemble(const GaussianCloud& base, const GaussianCloud& rows, std::span<const Run> runs) {
+GaussianCloud assemble(const GaussianCloud& base, const GaussianCloud& rows, std::span<const RowRange> ranges) {
   GaussianCloud out;
   out.sh_degree = base.sh_degree;
   out.extra_stride = base.extra_stride;
-  out.resize(runs.empty() ? 0 : runs.back().first + runs.back().count);
+  out.resize(ranges.empty() ? 0 : ranges.back().first + ranges.back().count);
   visit_arrays(
       [&](std::size_t stride, auto& to, const auto& from_base, const auto& from_rows) {
-        for (const Run& run : runs) copy_rows(run.from_base ? from_base : from_rows, to, run, stride);
+        for (const RowRange& range : ranges) copy_rows(range.from_base ? from_base : from_rows, to, range, stride);
       },
       out, base, rows);
   return out;
@@ -123,7 +123,7 @@ Result<void> validate(const Overlay& overlay, const GaussianCloud& base) {
 }
 
 GaussianCloud flatten(const GaussianCloud& base, const Overlay& overlay) {
-  return assemble(base, overlay.rows, runs_of(base.size(), overlay));
+  return assemble(base, overlay.rows, ranges_of(base.size(), overlay));
 }
 
 GaussianCloud flatten(const LayeredCloud& cloud) {
@@ -137,27 +137,27 @@ Overlay compose(std::size_t base_rows, const Overlay& lower, const Overlay& uppe
   Overlay out;
   std::vector<std::uint32_t> changed_values, added_values;
   std::size_t removed = 0, changed = 0;  // of upper's lists, as far as they have been dealt with
-  for (const Run& run : runs_of(base_rows, lower)) {
-    const std::size_t end = run.first + run.count;
-    const bool is_base_row = run.from_base || run.source < lower.changed.size();
+  for (const RowRange& range : ranges_of(base_rows, lower)) {
+    const std::size_t end = range.first + range.count;
+    const bool is_base_row = range.from_base || range.source < lower.changed.size();
     const auto base_row = [&](std::size_t row) {
-      return std::uint32_t(run.from_base ? run.source + (row - run.first) : lower.changed[run.source]);
+      return std::uint32_t(range.from_base ? range.source + (row - range.first) : lower.changed[range.source]);
     };
-    std::size_t row = run.first;
+    std::size_t row = range.first;
     const auto keep_until = [&](std::size_t next) {  // rows [row, next) are untouched by upper
-      if (!run.from_base)
+      if (!range.from_base)
         for (; row < next; ++row) {
           if (is_base_row) out.changed.push_back(base_row(row));
-          (is_base_row ? changed_values : added_values).push_back(std::uint32_t(run.source + (row - run.first)));
+          (is_base_row ? changed_values : added_values).push_back(std::uint32_t(range.source + (row - range.first)));
         }
       row = next;
     };
     while (true) {
-      const std::size_t gone = removed < upper.removed.size() ? upper.removed[removed] : end;
-      const std::size_t other = changed < upper.changed.size() ? upper.changed[changed] : end;
-      if (std::min(gone, other) >= end) break;
-      keep_until(std::min(gone, other));
-      if (gone < other) {
+      const std::size_t next_removed = removed < upper.removed.size() ? upper.removed[removed] : end;
+      const std::size_t next_changed = changed < upper.changed.size() ? upper.changed[changed] : end;
+      if (std::min(next_removed, next_changed) >= end) break;
+      keep_until(std::min(next_removed, next_changed));
+      if (next_removed < next_changed) {
         if (is_base_row) out.removed.push_back(base_row(row));
         ++removed;
       } else {
@@ -172,42 +172,45 @@ Overlay compose(std::size_t base_rows, const Overlay& lower, const Overlay& uppe
   for (std::size_t j = upper.changed.size(); j < upper.rows.size(); ++j)
     added_values.push_back(std::uint32_t(lower_rows + j));
 
-  std::vector<std::uint32_t> gone_below = lower.removed, gone;
-  std::merge(gone_below.begin(), gone_below.end(), out.removed.begin(), out.removed.end(), std::back_inserter(gone));
-  out.removed = std::move(gone);
+  std::vector<std::uint32_t> removed_below = lower.removed, all_removed;
+  std::merge(removed_below.begin(), removed_below.end(), out.removed.begin(), out.removed.end(),
+             std::back_inserter(all_removed));
+  out.removed = std::move(all_removed);
 
-  std::vector<Run> runs;
+  std::vector<RowRange> ranges;
   const auto take = [&](std::span<const std::uint32_t> values) {
     for (const std::uint32_t value : values) {
       const bool from_lower = value < lower_rows;
       const std::size_t source = from_lower ? value : value - lower_rows;
-      if (!runs.empty() && runs.back().from_base == from_lower && runs.back().source + runs.back().count == source)
-        ++runs.back().count;
+      if (!ranges.empty() && ranges.back().from_base == from_lower &&
+          ranges.back().source + ranges.back().count == source)
+        ++ranges.back().count;
       else
-        runs.push_back({runs.empty() ? 0 : runs.back().first + runs.back().count, from_lower, source, 1});
+        ranges.push_back({ranges.empty() ? 0 : ranges.back().first + ranges.back().count, from_lower, source, 1});
     }
   };
   take(changed_values);
   take(added_values);
-  out.rows = assemble(lower.rows, upper.rows, runs);
+  out.rows = assemble(lower.rows, upper.rows, ranges);
   return out;
 }
 
 GaussianCloud gather(const LayeredCloud& cloud, std::span<const std::uint32_t> rows) {
   const Overlay nothing;
   const Overlay& overlay = cloud.overlay ? *cloud.overlay : nothing;
-  const auto runs = runs_of(cloud.base->size(), overlay);
-  std::vector<Run> wanted;
+  const auto ranges = ranges_of(cloud.base->size(), overlay);
+  std::vector<RowRange> wanted;
   for (const std::uint32_t row : rows) {
     assert(row < cloud.size());
-    const Run& run = *std::prev(std::upper_bound(
-        runs.begin(), runs.end(), row, [](std::size_t r, const Run& candidate) { return r < candidate.first; }));
-    const std::size_t source = run.source + (row - run.first);
-    if (!wanted.empty() && wanted.back().from_base == run.from_base &&
+    const RowRange& range =
+        *std::prev(std::upper_bound(ranges.begin(), ranges.end(), row,
+                                    [](std::size_t r, const RowRange& candidate) { return r < candidate.first; }));
+    const std::size_t source = range.source + (row - range.first);
+    if (!wanted.empty() && wanted.back().from_base == range.from_base &&
         wanted.back().source + wanted.back().count == source)
       ++wanted.back().count;
     else
-      wanted.push_back({wanted.empty() ? 0 : wanted.back().first + wanted.back().count, run.from_base, source, 1});
+      wanted.push_back({wanted.empty() ? 0 : wanted.back().first + wanted.back().count, range.from_base, source, 1});
   }
   return assemble(*cloud.base, overlay.rows, wanted);
 }
@@ -216,11 +219,11 @@ Array3 means(const LayeredCloud& cloud) {
   if (!cloud.overlay) return cloud.base->mean;
   Array3 out;
   out.resize(cloud.size());
-  for (const Run& run : runs_of(cloud.base->size(), *cloud.overlay)) {
-    const Array3& from = run.from_base ? cloud.base->mean : cloud.overlay->rows.mean;
-    copy_rows(from.x, out.x, run);
-    copy_rows(from.y, out.y, run);
-    copy_rows(from.z, out.z, run);
+  for (const RowRange& range : ranges_of(cloud.base->size(), *cloud.overlay)) {
+    const Array3& from = range.from_base ? cloud.base->mean : cloud.overlay->rows.mean;
+    copy_rows(from.x, out.x, range);
+    copy_rows(from.y, out.y, range);
+    copy_rows(from.z, out.z, range);
   }
   return out;
 }
@@ -231,12 +234,12 @@ std::size_t count_within(const LayeredCloud& cloud, DVec3 point, double radius) 
     return glm::dot(offset, offset) < radius * radius;
   };
   const auto count = [&](const Array3& mean) {
-    constexpr std::size_t grain = 65536;
-    std::vector<std::size_t> partial(chunk_count(mean.size(), grain), 0);
-    parallel_for(mean.size(), grain, [&](std::size_t begin, std::size_t end) {
+    constexpr std::size_t rows_per_task = 65536;  // a choice
+    std::vector<std::size_t> partial(chunk_count(mean.size(), rows_per_task), 0);
+    parallel_for(mean.size(), rows_per_task, [&](std::size_t begin, std::size_t end) {
       std::size_t found = 0;
       for (std::size_t i = begin; i < end; ++i) found += is_within(mean.get(i));
-      partial[begin / grain] = found;
+      partial[begin / rows_per_task] = found;
     });
     std::size_t sum = 0;
     for (const std::size_t found : partial) sum += found;

@@ -21,7 +21,7 @@ std::vector<optim::AdamLayout> layout(int sh_degree) {
 CloudAdam::CloudAdam(std::size_t rows, int sh_degree, const optim::AdamOptions& options)
     : adam_(layout(sh_degree), rows, options) {}
 
-Result<void> CloudAdam::step(scene::GaussianCloud& cloud, const render::Gradients& g, const StepRates& rates,
+Result<void> CloudAdam::step(scene::GaussianCloud& cloud, const render::Gradients& g, const IterationRates& rates,
                              std::span<const float> mobility) {
   const std::array<double, 1> position{rates.position}, scale{rates.log_scale}, rotation{rates.rotation},
       opacity{rates.opacity_logit};

@@ -14,8 +14,8 @@
 
 namespace engine::train {
 
-/// Steps of one iteration per parameter, in the parameter's stored form. 0: stays as it is.
-struct StepRates {
+/// Learning rates of one iteration, per parameter in its stored form. 0: the parameter stays as it is.
+struct IterationRates {
   double position = 0;       ///< World units.
   double sh_dc = 0;          ///< SH coefficient 0.
   double sh_rest = 0;        ///< The other SH coefficients.
@@ -34,10 +34,9 @@ class CloudAdam {
   ///   cloud, gradients  of rows() rows and the degree
   ///   mobility          as in optim::Adam::step()
   ///   errors  internal: a gradient, parameter or moment is not finite; `where` is the first, with the property names
-  ///   of
-  ///           a .ply file where it has one: "[12].opacity", "[3].sh[17]". Parameters are spoilt then.
+  ///           of a .ply file where it has one: "[12].opacity", "[3].sh[17]". Parameters are spoilt then.
   [[nodiscard]] Result<void> step(scene::GaussianCloud& cloud, const render::Gradients& gradients,
-                                  const StepRates& rates, std::span<const float> mobility = {});
+                                  const IterationRates& rates, std::span<const float> mobility = {});
 
   /// Rows with keep[i] != 0 stay, in order. keep: [rows()].
   void keep_rows(std::span<const std::uint8_t> keep) { adam_.keep_rows(keep); }
@@ -45,9 +44,10 @@ class CloudAdam {
   void append_rows(std::size_t count) { adam_.append_rows(count); }
   [[nodiscard]] std::size_t rows() const { return adam_.rows(); }
 
-  /// Everything it remembers, for a checkpoint.
+  /// Writes the moments and counts, for a checkpoint.
   void write(ByteWriter& out) const { adam_.write(out); }
-  /// What write() of one with the same rows and degree wrote; other bytes leave `in` failed and this one of no use.
+  /// Reads what write() of an object with the same rows and degree wrote. Other bytes leave `in` failed, and this
+  /// object must not be used any more.
   void read(ByteReader& in) { adam_.read(in); }
 
  private:

@@ -9,9 +9,9 @@
 namespace engine::train {
 namespace {
 
-constexpr double shrink_of_split = 1.6;
+constexpr double shrink_of_split = 1.6;  // factor by which a split divides every extent. Source: Kerbl et al. 2023
 
-/// A place drawn from the Gaussian.
+/// A position drawn from the Gaussian.
 Vec3 drawn(Vec3 mean, DVec3 sigma, DMat3 rotation, Rng& rng) {
   DVec3 local;
   for (int axis = 0; axis < 3; ++axis) local[axis] = sigma[axis] * double(rng.normal());
@@ -21,17 +21,17 @@ Vec3 drawn(Vec3 mean, DVec3 sigma, DMat3 rotation, Rng& rng) {
 }  // namespace
 
 float halved_opacity(float logit) {
-  // Of the logit's negative: 1 - alpha would cancel near 1.
+  // 1 - alpha is the opacity of the negated logit: subtracted from 1, alpha near 1 would lose its digits.
   const double through = std::sqrt(render::opacity<double>(-double(logit)));  // sqrt(1 - alpha)
   return float(std::log1p(-through) - std::log(through));
 }
 
-void PullStatistic::reset(std::size_t rows) {
+void PositionGradientStatistic::reset(std::size_t rows) {
   sum.assign(rows, 0.0);
   views.assign(rows, 0);
 }
 
-void PullStatistic::add(const render::Gradients& gradients, const scene::Camera& camera) {
+void PositionGradientStatistic::add(const render::Gradients& gradients, const scene::Camera& camera) {
   assert(gradients.size() == sum.size());
   for (std::size_t i = 0; i < sum.size(); ++i) {
     const double x = double(gradients.mean2d_x_px[i]) * camera.width / 2,
@@ -42,22 +42,23 @@ void PullStatistic::add(const render::Gradients& gradients, const scene::Camera&
   }
 }
 
-void PullStatistic::keep_rows(std::span<const std::uint8_t> keep) {
+void PositionGradientStatistic::keep_rows(std::span<const std::uint8_t> keep) {
   assert(keep.size() == sum.size());
-  std::size_t kept = 0;
+  std::size_t remaining = 0;
   for (std::size_t row = 0; row < keep.size(); ++row)
-    if (keep[row] != 0) sum[kept] = sum[row], views[kept] = views[row], ++kept;
-  sum.resize(kept), views.resize(kept);
+    if (keep[row] != 0) sum[remaining] = sum[row], views[remaining] = views[row], ++remaining;
+  sum.resize(remaining), views.resize(remaining);
 }
 
-std::vector<std::uint32_t> rows_to_densify(const PullStatistic& pull, double threshold, std::size_t most) {
-  const auto mean = [&](std::uint32_t row) { return pull.sum[row] / std::max<double>(pull.views[row], 1); };
+std::vector<std::uint32_t> rows_to_densify(const PositionGradientStatistic& statistic, double threshold,
+                                           std::size_t max_rows) {
+  const auto mean = [&](std::uint32_t row) { return statistic.sum[row] / std::max<double>(statistic.views[row], 1); };
   std::vector<std::uint32_t> rows;
-  for (std::size_t i = 0; i < pull.sum.size(); ++i)
+  for (std::size_t i = 0; i < statistic.sum.size(); ++i)
     if (mean(std::uint32_t(i)) > threshold) rows.push_back(std::uint32_t(i));
-  if (rows.size() <= most) return rows;
+  if (rows.size() <= max_rows) return rows;
   std::stable_sort(rows.begin(), rows.end(), [&](std::uint32_t a, std::uint32_t b) { return mean(a) > mean(b); });
-  rows.resize(most);
+  rows.resize(max_rows);
   std::sort(rows.begin(), rows.end());
   return rows;
 }

@@ -1,4 +1,4 @@
-// More Gaussians where the picture asks for them.
+// Densification: more Gaussians where the loss asks for them.
 // Source: Kerbl et al. 2023, section 5.2; Rota Bulo et al. 2024, "Revising densification in Gaussian splatting",
 // section 3.3, for the opacity of clones.
 #pragma once
@@ -15,10 +15,10 @@
 
 namespace engine::train {
 
-/// How strongly pictures pull at the positions of splats.
-struct PullStatistic {
-  std::vector<double> sum;           ///< [R] of lengths, in half pictures.
-  std::vector<std::uint32_t> views;  ///< [R] that showed the row.
+/// Sums of the lengths of dL/d(position of a splat in the picture), by which rows are chosen to get children.
+struct PositionGradientStatistic {
+  std::vector<double> sum;           ///< [R] Lengths of the gradient, positions in half pictures.
+  std::vector<std::uint32_t> views;  ///< [R] Views that showed the row.
 
   void reset(std::size_t rows);
   /// Takes in one view.
@@ -27,8 +27,10 @@ struct PullStatistic {
   void keep_rows(std::span<const std::uint8_t> keep);
 };
 
-/// Rows whose mean pull exceeds the threshold, ascending: at most `most`, the strongest (the lower row if two tie).
-[[nodiscard]] std::vector<std::uint32_t> rows_to_densify(const PullStatistic& pull, double threshold, std::size_t most);
+/// Rows whose mean length over views exceeds the threshold, ascending: at most `max_rows`, those of the largest means
+/// (the lower row if two tie).
+[[nodiscard]] std::vector<std::uint32_t> rows_to_densify(const PositionGradientStatistic& statistic, double threshold,
+                                                         std::size_t max_rows);
 
 /// Logit of the opacity 1 - sqrt(1 - alpha), two of which, one behind the other, blend like the alpha of this logit.
 [[nodiscard]] float halved_opacity(float logit);

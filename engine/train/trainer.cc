@@ -14,7 +14,7 @@ namespace engine::train {
 namespace {
 
 const Vec3 black(0.0f);
-constexpr float free_to_split = 0.5f;  // least mobility of a row that densification may touch
+constexpr float free_to_split = 0.5f;  // smallest mobility of a row that may get a child: a choice
 
 /// Largest distance of a mean from their centre.
 double radius_of(const scene::GaussianCloud& cloud) {
@@ -58,7 +58,7 @@ Result<void> validate(const TrainOptions& options) {
   return validate(options.densify);
 }
 
-Trainer::Trainer(Frozen frozen, Changeable changeable, double scene_extent, const TrainOptions& options,
+Trainer::Trainer(FrozenScene frozen, TrainedRows changeable, double scene_extent, const TrainOptions& options,
                  optim::PerceptualLoss& loss)
     : frozen_(frozen),
       cloud_(std::move(changeable.cloud)),
@@ -80,8 +80,8 @@ bool Trainer::add_view(const scene::Camera& camera, const scene::Mask& mask, con
   assert(mask.width == camera.width && mask.height == camera.height);
   const scene::Rect box = scene::bounding_box(mask);
   if (box.empty()) return false;
-  scene::Rect reach = united(box, frame_.project(cloud_, camera));
-  reach = united(reach, frame_.project(original, camera));
+  scene::Rect reach = union_of(box, frame_.project(cloud_, camera));
+  reach = union_of(reach, frame_.project(original, camera));
   views_.push_back({.frozen = render::FrozenView(frozen_.layers(), camera, region_around(reach, camera), black),
                     .mask = mask,
                     .box = box,
@@ -89,9 +89,9 @@ bool Trainer::add_view(const scene::Camera& camera, const scene::Mask& mask, con
                     .edited = {},
                     .near_by_tile = {},
                     .nearest = 0,
-                    .used = 0});
-  View& view = views_.back();
-  make_room_for(view);
+                    .last_use = 0});
+  TrainingView& view = views_.back();
+  evict_for(view);
   frame_.merge(view.frozen);  // of `original`, as projected last
   view.background = view.frozen.color();
   frame_.forward(view.frozen, view.background);
@@ -99,29 +99,30 @@ bool Trainer::add_view(const scene::Camera& camera, const scene::Mask& mask, con
   return true;
 }
 
-void Trainer::lay_over(View& view) {
+void Trainer::merge_into(TrainingView& view) {
   const scene::Rect reach = frame_.project(cloud_, view.frozen.camera());
   if (!has_room(view.frozen.region(), reach, view.frozen.camera()))
     widen(view, reach, frozen_, black);
   else if (view.frozen.is_let_go())
     view.frozen.restore(frozen_.layers());
-  make_room_for(view);
+  evict_for(view);
   frame_.merge(view.frozen);
 }
 
-void Trainer::make_room_for(View& view) {
-  view.used = ++drawings_;
+void Trainer::evict_for(TrainingView& view) {
+  view.last_use = ++use_counter_;
   std::size_t bytes = 0;
-  std::vector<View*> kept;
-  for (View& other : views_) {
+  std::vector<TrainingView*> evictable;
+  for (TrainingView& other : views_) {
     if (other.frozen.is_let_go()) continue;
     bytes += other.frozen.memory_bytes();
-    if (&other != &view) kept.push_back(&other);
+    if (&other != &view) evictable.push_back(&other);
   }
   if (bytes <= options_.frozen_memory) return;
-  // Each is used once an epoch: the one just used is the one whose turn is farthest off.
-  std::sort(kept.begin(), kept.end(), [](const View* a, const View* b) { return a->used > b->used; });
-  for (View* const other : kept) {
+  // Every view is used once an epoch: the turn of the one used last is farthest off.
+  std::sort(evictable.begin(), evictable.end(),
+            [](const TrainingView* a, const TrainingView* b) { return a->last_use > b->last_use; });
+  for (TrainingView* const other : evictable) {
     if (bytes <= options_.frozen_memory) return;
     const std::size_t held = other->frozen.memory_bytes();
     other->frozen.let_go();
@@ -130,8 +131,8 @@ void Trainer::make_room_for(View& view) {
 }
 
 scene::Image Trainer::render(std::size_t v) {
-  View& view = views_[v];
-  lay_over(view);
+  TrainingView& view = views_[v];
+  merge_into(view);
   scene::Image picture = view.frozen.color();
   frame_.forward(view.frozen, picture);
   return picture;
@@ -145,7 +146,7 @@ void Trainer::set_edited(std::size_t v, scene::Image picture) {
   views_[v].edited = std::move(picture);
 }
 
-void Trainer::note_depths(View& view) {
+void Trainer::note_depths(TrainingView& view) {
   const scene::Camera& camera = view.frozen.camera();
   frame_.project(cloud_, camera);
   view.near_by_tile.assign(
@@ -158,22 +159,22 @@ void Trainer::note_depths(View& view) {
   }
 }
 
-void Trainer::begin_correction(const Key& key, int iterations) {
+void Trainer::begin_correction(const RandomKey& key, int iterations) {
   assert(!views_.empty() && iterations >= 1);
   key_ = key;
   iteration_ = 0, iterations_ = iterations;
-  pull_.reset(cloud_.size());
-  for (View& view : views_) note_depths(view);
+  position_gradients_.reset(cloud_.size());
+  for (TrainingView& view : views_) note_depths(view);
 }
 
-Result<double> Trainer::differentiate(View& view) {
-  lay_over(view);
+Result<double> Trainer::differentiate(TrainingView& view) {
+  merge_into(view);
   const scene::Camera& camera = view.frozen.camera();
   rendered_ = view.frozen.color();
   frame_.forward(view.frozen, rendered_);
   cost_ = {frame_.tiles().size(), frame_.entries(), view.frozen.splats()};
 
-  const scene::Rect region = view.frozen.region(), box = within(view.box, region);
+  const scene::Rect region = view.frozen.region(), box = relative_to(view.box, region);
   const std::size_t view_pixels = std::size_t(camera.width) * std::size_t(camera.height);
   shape_like(rendered_, v_rendered_);
   // What is edited is no part of the background, not even of a window of SSIM that reaches into it: a part that has
@@ -220,12 +221,12 @@ Result<void> Trainer::adam_step(double decay) {
   return tl::make_unexpected(std::move(error));
 }
 
-Result<Iteration> Trainer::step() {
+Result<IterationResult> Trainer::step() {
   assert(iteration_ < iterations_);
   const std::size_t in_epoch = std::size_t(iteration_) % views_.size();
   if (in_epoch == 0) order_ = shuffled(views_.size(), key_, std::size_t(iteration_));
-  Iteration done{iteration_, order_[in_epoch], 0};
-  View& view = views_[done.view];
+  IterationResult done{iteration_, order_[in_epoch], 0};
+  TrainingView& view = views_[done.view];
   const auto loss = differentiate(view);
   if (!loss) return propagate(loss);
   done.loss = *loss;
@@ -238,7 +239,7 @@ Result<Iteration> Trainer::step() {
 
   const DensifyOptions& densify_options = options_.densify;
   if (densify_options.every > 0) {
-    pull_.add(gradients_, view.frozen.camera());
+    position_gradients_.add(gradients_, view.frozen.camera());
     if (iteration_ % densify_options.every == 0 && iteration_ <= densify_options.until * iterations_) {
       remove_floaters();
       densify();
@@ -256,8 +257,8 @@ void Trainer::densify() {
       options_.background.l1_weight + options_.background.ssim_weight + options_.perceptual_weight;
   // A split moves a row at once, whatever its learning rates are: what should hardly change has no children.
   for (std::size_t row = 0; row < mobility_.size(); ++row)
-    if (mobility_[row] < free_to_split) pull_.sum[row] = 0;
-  const auto rows = rows_to_densify(pull_, options.gradient * loss_weight, most - std::min(most, there));
+    if (mobility_[row] < free_to_split) position_gradients_.sum[row] = 0;
+  const auto rows = rows_to_densify(position_gradients_, options.gradient * loss_weight, most - std::min(most, there));
   Rng rng = stream(key_, Purpose::split, std::size_t(iteration_));
   add_children(cloud_, rows, options.dense * position_scale_, rng);
   for (const std::uint32_t row : rows) {
@@ -265,7 +266,7 @@ void Trainer::densify() {
     if (!mobility_.empty()) mobility_.push_back(mobility_[row]);
   }
   adam_.append_rows(rows.size());
-  pull_.reset(cloud_.size());
+  position_gradients_.reset(cloud_.size());
 }
 
 void Trainer::remove_floaters() {
@@ -273,14 +274,15 @@ void Trainer::remove_floaters() {
   std::size_t removed = 0;
   const double margin = options_.floater_distance * radius_;
   for (std::size_t row = initial_rows_; row < cloud_.size(); ++row) {
-    const bool floats = std::any_of(views_.begin(), views_.end(), [&](const View& view) {
+    const bool floats = std::any_of(views_.begin(), views_.end(), [&](const TrainingView& view) {
       const scene::Camera& camera = view.frozen.camera();
       const DVec3 p = camera.cam_from_world(DVec3(cloud_.mean.get(row)));
       if (!(p.z > 0) || view.nearest == 0) return false;
       const DVec2 pixel = camera.pixel_from_cam(p);
       if (!(pixel.x >= 0 && pixel.x < camera.width && pixel.y >= 0 && pixel.y < camera.height)) return false;
-      const auto tile = std::size_t(int(pixel.y) / render::tile_size * render::tile_columns(camera.width) +
-                                    int(pixel.x) / render::tile_size);
+      const auto tile =
+          std::size_t(int(pixel.y) / render::tile_size) * std::size_t(render::tile_columns(camera.width)) +
+          std::size_t(int(pixel.x) / render::tile_size);
       const float near = view.near_by_tile[tile] != 0 ? view.near_by_tile[tile] : view.nearest;
       return p.z < double(near) - margin;
     });
@@ -289,22 +291,22 @@ void Trainer::remove_floaters() {
   if (removed == 0) return;
   cloud_ = scene::select(cloud_, keep);
   adam_.keep_rows(keep);
-  pull_.keep_rows(keep);
-  std::size_t kept = 0;
+  position_gradients_.keep_rows(keep);
+  std::size_t remaining = 0;
   for (std::size_t row = 0; row < keep.size(); ++row)
     if (keep[row] != 0) {
-      ancestor_[kept] = ancestor_[row];
-      if (!mobility_.empty()) mobility_[kept] = mobility_[row];
-      ++kept;
+      ancestor_[remaining] = ancestor_[row];
+      if (!mobility_.empty()) mobility_[remaining] = mobility_[row];
+      ++remaining;
     }
-  ancestor_.resize(kept);
-  if (!mobility_.empty()) mobility_.resize(kept);
+  ancestor_.resize(remaining);
+  if (!mobility_.empty()) mobility_.resize(remaining);
   floaters_ += removed;
 }
 
 std::size_t Trainer::memory_bytes() const {
   std::size_t bytes = 0;
-  for (const View& view : views_)
+  for (const TrainingView& view : views_)
     bytes += view.frozen.memory_bytes() + view.mask.data.size() + view.near_by_tile.size() * sizeof(float) +
              (view.background.data.size() + view.edited.data.size()) * sizeof(float);
   return bytes;

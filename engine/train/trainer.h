@@ -1,4 +1,4 @@
-// Training of changeable Gaussians amid frozen ones, towards pictures.
+// Training of an edit's Gaussians amid frozen ones, towards pictures.
 // Source: 3DGS-Drag (ICLR 2025), section 3.4, for the loss; Kerbl et al. 2023 for the rest.
 //
 // Per iteration one view:
@@ -23,35 +23,36 @@
 #include "engine/scene/camera.h"
 #include "engine/scene/gaussian_cloud.h"
 #include "engine/scene/image.h"
-#include "engine/train/chance.h"
 #include "engine/train/cloud_adam.h"
 #include "engine/train/densify.h"
 #include "engine/train/options.h"
+#include "engine/train/random_streams.h"
 #include "engine/train/view.h"
 
 namespace engine::train {
 
 /// The Gaussians that are trained.
-struct Changeable {
+struct TrainedRows {
   scene::GaussianCloud cloud;
-  std::vector<std::uint32_t> name;   ///< [rows] What messages call each; empty: by its row.
-  std::vector<float> mobility = {};  ///< [rows] What each row's learning rates are multiplied by; empty: 1.
+  std::vector<std::uint32_t> name;   ///< [rows] Number of each in messages; empty: its row.
+  std::vector<float> mobility = {};  ///< [rows] Factor of each row's learning rates; empty: 1.
 };
 
-/// One iteration.
-struct Iteration {
-  int number = 0;        ///< From 0, within the correction.
-  std::size_t view = 0;  ///< As numbered by add_view().
-  double loss = 0;       ///< Of that view, before the step.
+/// The result of one iteration.
+struct IterationResult {
+  int number = 0;        ///< Number of the iteration in the correction, from 0.
+  std::size_t view = 0;  ///< Number of its view: see add_view().
+  double loss = 0;       ///< Loss of that view, before the step.
 };
 
-/// What an iteration has cost, in things that do not depend on the machine.
+/// The cost of an iteration, in counts that do not depend on the machine.
 struct IterationCost {
-  std::size_t tiles = 0;          ///< Rendered and differentiated.
-  std::size_t entries = 0;        ///< Splats in their lists.
-  std::size_t frozen_splats = 0;  ///< Of the view's region.
+  std::size_t tiles = 0;          ///< Tiles rendered and differentiated.
+  std::size_t entries = 0;        ///< Entries of their lists.
+  std::size_t frozen_splats = 0;  ///< Frozen splats in the view's region.
 };
 
+/// Trains the rows of one correction, view by view. One thread at a time may use an object.
 class Trainer {
  public:
   /// Adam starts with moments 0.
@@ -60,7 +61,7 @@ class Trainer {
   ///   scene_extent  world units, see optim::position_scale()
   ///   loss          outlives the trainer
   /// Precondition: validate(options).
-  Trainer(Frozen frozen, Changeable changeable, double scene_extent, const TrainOptions& options,
+  Trainer(FrozenScene frozen, TrainedRows changeable, double scene_extent, const TrainOptions& options,
           optim::PerceptualLoss& loss);
 
   /// A view to train on. I_o is the picture in which `original` stands among the frozen Gaussians, at the place of the
@@ -69,24 +70,24 @@ class Trainer {
   ///   returns  whether it was added. Views are numbered as they are added.
   bool add_view(const scene::Camera& camera, const scene::Mask& mask, const scene::GaussianCloud& original);
   [[nodiscard]] std::size_t views() const { return views_.size(); }
-  [[nodiscard]] const View& view(std::size_t v) const { return views_[v]; }
+  [[nodiscard]] const TrainingView& view(std::size_t v) const { return views_[v]; }
 
-  /// What view v shows now: a picture of its region.
+  /// The picture of view v's region as the Gaussians are now.
   [[nodiscard]] scene::Image render(std::size_t v);
   /// Sets I_e of view v, rounded to 8 bits. A picture of its region.
   void set_edited(std::size_t v, scene::Image picture);
 
   /// Starts over with iteration 0 of a correction: learning rates are full again, Adam goes on.
   /// Precondition: views() > 0, iterations >= 1.
-  void begin_correction(const Key& key, int iterations);
+  void begin_correction(const RandomKey& key, int iterations);
   /// The next iteration of those that begin_correction() announced: view by view, in shuffled epochs.
   /// Every so often (DensifyOptions) rows that pictures pull at get children, which are appended. After that, and
   /// after the last iteration, children that came to stand nearer to a camera than the changeable part did when the
   /// correction began, by more than floater_distance, are removed: floaters.
   ///   errors  internal: a parameter, a gradient or the loss is not finite. `where` names the first
-  ///           ("gaussian[12].opacity"; by Changeable::name; a child goes by its ancestor). The trainer is of no use
-  ///           any more. Those of the loss.
-  [[nodiscard]] Result<Iteration> step();
+  ///           ("gaussian[12].opacity"; by TrainedRows::name; a child goes by its ancestor). Besides, the errors of
+  ///           the loss. After an error the trainer must not be used any more.
+  [[nodiscard]] Result<IterationResult> step();
 
   [[nodiscard]] const scene::GaussianCloud& cloud() const { return cloud_; }
   /// [rows] The row of the initial cloud that each comes from. Rows from initial_rows() on are children.
@@ -98,35 +99,35 @@ class Trainer {
 
  private:
   /// Puts the changeable Gaussians as they are now into the view; widens it if they have left it.
-  void lay_over(View& view);
+  void merge_into(TrainingView& view);
   /// Lets go of what other views keep, until all of them stay within TrainOptions::frozen_memory.
-  void make_room_for(View& view);
-  Result<double> differentiate(View& view);
+  void evict_for(TrainingView& view);
+  Result<double> differentiate(TrainingView& view);
   Result<void> adam_step(double decay);
   void densify();
   void remove_floaters();
-  void note_depths(View& view);
+  void note_depths(TrainingView& view);
 
-  Frozen frozen_;
+  FrozenScene frozen_;
   scene::GaussianCloud cloud_;
   std::vector<std::uint32_t> name_;
-  std::vector<float> mobility_;  ///< Of all rows, children included, or empty.
+  std::vector<float> mobility_;  ///< [rows] Children included; or empty.
   TrainOptions options_;
   optim::PerceptualLoss& loss_;
   std::size_t initial_rows_;
   double radius_, position_scale_;
   std::vector<std::uint32_t> ancestor_;
-  std::vector<View> views_;
-  std::uint64_t drawings_ = 0;
+  std::vector<TrainingView> views_;
+  std::uint64_t use_counter_ = 0;
 
-  Key key_;
+  RandomKey key_;
   int iteration_ = 0, iterations_ = 0;
   std::vector<std::uint32_t> order_;
   std::size_t floaters_ = 0;
   IterationCost cost_;
 
   CloudAdam adam_;
-  PullStatistic pull_;
+  PositionGradientStatistic position_gradients_;
   render::LocalFrame frame_;
   render::Gradients gradients_;
   scene::Image rendered_, comparable_, v_rendered_;

@@ -10,10 +10,10 @@
 namespace engine::train {
 namespace {
 
-// Gaussians wander by a few pixels; making a region anew costs a pass over the scene.
+// Pixels. Gaussians wander by a few pixels, and making a region anew costs a pass over the scene. A choice.
 constexpr int spare_px = 2 * render::tile_size;
 
-scene::Rect grown(scene::Rect rect, int by, const scene::Camera& camera) {
+scene::Rect padded(scene::Rect rect, int by, const scene::Camera& camera) {
   if (rect.empty()) return rect;
   return {std::max(rect.x0 - by, 0), std::max(rect.y0 - by, 0), std::min(rect.x1 + by, camera.width),
           std::min(rect.y1 + by, camera.height)};
@@ -21,27 +21,27 @@ scene::Rect grown(scene::Rect rect, int by, const scene::Camera& camera) {
 
 /// Copies a picture of the region `from_region` into one of a region that holds it.
 void paste(const scene::Image& from, scene::Rect from_region, scene::Rect to_region, scene::Image& to) {
-  const scene::Rect place = within(from_region, to_region);
+  const scene::Rect target = relative_to(from_region, to_region);
   for (int c = 0; c < from.channels; ++c)
     for (int y = 0; y < from.height; ++y)
       std::copy_n(from.plane(c).data() + std::ptrdiff_t(y) * from.width, from.width,
-                  to.plane(c).data() + std::ptrdiff_t(place.y0 + y) * to.width + place.x0);
+                  to.plane(c).data() + std::ptrdiff_t(target.y0 + y) * to.width + target.x0);
 }
 
 }  // namespace
 
 bool has_room(scene::Rect region, scene::Rect reach, const scene::Camera& camera) {
-  return united(region, grown(reach, optim::ssim_rim, camera)) == region;
+  return union_of(region, padded(reach, optim::ssim_rim, camera)) == region;
 }
 
 scene::Rect region_around(scene::Rect reach, const scene::Camera& camera) {
-  return render::whole_tiles(grown(reach, optim::ssim_rim + spare_px, camera), camera);
+  return render::whole_tiles(padded(reach, optim::ssim_rim + spare_px, camera), camera);
 }
 
-void widen(View& view, scene::Rect reach, const Frozen& frozen, Vec3 background) {
+void widen(TrainingView& view, scene::Rect reach, const FrozenScene& frozen, Vec3 background) {
   const scene::Camera camera = view.frozen.camera();
   const scene::Rect before = view.frozen.region();
-  view.frozen = render::FrozenView(frozen.layers(), camera, united(before, region_around(reach, camera)), background);
+  view.frozen = render::FrozenView(frozen.layers(), camera, union_of(before, region_around(reach, camera)), background);
   scene::Image rounded = view.frozen.color();
   quantise(rounded);
   for (const auto& [picture, around] : {std::pair{&view.background, &view.frozen.color()}, {&view.edited, &rounded}}) {
@@ -52,7 +52,8 @@ void widen(View& view, scene::Rect reach, const Frozen& frozen, Vec3 background)
 }
 
 void quantise(scene::Image& image) {
-  parallel_for(image.data.size(), 65536, [&](std::size_t begin, std::size_t end) {
+  constexpr std::size_t values_per_task = 65536;  // a choice
+  parallel_for(image.data.size(), values_per_task, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i)
       image.data[i] = std::round(std::clamp(image.data[i], 0.0f, 1.0f) * 255.0f) / 255.0f;
   });

@@ -118,7 +118,7 @@ Result<scene::GaussianCloud> load_start(const io::Dataset& dataset, const FitCom
 
 /// A start that the cameras do not see leads nowhere, whatever the photos show.
 Result<void> check_seen(const scene::GaussianCloud& start, const std::vector<fit::Photo>& photos, Terminal& terminal) {
-  const std::size_t seen = fit::seen(start, photos);
+  const std::size_t seen = fit::visible_count(start, photos);
   if (seen == 0)
     return fail(ErrorCode::unprocessable,
                 "no camera sees any of the " + std::to_string(start.size()) +
@@ -211,7 +211,7 @@ class RunningFit {
   }
 
   void add_milestone(int iteration) {
-    const auto near = fit::closeness(cloud(), photos(), options_.fit.background, photos_per_milestone);
+    const auto near = fit::quality_on(cloud(), photos(), options_.fit.background, photos_per_milestone);
     history_.milestones.push_back({iteration, history_.seconds, cloud().size(), near.psnr_db});
   }
 
@@ -275,10 +275,10 @@ Result<void> run(const FitCommandOptions& options, Terminal& terminal) {
                      .start_gaussians = start->size(),
                      .gaussians = fitted.cloud.size(),
                      .history = fitting.history(),
-                     .training = fit::closeness(fitted.cloud, fitting.photos(), options.fit.background),
+                     .training = fit::quality_on(fitted.cloud, fitting.photos(), options.fit.background),
                      .held_out = std::nullopt};
     if (!photos->held_out.empty())
-      report.held_out = fit::closeness(fitted.cloud, photos->held_out, options.fit.background);
+      report.held_out = fit::quality_on(fitted.cloud, photos->held_out, options.fit.background);
     const std::string json = to_json(report);
     if (auto saved = engine::write_file(folder / "report.json", std::as_bytes(std::span(json))); !saved) return saved;
     fitting.remove_checkpoint();

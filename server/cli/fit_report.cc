@@ -9,7 +9,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-ordered_json encode(const engine::fit::Closeness& near) {
+ordered_json encode(const engine::fit::FitQuality& near) {
   return {{"psnr_db", near.psnr_db},
           {"ssim", near.ssim},
           {"worst_psnr_db", near.worst_psnr_db},

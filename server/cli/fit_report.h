@@ -20,8 +20,8 @@ struct FitReport {
   std::size_t views = 0;  ///< Trained on.
   std::size_t start_gaussians = 0, gaussians = 0;
   engine::fit::History history;
-  engine::fit::Closeness training;
-  std::optional<engine::fit::Closeness> held_out;
+  engine::fit::FitQuality training;
+  std::optional<engine::fit::FitQuality> held_out;
 };
 
 /// The file report.json.

@@ -140,7 +140,7 @@ struct EditService::Impl {
   /// An edit that has its result can no longer be cancelled, though its record may not say so yet.
   Result<jobs::Job> refuse_to_cancel(const std::string& id) {
     const auto deadline = steady_clock::now() + result_is_recorded_within;
-    for (auto seen = queue->version(); steady_clock::now() < deadline;
+    for (auto seen = queue->revision(); steady_clock::now() < deadline;
          seen = queue->wait_for_change(seen, std::chrono::milliseconds(100))) {
       const auto job = queue->find(id);
       if (!job || jobs::is_final(job->state)) break;
@@ -318,7 +318,7 @@ Result<void> EditService::remove_scene(const std::string& scene) {
   return while_idle(scene, [&] { return impl_->scenes.remove(scene); });
 }
 
-std::uint64_t EditService::version() const { return impl_->queue->version(); }
+std::uint64_t EditService::version() const { return impl_->queue->revision(); }
 
 std::uint64_t EditService::wait_for_change(std::uint64_t seen, std::chrono::milliseconds timeout) const {
   return impl_->queue->wait_for_change(seen, timeout);
@@ -332,7 +332,7 @@ std::optional<engine::Error> EditService::trouble() const {
 
 std::map<std::string, std::size_t> EditService::counts() {
   std::map<std::string, std::size_t> counts;
-  for (int state = 0; state < jobs::state_count; ++state) counts[std::string(to_string(jobs::State(state)))] = 0;
+  for (int state = 0; state < jobs::state_count; ++state) counts[std::string(to_string(jobs::JobState(state)))] = 0;
   const auto found = impl_->queue->list({.limit = all_jobs});
   if (!found) return counts;
   for (const jobs::Job& job : *found) ++counts[std::string(to_string(job.state))];

@@ -23,13 +23,13 @@ proto::EditRequest resolved_now(const proto::EditRequest& asked) {
 
 void fill_in(proto::EditStatus& status, proto::EditRecord record, const jobs::Job& job) {
   const bool ended = jobs::is_final(job.state);
-  const bool succeeded = job.state == jobs::State::succeeded;
+  const bool succeeded = job.state == jobs::JobState::succeeded;
   status.progress = record.progress;
   if (!ended) {
     status.stage = std::move(record.stage);
     status.eta_seconds = record.eta_seconds;
   }
-  if (!ended && job.state != jobs::State::queued) {  // one that waits to go on begins its interval again
+  if (!ended && job.state != jobs::JobState::queued) {  // one that waits to go on begins its interval again
     status.iteration = record.iteration;
     status.loss = record.loss;
   }
@@ -37,7 +37,7 @@ void fill_in(proto::EditStatus& status, proto::EditRecord record, const jobs::Jo
   if (record.intervals > 0) status.intervals = record.intervals;
   // The pictures and the checkpoint of an interval are there once the job says so, and go with a cancelled job.
   for (proto::FinishedInterval& finished : record.finished_intervals)
-    if (finished.interval <= job.finished_intervals && job.state != jobs::State::cancelled)
+    if (finished.interval <= job.finished_intervals && job.state != jobs::JobState::cancelled)
       status.finished_intervals.push_back(std::move(finished));
   status.handles = std::move(record.handles);
   if (record.request) status.request = std::move(*record.request);

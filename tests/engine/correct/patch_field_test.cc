@@ -16,7 +16,7 @@ namespace {
 struct Lookup {
   Planes target;
   std::vector<float> weight;
-  std::vector<Place> centres;
+  std::vector<Pixel> centres;
   std::vector<std::uint32_t> number;
   std::vector<PatchSource> sources;
 
@@ -32,16 +32,16 @@ struct Lookup {
   [[nodiscard]] PatchQuery query() const { return {&target, weight, centres, number, sources}; }
 
   /// The field after so many passes.
-  [[nodiscard]] std::vector<Match> searched(int passes, std::uint64_t seed = 1) const {
-    std::vector<Match> field = random_field(query(), seed), next(field.size());
+  [[nodiscard]] std::vector<PatchMatch> searched(int passes, std::uint64_t seed = 1) const {
+    std::vector<PatchMatch> field = random_field(query(), seed), next(field.size());
     for (int pass = 0; pass < passes; ++pass) {
       improve(query(), field, 1 << pass % 3, seed + std::uint64_t(pass) + 1, next);
       field.swap(next);
     }
     return field;
   }
-  /// What Match::distance is, pixel by pixel.
-  [[nodiscard]] double distance(std::size_t k, const Match& match) const {
+  /// What PatchMatch::distance is, pixel by pixel.
+  [[nodiscard]] double distance(std::size_t k, const PatchMatch& match) const {
     const Planes& source = sources[match.source].picture;
     double sum = 0, weights = 0;
     for (int dy = -patch_radius; dy <= patch_radius; ++dy)
@@ -73,8 +73,8 @@ Lookup of_noise() {
   return lookup;
 }
 
-bool same_bytes(const std::vector<Match>& a, const std::vector<Match>& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Match& m, const Match& n) {
+bool same_bytes(const std::vector<PatchMatch>& a, const std::vector<PatchMatch>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const PatchMatch& m, const PatchMatch& n) {
     return m.source == n.source && m.centre.x == n.centre.x && m.centre.y == n.centre.y && m.distance == n.distance;
   });
 }
@@ -108,7 +108,7 @@ TEST(RandomField, ComesFromAllowedPlacesOfAllSources) {
   const auto field = random_field(lookup.query(), 3);
   ASSERT_EQ(field.size(), lookup.centres.size());
   std::size_t of_first = 0;
-  for (const Match& match : field) {
+  for (const PatchMatch& match : field) {
     ASSERT_LT(match.source, 2u);
     ASSERT_EQ(lookup.sources[match.source].centre_allowed.at(match.centre.x, match.centre.y), 1);
     of_first += match.source == 0;
@@ -124,20 +124,20 @@ TEST(RandomField, PassesOverSourcesWithoutAPlace) {
   const Lookup lookup(noise(12, 12, 1),
                       {patch_source(noise(12, 12, 2), scene::Mask(12, 12)),
                        patch_source(noise(12, 12, 3), all_set(12, 12)), patch_source(noise(3, 3, 4), all_set(3, 3))});
-  for (const Match& match : lookup.searched(4)) EXPECT_EQ(match.source, 1u);
+  for (const PatchMatch& match : lookup.searched(4)) EXPECT_EQ(match.source, 1u);
 }
 
 TEST(DoubledField, CarriesOverWhatWasFoundWhereThatIsAllowed) {
   const Lookup lookup = of_noise();
   Lookup small(noise(16, 13, 1), {patch_source(noise(20, 17, 2), mostly_allowed(20, 17, 3)),
                                   patch_source(noise(14, 19, 4), mostly_allowed(14, 19, 5))});
-  const Field coarse{16, small.number, small.searched(2)};
-  const auto field = doubled_field(lookup.query(), coarse, 3);
+  const PatchField coarse{16, small.number, small.searched(2)};
+  const auto field = double_size_field(lookup.query(), coarse, 3);
   const auto drawn = random_field(lookup.query(), 3);
   ASSERT_EQ(field.size(), lookup.centres.size());
   std::size_t carried = 0, not_allowed = 0, beyond = 0;
   for (std::size_t k = 0; k < field.size(); ++k) {
-    const Place here = lookup.centres[k];
+    const Pixel here = lookup.centres[k];
     const scene::Mask& allowed = lookup.sources[field[k].source].centre_allowed;
     EXPECT_EQ(allowed.at(field[k].centre.x, field[k].centre.y), 1);
     const std::uint32_t number = small.number[small.target.index(here.x / 2, here.y / 2)];
@@ -146,8 +146,8 @@ TEST(DoubledField, CarriesOverWhatWasFoundWhereThatIsAllowed) {
       ++beyond;
       continue;
     }
-    const Match& found = coarse.matches[number];
-    const Place there{std::int16_t(2 * found.centre.x + here.x % 2), std::int16_t(2 * found.centre.y + here.y % 2)};
+    const PatchMatch& found = coarse.matches[number];
+    const Pixel there{std::int16_t(2 * found.centre.x + here.x % 2), std::int16_t(2 * found.centre.y + here.y % 2)};
     if (lookup.sources[found.source].centre_allowed.at(there.x, there.y) == 0) {
       EXPECT_TRUE(same_bytes({field[k]}, {drawn[k]}));
       ++not_allowed;
@@ -171,7 +171,7 @@ TEST(Improve, FindsPatchesThatAreThere) {
   std::size_t found = 0;
   const auto field = lookup.searched(20);
   for (std::size_t k = 0; k < field.size(); ++k) {
-    const Match& match = field[k];
+    const PatchMatch& match = field[k];
     const bool there =
         match.source == 1 && match.centre.x == lookup.centres[k].x + 20 && match.centre.y == lookup.centres[k].y + 10;
     found += there;
@@ -182,7 +182,7 @@ TEST(Improve, FindsPatchesThatAreThere) {
 
 TEST(Improve, NeverMakesAMatchWorseNorTakesWhatIsNotAllowed) {
   const Lookup lookup = of_noise();
-  std::vector<Match> field = random_field(lookup.query(), 1), next(field.size());
+  std::vector<PatchMatch> field = random_field(lookup.query(), 1), next(field.size());
   for (std::uint64_t pass = 0; pass < 8; ++pass) {
     std::size_t better = 0;
     improve(lookup.query(), field, 1 + int(pass % 4), pass, next);
@@ -217,12 +217,12 @@ TEST(Improve, PixelsThatCountNothingDoNotMatter) {
   }
   EXPECT_TRUE(same_bytes(lookup.searched(3), other.searched(3)));
   std::fill(lookup.weight.begin(), lookup.weight.end(), 0.0f);
-  for (const Match& match : lookup.searched(2)) ASSERT_EQ(match.distance, 0) << "nothing counts";
+  for (const PatchMatch& match : lookup.searched(2)) ASSERT_EQ(match.distance, 0) << "nothing counts";
 }
 
 TEST(Improve, GivesTheSameBytesForAnyNumberOfThreads) {
   const scene::Image picture = noise(70, 60, 1);
-  std::vector<Match> first;
+  std::vector<PatchMatch> first;
   for (const int threads : {1, 2, 4}) {
     WorkArena arena(threads);
     arena.run([&] {

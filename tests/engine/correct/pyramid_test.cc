@@ -10,56 +10,56 @@
 namespace engine::correct {
 namespace {
 
-TEST(Halved, TakesTheMeanOfWhatIsKnown) {
-  Partial fine{scene::Image(3, 2, 3), scene::Image(3, 2, 1, 1.0f)};
+TEST(HalfSize, TakesTheMeanOfWhatIsKnown) {
+  MaskedPicture fine{scene::Image(3, 2, 3), scene::Image(3, 2, 1, 1.0f)};
   const float red[] = {0.1f, 0.3f, 0.8f, 0.5f, 0.7f, 0.2f};
   std::copy(std::begin(red), std::end(red), fine.picture.data.begin());
-  fine.known.data = {1, 0, 1, 0.5f, 0, 1};
-  const Partial coarse = halved(fine);
+  fine.confidence.data = {1, 0, 1, 0.5f, 0, 1};
+  const MaskedPicture coarse = half_size(fine);
   ASSERT_EQ(coarse.picture.width, 2);
   ASSERT_EQ(coarse.picture.height, 1);
   EXPECT_FLOAT_EQ(coarse.picture.at(0, 0), (0.1f + 0.5f * 0.5f) / 1.5f);
   EXPECT_FLOAT_EQ(coarse.picture.at(1, 0), 0.5f) << "two pixels at the odd side";
-  EXPECT_FLOAT_EQ(coarse.known.at(0, 0), 1.5f / 4);
-  EXPECT_FLOAT_EQ(coarse.known.at(1, 0), 1);
+  EXPECT_FLOAT_EQ(coarse.confidence.at(0, 0), 1.5f / 4);
+  EXPECT_FLOAT_EQ(coarse.confidence.at(1, 0), 1);
 }
 
-TEST(Halved, WhereNothingIsKnownItIsFiniteAndSaysSo) {
-  const Partial coarse = halved({noise(7, 5, 1), scene::Image(7, 5, 1, 0.0f)});
-  EXPECT_EQ(coarse.known, scene::Image(4, 3, 1, 0.0f));
+TEST(HalfSize, WhereNothingIsKnownItIsFiniteAndSaysSo) {
+  const MaskedPicture coarse = half_size({noise(7, 5, 1), scene::Image(7, 5, 1, 0.0f)});
+  EXPECT_EQ(coarse.confidence, scene::Image(4, 3, 1, 0.0f));
   for (const float value : coarse.picture.data) EXPECT_TRUE(value >= 0 && value <= 1) << value;
 }
 
-TEST(Halved, OneColourStaysOneColourHoweverLittleIsKnown) {
-  Partial partial{scene::Image(37, 21, 3, 0.25f), noise(37, 21, 2, 1)};
-  while (partial.picture.pixels() > 1) {
-    partial = halved(partial);
-    for (const float value : partial.picture.data) ASSERT_NEAR(value, 0.25f, 1e-6f);
+TEST(HalfSize, OneColourStaysOneColourHoweverLittleIsKnown) {
+  MaskedPicture picture{scene::Image(37, 21, 3, 0.25f), noise(37, 21, 2, 1)};
+  while (picture.picture.pixels() > 1) {
+    picture = half_size(picture);
+    for (const float value : picture.picture.data) ASSERT_NEAR(value, 0.25f, 1e-6f);
   }
 }
 
-TEST(HalvedAll, NeedsEveryPixel) {
+TEST(HalfSizeMask, NeedsEveryPixel) {
   scene::Mask fine = all_set(5, 3);
   fine.at(1, 1) = 0;
-  const scene::Mask coarse = halved_all(fine);
+  const scene::Mask coarse = half_size_mask(fine);
   ASSERT_EQ(coarse.width, 3);
   ASSERT_EQ(coarse.height, 2);
   EXPECT_EQ(coarse.data, (std::vector<std::uint8_t>{0, 1, 1, 1, 1, 1}));
 }
 
-TEST(Doubled, IsExactOnAffinePicturesAwayFromTheRim) {
+TEST(DoubleSize, IsExactOnAffinePicturesAwayFromTheRim) {
   // The middle of pixel u of the fine picture is at (u + 1/2) / 2 of the coarse one.
   const auto value = [](double x, double y) { return float(0.3 + 0.05 * x - 0.03 * y); };
   const scene::Image coarse = painted(9, 8, [&](int x, int y, int) { return value(x + 0.5, y + 0.5); });
-  const scene::Image fine = doubled(coarse, 17, 16);
+  const scene::Image fine = double_size(coarse, 17, 16);
   for (int y = 1; y < 15; ++y)
     for (int x = 1; x < 17; ++x)
       ASSERT_NEAR(fine.at(x, y), value((x + 0.5) / 2, (y + 0.5) / 2), 1e-6) << x << ", " << y;
 }
 
-TEST(Doubled, RepeatsWhatIsAtTheRimAndLooksTheSameFromEachSide) {
+TEST(DoubleSize, RepeatsWhatIsAtTheRimAndLooksTheSameFromEachSide) {
   const scene::Image coarse = noise(6, 5, 3);
-  const scene::Image fine = doubled(coarse, 12, 10);
+  const scene::Image fine = double_size(coarse, 12, 10);
   EXPECT_FLOAT_EQ(fine.at(0, 0), coarse.at(0, 0));
   EXPECT_FLOAT_EQ(fine.at(11, 0), coarse.at(5, 0));
   EXPECT_FLOAT_EQ(fine.at(0, 9), coarse.at(0, 4));
@@ -68,11 +68,11 @@ TEST(Doubled, RepeatsWhatIsAtTheRimAndLooksTheSameFromEachSide) {
     return painted(image.width, image.height,
                    [&](int x, int y, int c) { return image.at(image.width - 1 - x, image.height - 1 - y, c); });
   };
-  EXPECT_LT(largest_difference(doubled(mirrored(coarse), 12, 10), mirrored(fine)), 1e-6);
+  EXPECT_LT(largest_difference(double_size(mirrored(coarse), 12, 10), mirrored(fine)), 1e-6);
 }
 
-TEST(Doubled, OfOnePixelIsOneColour) {
-  const scene::Image fine = doubled(scene::Image(1, 1, 3, 0.4f), 2, 1);
+TEST(DoubleSize, OfOnePixelIsOneColour) {
+  const scene::Image fine = double_size(scene::Image(1, 1, 3, 0.4f), 2, 1);
   for (const float value : fine.data) EXPECT_FLOAT_EQ(value, 0.4f);
 }
 

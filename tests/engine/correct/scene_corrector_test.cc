@@ -22,18 +22,18 @@ Example example_of(scene::Image picture) {
 }
 
 /// A picture with a hole: masked, not trusted, and in a colour that must not show.
-Flawed with_hole(const scene::Image& truth, const scene::Mask& hole, std::vector<std::size_t> examples = {0}) {
-  Flawed flawed{spoilt(truth, hole, unlike_any), hole, scene::Image(truth.width, truth.height, 1, 1.0f),
-                std::move(examples)};
-  flawed.trust = spoilt(flawed.trust, hole, 0);
-  return flawed;
+CorrectionTask with_hole(const scene::Image& truth, const scene::Mask& hole, std::vector<std::size_t> examples = {0}) {
+  CorrectionTask task{spoilt(truth, hole, unlike_any), hole, scene::Image(truth.width, truth.height, 1, 1.0f),
+                      std::move(examples)};
+  task.trust = spoilt(task.trust, hole, 0);
+  return task;
 }
 
-scene::Image corrected(const std::vector<Example>& buffer, const Flawed& flawed, double strength = 0.5,
+scene::Image corrected(const std::vector<Example>& buffer, const CorrectionTask& task, double strength = 0.5,
                        std::uint64_t seed = 1) {
   SceneCorrector corrector;
   EXPECT_TRUE(corrector.fine_tune(buffer, 0));
-  auto pictures = corrector.correct(std::span(&flawed, 1), strength, seed);
+  auto pictures = corrector.correct(std::span(&task, 1), strength, seed);
   if (!pictures || pictures->size() != 1) {
     ADD_FAILURE() << "no picture";
     return {};
@@ -50,32 +50,32 @@ const scene::Mask hole = box_mask(width, height, {34, 28, 58, 48});
 
 TEST(SceneCorrector, PutsStripesTogetherFromAnExampleOfThem) {
   const scene::Image truth = stripes(width, height);
-  const Flawed flawed = with_hole(truth, hole);
-  const scene::Image made = corrected({example_of(stripes(width, height, 5))}, flawed);
-  scene::Image smooth = flawed.picture;
+  const CorrectionTask task = with_hole(truth, hole);
+  const scene::Image made = corrected({example_of(stripes(width, height, 5))}, task);
+  scene::Image smooth = task.picture;
   fill_harmonic(smooth, hole);
   EXPECT_GT(psnr_in(made, truth, hole), 30);
   EXPECT_GT(psnr_in(made, truth, hole), psnr_in(smooth, truth, hole) + 10);
 }
 
 TEST(SceneCorrector, ChangesNothingButFlaws) {
-  Flawed flawed = with_hole(stripes(width, height), hole);
+  CorrectionTask task = with_hole(stripes(width, height), hole);
   for (int y = 30; y < 34; ++y)
-    for (int x = 36; x < 50; ++x) flawed.trust.at(x, y) = trusted;
-  flawed.trust.at(2, 2) = 0;  // outside the mask
-  const scene::Image made = corrected({example_of(stripes(width, height, 5))}, flawed);
-  const scene::Mask flaws = flaws_of(flawed);
+    for (int x = 36; x < 50; ++x) task.trust.at(x, y) = trusted;
+  task.trust.at(2, 2) = 0;  // outside the mask
+  const scene::Image made = corrected({example_of(stripes(width, height, 5))}, task);
+  const scene::Mask flaws = pixels_to_correct(task);
   EXPECT_EQ(flaws.area(), hole.area() - 4 * 14);
   for (int c = 0; c < 3; ++c)
     for (std::size_t i = 0; i < flaws.data.size(); ++i)
       if (flaws.data[i] == 0) {
-        ASSERT_EQ(made.plane(c)[i], flawed.picture.plane(c)[i]) << i;
+        ASSERT_EQ(made.plane(c)[i], task.picture.plane(c)[i]) << i;
       }
 }
 
 TEST(SceneCorrector, NothingToCorrectGivesBackThePictures) {
-  const Flawed unmasked = with_hole(stripes(width, height), scene::Mask(width, height));
-  Flawed sure = with_hole(stripes(width, height), hole);
+  const CorrectionTask unmasked = with_hole(stripes(width, height), scene::Mask(width, height));
+  CorrectionTask sure = with_hole(stripes(width, height), hole);
   sure.trust = scene::Image(width, height, 1, 1.0f);
   const std::vector<Example> buffer{example_of(stripes(width, height, 5))};
   EXPECT_EQ(corrected(buffer, unmasked), unmasked.picture);
@@ -139,8 +139,8 @@ TEST(SceneCorrector, GivesAFinitePictureWhateverIsMissing) {
   const std::vector<Example> buffer{example_of(stripes(50, 44, 5))};
   const auto expect_finite = [&](const char* what, int w, int h, const scene::Mask& missing) {
     for (const double strength : {0.0, 0.5, 1.0}) {
-      const Flawed flawed = with_hole(stripes(w, h), missing);
-      EXPECT_TRUE(finite(corrected(buffer, flawed, strength))) << what << ", " << strength;
+      const CorrectionTask task = with_hole(stripes(w, h), missing);
+      EXPECT_TRUE(finite(corrected(buffer, task, strength))) << what << ", " << strength;
       EXPECT_TRUE(finite(corrected({}, with_hole(stripes(w, h), missing, {}), strength))) << what << ", " << strength;
     }
   };
@@ -163,30 +163,30 @@ TEST(SceneCorrector, FillsWhatIsMissingUpToTheRim) {
 
 TEST(SceneCorrector, TheMoreStrengthTheLessRemainsOfAHint) {
   const scene::Image truth = stripes(width, height);
-  Flawed flawed = with_hole(truth, hole);
+  CorrectionTask task = with_hole(truth, hole);
   // The stripes, dimly, under noise: half trusted.
   const scene::Image disturbance = noise(width, height, 8);
   for (int c = 0; c < 3; ++c)
     for (std::size_t i = 0; i < hole.data.size(); ++i)
       if (hole.data[i] != 0)
-        flawed.picture.plane(c)[i] = 0.5f * (truth.plane(c)[i] + disturbance.plane(c)[i]), flawed.trust.data[i] = 0.5f;
+        task.picture.plane(c)[i] = 0.5f * (truth.plane(c)[i] + disturbance.plane(c)[i]), task.trust.data[i] = 0.5f;
   const std::vector<Example> buffer{example_of(stripes(width, height, 5))};
-  const scene::Image none = corrected(buffer, flawed, 0), some = corrected(buffer, flawed, 0.5),
-                     all = corrected(buffer, flawed, 1);
-  EXPECT_GT(psnr_in(none, flawed.picture, hole), 40);
+  const scene::Image none = corrected(buffer, task, 0), some = corrected(buffer, task, 0.5),
+                     all = corrected(buffer, task, 1);
+  EXPECT_GT(psnr_in(none, task.picture, hole), 40);
   EXPECT_GT(psnr_in(some, truth, hole), 25);
   EXPECT_GT(psnr_in(all, truth, hole), 25);
-  EXPECT_LT(psnr_in(some, flawed.picture, hole), psnr_in(none, flawed.picture, hole));
+  EXPECT_LT(psnr_in(some, task.picture, hole), psnr_in(none, task.picture, hole));
   // What nobody vouches for is no hint.
-  Flawed bare = flawed;
+  CorrectionTask bare = task;
   for (float& trust : bare.trust.data) trust = trust < 1 ? 0.05f : 1;
   EXPECT_GT(psnr_in(corrected(buffer, bare, 0), truth, hole), 25);
 }
 
 TEST(SceneCorrector, GivesTheSameBytesForTheSameSeedAndAnyNumberOfThreads) {
   const std::vector<Example> buffer{example_of(noise(60, 50, 1)), example_of(noise(60, 50, 2))};
-  const std::vector<Flawed> views{with_hole(noise(60, 50, 3), box_mask(60, 50, {20, 15, 44, 36}), {0, 1}),
-                                  with_hole(noise(60, 50, 4), box_mask(60, 50, {5, 5, 20, 30}), {1})};
+  const std::vector<CorrectionTask> views{with_hole(noise(60, 50, 3), box_mask(60, 50, {20, 15, 44, 36}), {0, 1}),
+                                          with_hole(noise(60, 50, 4), box_mask(60, 50, {5, 5, 20, 30}), {1})};
   const auto run = [&](std::uint64_t seed) {
     SceneCorrector corrector;
     EXPECT_TRUE(corrector.fine_tune(buffer, 0));

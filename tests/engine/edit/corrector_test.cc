@@ -248,7 +248,7 @@ class Failing final : public correct::Corrector {
     if (when_tuned_) return fail(ErrorCode::unavailable, "the corrector cannot learn", "tuning");
     return {};
   }
-  Result<std::vector<scene::Image>> correct(std::span<const correct::Flawed>, double, std::uint64_t) override {
+  Result<std::vector<scene::Image>> correct(std::span<const correct::CorrectionTask>, double, std::uint64_t) override {
     return fail(ErrorCode::unavailable, "the corrector is out of order", "corrector");
   }
 
@@ -272,11 +272,11 @@ class Noting final : public correct::Corrector {
  public:
   std::vector<double> strengths;  ///< Each time that it changed.
   Result<void> fine_tune(std::span<const correct::Example>, int) override { return {}; }
-  Result<std::vector<scene::Image>> correct(std::span<const correct::Flawed> views, double strength,
+  Result<std::vector<scene::Image>> correct(std::span<const correct::CorrectionTask> views, double strength,
                                             std::uint64_t) override {
     if (strengths.empty() || strengths.back() != strength) strengths.push_back(strength);
     std::vector<scene::Image> pictures;
-    for (const correct::Flawed& flawed : views) pictures.push_back(flawed.picture);
+    for (const correct::CorrectionTask& flawed : views) pictures.push_back(flawed.picture);
     return pictures;
   }
 };

@@ -27,9 +27,10 @@ using Entry = std::pair<std::string_view, int>;
 class Identity final : public correct::Corrector {
  public:
   Result<void> fine_tune(std::span<const correct::Example>, int) override { return {}; }
-  Result<std::vector<scene::Image>> correct(std::span<const correct::Flawed> views, double, std::uint64_t) override {
+  Result<std::vector<scene::Image>> correct(std::span<const correct::CorrectionTask> views, double,
+                                            std::uint64_t) override {
     std::vector<scene::Image> pictures;
-    for (const correct::Flawed& flawed : views) pictures.push_back(flawed.picture);
+    for (const correct::CorrectionTask& flawed : views) pictures.push_back(flawed.picture);
     return pictures;
   }
 };

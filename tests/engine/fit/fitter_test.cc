@@ -72,11 +72,11 @@ TEST(Fitter, ComesNearToThePhotosAndToViewsItHasNotSeen) {
   const std::vector<Photo> held_out{training[3]};
   training.erase(training.begin() + 3);
   Fitter fitter(training, capture.start(), short_fit(400));
-  const double before = closeness(fitter.cloud(), held_out, Vec3(0.0f)).psnr_db;
+  const double before = quality_on(fitter.cloud(), held_out, Vec3(0.0f)).psnr_db;
   run(fitter, 400);
   ASSERT_TRUE(fitter.done());
-  EXPECT_GT(closeness(fitter.cloud(), training, Vec3(0.0f)).psnr_db, before + 7) << "from " << before;
-  EXPECT_GT(closeness(fitter.cloud(), held_out, Vec3(0.0f)).psnr_db, before + 6) << "from " << before;
+  EXPECT_GT(quality_on(fitter.cloud(), training, Vec3(0.0f)).psnr_db, before + 7) << "from " << before;
+  EXPECT_GT(quality_on(fitter.cloud(), held_out, Vec3(0.0f)).psnr_db, before + 6) << "from " << before;
 }
 
 TEST(Fitter, GrowsUpToTheLimitAndGainsBands) {
@@ -127,7 +127,7 @@ TEST(Fitter, LeavesASceneThatIsRightAlone) {
   Fitter fitter(capture.photos, capture.truth, options);
   run(fitter, 12);
   // Adam goes where SSIM sees the rounding of the photos; it cannot get far in a few steps.
-  EXPECT_GT(closeness(fitter.cloud(), capture.photos, Vec3(0.0f)).psnr_db, 35);
+  EXPECT_GT(quality_on(fitter.cloud(), capture.photos, Vec3(0.0f)).psnr_db, 35);
 }
 
 TEST(Fitter, GivesTheSameBytesForAnyNumberOfThreads) {
@@ -252,18 +252,18 @@ TEST(Fitter, NamesAParameterThatIsNotFinite) {
 TEST(StageOf, GoesFromCoarseToFineAndFromFlatToShiny) {
   FitOptions options;
   options.iterations = 1000;
-  Stage before = stage_of(options, 0, 0);
-  EXPECT_EQ(before, (Stage{options.halvings, 0}));
+  Phase before = phase_of(options, 0, 0);
+  EXPECT_EQ(before, (Phase{options.halvings, 0}));
   for (int i = 1; i < 1000; ++i) {
-    const Stage stage = stage_of(options, 0, i);
+    const Phase stage = phase_of(options, 0, i);
     EXPECT_LE(stage.halvings, before.halvings);
     EXPECT_GE(stage.sh_degree, before.sh_degree);
     before = stage;
   }
-  EXPECT_EQ(before, (Stage{0, 3}));
-  EXPECT_EQ(stage_of(options, 2, 0).sh_degree, 2) << "bands that exist are fitted from the beginning";
+  EXPECT_EQ(before, (Phase{0, 3}));
+  EXPECT_EQ(phase_of(options, 2, 0).sh_degree, 2) << "bands that exist are fitted from the beginning";
   options.halvings = 8;
-  EXPECT_EQ(stage_of(options, 0, 999).halvings, 0);
+  EXPECT_EQ(phase_of(options, 0, 999).halvings, 0);
 }
 
 TEST(ValidateFitOptions, NamesTheWrongOne) {

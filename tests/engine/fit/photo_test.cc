@@ -33,7 +33,7 @@ TEST(Halved, IsTheMeanOfFourPixelsAndLeavesOddOnesOut) {
   Photo photo{camera_of(5, 3), std::vector<std::uint8_t>(3 * 15, 0)};
   for (int x = 0; x < 5; ++x)
     for (int y = 0; y < 3; ++y) photo.rgb[std::size_t(15 + y * 5 + x)] = std::uint8_t(10 * x + 4 * y);  // green
-  const Photo half = halved(photo);
+  const Photo half = half_size(photo);
   EXPECT_EQ(half.camera.width, 2);
   EXPECT_EQ(half.camera.height, 1);
   EXPECT_EQ(half.rgb, (std::vector<std::uint8_t>{0, 0, 7, 27, 0, 0}));
@@ -41,7 +41,7 @@ TEST(Halved, IsTheMeanOfFourPixelsAndLeavesOddOnesOut) {
 
 TEST(Halved, SeesAPointAtHalfThePixelPosition) {
   const scene::Camera fine = camera_of(41, 30);
-  const scene::Camera coarse = halved({fine, std::vector<std::uint8_t>(3 * 41 * 30)}).camera;
+  const scene::Camera coarse = half_size({fine, std::vector<std::uint8_t>(3 * 41 * 30)}).camera;
   const DVec3 point(0.3, -0.2, 0.5);
   const DVec2 at = fine.pixel_from_cam(fine.cam_from_world(point)),
               half = coarse.pixel_from_cam(coarse.cam_from_world(point));

@@ -11,7 +11,7 @@ namespace {
 
 constexpr Time noon{std::chrono::hours(12)};
 
-Job job_in(State state, bool claimed, int finished_intervals) {
+Job job_in(JobState state, bool claimed, int finished_intervals) {
   Job job;
   job.id = "e000007";
   job.state = state;
@@ -23,12 +23,12 @@ Job job_in(State state, bool claimed, int finished_intervals) {
 Result<Job> after_event(const Job& job, Event event) {
   Change change{.event = event, .interval = job.finished_intervals + 1, .result = "text", .stopped_early = true};
   change.error = {ErrorCode::unprocessable, "why", "where"};
-  return after(job, change, noon);
+  return transition(job, change, noon);
 }
 
 /// One line of the table that the states' documentation amounts to: "-" is a conflict.
 struct Line {
-  State state;
+  JobState state;
   bool claimed;
   int finished_intervals;
   std::array<std::string, event_count> next;  // claim report finish_interval stop cancel succeed fail release
@@ -38,7 +38,7 @@ const std::string no = "-", run = "running", stopping = "stop_requested", leavin
                   good = "succeeded", bad = "failed", gone = "cancelled";
 
 const std::vector<Line>& table() {
-  using enum State;
+  using enum JobState;
   static const std::vector<Line> lines = {
       {queued, false, 0, {run, no, no, no, gone, no, no, no}},
       {running, true, 0, {no, run, run, no, leaving, good, bad, run}},
@@ -71,7 +71,7 @@ TEST(JobStates, FollowTheTable) {
 }
 
 TEST(JobStates, AreAllInTheTable) {
-  std::map<State, int> lines;
+  std::map<JobState, int> lines;
   for (const Line& line : table()) ++lines[line.state];
   EXPECT_EQ(lines.size(), std::size_t(state_count));
 }
@@ -86,13 +86,13 @@ TEST(JobStates, EndWithATimeAndWithoutAWorker) {
       if (is_final(result->state)) {
         EXPECT_FALSE(result->claimed);
       }
-      EXPECT_EQ(!result->result.empty() || result->stopped_early, result->state == State::succeeded);
-      EXPECT_EQ(result->error.has_value(), result->state == State::failed);
+      EXPECT_EQ(!result->result.empty() || result->stopped_early, result->state == JobState::succeeded);
+      EXPECT_EQ(result->error.has_value(), result->state == JobState::failed);
     }
 }
 
 TEST(JobStates, CancellingAgainChangesNothing) {
-  Job job = job_in(State::cancelled, false, 1);
+  Job job = job_in(JobState::cancelled, false, 1);
   job.ended = Time(std::chrono::hours(3));
   const auto again = after_event(job, Event::cancel);
   ASSERT_TRUE(again);
@@ -100,31 +100,31 @@ TEST(JobStates, CancellingAgainChangesNothing) {
 }
 
 TEST(JobStates, KeepTheTimeOfTheFirstStart) {
-  Job job = job_in(State::running, false, 1);
+  Job job = job_in(JobState::running, false, 1);
   job.started = Time(std::chrono::hours(3));
   EXPECT_EQ(after_event(job, Event::claim)->started, job.started);
-  EXPECT_EQ(after_event(job_in(State::queued, false, 0), Event::claim)->started, noon);
+  EXPECT_EQ(after_event(job_in(JobState::queued, false, 0), Event::claim)->started, noon);
 }
 
 TEST(JobStates, RefuseIntervalsThatDoNotCountUp) {
-  const Job job = job_in(State::running, true, 2);
+  const Job job = job_in(JobState::running, true, 2);
   for (const int interval : {-1, 0, 2}) {
-    const auto result = after(job, {.event = Event::finish_interval, .interval = interval}, noon);
+    const auto result = transition(job, {.event = Event::finish_interval, .interval = interval}, noon);
     ASSERT_FALSE(result);
     EXPECT_EQ(result.error().code, ErrorCode::invalid_argument);
   }
-  EXPECT_EQ(after(job, {.event = Event::finish_interval, .interval = 5}, noon)->finished_intervals, 5);
+  EXPECT_EQ(transition(job, {.event = Event::finish_interval, .interval = 5}, noon)->finished_intervals, 5);
 }
 
 TEST(JobStates, SayWhatToDoInstead) {
-  EXPECT_EQ(after_event(job_in(State::running, true, 0), Event::stop).error().message,
+  EXPECT_EQ(after_event(job_in(JobState::running, true, 0), Event::stop).error().message,
             "e000007 has no finished interval to keep yet: wait for the first one, or cancel");
-  EXPECT_EQ(after_event(job_in(State::failed, false, 0), Event::cancel).error().message,
+  EXPECT_EQ(after_event(job_in(JobState::failed, false, 0), Event::cancel).error().message,
             "e000007 is failed: it has already ended and stays as it is");
 }
 
 TEST(JobStates, HaveNamesThatAreReadBack) {
-  for (int s = 0; s < state_count; ++s) EXPECT_EQ(parse_state(to_string(State(s))), State(s));
+  for (int s = 0; s < state_count; ++s) EXPECT_EQ(parse_state(to_string(JobState(s))), JobState(s));
   EXPECT_FALSE(parse_state("Queued"));
   EXPECT_FALSE(parse_state(""));
 }

@@ -54,7 +54,7 @@ inline std::unique_ptr<Queue> open_queue(Store& store, const std::filesystem::pa
 template <class Wanted>
 Job wait_for(Queue& queue, const std::string& id, Wanted wanted) {
   const auto deadline = std::chrono::steady_clock::now() + patience;
-  for (auto seen = queue.version();; seen = queue.wait_for_change(seen, std::chrono::seconds(1))) {
+  for (auto seen = queue.revision();; seen = queue.wait_for_change(seen, std::chrono::seconds(1))) {
     Job job = value(queue.find(id));
     if (wanted(job)) return job;
     if (std::chrono::steady_clock::now() > deadline)

@@ -60,7 +60,7 @@ int serve(const fs::path& folder, int round, int accepted) {
         value(queue->submit({.lane = "b", .payload = "3", .idempotency_key = "round " + std::to_string(round)})).job.id;
     if (::write(accepted, id.data(), id_length) != id_length) return 2;
     for (const Job& job : value(queue->list()))
-      if (wait_for_end(*queue, job.id).state != State::succeeded) return 3;
+      if (wait_for_end(*queue, job.id).state != JobState::succeeded) return 3;
     return 0;
   } catch (const std::exception& e) {
     std::fprintf(stderr, "round %d: %s\n", round, e.what());
@@ -116,12 +116,12 @@ TEST(Kill, LosesNoAcceptedJobAndChangesNoResult) {
 
   const auto store = open_store(dir.path());
   const Job job = value(store->find(long_job));
-  EXPECT_EQ(job.state, State::succeeded);
+  EXPECT_EQ(job.state, JobState::succeeded);
   EXPECT_EQ(job.result, undisturbed(intervals));
   for (const std::string& id : promises) {
     const auto kept = store->find(id);
     ASSERT_TRUE(kept) << "accepted, then lost";
-    EXPECT_EQ(kept->state, State::succeeded) << id;
+    EXPECT_EQ(kept->state, JobState::succeeded) << id;
     EXPECT_EQ(kept->result, undisturbed(3)) << id;
   }
   EXPECT_FALSE(promises.empty());

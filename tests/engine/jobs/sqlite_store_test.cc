@@ -62,7 +62,7 @@ TEST_F(SqliteStoreTest, KeepsEveryFieldAcrossARestart) {
   EXPECT_EQ(after.lane, bytes);
   EXPECT_EQ(after.payload, bytes);
   EXPECT_EQ(after.idempotency_key, "key");
-  EXPECT_EQ(after.state, State::failed);
+  EXPECT_EQ(after.state, JobState::failed);
   EXPECT_EQ(after.finished_intervals, 3);
   EXPECT_EQ(after.progress, bytes);
   ASSERT_TRUE(after.error);
@@ -92,7 +92,7 @@ TEST_F(SqliteStoreTest, AnswersARepeatedSubmissionWithTheSameJob) {
   EXPECT_EQ(again.job.id, id);
   reopen();
   EXPECT_EQ(end_one(), id);
-  EXPECT_EQ(value(store->submit(job, 1)).job.state, State::succeeded);
+  EXPECT_EQ(value(store->submit(job, 1)).job.state, JobState::succeeded);
   EXPECT_EQ(code_of(store->submit({.lane = "a", .payload = "{ }", .idempotency_key = "k"}, 1)),
             ErrorCode::unprocessable);
   EXPECT_EQ(code_of(store->submit({.lane = "b", .payload = "{}", .idempotency_key = "k"}, 1)),
@@ -164,10 +164,10 @@ TEST_F(SqliteStoreTest, ReleasesWhatADeadProcessHeld) {
   value(store->apply("e000002", {.event = Event::stop}));
   value(store->apply("e000003", {.event = Event::cancel}));
   reopen();
-  EXPECT_EQ(value(store->find("e000001")).state, State::running);
-  EXPECT_EQ(value(store->find("e000002")).state, State::stop_requested);
-  EXPECT_EQ(value(store->find("e000003")).state, State::cancelled);
-  EXPECT_EQ(value(store->find("e000004")).state, State::queued);
+  EXPECT_EQ(value(store->find("e000001")).state, JobState::running);
+  EXPECT_EQ(value(store->find("e000002")).state, JobState::stop_requested);
+  EXPECT_EQ(value(store->find("e000003")).state, JobState::cancelled);
+  EXPECT_EQ(value(store->find("e000004")).state, JobState::queued);
   EXPECT_EQ(claim(), "e000001");
   EXPECT_EQ(value(store->find("e000001")).finished_intervals, 2);
 }
@@ -239,7 +239,7 @@ TEST_F(SqliteStoreTest, SurvivesAFullDisk) {
     ASSERT_EQ(code_of(refused), ErrorCode::no_space);
     EXPECT_EQ(refused.error().where, file.string());
     EXPECT_EQ(code_of(store->claim()), ErrorCode::no_space);
-    EXPECT_EQ(value(store->find("e000001")).state, State::queued) << "reading needs no space";
+    EXPECT_EQ(value(store->find("e000001")).state, JobState::queued) << "reading needs no space";
     EXPECT_EQ(value(store->list({})).size(), 1u);
   }
   EXPECT_EQ(submit(), "e000002") << "what was refused has left no trace";

@@ -88,7 +88,7 @@ TEST_F(WorkerTest, DoesJobsInTheirOrder) {
     return JobResult{.text = context.payload() + " done"};
   });
   const Job last = wait_for_end(*queue, "e000003");
-  EXPECT_EQ(last.state, State::succeeded);
+  EXPECT_EQ(last.state, JobState::succeeded);
   EXPECT_EQ(last.result, "three done");
   EXPECT_FALSE(last.stopped_early);
   EXPECT_EQ(order, (std::vector<std::string>{"one", "two", "three"}));
@@ -104,10 +104,10 @@ TEST_F(WorkerTest, RecordsTheErrorOfAJobAndGoesOn) {
     return JobResult{};
   });
   const Job bad = wait_for_end(*queue, "e000001");
-  EXPECT_EQ(bad.state, State::failed);
+  EXPECT_EQ(bad.state, JobState::failed);
   EXPECT_EQ(bad.error->code, ErrorCode::unprocessable);
   EXPECT_EQ(bad.error->where, "handles[0]");
-  EXPECT_EQ(wait_for_end(*queue, "e000002").state, State::succeeded);
+  EXPECT_EQ(wait_for_end(*queue, "e000002").state, JobState::succeeded);
 }
 
 TEST_F(WorkerTest, TurnsAnExceptionIntoAnInternalError) {
@@ -118,7 +118,7 @@ TEST_F(WorkerTest, TurnsAnExceptionIntoAnInternalError) {
     throw 7;
   });
   const Job known = wait_for_end(*queue, "e000001");
-  EXPECT_EQ(known.state, State::failed);
+  EXPECT_EQ(known.state, JobState::failed);
   EXPECT_EQ(known.error->code, ErrorCode::internal);
   EXPECT_NE(known.error->message.find("vector::at"), std::string::npos);
   EXPECT_EQ(wait_for_end(*queue, "e000002").error->code, ErrorCode::internal);
@@ -128,10 +128,10 @@ TEST_F(WorkerTest, CancelsAJobThatWaitsAtOnce) {
   const std::string first = submit();
   const std::string second = submit();
   start(three_intervals());
-  EXPECT_EQ(value(queue->cancel(second)).state, State::cancelled);
-  EXPECT_EQ(value(queue->cancel(second)).state, State::cancelled);
+  EXPECT_EQ(value(queue->cancel(second)).state, JobState::cancelled);
+  EXPECT_EQ(value(queue->cancel(second)).state, JobState::cancelled);
   for (int u = 0; u < 3; ++u) gate.open();
-  EXPECT_EQ(wait_for_end(*queue, first).state, State::succeeded);
+  EXPECT_EQ(wait_for_end(*queue, first).state, JobState::succeeded);
   EXPECT_FALSE(value(queue->find(second)).started);
   EXPECT_EQ(code_of(queue->cancel(first)), ErrorCode::conflict) << "its result stands";
 }
@@ -143,9 +143,9 @@ TEST_F(WorkerTest, CancelsAJobThatRunsAndRemovesItsFiles) {
   wait_for_interval(*queue, id, 1);
   EXPECT_TRUE(fs::exists(folder(id)));
   EXPECT_EQ(code_of(queue->remove(id)), ErrorCode::conflict);
-  const State state = value(queue->cancel(id)).state;
-  EXPECT_EQ(state, State::cancel_requested);
-  EXPECT_EQ(wait_for_end(*queue, id).state, State::cancelled);
+  const JobState state = value(queue->cancel(id)).state;
+  EXPECT_EQ(state, JobState::cancel_requested);
+  EXPECT_EQ(wait_for_end(*queue, id).state, JobState::cancelled);
   worker.reset();
   EXPECT_FALSE(fs::exists(folder(id)));
 }
@@ -162,22 +162,22 @@ TEST_F(WorkerTest, DropsWhatAJobReturnsAfterACancel) {
   value(queue->cancel(id));
   gate.open();
   const Job job = wait_for_end(*queue, id);
-  EXPECT_EQ(job.state, State::cancelled);
+  EXPECT_EQ(job.state, JobState::cancelled);
   EXPECT_EQ(job.result, "");
 }
 
 TEST_F(WorkerTest, StopsAfterAnIntervalAndKeepsIt) {
   const std::string id = submit();
   start(three_intervals());
-  wait_for(*queue, id, [](const Job& job) { return job.state == State::running; });
+  wait_for(*queue, id, [](const Job& job) { return job.state == JobState::running; });
   EXPECT_EQ(code_of(queue->stop(id)), ErrorCode::conflict) << "there is nothing to keep";
   gate.open();
   wait_for_interval(*queue, id, 1);
-  EXPECT_EQ(value(queue->stop(id)).state, State::stop_requested);
-  EXPECT_EQ(value(queue->stop(id)).state, State::stop_requested);
+  EXPECT_EQ(value(queue->stop(id)).state, JobState::stop_requested);
+  EXPECT_EQ(value(queue->stop(id)).state, JobState::stop_requested);
   gate.open();
   const Job job = wait_for_end(*queue, id);
-  EXPECT_EQ(job.state, State::succeeded);
+  EXPECT_EQ(job.state, JobState::succeeded);
   EXPECT_TRUE(job.stopped_early);
   EXPECT_TRUE(job.result == "1" || job.result == "12") << job.result;
   EXPECT_EQ(job.result.size(), std::size_t(job.finished_intervals));
@@ -198,7 +198,7 @@ TEST_F(WorkerTest, ShowsProgressAtOnce) {
   published.pass();
   EXPECT_EQ(value(queue->find(id)).progress, "half");
   EXPECT_EQ(value(queue->list())[0].progress, "half");
-  const auto seen = queue->version();
+  const auto seen = queue->revision();
   gate.open();
   EXPECT_NE(queue->wait_for_change(seen, patience), seen);
   wait_for_end(*queue, id);
@@ -225,7 +225,7 @@ TEST_F(WorkerTest, WritesProgressToDiskOnlySoOften) {
 }
 
 TEST_F(WorkerTest, WaitsNoLongerThanAsked) {
-  const auto seen = queue->version();
+  const auto seen = queue->revision();
   EXPECT_EQ(queue->wait_for_change(seen, 1ms), seen);
   submit();
   EXPECT_NE(queue->wait_for_change(seen, patience), seen);
@@ -237,16 +237,16 @@ TEST_F(WorkerTest, DrainsAtTheEndOfAnIntervalAndGoesOnAfterARestart) {
   start(three_intervals());
   gate.open();
   for (int u = 1; u <= 2; ++u) arrived.pass();
-  const auto seen = queue->version();  // the worker changes nothing while it waits: the next change is the drain's
+  const auto seen = queue->revision();  // the worker changes nothing while it waits: the next change is the drain's
   std::thread drain([&] { worker->drain(patience); });
   EXPECT_NE(queue->wait_for_change(seen, patience), seen);
   gate.open();  // the running interval may end
   drain.join();
   const Job left = value(queue->find(id));
-  EXPECT_EQ(left.state, State::running);
+  EXPECT_EQ(left.state, JobState::running);
   EXPECT_FALSE(left.claimed);
   EXPECT_EQ(left.finished_intervals, 2);
-  EXPECT_EQ(value(queue->find(next)).state, State::queued);
+  EXPECT_EQ(value(queue->find(next)).state, JobState::queued);
 
   for (int u = 0; u < 4; ++u) gate.open();  // one for the third interval, three for the next job
   restart(three_intervals());
@@ -281,9 +281,9 @@ TEST_F(WorkerTest, InterruptsAJobThatTakesLongerThanTheGrace) {
   gate.open();
   wait_for_interval(*queue, id, 1);
   worker->drain(1ms);
-  EXPECT_EQ(value(queue->find(id)).state, State::running);
+  EXPECT_EQ(value(queue->find(id)).state, JobState::running);
   EXPECT_EQ(value(queue->find(id)).finished_intervals, 1);
-  EXPECT_EQ(value(queue->cancel(id)).state, State::cancelled) << "nobody is at work on it";
+  EXPECT_EQ(value(queue->cancel(id)).state, JobState::cancelled) << "nobody is at work on it";
   EXPECT_FALSE(fs::exists(folder(id)));
 }
 
@@ -294,7 +294,7 @@ TEST_F(WorkerTest, DrainsAnIdleWorkerWithoutDelay) {
   worker->drain(patience);
   EXPECT_LT(std::chrono::steady_clock::now() - begin, 10s);
   submit();
-  EXPECT_EQ(value(queue->find("e000001")).state, State::queued);
+  EXPECT_EQ(value(queue->find("e000001")).state, JobState::queued);
 }
 
 TEST_F(WorkerTest, EndsAStoppedJobAfterARestartFromItsCheckpoint) {
@@ -306,7 +306,7 @@ TEST_F(WorkerTest, EndsAStoppedJobAfterARestartFromItsCheckpoint) {
   value(store->apply(id, {.event = Event::stop}));
   restart(three_intervals());
   const Job job = wait_for_end(*queue, id);
-  EXPECT_EQ(job.state, State::succeeded);
+  EXPECT_EQ(job.state, JobState::succeeded);
   EXPECT_TRUE(job.stopped_early);
   EXPECT_EQ(job.result, "1");
 }
@@ -342,7 +342,7 @@ TEST_F(WorkerTest, ExpiresEndedJobsAsItWorks) {
   });
   const auto deadline = std::chrono::steady_clock::now() + patience;
   while (value(queue->list()).size() > 1 && std::chrono::steady_clock::now() < deadline)
-    queue->wait_for_change(queue->version(), 10ms);
+    queue->wait_for_change(queue->revision(), 10ms);
   EXPECT_EQ(value(queue->list())[0].id, "e000003");
   worker.reset();
   EXPECT_FALSE(fs::exists(folder("e000001")));
@@ -358,7 +358,7 @@ TEST_F(WorkerTest, RemovesWhatAKilledRunLeftHalfWritten) {
     EXPECT_TRUE(fs::exists(folder(id) / "picture.jpg"));
     return JobResult{};
   });
-  EXPECT_EQ(wait_for_end(*queue, id).state, State::succeeded);
+  EXPECT_EQ(wait_for_end(*queue, id).state, JobState::succeeded);
 }
 
 TEST_F(WorkerTest, NeverOverwritesACheckpointByAWrongNumber) {
@@ -389,7 +389,7 @@ TEST_F(WorkerTest, FailsTheJobOnAFullDiskAndHarmsNothingElse) {
   EXPECT_EQ(worker->trouble()->code, ErrorCode::no_space);
   full.reset();
   const Job job = wait_for_end(*queue, id);
-  EXPECT_EQ(job.state, State::failed);
+  EXPECT_EQ(job.state, JobState::failed);
   EXPECT_EQ(job.error->code, ErrorCode::no_space);
   EXPECT_EQ(job.finished_intervals, 1);
   EXPECT_FALSE(fs::exists(folder(id))) << "its files may be what took the last bytes";
@@ -446,7 +446,7 @@ TEST_F(WorkerTest, BearsManyHandsAtOnce) {
   Worker second(*queue, function, {.progress_period = 0ms});
   std::atomic<bool> watching = true;
   std::thread watcher([&] {
-    for (auto seen = queue->version(); watching; seen = queue->wait_for_change(seen, 1s))
+    for (auto seen = queue->revision(); watching; seen = queue->wait_for_change(seen, 1s))
       for (const Job& job : value(queue->list())) EXPECT_EQ(is_final(job.state), job.ended.has_value()) << job.id;
   });
   std::vector<std::thread> hands;
@@ -455,7 +455,7 @@ TEST_F(WorkerTest, BearsManyHandsAtOnce) {
       Rng rng(1, std::uint64_t(t));
       for (int i = 0; i < rounds; ++i) {
         const std::string id = submit("", std::to_string(rng.below(3)));
-        if (rng.below(2) == 0) queue->wait_for_change(queue->version(), std::chrono::milliseconds(rng.below(4)));
+        if (rng.below(2) == 0) queue->wait_for_change(queue->revision(), std::chrono::milliseconds(rng.below(4)));
         switch (rng.below(4)) {
           case 0:
             (void)queue->cancel(id);
@@ -474,8 +474,8 @@ TEST_F(WorkerTest, BearsManyHandsAtOnce) {
   for (std::thread& hand : hands) hand.join();
   for (const Job& job : value(queue->list())) {
     const Job end = wait_for_end(*queue, job.id);
-    EXPECT_NE(end.state, State::failed) << end.error->message;
-    EXPECT_EQ(end.result, end.state == State::cancelled ? "" : end.stopped_early ? "early" : "whole") << end.id;
+    EXPECT_NE(end.state, JobState::failed) << end.error->message;
+    EXPECT_EQ(end.result, end.state == JobState::cancelled ? "" : end.stopped_early ? "early" : "whole") << end.id;
   }
   watching = false;
   watcher.join();

@@ -23,21 +23,20 @@ using working::Role;
 class Recorder final : public correct::Corrector {
  public:
   std::vector<correct::Example> buffer;
-  std::vector<correct::Flawed> asked;
+  std::vector<correct::CorrectionTask> asked;
   std::vector<double> strengths;
   std::vector<std::uint64_t> seeds;
-  std::function<Result<scene::Image>(const correct::Flawed&)> answer = [](const correct::Flawed& flawed) {
-    return Result<scene::Image>(flawed.picture);
-  };
+  std::function<Result<scene::Image>(const correct::CorrectionTask&)> answer =
+      [](const correct::CorrectionTask& flawed) { return Result<scene::Image>(flawed.picture); };
 
   Result<void> fine_tune(std::span<const correct::Example> examples, int) override {
     buffer.assign(examples.begin(), examples.end());
     return {};
   }
-  Result<std::vector<scene::Image>> correct(std::span<const correct::Flawed> views, double strength,
+  Result<std::vector<scene::Image>> correct(std::span<const correct::CorrectionTask> views, double strength,
                                             std::uint64_t seed) override {
     std::vector<scene::Image> out;
-    for (const correct::Flawed& flawed : views) {
+    for (const correct::CorrectionTask& flawed : views) {
       asked.push_back(flawed), strengths.push_back(strength), seeds.push_back(seed);
       auto picture = answer(flawed);
       if (!picture) return propagate(picture);
@@ -86,9 +85,9 @@ struct Moved {
 };
 
 /// Paints what it is asked for in one colour.
-Result<scene::Image> painted(const correct::Flawed& flawed, Vec3 color) {
+Result<scene::Image> painted(const correct::CorrectionTask& flawed, Vec3 color) {
   scene::Image picture = flawed.picture;
-  const scene::Mask flaws = correct::flaws_of(flawed);
+  const scene::Mask flaws = correct::pixels_to_correct(flawed);
   for (int c = 0; c < 3; ++c)
     for (std::size_t i = 0; i < flaws.data.size(); ++i)
       if (flaws.data[i] != 0) picture.plane(c)[i] = color[c];
@@ -108,7 +107,7 @@ TEST(Repair, AsksForEachViewFirstWhatIsBehindAndThenAll) {
   EXPECT_EQ(std::set(corrector.seeds.begin(), corrector.seeds.end()).size(), corrector.seeds.size())
       << "each picture has a seed of its own";
   for (std::size_t k = 0; k < corrector.asked.size(); ++k) {
-    const correct::Flawed& flawed = corrector.asked[k];
+    const correct::CorrectionTask& flawed = corrector.asked[k];
     const std::size_t v = flawed.examples.at(0);  // the view itself is the most alike
     EXPECT_EQ(flawed.examples.size(), 5u);
     EXPECT_EQ(flawed.picture.width, 64);
@@ -169,7 +168,7 @@ TEST(Repair, TheBufferIsTheUneditedSceneWithoutTheBlockInItsPlace) {
 TEST(Repair, LaysWhatTheCorrectorFindsIntoTheSceneSoThatLaterViewsShowIt) {
   Moved moved;
   const Vec3 found{0.1f, 0.9f, 0.2f};
-  moved.corrector.answer = [&](const correct::Flawed& flawed) { return painted(flawed, found); };
+  moved.corrector.answer = [&](const correct::CorrectionTask& flawed) { return painted(flawed, found); };
   const std::size_t rows = moved.working.size();
   const auto outcome = moved.correct();
   ASSERT_TRUE(outcome);
@@ -197,7 +196,7 @@ TEST(Repair, LaysWhatTheCorrectorFindsIntoTheSceneSoThatLaterViewsShowIt) {
   // The first view needs most of them; the others see them and add little.
   std::size_t first = 0;
   for (std::size_t i = 0; i < moved.corrector.asked[0].mask.data.size(); ++i)
-    first += correct::flaws_of(moved.corrector.asked[0]).data[i];
+    first += correct::pixels_to_correct(moved.corrector.asked[0]).data[i];
   EXPECT_LT(outcome->seeds, 3 * first);
 }
 
@@ -224,7 +223,7 @@ TEST(Repair, LeavesAPitOpenThatViewsHaveLookedInto) {
     camera.fx *= 2, camera.fy *= 2, camera.cx *= 2, camera.cy *= 2;
   }
   Moved moved(std::move(block));
-  moved.corrector.answer = [](const correct::Flawed& flawed) { return painted(flawed, {0, 1, 0}); };
+  moved.corrector.answer = [](const correct::CorrectionTask& flawed) { return painted(flawed, {0, 1, 0}); };
   ASSERT_TRUE(moved.correct());
   std::size_t over_pit = 0, beside = 0;
   for (std::size_t row = moved.original.size(); row < moved.working.size(); ++row) {
@@ -244,7 +243,7 @@ TEST(Repair, KeepsInThePictureWhatWasFilledInWhereNoSurfaceGoesOn) {
   block.floor_rows = 0;
   Moved moved(std::move(block));
   bool first = true;
-  moved.corrector.answer = [&](const correct::Flawed& flawed) {
+  moved.corrector.answer = [&](const correct::CorrectionTask& flawed) {
     const bool is_background = std::exchange(first, !first);
     return painted(flawed, is_background ? Vec3(0, 1, 0) : Vec3(0, 0, 1));
   };
@@ -342,7 +341,7 @@ TEST(Repair, GoesOutwardFromTheBestViewAndTellsHowFarItIs) {
 
 TEST(Repair, EndsWithTheErrorOfTheCorrectorOrOfWhoeverIsTold) {
   Moved failing;
-  failing.corrector.answer = [](const correct::Flawed&) -> Result<scene::Image> {
+  failing.corrector.answer = [](const correct::CorrectionTask&) -> Result<scene::Image> {
     return fail(ErrorCode::unavailable, "out of order", "corrector");
   };
   const auto failed = failing.correct();

@@ -69,26 +69,26 @@ TEST(Densify, OpacitiesAtTheEndsOfTheirRangeStayFinite) {
 }
 
 TEST(Densify, TakesTheStrongestWhereThereIsNoRoomForAll) {
-  PullStatistic pull;
-  pull.reset(5);
-  pull.sum = {4, 9, 1, 9, 20};
-  pull.views = {1, 1, 1, 3, 2};  // means 4, 9, 1, 3, 10
-  EXPECT_EQ(rows_to_densify(pull, 2, 10), (std::vector<std::uint32_t>{0, 1, 3, 4}));
-  EXPECT_EQ(rows_to_densify(pull, 2, 2), (std::vector<std::uint32_t>{1, 4}));
-  EXPECT_TRUE(rows_to_densify(pull, 2, 0).empty());
-  EXPECT_TRUE(rows_to_densify(pull, 10, 10).empty());
+  PositionGradientStatistic statistic;
+  statistic.reset(5);
+  statistic.sum = {4, 9, 1, 9, 20};
+  statistic.views = {1, 1, 1, 3, 2};  // means 4, 9, 1, 3, 10
+  EXPECT_EQ(rows_to_densify(statistic, 2, 10), (std::vector<std::uint32_t>{0, 1, 3, 4}));
+  EXPECT_EQ(rows_to_densify(statistic, 2, 2), (std::vector<std::uint32_t>{1, 4}));
+  EXPECT_TRUE(rows_to_densify(statistic, 2, 0).empty());
+  EXPECT_TRUE(rows_to_densify(statistic, 10, 10).empty());
 }
 
 TEST(Densify, ViewsThatDoNotShowARowDoNotCount) {
-  PullStatistic pull;
-  pull.reset(2);
+  PositionGradientStatistic statistic;
+  statistic.reset(2);
   render::Gradients gradients;
   gradients.reset(2, 0);
   gradients.mean2d_x_px = {3, 0}, gradients.mean2d_y_px = {4, 0};
-  pull.add(gradients, scene::look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 1.0, 20, 20));
-  EXPECT_DOUBLE_EQ(pull.sum[0], 50);
-  EXPECT_EQ(pull.views[0], 1u);
-  EXPECT_EQ(pull.views[1], 0u);
+  statistic.add(gradients, scene::look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 1.0, 20, 20));
+  EXPECT_DOUBLE_EQ(statistic.sum[0], 50);
+  EXPECT_EQ(statistic.views[0], 1u);
+  EXPECT_EQ(statistic.views[1], 0u);
 }
 
 }  // namespace

@@ -70,7 +70,7 @@ struct Setting {
 };
 
 /// Trains, and gives the loss of each iteration.
-std::vector<double> train(Trainer& trainer, int iterations, const Key& key = {}) {
+std::vector<double> train(Trainer& trainer, int iterations, const RandomKey& key = {}) {
   trainer.begin_correction(key, iterations);
   std::vector<double> losses;
   for (int i = 0; i < iterations; ++i) losses.push_back(trainer.step().value().loss);
@@ -311,7 +311,7 @@ TEST(Trainer, ParametersThatOverflowAreNamed) {
   options.rates.opacity_logit = 1e38;
   Trainer trainer = setting.pushed(options);
   trainer.begin_correction({}, 50);
-  Result<Iteration> last;
+  Result<IterationResult> last;
   for (int i = 0; i < 50 && last; ++i) last = trainer.step();
   ASSERT_FALSE(last);
   EXPECT_TRUE(last.error().where.starts_with("gaussian[")) << last.error().where;

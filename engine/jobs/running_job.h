@@ -1,4 +1,4 @@
-// What connects a running job with those who ask about it. Of this room only.
+// What connects a running job with those who ask about it. Only this room includes this header.
 #pragma once
 
 #include <atomic>
@@ -11,15 +11,15 @@
 
 namespace engine::jobs {
 
-struct Queue::Live {
-  std::stop_source interrupt;      ///< Cancelled, or the worker has no time left.
-  std::atomic<bool> stop = false;  ///< Keep the last finished interval.
+struct Queue::RunningJob {
+  std::stop_source interrupt;      ///< Fires when the job is cancelled, or the worker has no time left.
+  std::atomic<bool> stop = false;  ///< Set when the job is to end and keep its last finished interval.
 
   void set_progress(std::string text) {
     const std::lock_guard lock(mutex_);
     progress_ = std::move(text);
   }
-  /// Nothing until this worker has published some: what the record says is then the latest.
+  /// The progress that this worker published last. Nothing before it has published any: the record then has the latest.
   [[nodiscard]] std::optional<std::string> progress() const {
     const std::lock_guard lock(mutex_);
     return progress_;

@@ -11,23 +11,23 @@
 
 namespace engine::train {
 
-/// Which correction of which edit.
-struct Key {
-  std::uint64_t seed = 0;
-  int interval = 0;  ///< 0 to 255
-  int round = 0;     ///< Correction within the interval, 0 to 255.
+/// The name of a correction's random numbers.
+struct RandomKey {
+  std::uint64_t seed = 0;  ///< Random seed of the edit or fit.
+  int interval = 0;        ///< 0 to 255
+  int correction = 0;      ///< Correction within the interval, 0 to 255.
 };
 
 enum class Purpose : std::uint8_t { order, split };
 
 /// The stream for a purpose at an iteration (below 2^32).
-inline Rng stream(const Key& key, Purpose purpose, std::size_t iteration) {
+inline Rng stream(const RandomKey& key, Purpose purpose, std::size_t iteration) {
   return Rng(key.seed, std::uint64_t{1} << 63 | std::uint64_t(purpose) << 48 | std::uint64_t(key.interval & 255) << 40 |
-                           std::uint64_t(key.round & 255) << 32 | std::uint64_t(iteration & 0xffffffffu));
+                           std::uint64_t(key.correction & 255) << 32 | std::uint64_t(iteration & 0xffffffffu));
 }
 
 /// 0 to count - 1 in random order (Fisher and Yates): the views of an epoch, which is named by its first iteration.
-inline std::vector<std::uint32_t> shuffled(std::size_t count, const Key& key, std::size_t first_iteration) {
+inline std::vector<std::uint32_t> shuffled(std::size_t count, const RandomKey& key, std::size_t first_iteration) {
   std::vector<std::uint32_t> order(count);
   std::iota(order.begin(), order.end(), 0u);
   Rng rng = stream(key, Purpose::order, first_iteration);
