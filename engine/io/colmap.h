@@ -17,6 +17,7 @@ namespace engine::io {
 /// Lenses by camera_id.
 using ColmapCameras = std::unordered_map<std::uint32_t, Lens>;
 
+/// The two encodings of a COLMAP model.
 enum class ColmapEncoding { binary, text };
 
 /// cameras.bin or cameras.txt. Known models: SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, OPENCV_FISHEYE,

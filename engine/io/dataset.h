@@ -22,6 +22,7 @@ struct View {
   std::optional<Lens> lens;     ///< Lens of the photo as taken, if it has to be undistorted.
 };
 
+/// The cameras of a folder, with the sparse points if they were read.
 struct Dataset {
   std::vector<View> views;     ///< Sorted by name. Names are unique.
   std::vector<Point> points;   ///< Points of the sparse reconstruction; may be empty.
@@ -29,6 +30,7 @@ struct Dataset {
   std::string kind;            ///< "colmap", "transforms" or "inria".
 };
 
+/// What read_dataset() reads, and where it looks.
 struct DatasetOptions {
   bool points = true;             ///< Read the sparse points, too.
   std::string image_folder = {};  ///< Below the dataset, for COLMAP and INRIA; by default the first of images,

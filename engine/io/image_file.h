@@ -13,15 +13,18 @@
 
 namespace engine::io {
 
+/// The order of rows and columns of a photo that is read.
 enum class Orientation {
   upright,   ///< Rows as a viewer shows them: the EXIF orientation is applied.
   as_stored  ///< Rows as in the file. Cameras are calibrated on these by COLMAP and its kin, which ignore EXIF.
 };
+/// What becomes of the alpha of a picture that is read.
 enum class Alpha {
   on_black,  ///< Colour times alpha, 3 channels: the picture in front of black, as 3DGS trains on it.
   keep       ///< 4 channels where the file has alpha; colour as the file stores it.
 };
 
+/// How a picture is read, and the limits, which hold before memory is allocated. The limits are choices.
 struct ImageOptions {
   Orientation orientation = Orientation::upright;
   Alpha alpha = Alpha::on_black;
@@ -30,6 +33,7 @@ struct ImageOptions {
   std::uint64_t max_file_bytes = std::uint64_t{1} << 30;  ///< Larger files are refused (too_large).
 };
 
+/// Size of a picture file.
 struct PictureSize {
   int width = 0, height = 0;  ///< Pixels, as stored.
   bool operator==(const PictureSize&) const = default;
@@ -48,12 +52,14 @@ struct PictureSize {
 /// Size of a picture from its header alone. Errors as read_image().
 [[nodiscard]] Result<PictureSize> picture_size(const std::filesystem::path& path, const ImageOptions& options = {});
 
+/// The formats that pictures are written in.
 enum class ImageFormat { png, jpeg, exr };
 
 /// By extension: .png, .jpg, .jpeg, .exr, in any case.
 ///   errors  unsupported
 [[nodiscard]] Result<ImageFormat> format_of(const std::filesystem::path& path);
 
+/// How a picture is written.
 struct EncodeOptions {
   int jpeg_quality = 90;  ///< 1 to 100.
   int png_bits = 8;       ///< 8 or 16 per channel.
@@ -79,6 +85,7 @@ struct RenderLayers {
 [[nodiscard]] Result<std::vector<std::byte>> encode_exr(const RenderLayers& layers);
 [[nodiscard]] Result<void> write_exr(const std::filesystem::path& path, const RenderLayers& layers);
 
+/// The filters of a change of size.
 enum class ResizeFilter {
   box,      ///< Mean over the pixel's footprint when it shrinks, nearest pixel when it grows; never overshoots.
   lanczos3  ///< Sharper; may leave the range of the picture by a little at edges.

@@ -13,10 +13,12 @@
 
 namespace engine::io {
 
+/// The types of a property.
 enum class PlyType : std::uint8_t { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
 
 [[nodiscard]] std::size_t size_of(PlyType type) noexcept;
 
+/// A property of an element.
 struct PlyProperty {
   std::string name;
   PlyType type = PlyType::float32;
@@ -24,6 +26,7 @@ struct PlyProperty {
   bool is_list = false;    ///< Then the row has no fixed length, and offset and stride mean nothing.
 };
 
+/// An element: a table of `count` rows with its properties.
 struct PlyElement {
   std::string name;
   std::uint64_t count = 0;
@@ -36,8 +39,10 @@ struct PlyElement {
   [[nodiscard]] bool has_list() const;
 };
 
+/// The encodings of a .ply file.
 enum class PlyFormat { ascii, binary_little_endian, binary_big_endian };
 
+/// The header of a .ply file.
 struct PlyHeader {
   std::string text;  ///< As in the file: comments, spacing and line endings (LF or CRLF) included, to the last byte.
   PlyFormat format = PlyFormat::ascii;

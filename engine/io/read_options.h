@@ -11,6 +11,7 @@ enum class SpzFrame {
   as_stored  ///< Numbers as they are, for tools that write .spz without converting.
 };
 
+/// How a scene file is read. The limits are choices.
 struct ReadOptions {
   std::uint64_t max_gaussians = 50'000'000;  ///< Larger files are refused (too_large).
   std::uint64_t max_memory_bytes = std::uint64_t(16)

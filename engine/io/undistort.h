@@ -11,6 +11,7 @@
 
 namespace engine::io {
 
+/// The lens models that can be undistorted.
 enum class LensModel {
   perspective,  ///< r_d = r (1 + k1 r^2 + k2 r^4 + k3 r^6), plus the tangential terms
   fisheye       ///< r_d = t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8), t = atan(r)

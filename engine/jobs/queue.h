@@ -15,6 +15,7 @@
 
 namespace engine::jobs {
 
+/// Where the queue keeps files, and how many jobs it holds.
 struct QueueOptions {
   std::filesystem::path folder;  ///< Holds one folder per job that needs one, named by its id. Nothing else uses it.
   std::size_t max_queued = 32;   ///< Jobs that may wait. A choice.

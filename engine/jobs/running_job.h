@@ -11,6 +11,7 @@
 
 namespace engine::jobs {
 
+/// A claimed job. Safe to use from any thread.
 struct Queue::RunningJob {
   std::stop_source interrupt;      ///< Fires when the job is cancelled, or the worker has no time left.
   std::atomic<bool> stop = false;  ///< Set when the job is to end and keep its last finished interval.

@@ -109,7 +109,8 @@ class Database {
     }
   }
 
-  /// The errno of the write-ahead log, to which all is written first. (sqlite3_system_errno() is gone after a rollback.)
+  /// The errno of the write-ahead log, to which all is written first. (sqlite3_system_errno() is gone after a
+  /// rollback.)
   [[nodiscard]] int last_errno() const {
     int number = 0;
     sqlite3_file* log = nullptr;

@@ -10,6 +10,7 @@
 
 namespace engine::neighbours {
 
+/// A point that a query has found.
 struct Neighbour {
   std::uint32_t index = 0;     ///< Of the point, as given.
   float squared_distance = 0;  ///< Euclidean, units of the points squared.

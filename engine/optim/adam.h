@@ -14,6 +14,7 @@
 
 namespace engine::optim {
 
+/// Constants of Adam, by the names of the paper.
 struct AdamOptions {
   double beta1 = 0.9;    ///< Decay of the mean of gradients, 0 to below 1.
   double beta2 = 0.999;  ///< Decay of the mean of their squares, 0 to below 1.

@@ -40,6 +40,7 @@ enum class SmoothL1 {
   charbonnier,  ///< sqrt(d^2 + scale^2) - scale. Smooth; gradient d / sqrt(d^2 + scale^2).
 };
 
+/// Which smooth absolute value, and its scale.
 struct L1Options {
   SmoothL1 kind = SmoothL1::dead_zone;
   double scale = 0.5 / 255.0;  ///< Colour units, 1e-6 to 1. Default: half a step of an 8-bit picture.
@@ -82,6 +83,7 @@ struct BackgroundLossOptions {
 };
 [[nodiscard]] Result<void> validate(const BackgroundLossOptions& options);
 
+/// The background term and its parts, not weighted.
 struct BackgroundLoss {
   double l1 = 0;     ///< The result of smooth_l1_loss().
   double ssim = 0;   ///< The result of ssim_loss(): 1 - SSIM.

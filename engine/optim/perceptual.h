@@ -27,6 +27,7 @@ class PerceptualLoss {
                                                 scene::Image& v_rendered) = 0;
 };
 
+/// The mix of MS-SSIM and L1.
 struct MsSsimOptions {
   double ms_ssim_weight = 0.84;  ///< 0 to 1: alpha of Zhao et al., eq. 14; the L1 has the rest.
   double floor = 0.01;           ///< 0 to 1, exclusive: least mean term of a scale; below it, no gradient. A choice.

@@ -19,6 +19,7 @@
 
 namespace engine::procedural {
 
+/// What the demo scene is made of.
 struct DemoOptions {
   std::size_t gaussians = 150'000;  ///< 2,000 to 5,000,000.
   std::uint64_t seed = 0;
@@ -40,6 +41,7 @@ struct SuggestedDrag {
   std::vector<Handle> handles;
 };
 
+/// The demo scene.
 struct DemoScene {
   scene::GaussianCloud cloud;             ///< Of SH degree 1; only what some camera sees.
   std::vector<scene::Camera> cameras;     ///< "view_00" from the front, the others around it in an arc.

@@ -18,6 +18,7 @@ struct Window {
   float softness = 0.04f;                             ///< Of the edges of the light, world units.
 };
 
+/// The light of a made-up scene.
 struct Light {
   Vec3 to_sun{0, -1, 0};         ///< Unit.
   Vec3 sun{3.0f};                ///< Irradiance of a surface that faces it, linear.

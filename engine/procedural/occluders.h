@@ -10,6 +10,7 @@
 
 namespace engine::procedural {
 
+/// Where a ray meets a surface.
 struct Hit {
   float distance = 0;       ///< Along the ray, in lengths of its direction.
   std::uint32_t patch = 0;  ///< Number of the patch, counted over all objects in order.

@@ -52,6 +52,7 @@ struct Object {
 
 // Shapes. Lengths in world units; each returns patches in the object's frame.
 
+/// A corner of a profile.
 struct ProfilePoint {
   float radius = 0, height = 0;
 };

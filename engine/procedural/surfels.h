@@ -13,6 +13,7 @@
 
 namespace engine::procedural {
 
+/// Gaussians on the surfaces of objects.
 struct Surfels {
   scene::GaussianCloud cloud;         ///< SH degree 1: glazed things look a little different from each side.
   std::vector<std::uint16_t> object;  ///< [N] number of the object each Gaussian belongs to.

@@ -42,6 +42,7 @@ struct Gradients {
   void reset(std::size_t rows, int degree);
 };
 
+/// What a backward pass computes.
 struct BackwardOptions {
   /// What was rendered. Its background, degree, rectangle, tiles, backend and semantics count; which pictures it asked
   /// for does not. Pixels outside the rectangle or the tiles contribute nothing.

@@ -40,6 +40,7 @@ enum class Semantics {
   tile16_stop,   ///< dense_stop, and a splat only reaches the tiles its 3-sigma square meets. Reference backend only.
 };
 
+/// What a forward pass draws.
 struct ForwardOptions {
   Vec3 background{0.0f};                     ///< Colour behind everything, display-referred.
   bool color = true;                         ///< Compute Rendering::color.

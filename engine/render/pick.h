@@ -11,6 +11,7 @@
 
 namespace engine::render {
 
+/// The surface that a pixel shows.
 struct PixelHit {
   double depth = 0;       ///< Depth at which transmittance falls below one half, world units along the optical axis.
   DVec3 point{0.0};       ///< On the pixel's ray, at that depth. World units.

@@ -165,6 +165,7 @@ struct ForwardBuffers {
   Buffer<RayEnds> ray_ends;  ///< [tiles]
 };
 
+/// The memory behind a Workspace.
 struct Workspace::Impl {
   ForwardBuffers buffers;
 };

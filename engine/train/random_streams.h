@@ -18,6 +18,7 @@ struct RandomKey {
   int correction = 0;      ///< Correction within the interval, 0 to 255.
 };
 
+/// What a stream is for: the order of views, or the positions of children.
 enum class Purpose : std::uint8_t { order, split };
 
 /// The stream for a purpose at an iteration (below 2^32).
