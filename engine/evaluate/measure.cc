@@ -5,13 +5,13 @@
 #include <functional>
 #include <limits>
 
-#include "engine/working/footprint.h"
-#include "engine/repair/seed.h"
 #include "engine/mask/mask.h"
 #include "engine/neighbours/point_index.h"
 #include "engine/optim/losses.h"
 #include "engine/optim/picture_view.h"
 #include "engine/render/forward.h"
+#include "engine/repair/seed.h"
+#include "engine/working/footprint.h"
 
 namespace engine::evaluate {
 namespace {

@@ -5,11 +5,11 @@
 #include <utility>
 
 #include "engine/edit/edit.h"
-#include "engine/working/footprint.h"
 #include "engine/mask/mask.h"
 #include "engine/neighbours/point_index.h"
 #include "engine/render/forward.h"
 #include "engine/scene/overlay.h"
+#include "engine/working/footprint.h"
 
 namespace engine::evaluate {
 namespace {
