@@ -180,7 +180,7 @@ class Run {
 
   Result<void> publish(const edit::Outcome& outcome) {
     keeper_.enter("publish");
-    const auto hold = workshop_.results.own(context_.id());
+    const auto hold = workshop_.results.lock(context_.id());
     // Asked once it can no longer be cancelled in between: a cancelled edit leaves no version.
     if (context_.cancel_token().stop_requested())
       return fail(ErrorCode::cancelled, context_.id() + " was interrupted before its result was published");

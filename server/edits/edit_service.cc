@@ -16,8 +16,8 @@
 #include "server/edits/convert.h"
 #include "server/edits/edit_job.h"
 #include "server/edits/estimate.h"
-#include "server/edits/gate.h"
 #include "server/edits/interval_pictures.h"
+#include "server/edits/named_locks.h"
 #include "server/edits/status.h"
 #include "server/scenes/disk/plain_error.h"
 
@@ -196,8 +196,8 @@ struct EditService::Impl {
   scenes::SceneStore& scenes;
   const ServiceOptions options;
   engine::WorkArena arena;
-  Gate scenes_in_use;  ///< Shared by scene while an edit of it is accepted, owned by while_idle().
-  Gate results;        ///< By edit; see Workshop.
+  NamedLocks scenes_in_use;  ///< By scene: shared while an edit of it is accepted, alone in while_idle().
+  NamedLocks results;        ///< By edit; see Workshop.
   std::unique_ptr<jobs::SqliteStore> records;
   std::unique_ptr<jobs::Queue> queue;
   std::optional<jobs::Worker> worker;  ///< Last: it uses all of the above until it ends.
@@ -220,7 +220,7 @@ Result<EditService::Submission> EditService::submit(const proto::EditRequest& re
   const auto earlier = impl_->earlier(idempotency_key, job);
   if (!earlier) return propagate(earlier);
   if (*earlier) return Submission{status_of(**earlier), false};
-  const auto hold = impl_->scenes_in_use.share(*asked->scene);
+  const auto hold = impl_->scenes_in_use.lock_shared(*asked->scene);
   if (const auto checked = check(impl_->scenes, *asked); !checked) return propagate(checked);
   const auto submission = impl_->queue->submit(job);
   if (!submission) return propagate(submission);
@@ -322,7 +322,7 @@ Result<proto::EditStatus> EditService::cancel(const std::string& id) {
   const auto job = about_edit(impl_->queue->find(id), id);
   if (!job) return propagate(job);
   {
-    const auto hold = impl_->results.share(id);
+    const auto hold = impl_->results.lock_shared(id);
     if (jobs::is_final(job->state) || !version_made_by(impl_->scenes, job->lane, id))
       return shown(about_edit(impl_->queue->cancel(id), id));
   }
@@ -366,7 +366,7 @@ Result<std::string> EditService::interval_picture(const std::string& id, int int
 }
 
 Result<void> EditService::while_idle(const std::string& scene, const std::function<Result<void>()>& change) {
-  const auto hold = impl_->scenes_in_use.own(scene);
+  const auto hold = impl_->scenes_in_use.lock(scene);
   const auto active = impl_->queue->list({.lane = scene, .active_only = true, .limit = 1});
   if (!active) return propagate(active);
   if (!active->empty())

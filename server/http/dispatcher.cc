@@ -92,13 +92,13 @@ Answer Dispatcher::refused(const Refusal& refusal, const std::string& request_id
 }
 
 tl::expected<Dispatcher::Asked, Refusal> Dispatcher::check(const RequestHead& head, Answer& answer) const {
-  if (auto refusal = gate_.check_origin(head)) return tl::make_unexpected(std::move(*refusal));
+  if (auto refusal = guard_.check_origin(head)) return tl::make_unexpected(std::move(*refusal));
   const auto segments = split_path(head.path);
   Asked asked;
   if (segments) asked.match = routes_.find(head.method, *segments);
   // Whoever has no token learns nothing about routes but those that are open to all.
   const bool open = asked.match.route != nullptr && asked.match.route->access == Access::open;
-  if (!open && !gate_.admits(head))
+  if (!open && !guard_.admits(head))
     return refuse(401, "unauthorized", "this service wants a token: \"Authorization: Bearer ...\"");
   if (!segments) return tl::make_unexpected(refusal_of(segments.error()));
   if (asked.match.route == nullptr && !asked.match.allow.empty()) {

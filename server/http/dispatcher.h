@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "engine/core/file_descriptor.h"
+#include "server/http/access_guard.h"
 #include "server/http/connection.h"
-#include "server/http/gate.h"
 #include "server/http/request_head.h"
 #include "server/http/route_table.h"
 #include "server/http/router.h"
@@ -56,13 +56,13 @@ struct Answer {
   std::string route = "-";           ///< As declared; "-" if the request found none.
 };
 
-/// Safe to call from any thread. Gate and logger outlive it.
+/// Safe to call from any thread. The guard and the logger outlive it.
 class Dispatcher {
  public:
-  Dispatcher(Router router, const Gate& gate, spdlog::logger& logger, const DispatcherOptions& options,
+  Dispatcher(Router router, const AccessGuard& guard, spdlog::logger& logger, const DispatcherOptions& options,
              std::function<void(int)> count_stream)
       : routes_(std::move(router)),
-        gate_(gate),
+        guard_(guard),
         logger_(logger),
         options_(options),
         count_stream_(std::move(count_stream)) {}
@@ -85,7 +85,7 @@ class Dispatcher {
                                                            const RequestHead& head) const;
 
   const RouteTable routes_;
-  const Gate& gate_;
+  const AccessGuard& guard_;
   spdlog::logger& logger_;
   const DispatcherOptions options_;
   const std::function<void(int)> count_stream_;

@@ -144,12 +144,12 @@ std::string counted_method(const std::string& method) {
 }  // namespace
 
 struct HttpServer::Impl {
-  Impl(const ServerOptions& server_options, Router router, Gate& gate, Metrics& server_metrics,
+  Impl(const ServerOptions& server_options, Router router, AccessGuard& guard, Metrics& server_metrics,
        spdlog::logger& server_logger)
       : options(server_options),
         metrics(server_metrics),
         logger(server_logger),
-        dispatcher(std::move(router), gate, logger, options.dispatcher,
+        dispatcher(std::move(router), guard, logger, options.dispatcher,
                    [this](int change) { metrics.add_stream(change); }),
         line(options.threads, options.max_waiting, [this] { return make_server(); }) {}
   ~Impl() {
@@ -415,16 +415,17 @@ HttpServer::HttpServer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 HttpServer::~HttpServer() { stop(); }
 
-engine::Result<std::unique_ptr<HttpServer>> HttpServer::start(const ServerOptions& options, Router router, Gate& gate,
-                                                              Metrics& metrics, spdlog::logger& logger) {
-  auto impl = std::make_unique<Impl>(options, std::move(router), gate, metrics, logger);
+engine::Result<std::unique_ptr<HttpServer>> HttpServer::start(const ServerOptions& options, Router router,
+                                                              AccessGuard& guard, Metrics& metrics,
+                                                              spdlog::logger& logger) {
+  auto impl = std::make_unique<Impl>(options, std::move(router), guard, metrics, logger);
   const auto socket = listen_on(options.host, options.port);
   if (!socket) return engine::propagate(socket);
   impl->listening = *socket;
   impl->stopping = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   if (impl->stopping < 0) return engine::fail(engine::ErrorCode::unavailable, "this process may open no more files");
   impl->port = bound_port(*socket);
-  gate.bound_to(options.host, impl->port);
+  guard.bound_to(options.host, impl->port);
   impl->acceptor = std::thread([raw = impl.get()] { raw->accept_connections(); });
   return std::unique_ptr<HttpServer>(new HttpServer(std::move(impl)));
 }

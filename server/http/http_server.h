@@ -9,9 +9,9 @@
 #include <string>
 
 #include "engine/core/result.h"
+#include "server/http/access_guard.h"
 #include "server/http/connection.h"
 #include "server/http/dispatcher.h"
-#include "server/http/gate.h"
 #include "server/http/metrics.h"
 #include "server/http/router.h"
 
@@ -31,11 +31,11 @@ struct ServerOptions {
 class HttpServer {
  public:
   /// Binds, listens and serves, from now on.
-  ///   gate, metrics, logger  outlive the server; `gate` is told what the server is bound to
+  ///   guard, metrics, logger  outlive the server; `guard` is told what the server is bound to
   ///   errors  invalid_argument: no such host; unavailable: the port is taken (by any other program, this one included)
   ///           or not permitted (`where` is "--host" or "--port")
   [[nodiscard]] static engine::Result<std::unique_ptr<HttpServer>> start(const ServerOptions& options, Router router,
-                                                                         Gate& gate, Metrics& metrics,
+                                                                         AccessGuard& guard, Metrics& metrics,
                                                                          spdlog::logger& logger);
   ~HttpServer();
 

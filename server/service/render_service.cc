@@ -37,7 +37,7 @@ std::vector<float> weights_of_changes(const render::Layers& layers) {
 RenderService::RenderService(const RenderServiceOptions& options)
     : options_(options),
       arena_(options.threads, engine::Priority::high),
-      gate_(arena_.threads(), options.max_waiting) {}
+      slots_(arena_.threads(), options.max_waiting) {}
 
 std::string RenderService::etag(const scenes::LoadedVersion& version, const PictureOrder& order) const {
   const Camera& camera = order.camera;
@@ -64,8 +64,8 @@ Result<void> RenderService::check(const Camera& camera) const {
 }
 
 Result<void> RenderService::run(const std::function<void()>& work) {
-  const auto place = gate_.enter();
-  if (!place) return propagate(place);
+  const auto slot = slots_.acquire();
+  if (!slot) return propagate(slot);
   try {
     arena_.run(work);
   } catch (const std::bad_alloc&) {
@@ -76,8 +76,8 @@ Result<void> RenderService::run(const std::function<void()>& work) {
 
 Result<void> RenderService::on_canvas(const Camera& camera, const std::function<void(Canvas&)>& work) {
   if (auto sound = check(camera); !sound) return sound;
-  const auto place = gate_.enter();
-  if (!place) return propagate(place);
+  const auto slot = slots_.acquire();
+  if (!slot) return propagate(slot);
   std::unique_ptr<Canvas> canvas;
   {
     const std::lock_guard lock(mutex_);

@@ -18,7 +18,7 @@
 #include "engine/scene/camera.h"
 #include "server/pictures/shown_picture.h"
 #include "server/scenes/scene_store.h"
-#include "server/service/fair_gate.h"
+#include "server/service/fair_semaphore.h"
 
 namespace server::service {
 
@@ -75,7 +75,7 @@ class RenderService {
   [[nodiscard]] Result<void> run(const std::function<void()>& work);
 
   /// How many wait for their turn.
-  [[nodiscard]] std::size_t waiting() const { return gate_.waiting(); }
+  [[nodiscard]] std::size_t waiting() const { return slots_.waiting(); }
   [[nodiscard]] const RenderServiceOptions& options() const { return options_; }
 
  private:
@@ -91,7 +91,7 @@ class RenderService {
 
   const RenderServiceOptions options_;
   engine::WorkArena arena_;
-  FairGate gate_;
+  FairSemaphore slots_;
   std::mutex mutex_;  ///< Guards canvases_.
   /// Not one per thread: while a thread waits within a rendering, oneTBB may have it begin another one.
   std::vector<std::unique_ptr<Canvas>> canvases_;

@@ -9,7 +9,7 @@
 
 #include "engine/core/result.h"
 #include "server/edits/edit_service.h"
-#include "server/http/gate.h"
+#include "server/http/access_guard.h"
 #include "server/http/http_server.h"
 #include "server/scenes/scene_store.h"
 #include "server/service/end_signals.h"
@@ -26,7 +26,7 @@ struct ServeOptions {
   int drain_seconds = 30;            ///< So long may a running edit finish its interval.
   int preview_seconds = 600;         ///< So long does a preview live that nobody looks at.
   http::ServerOptions http;
-  http::GateOptions gate;
+  http::AccessOptions access;
   scenes::StoreOptions scenes;
   edits::ServiceOptions edits;
   routes::EditLimits edit_limits;
@@ -36,7 +36,7 @@ struct ServeOptions {
   std::string simd;      ///< Instruction set in use, likewise.
 };
 
-/// Reads the token into options.gate. Writes warnings to the log.
+/// Reads the token into options.access. Writes warnings to the log.
 ///   errors  those of read_token(); invalid_argument: a host that others can reach, no token, and not `insecure`
 [[nodiscard]] engine::Result<void> check_token(ServeOptions& options, spdlog::logger& logger);
 

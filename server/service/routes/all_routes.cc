@@ -15,7 +15,7 @@ http::Router all_routes(const ServiceParts& parts) {
                             }});
   add_render_routes(router, parts.scenes, parts.views, parts.renders);
   add_edit_routes(router, parts.edits, {.limits = parts.edit_limits});
-  add_system_routes(router, {parts.gate, parts.metrics, parts.info, [&edits = parts.edits] { return edits.trouble(); },
+  add_system_routes(router, {parts.guard, parts.metrics, parts.info, [&edits = parts.edits] { return edits.trouble(); },
                              page_files(), contract_files().front().bytes});
   return router;
 }

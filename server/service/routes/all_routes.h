@@ -3,7 +3,7 @@
 
 #include "proto/service_info.h"
 #include "server/edits/edit_service.h"
-#include "server/http/gate.h"
+#include "server/http/access_guard.h"
 #include "server/http/metrics.h"
 #include "server/http/router.h"
 #include "server/scenes/scene_store.h"
@@ -20,7 +20,7 @@ struct ServiceParts {
   EditLimits edit_limits;
   RenderService& renders;
   SceneViews& views;
-  http::Gate& gate;
+  http::AccessGuard& guard;
   http::Metrics& metrics;
   proto::ServiceInfo info;
 };

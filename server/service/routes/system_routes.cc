@@ -50,22 +50,22 @@ void add_page(http::Router& router, const std::vector<EmbeddedFile>& page) {
 
 /// A cookie that scripts cannot read and that no other site's request carries.
 std::string cookie(const std::string& value, const std::string& more) {
-  return std::string(http::Gate::cookie_name) + "=" + value + "; HttpOnly; SameSite=Strict; Path=/" + more;
+  return std::string(http::AccessGuard::cookie_name) + "=" + value + "; HttpOnly; SameSite=Strict; Path=/" + more;
 }
 
-void add_session(http::Router& router, http::Gate& gate) {
-  const auto open = [&gate](const Call& call) -> Result<Reply> {
+void add_session(http::Router& router, http::AccessGuard& guard) {
+  const auto open = [&guard](const Call& call) -> Result<Reply> {
     Reply reply = Reply::no_content();
-    if (!gate.needs_token()) return reply;
-    if (!gate.is_token(call.header("authorization")))
+    if (!guard.needs_token()) return reply;
+    if (!guard.is_token(call.header("authorization")))
       return Reply::refusal(
           {401, "unauthorized", "that is not this service's token (\"Authorization: Bearer ...\")", ""},
           call.request_id());
-    reply.headers.emplace_back("Set-Cookie", cookie(gate.open_session(), ""));
+    reply.headers.emplace_back("Set-Cookie", cookie(guard.open_session(), ""));
     return reply;
   };
-  const auto close = [&gate](const Call& call) -> Result<Reply> {
-    gate.close_session(call.header("cookie"));
+  const auto close = [&guard](const Call& call) -> Result<Reply> {
+    guard.close_session(call.header("cookie"));
     Reply reply = Reply::no_content();
     reply.headers.emplace_back("Set-Cookie", cookie("", "; Max-Age=0"));
     return reply;
@@ -101,7 +101,7 @@ void add_system_routes(http::Router& router, const SystemParts& parts) {
     return Reply::json(text);
   };
   get(router, "/v1/info", info, Access::protected_);
-  add_session(router, parts.gate);
+  add_session(router, parts.guard);
   add_page(router, parts.page);
 }
 

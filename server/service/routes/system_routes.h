@@ -8,7 +8,7 @@
 
 #include "engine/core/result.h"
 #include "proto/service_info.h"
-#include "server/http/gate.h"
+#include "server/http/access_guard.h"
 #include "server/http/metrics.h"
 #include "server/http/router.h"
 #include "server/service/embedded_files.h"
@@ -17,7 +17,7 @@ namespace server::service::routes {
 
 /// What these routes tell of.
 struct SystemParts {
-  http::Gate& gate;  ///< Outlives the router, as the metrics do.
+  http::AccessGuard& guard;  ///< Outlives the router, as the metrics do.
   const http::Metrics& metrics;
   proto::ServiceInfo info;
   std::function<std::optional<engine::Error>()> trouble;  ///< What keeps the service from working, if anything does.

@@ -14,7 +14,7 @@
 
 namespace server::http {
 
-struct GateOptions {
+struct AccessOptions {
   std::string token;                         ///< Empty: none is needed.
   std::vector<std::string> allowed_hosts;    ///< Beside the bound host and the loopback names: "name", or "name:port".
   std::vector<std::string> allowed_origins;  ///< Beside the service's own: "https://example.org".
@@ -23,9 +23,9 @@ struct GateOptions {
 };
 
 /// Safe to call from any thread.
-class Gate {
+class AccessGuard {
  public:
-  explicit Gate(GateOptions options) : options_(std::move(options)) {}
+  explicit AccessGuard(AccessOptions options) : options_(std::move(options)) {}
 
   /// Names the service goes by; called once, before the first request.
   void bound_to(const std::string& host, int port);
@@ -55,7 +55,7 @@ class Gate {
   [[nodiscard]] bool is_own_host(std::string_view host) const;
   [[nodiscard]] bool has_session(std::string_view cookies) const;
 
-  const GateOptions options_;
+  const AccessOptions options_;
   std::vector<std::string> own_hosts_;
   mutable std::mutex mutex_;                           ///< Guards sessions_.
   std::map<std::string, Clock::time_point> sessions_;  ///< By secret: when it was opened.
