@@ -30,7 +30,7 @@ ProgressDisplay::~ProgressDisplay() {
 
 void ProgressDisplay::show(double fraction, const std::string& doing) {
   const int percent = int(std::floor(100 * std::clamp(fraction, 0.0, 1.0)));
-  if (!begun_at_) begun_at_ = fraction;
+  if (!first_fraction_) first_fraction_ = fraction;
   const auto line = [&] { return std::to_string(percent) + " %  " + doing + time_left(fraction); };
   if (style_ == Style::bar) {
     if (clock_() - drawn_ < redraw_every && percent < 100) return;
@@ -62,7 +62,7 @@ void ProgressDisplay::show(const engine::edit::Progress& progress) {
 
 std::string ProgressDisplay::time_left(double fraction) const {
   const double elapsed = Seconds(clock_() - start_).count();
-  const double done = fraction - begun_at_.value_or(0);  // since we look: work that goes on begins in its middle
+  const double done = fraction - first_fraction_.value_or(0);  // since we look: work that goes on begins in its middle
   // A guess from less than this would be noise.
   if (done < 0.05 || fraction >= 1 || elapsed < 1) return {};
   const auto seconds = std::int64_t(std::ceil(elapsed * (1 - fraction) / done));

@@ -168,7 +168,7 @@ class Run {
                  .seconds = done.seconds,
                  .positions = to_points(done.positions),
                  .loss = done.loss,
-                 .renders = pictures_->of(done.interval)});
+                 .renders = pictures_->renders_of(done.interval)});
     keeper_.publish();
     if (done.interval <= context_.finished_intervals()) return {};  // made up for
     auto saved = context_.save_checkpoint(done.interval, edit::encode(done.state));

@@ -19,7 +19,7 @@
 #include "server/edits/interval_pictures.h"
 #include "server/edits/named_locks.h"
 #include "server/edits/status.h"
-#include "server/scenes/disk/plain_error.h"
+#include "server/scenes/disk/public_errors.h"
 
 namespace server::edits {
 namespace {
@@ -249,7 +249,7 @@ Result<proto::EditEstimate> EditService::estimate(const proto::EditRequest& requ
   work.intervals = checked->preview.intervals;
   work.iterations = std::size_t(params.iterations) * std::size_t(params.annealing_steps);
   work.rounds = std::size_t(params.annealing_steps);
-  work.corrected = corrects(params);
+  work.corrected = uses_corrector(params);
   work.candidates = candidates->count;
   work.candidate_pixels = std::size_t(camera.width) * std::size_t(camera.height);
   work.virtual_views = candidates->are_virtual;

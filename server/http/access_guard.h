@@ -14,12 +14,14 @@
 
 namespace server::http {
 
+/// Who is let in.
 struct AccessOptions {
-  std::string token;                         ///< Empty: none is needed.
-  std::vector<std::string> allowed_hosts;    ///< Beside the bound host and the loopback names: "name", or "name:port".
-  std::vector<std::string> allowed_origins;  ///< Beside the service's own: "https://example.org".
-  std::size_t max_sessions = 1000;           ///< The oldest makes room.
-  std::chrono::seconds session_lifetime{7 * 24 * 3600};
+  std::string token;  ///< Secret that clients must send; empty: none is needed.
+  std::vector<std::string>
+      allowed_hosts;  ///< Names beside the bound host and the loopback ones: "name" or "name:port".
+  std::vector<std::string> allowed_origins;              ///< Origins beside the service's own: "https://example.org".
+  std::size_t max_sessions = 1000;                       ///< Sessions open at a time; a new one ends the oldest.
+  std::chrono::seconds session_lifetime{7 * 24 * 3600};  ///< From opening on; a week is a choice.
 };
 
 /// Safe to call from any thread.
@@ -27,7 +29,7 @@ class AccessGuard {
  public:
   explicit AccessGuard(AccessOptions options) : options_(std::move(options)) {}
 
-  /// Names the service goes by; called once, before the first request.
+  /// Tells the guard which names the service goes by; called once, before the first request.
   void bound_to(const std::string& host, int port);
 
   /// Whether a request is meant for this service and comes from no foreign page. A browser sends a page's requests with
@@ -58,7 +60,7 @@ class AccessGuard {
   const AccessOptions options_;
   std::vector<std::string> own_hosts_;
   mutable std::mutex mutex_;                           ///< Guards sessions_.
-  std::map<std::string, Clock::time_point> sessions_;  ///< By secret: when it was opened.
+  std::map<std::string, Clock::time_point> sessions_;  ///< Time of opening by secret.
 };
 
 /// 32 random hexadecimal digits, from the system's own source.

@@ -17,13 +17,14 @@
 
 namespace server::http {
 
+/// Where the server listens and how much it serves at a time.
 struct ServerOptions {
   std::string host = "127.0.0.1";
-  int port = 8080;                         ///< 0: any that is free.
+  int port = 8080;                         ///< TCP port; 0: any that is free.
   std::size_t threads = 64;                ///< Connections served at a time.
   std::size_t max_waiting = 128;           ///< Connections that may wait for a thread; more are turned away with 503.
-  int max_requests = 1000;                 ///< Per connection.
-  std::chrono::milliseconds grace{5'000};  ///< For answers under way when the server stops.
+  int max_requests = 1000;                 ///< Requests on one connection; then it ends.
+  std::chrono::milliseconds grace{5'000};  ///< Time that answers under way get when the server stops.
   ConnectionLimits connection = {};
   DispatcherOptions dispatcher = {};
 };

@@ -82,7 +82,7 @@ void add_gauges(http::Metrics& metrics, scenes::SceneStore& scenes, edits::EditS
 /// Tells the parts what they have to know of the whole.
 void share_out(ServeOptions& options, spdlog::logger& logger) {
   options.scenes.folder = options.data_dir / "scenes";
-  options.scenes.program_version = SPLATDRAG_VERSION;
+  options.scenes.program_release = SPLATDRAG_VERSION;
   options.scenes.preview_lifetime = std::chrono::seconds(options.preview_seconds);
   options.edits.folder = options.data_dir / "edits";
   options.edits.threads = options.threads;

@@ -13,8 +13,8 @@
 
 namespace server::service::routes {
 
-/// What the routes are made over. All of it outlives the router.
-struct ServiceParts {
+/// What the routes work with. All of it outlives the router.
+struct RouteDependencies {
   scenes::SceneStore& scenes;
   edits::EditService& edits;
   EditLimits edit_limits;
@@ -26,6 +26,6 @@ struct ServiceParts {
 };
 
 /// A router with every path of the contract, and the files of the page.
-[[nodiscard]] http::Router all_routes(const ServiceParts& parts);
+[[nodiscard]] http::Router all_routes(const RouteDependencies& dependencies);
 
 }  // namespace server::service::routes

@@ -76,33 +76,32 @@ void add_session(http::Router& router, http::AccessGuard& guard) {
 
 }  // namespace
 
-void add_system_routes(http::Router& router, const SystemParts& parts) {
+void add_system_routes(http::Router& router, const SystemRouteDependencies& dependencies) {
   get(
       router, "/healthz", [](const Call&) -> Result<Reply> { return Reply::json(R"({"status":"ok"})"); }, Access::open);
-  const auto ready = [trouble = parts.trouble](const Call&) -> Result<Reply> {
+  const auto ready = [trouble = dependencies.trouble](const Call&) -> Result<Reply> {
     if (const auto error = trouble())
       return engine::fail(engine::ErrorCode::unavailable, "the service cannot work: " + error->message, error->where);
     return Reply::json(R"({"ready":true})");
   };
   get(router, "/readyz", ready, Access::open);
-  const auto metrics = [&metrics = parts.metrics](const Call&) -> Result<Reply> {
+  const auto metrics = [&metrics = dependencies.metrics](const Call&) -> Result<Reply> {
     Reply reply;
     reply.media_type = http::Metrics::media_type;
     reply.body = metrics.text();
     return reply;
   };
   get(router, "/metrics", metrics, Access::protected_);
-  const auto contract = [bytes = parts.contract, etag = http::etag_of(parts.contract)](const Call&) -> Result<Reply> {
-    return file_reply("openapi.yaml", bytes, etag);
-  };
+  const auto contract = [bytes = dependencies.contract, etag = http::etag_of(dependencies.contract)](
+                            const Call&) -> Result<Reply> { return file_reply("openapi.yaml", bytes, etag); };
   get(router, "/openapi.yaml", contract, Access::protected_);
   // Who gets as far as the handler is authorised.
-  const auto info = [text = proto::to_json(parts.info, true)](const Call&) -> Result<Reply> {
+  const auto info = [text = proto::to_json(dependencies.info, true)](const Call&) -> Result<Reply> {
     return Reply::json(text);
   };
   get(router, "/v1/info", info, Access::protected_);
-  add_session(router, parts.guard);
-  add_page(router, parts.page);
+  add_session(router, dependencies.guard);
+  add_page(router, dependencies.page);
 }
 
 }  // namespace server::service::routes

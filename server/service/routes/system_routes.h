@@ -15,8 +15,8 @@
 
 namespace server::service::routes {
 
-/// What these routes tell of.
-struct SystemParts {
+/// What these routes work with.
+struct SystemRouteDependencies {
   http::AccessGuard& guard;  ///< Outlives the router, as the metrics do.
   const http::Metrics& metrics;
   proto::ServiceInfo info;
@@ -26,6 +26,6 @@ struct SystemParts {
 };
 
 /// Adds these routes.
-void add_system_routes(http::Router& router, const SystemParts& parts);
+void add_system_routes(http::Router& router, const SystemRouteDependencies& dependencies);
 
 }  // namespace server::service::routes
