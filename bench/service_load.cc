@@ -72,37 +72,37 @@ json expect_json(const httplib::Result& result, const std::string& what) {
 }
 
 /// Where the camera looks, and from how far.
-struct Stage {
+struct SceneExtent {
   std::array<double, 3> centre{}, up{};
   double radius = 1;
 };
 
-Stage find_stage(const Options& options) {
+SceneExtent find_extent(const Options& options) {
   auto client = connect(options);
   const json scene = expect_json(client.Get("/v1/scenes/" + options.scene), "the scene");
-  Stage stage;
-  stage.centre = scene["centre"].get<std::array<double, 3>>();
-  stage.up = scene["up"].is_null() ? std::array<double, 3>{0, -1, 0} : scene["up"].get<std::array<double, 3>>();
-  stage.radius = std::max(scene["radius"].get<double>(), 1e-6);
-  return stage;
+  SceneExtent extent;
+  extent.centre = scene["centre"].get<std::array<double, 3>>();
+  extent.up = scene["up"].is_null() ? std::array<double, 3>{0, -1, 0} : scene["up"].get<std::array<double, 3>>();
+  extent.radius = std::max(scene["radius"].get<double>(), 1e-6);
+  return extent;
 }
 
 /// A camera on a sphere around the scene that no request has used before.
-json new_camera(const Options& options, const Stage& stage, std::size_t number) {
+json new_camera(const Options& options, const SceneExtent& extent, std::size_t number) {
   constexpr double golden_angle = 2 * std::numbers::pi * (2 - std::numbers::phi);
   const double turn = golden_angle * double(number), tilt = 0.4 * std::sin(0.37 * double(number));
-  const double distance = 4 * stage.radius;
+  const double distance = 4 * extent.radius;
   const std::array<double, 3> out{std::cos(turn) * std::cos(tilt), std::sin(tilt), std::sin(turn) * std::cos(tilt)};
   // `out` is upright along y: its axes are dealt out so that y falls on the scene's main upward axis.
-  const std::size_t upright =
-      std::max_element(stage.up.begin(), stage.up.end(), [](double a, double b) { return std::abs(a) < std::abs(b); }) -
-      stage.up.begin();
-  std::array<double, 3> eye = stage.centre;
+  const std::size_t upright = std::max_element(extent.up.begin(), extent.up.end(),
+                                               [](double a, double b) { return std::abs(a) < std::abs(b); }) -
+                              extent.up.begin();
+  std::array<double, 3> eye = extent.centre;
   eye[upright] += distance * out[1];
   eye[(upright + 1) % 3] += distance * out[0];
   eye[(upright + 2) % 3] += distance * out[2];
-  return {{"eye", eye},      {"target", stage.centre}, {"up", stage.up},
-          {"fov_y_deg", 50}, {"width", options.width}, {"height", options.height}};
+  return {{"eye", eye},      {"target", extent.centre}, {"up", extent.up},
+          {"fov_y_deg", 50}, {"width", options.width},  {"height", options.height}};
 }
 
 /// Which edit is in work; its id is empty while there is none.
@@ -137,8 +137,9 @@ Heard heard(const httplib::Result& result) { return heard(result, result ? resul
 
 class LoadClient {
  public:
-  LoadClient(const Options& options, const Stage& stage, const CurrentEdit& edit, std::atomic<std::size_t>& cameras)
-      : options_(options), stage_(stage), edit_(edit), cameras_(cameras), client_(connect(options)) {}
+  LoadClient(const Options& options, const SceneExtent& extent, const CurrentEdit& edit,
+             std::atomic<std::size_t>& cameras)
+      : options_(options), extent_(extent), edit_(edit), cameras_(cameras), client_(connect(options)) {}
 
   void run_until(Clock::time_point end, std::size_t offset) {
     for (std::size_t n = offset; Clock::now() < end; ++n) {
@@ -167,7 +168,7 @@ class LoadClient {
   Heard ask(Kind kind) {
     const std::string version = "/v1/scenes/" + options_.scene + "/versions/" + std::to_string(options_.version);
     if (kind == poll) return ask_edit();
-    const json camera = new_camera(options_, stage_, cameras_++);
+    const json camera = new_camera(options_, extent_, cameras_++);
     if (kind == render)
       return heard(
           client_.Post(version + "/render", json{{"camera", camera}, {"format", "jpeg"}}.dump(), "application/json"));
@@ -197,7 +198,7 @@ class LoadClient {
   }
 
   const Options& options_;
-  const Stage& stage_;
+  const SceneExtent& extent_;
   const CurrentEdit& edit_;
   std::atomic<std::size_t>& cameras_;  ///< How many have been used.
   httplib::Client client_;
@@ -338,7 +339,7 @@ json read_edit(const Options& options) {
 }
 
 bool run(const Options& options) {
-  const Stage stage = find_stage(options);
+  const SceneExtent extent = find_extent(options);
   const json request = options.edit.empty() ? json() : read_edit(options);
   const auto start = Clock::now();
   const auto end = start + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(options.seconds));
@@ -350,7 +351,7 @@ bool run(const Options& options) {
   std::atomic<std::size_t> cameras{0};
   std::vector<std::unique_ptr<LoadClient>> clients;
   for (int i = 0; i < options.clients; ++i)
-    clients.push_back(std::make_unique<LoadClient>(options, stage, current, cameras));
+    clients.push_back(std::make_unique<LoadClient>(options, extent, current, cameras));
   {
     std::vector<std::jthread> threads;
     for (std::size_t i = 0; i < clients.size(); ++i) threads.emplace_back([&, i] { clients[i]->run_until(end, i); });

@@ -27,7 +27,7 @@ using nlohmann::json;
 using std::filesystem::path;
 
 /// What an edit came to, on the mean over cases.
-struct Point {
+struct SettingResult {
   std::string setting;
   double edited_db = 0, ssim = 0, vacated_db = 0, outside_db = 0, seconds = 0;
 };
@@ -74,9 +74,9 @@ class Bench {
   }
 
   /// Of the cases and corrector that the arguments of bench-edit name.
-  [[nodiscard]] Point measure(const std::string& setting, const std::string& arguments) const {
+  [[nodiscard]] SettingResult measure(const std::string& setting, const std::string& arguments) const {
     const json found = run("bench.json", arguments);
-    Point point{.setting = setting};
+    SettingResult point{.setting = setting};
     double textured = 0;
     const double cases = double(found.at("cases").size());
     for (const json& each : found.at("cases")) {
@@ -124,7 +124,7 @@ const std::vector<Knob>& knobs() {
   return all;
 }
 
-std::string row(const Point& point) {
+std::string row(const SettingResult& point) {
   std::ostringstream out;
   out << "| " << point.setting << std::fixed << std::setprecision(2) << " | " << point.edited_db << " | "
       << std::setprecision(4) << point.ssim << std::setprecision(2) << " | " << point.vacated_db << " | "
@@ -138,18 +138,19 @@ constexpr const char* trip_head =
 constexpr const char* head =
     "| setting | edited, dB | SSIM | vacated, dB | outside, dB | s |\n| --- | ---: | ---: | ---: | ---: | ---: |\n";
 
-bench::Series series(const std::string& name, const std::vector<Point>& points) {
+bench::Series series(const std::string& name, const std::vector<SettingResult>& points) {
   bench::Series out{name, {}};
-  for (const Point& point : points) out.points.emplace_back(point.seconds, point.edited_db);
+  for (const SettingResult& point : points) out.points.emplace_back(point.seconds, point.edited_db);
   std::sort(out.points.begin(), out.points.end());
   return out;
 }
 
 /// Those that no other one beats in both time and quality, by time.
-std::vector<Point> front(std::vector<Point> points) {
-  std::sort(points.begin(), points.end(), [](const Point& a, const Point& b) { return a.seconds < b.seconds; });
-  std::vector<Point> best;
-  for (const Point& point : points)
+std::vector<SettingResult> front(std::vector<SettingResult> points) {
+  std::sort(points.begin(), points.end(),
+            [](const SettingResult& a, const SettingResult& b) { return a.seconds < b.seconds; });
+  std::vector<SettingResult> best;
+  for (const SettingResult& point : points)
     if (best.empty() || point.edited_db > best.back().edited_db) best.push_back(point);
   return best;
 }
@@ -165,7 +166,7 @@ void write_docs(const Bench& bench, const path& folder) {
           "![](tradeoff.svg)\n\n## Presets, all cases\n\n"
        << head;
   std::vector<bench::Chart> charts;
-  std::vector<Point> presets;
+  std::vector<SettingResult> presets;
   for (const std::string preset : {"preview", "draft", "standard"})
     for (const std::string corrector : {"none", "harmonic", "scene"}) {
       if (preset == "preview" && corrector != "none") continue;
@@ -178,12 +179,12 @@ void write_docs(const Bench& bench, const path& folder) {
     page << row(bench.measure(preset + ", scene", "--small --preset " + preset + " --corrector scene"));
 
   page << "\n## Each knob alone\n\nThe small cases, preset `draft`, corrector `scene` but where it says otherwise.\n";
-  std::vector<Point> all;
+  std::vector<SettingResult> all;
   bench::Chart by_knob{"Each knob alone",         "seconds",           "edited region, dB", {},
                        bench::Scale::logarithmic, bench::Scale::linear};
   for (const Knob& knob : knobs()) {
     page << "\n### " << knob.name << "\n\n" << head;
-    std::vector<Point> points;
+    std::vector<SettingResult> points;
     for (const std::string& value : knob.values) {
       const std::string corrector = knob.flag == "--corrector" ? "" : " --corrector scene";
       points.push_back(
@@ -218,9 +219,9 @@ void write_docs(const Bench& bench, const path& folder) {
        << trip_head;
   for (const std::string preset : {"preview", "draft", "standard"})
     page << bench.trip(preset, "--preset " + preset + " --corrector scene");
-  const std::vector<Point> best = front(all);
+  const std::vector<SettingResult> best = front(all);
   page << "\n## The front\n\nSettings above that no other one beats in both time and quality.\n\n" << head;
-  for (const Point& point : best) page << row(point);
+  for (const SettingResult& point : best) page << row(point);
   charts.push_back(by_knob);
   charts.push_back({"The front",
                     "seconds",

@@ -12,8 +12,8 @@ namespace proto {
 
 using Pose = std::array<std::array<double, 4>, 3>;  ///< Rows of [R | t]: x_in_cam = R x_in_world + t; R is a rotation.
 
-constexpr int max_camera_side = 16384;  ///< Pixels.
-constexpr double default_fov_y_deg = 50;
+constexpr int max_camera_side = 16384;    ///< Pixels; what the engine draws at most (engine/scene/camera.h).
+constexpr double default_fov_y_deg = 50;  ///< Vertical field of view; about that of an eye. A choice.
 
 /// Image origin: upper left corner of the upper left pixel (COLMAP). Axes: x right, y down, z forward.
 struct PinholeCamera {
@@ -24,9 +24,10 @@ struct PinholeCamera {
   bool operator==(const PinholeCamera&) const = default;
 };
 
+/// A camera at `eye` that looks at `target`.
 struct LookAtCamera {
   Point eye{}, target{};    ///< World units.
-  std::optional<Point> up;  ///< World direction; nothing: the scene's.
+  std::optional<Point> up;  ///< World direction; without one, the scene's.
   double fov_y_deg = default_fov_y_deg;
   int width = 0, height = 0;  ///< Pixels.
   bool operator==(const LookAtCamera&) const = default;

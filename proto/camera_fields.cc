@@ -10,7 +10,7 @@ constexpr double min_direction_length = 1e-12;  // so that its square is a numbe
 
 /// Orthonormal and no mirror image, to the digits that people print.
 bool is_rotation(const Pose& pose) {
-  constexpr double tolerance = 1e-3;
+  constexpr double tolerance = 1e-3;  // of each entry of R R^T: three digits, as people print
   for (std::size_t i = 0; i < 3; ++i)
     for (std::size_t j = 0; j <= i; ++j) {
       double product = 0;
@@ -21,7 +21,7 @@ bool is_rotation(const Pose& pose) {
   return pose[0][0] * minor(1, 2) - pose[0][1] * minor(0, 2) + pose[0][2] * minor(0, 1) > 0;
 }
 
-Pose read_pose(const Field& field) {
+Pose read_pose(const JsonField& field) {
   Pose pose{};
   const auto rows = field.elements(3, 3, "rows");
   for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -32,7 +32,7 @@ Pose read_pose(const Field& field) {
   return pose;
 }
 
-PinholeCamera read_pinhole(const Field& field) {
+PinholeCamera read_pinhole(const JsonField& field) {
   const Members members(field, {"width", "height", "fx", "fy", "cx", "cy", "cam_from_world"});
   PinholeCamera camera;
   if (const auto f = members.required("width")) camera.width = f->whole(1, max_camera_side);
@@ -45,7 +45,7 @@ PinholeCamera read_pinhole(const Field& field) {
   return camera;
 }
 
-LookAtCamera read_look_at(const Field& field) {
+LookAtCamera read_look_at(const JsonField& field) {
   const Members members(field, {"eye", "target", "up", "fov_y_deg", "width", "height"});
   LookAtCamera camera;
   if (const auto f = members.required("eye")) camera.eye = f->point();
@@ -59,23 +59,23 @@ LookAtCamera read_look_at(const Field& field) {
 
 }  // namespace
 
-double read_fov(const Field& field) { return field.number(0.001, 179.999); }
+double read_fov(const JsonField& field) { return field.number(0.001, 179.999); }
 
-Point read_direction(const Field& field) {
+Point read_direction(const JsonField& field) {
   const Point direction = field.point();
   if (std::hypot(direction[0], direction[1], direction[2]) < min_direction_length)
     field.refuse("expected a direction: three numbers that are not all 0, or next to it");
   return direction;
 }
 
-Camera read_camera(const Field& field) {
+Camera read_camera(const JsonField& field) {
   const Members any(field,
                     {"eye", "target", "up", "fov_y_deg", "width", "height", "fx", "fy", "cx", "cy", "cam_from_world"});
   if (any.optional("eye") || any.optional("target")) return read_look_at(field);
   return read_pinhole(field);
 }
 
-Viewpoint read_viewpoint(const Field& object, const Members& members) {
+Viewpoint read_viewpoint(const JsonField& object, const Members& members) {
   const auto camera = members.optional("camera"), view = members.optional("view");
   if (camera.has_value() == view.has_value()) {
     object.refuse("expected exactly one of camera and view");

@@ -9,14 +9,14 @@
 namespace proto {
 
 /// A camera in one of its two forms: the one that has `eye` or `target`, or the one that has a pose.
-[[nodiscard]] Camera read_camera(const Field& field);
+[[nodiscard]] Camera read_camera(const JsonField& field);
 
 /// Exactly one of `camera` and `view` among the members of `object`.
-[[nodiscard]] Viewpoint read_viewpoint(const Field& object, const Members& members);
+[[nodiscard]] Viewpoint read_viewpoint(const JsonField& object, const Members& members);
 
 /// A vertical field of view, degrees.
-[[nodiscard]] double read_fov(const Field& field);
+[[nodiscard]] double read_fov(const JsonField& field);
 /// A direction: a vector of length 1e-12 or more.
-[[nodiscard]] Point read_direction(const Field& field);
+[[nodiscard]] Point read_direction(const JsonField& field);
 
 }  // namespace proto

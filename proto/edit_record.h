@@ -1,5 +1,5 @@
-// What a running edit writes down about itself: kept in its job's record, read back into its status, and by the run
-// that goes on with it after a restart. Not for clients.
+// The record of a running edit, which is kept with its job. The edit's status is made from it, and whoever goes on with
+// the edit after a restart reads it. Not for clients.
 #pragma once
 
 #include <optional>
@@ -11,7 +11,7 @@
 
 namespace proto {
 
-/// The fields are those of EditStatus.
+/// Fields mean what those of the same name in EditStatus mean.
 struct EditRecord {
   std::string stage;
   double progress = 0;
@@ -29,8 +29,10 @@ struct EditRecord {
   std::string simd;
 };
 
+/// The record as JSON text.
 [[nodiscard]] std::string to_json(const EditRecord& record);
-/// errors  corrupt_data: the text is not what to_json() writes
+/// The reverse of to_json().
+///   errors  corrupt_data: the text is not what to_json() writes
 [[nodiscard]] Result<EditRecord> parse_edit_record(std::string_view text);
 
 }  // namespace proto

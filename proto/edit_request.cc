@@ -21,7 +21,7 @@ using nlohmann::ordered_json;
 
 constexpr int no_limit = std::numeric_limits<int>::max();
 
-Handle read_handle(const Field& field) {
+Handle read_handle(const JsonField& field) {
   const Members members(field, {"source", "target", "radius", "group"});
   Handle handle;
   if (const auto source = members.required("source")) handle.source = source->point();
@@ -31,7 +31,7 @@ Handle read_handle(const Field& field) {
   return handle;
 }
 
-Region read_region(const Field& field, std::string_view size_name) {
+Region read_region(const JsonField& field, std::string_view size_name) {
   const Members members(field, {"center", size_name});
   Region region;
   if (const auto center = members.required("center")) region.center = center->point();
@@ -39,7 +39,7 @@ Region read_region(const Field& field, std::string_view size_name) {
   return region;
 }
 
-EditRequest read_edit_request(const Field& field) {
+EditRequest read_edit_request(const JsonField& field) {
   const Members members(field, {"scene", "version", "mode", "preset", "prompt", "handles", "region", "params"});
   EditRequest request;
   if (const auto f = members.optional("scene")) request.scene = f->text();
@@ -48,7 +48,7 @@ EditRequest read_edit_request(const Field& field) {
   if (const auto f = members.optional("preset")) request.preset = f->one_of(engine::names<Preset>);
   if (const auto f = members.optional("prompt"); f && !f->is_null()) request.prompt = f->text();
   if (const auto handles = members.required("handles"))
-    for (const Field& handle : handles->elements(1, max_handles, "handles"))
+    for (const JsonField& handle : handles->elements(1, max_handles, "handles"))
       request.handles.push_back(read_handle(handle));
   if (const auto f = members.optional("region")) request.region = read_region(*f, "size");
   if (const auto f = members.optional("params")) request.params = read_params(*f);
@@ -56,15 +56,15 @@ EditRequest read_edit_request(const Field& field) {
 }
 
 /// One element per handle, or a refusal that says how many there are.
-std::vector<Field> per_handle(const Field& field, std::size_t handles, const std::string& things) {
+std::vector<JsonField> per_handle(const JsonField& field, std::size_t handles, const std::string& things) {
   return field.elements(handles, handles, things + ", as many as start has");
 }
 
-EditRequest read_released_config(const Field& field) {
+EditRequest read_released_config(const JsonField& field) {
   const Members members(field, {"start", "direction", "voxel_size", "cluster", "local_mask", "mode"});
   EditRequest request;
   if (const auto start = members.required("start"))
-    for (const Field& source : start->elements(1, max_handles, "points"))
+    for (const JsonField& source : start->elements(1, max_handles, "points"))
       request.handles.push_back({.source = source.point(), .target = {}});
   const std::size_t n = request.handles.size();
   if (const auto f = members.required("direction")) {
@@ -90,7 +90,7 @@ EditRequest read_released_config(const Field& field) {
 template <class Read>
 Result<EditRequest> decode(const json& document, const std::string& where, Read read) {
   std::optional<Error> error;
-  EditRequest request = read(Field(document, where, error));
+  EditRequest request = read(JsonField(document, where, error));
   if (error) return tl::make_unexpected(std::move(*error));
   return request;
 }
@@ -128,10 +128,11 @@ std::vector<std::string> request_names(const json& document) {
 }
 
 std::string listed(const std::vector<std::string>& names) {
-  constexpr std::size_t enough = 20;
+  constexpr std::size_t max_listed = 20;  // names in a message: it stays readable
   std::string text;
-  for (std::size_t i = 0; i < std::min(names.size(), enough); ++i) text += (i == 0 ? "" : ", ") + printable(names[i]);
-  return names.size() > enough ? text + ", ..." : text;
+  for (std::size_t i = 0; i < std::min(names.size(), max_listed); ++i)
+    text += (i == 0 ? "" : ", ") + printable(names[i]);
+  return names.size() > max_listed ? text + ", ..." : text;
 }
 
 ordered_json encode(const Handle& handle) {

@@ -27,33 +27,37 @@ using engine::params::Perceptual;
 using engine::params::Preset;
 using engine::params::Rotation;
 
-/// What is not given is left to the preset.
+/// The parameters that a request gives; the rest is left to the preset.
 using Params = engine::params::GivenParams;
 
+// Limits of what is read. All are choices: far above what people send, far below what would hurt.
 constexpr std::size_t max_handles = 256;
-constexpr std::size_t max_text_bytes = 4096;  ///< Of a prompt, a name.
-constexpr double max_coordinate = 1e12;       ///< World units.
+constexpr std::size_t max_text_bytes = 4096;  ///< Length of a prompt or a name.
+constexpr double max_coordinate = 1e12;       ///< Absolute value, world units.
 
+/// A point on the part that is dragged, and where it is to go.
 struct Handle {
   Point source{};
-  std::optional<Point> target;  ///< Nothing: an anchor.
+  std::optional<Point> target;  ///< Where the handle is to go; without one it is an anchor.
   double radius = 0;            ///< World units, above 0.
-  int group = 0;                ///< From 0 up.
+  int group = 0;                ///< Its group, from 0 up.
   bool operator==(const Handle&) const = default;
 };
 
+/// A box that limits what may be dragged.
 struct Region {
   Point center{}, size{};  ///< World units; full edge lengths, above 0.
   bool operator==(const Region&) const = default;
 };
 
+/// One edit as a client asks for it.
 struct EditRequest {
   std::optional<std::string> scene;  ///< Id of a scene that a service holds.
-  std::optional<int> version;        ///< Of that scene, from 0 up.
+  std::optional<int> version;        ///< Version of that scene, from 0 up.
   Mode mode = Mode::move;
-  std::optional<Preset> preset;
-  std::optional<std::string> prompt;
-  std::vector<Handle> handles;  ///< 1 to max_handles
+  std::optional<Preset> preset;       ///< None: standard.
+  std::optional<std::string> prompt;  ///< For a corrector that reads one.
+  std::vector<Handle> handles;        ///< 1 to max_handles
   std::optional<Region> region;
   Params params;
   bool operator==(const EditRequest&) const = default;
@@ -83,7 +87,7 @@ struct JsonLimits {
 /// A request and how its file says it, for the addresses of errors that come up later.
 struct RequestFile {
   EditRequest request;
-  std::string name;       ///< Of the request among several; empty if the file holds one.
+  std::string name;       ///< Name of the request among several; empty if the file holds one.
   bool released = false;  ///< The file is a released 3DGS-Drag configuration.
 
   /// What the file calls a field of the request: "ear_up.handles[2].radius", or "voxel_size" in a released

@@ -15,27 +15,31 @@ namespace proto {
 /// One picture of an interval, under /v1/edits/{id}/intervals/{u}/renders/{k}.
 struct IntervalRender {
   std::string view;
-  std::vector<std::string> stages;  ///< "before", "deformed", ...: those there are.
+  std::vector<std::string> stages;  ///< Which pictures there are of the view: "before", "deformed", ...
 };
 
 /// An interval whose checkpoint is on disk.
 struct FinishedInterval {
-  int interval = 0;              ///< From 1.
-  double seconds = 0;            ///< It took.
-  std::vector<Point> positions;  ///< Of the handles after it, world units.
+  int interval = 0;              ///< Its number, from 1.
+  double seconds = 0;            ///< Time that it took.
+  std::vector<Point> positions;  ///< Where the handles are after it, world units.
   std::optional<double> loss;    ///< Mean over the views of the last epoch; none without optimisation.
   std::vector<IntervalRender> renders;
 };
 
+/// How much a handle of the request holds.
 struct HandleCount {
-  std::size_t gaussians = 0;  ///< That it holds.
+  std::size_t gaussians = 0;  ///< Gaussians that follow the handle.
 };
 
+/// Time that a stage of the edit has taken.
 struct StageSeconds {
-  std::string stage;
-  double seconds = 0;
+  std::string stage;   ///< Name of an engine::edit::Stage.
+  double seconds = 0;  ///< All intervals together.
 };
 
+/// Gaussians of an edit: in its input and its output, rows removed and new rows (`copies`), members of M
+/// (`changeable`).
 struct GaussianCounts {
   std::size_t input = 0, output = 0, removed = 0, copies = 0, changeable = 0;
 };
@@ -44,50 +48,52 @@ struct GaussianCounts {
 struct EditStatus {
   std::string id;
   std::string scene;
-  int version = 0;    ///< That it edits.
+  int version = 0;    ///< Version that it edits.
   std::string state;  ///< "queued", "running", "stop_requested", "cancel_requested", "succeeded", "failed", "cancelled"
   bool stopped_early = false;
-  std::optional<int> queue_position;  ///< 1: next.
-  std::string stage;                  ///< "assign", "views", "deform", "mask", ...; empty before it starts.
+  std::optional<int> queue_position;  ///< Place among the edits that wait; 1 is the next.
+  std::string stage;                  ///< "assign", "views", "deform", "mask", ...; empty before the edit starts.
   double progress = 0;                ///< 0 to 1, never falls.
-  std::optional<double> eta_seconds;  ///< Of the running edit, as of its last news.
-  int interval = 0, intervals = 0;    ///< In work, of T; 0 before they are known.
-  int iteration = 0;           ///< Done of the optimisation of the interval in work; 0 while it does not optimise.
-  int iterations = 0;          ///< Of each interval, all corrections together; 0: nothing is optimised.
-  std::optional<double> loss;  ///< Of the last iteration, as of its last news, while it optimises.
+  std::optional<double> eta_seconds;  ///< Time left of a running edit, as estimated at its last report.
+  int interval = 0, intervals = 0;    ///< Number of the interval in work, and T; 0 before it is known.
+  int iteration = 0;                  ///< Iterations done in the interval in work; 0 while it does not optimise.
+  int iterations = 0;                 ///< Iterations of each interval, all corrections together; 0: none.
+  std::optional<double> loss;         ///< Loss of the last iteration reported, while it optimises.
   std::vector<FinishedInterval> finished_intervals;
   std::vector<HandleCount> handles;
-  EditRequest request;  ///< As asked; with every parameter filled in once the edit has started.
+  EditRequest request;  ///< As the client sent it; with every parameter filled in once the edit has started.
   std::vector<StageSeconds> timings;
-  std::optional<GaussianCounts> gaussians;  ///< Of one that succeeded.
+  std::optional<GaussianCounts> gaussians;  ///< Only of an edit that succeeded.
   std::vector<std::string> warnings;
   std::optional<int> result_version;
   std::optional<engine::Error> error;
   std::string created;
   std::optional<std::string> started, ended;
-  std::string simd;  ///< Instruction set it ran on; empty before it starts.
+  std::string simd;  ///< Instruction set that the edit ran on; empty before it starts.
 };
 
+/// What an edit is expected to cost.
 struct EditEstimate {
   std::vector<HandleCount> handles;
   std::size_t views = 0;
   int intervals = 0;
-  double seconds = 0;              ///< About.
-  std::uint64_t memory_bytes = 0;  ///< Beside the scene itself, about.
-  EditRequest request;             ///< With every parameter filled in.
+  double seconds = 0;              ///< Estimated time.
+  std::uint64_t memory_bytes = 0;  ///< Estimated peak beside the scene itself.
+  EditRequest request;             ///< The request with every parameter filled in.
   std::vector<std::string> warnings;
 };
 
+/// A deformation that was made at once, as a version that lives for a while.
 struct Preview {
   std::string scene;
   std::string version;  ///< "p000001": may be rendered and picked like any version, until it expires.
   int parent = 0;
   std::string expires;
   std::vector<HandleCount> handles;
-  std::vector<Point> positions;  ///< Of the handles after the whole drag.
+  std::vector<Point> positions;  ///< Where the handles are after the whole drag, world units.
   int intervals = 0;
   GaussianCounts gaussians;
-  double seconds = 0;  ///< It took.
+  double seconds = 0;  ///< Time that the preview took.
   std::vector<std::string> warnings;
 };
 

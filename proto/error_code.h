@@ -1,4 +1,4 @@
-// What an error is called on the wire.
+// Names of error codes on the wire.
 #pragma once
 
 #include <string_view>

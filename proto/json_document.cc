@@ -105,7 +105,7 @@ class Builder final : public nlohmann::json_sax<json> {
     return true;
   }
 
-  /// Of the value that comes next.
+  /// The address of the value that comes next.
   [[nodiscard]] std::string address() const {
     std::string text;
     for (const Level& level : levels_) {

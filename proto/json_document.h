@@ -9,7 +9,8 @@
 
 namespace proto {
 
-/// errors  as parse_edit_request(); `where` of a number that overflows or a repeated name is its address
+/// Parses a text.
+///   errors  as parse_edit_request(); `where` of a number that overflows or a repeated name is its address
 [[nodiscard]] Result<nlohmann::json> parse_document(std::string_view text, const JsonLimits& limits);
 
 /// Text from a document as it may stand in a message or an address: one line, ASCII, not long.

@@ -23,13 +23,13 @@ std::string found(const nlohmann::json& value) {
 
 }  // namespace
 
-void Field::refuse(std::string message) const {
+void JsonField::refuse(std::string message) const {
   if (!*error_) *error_ = engine::Error{engine::ErrorCode::invalid_argument, std::move(message), where_};
 }
 
-void Field::expected(const std::string& what) const { refuse("expected " + what + ", found " + found(*value_)); }
+void JsonField::expected(const std::string& what) const { refuse("expected " + what + ", found " + found(*value_)); }
 
-double Field::number(double low, double high) const {
+double JsonField::number(double low, double high) const {
   if (value_->is_number()) {
     const double value = value_->get<double>();
     if (value >= low && value <= high) return value;
@@ -38,7 +38,7 @@ double Field::number(double low, double high) const {
   return low;
 }
 
-double Field::length() const {
+double JsonField::length() const {
   if (value_->is_number()) {
     const double value = value_->get<double>();
     if (value > 0 && value <= max_coordinate) return value;
@@ -47,7 +47,7 @@ double Field::length() const {
   return 1;
 }
 
-int Field::whole(int low, int high) const {
+int JsonField::whole(int low, int high) const {
   if (value_->is_number_integer()) {
     const bool fits = !value_->is_number_unsigned() || value_->get<std::uint64_t>() <= std::uint64_t(high);
     if (fits && value_->get<std::int64_t>() >= low && value_->get<std::int64_t>() <= high) return value_->get<int>();
@@ -58,26 +58,26 @@ int Field::whole(int low, int high) const {
   return low;
 }
 
-std::uint64_t Field::unsigned_number() const {
+std::uint64_t JsonField::unsigned_number() const {
   if (value_->is_number_unsigned()) return value_->get<std::uint64_t>();
   expected("a whole number from 0 to 18446744073709551615");
   return 0;
 }
 
-bool Field::boolean() const {
+bool JsonField::boolean() const {
   if (value_->is_boolean()) return value_->get<bool>();
   expected("true or false");
   return false;
 }
 
-std::string Field::text() const {
+std::string JsonField::text() const {
   if (value_->is_string() && value_->get_ref<const std::string&>().size() <= max_text_bytes)
     return value_->get<std::string>();
   expected("a string of at most " + std::to_string(max_text_bytes) + " bytes");
   return {};
 }
 
-Point Field::point() const {
+Point JsonField::point() const {
   Point point{};
   const auto coordinates = elements(3, 3, "numbers");
   for (std::size_t i = 0; i < coordinates.size(); ++i)
@@ -85,15 +85,15 @@ Point Field::point() const {
   return point;
 }
 
-Point Field::edges() const {
+Point JsonField::edges() const {
   Point size{1, 1, 1};
   const auto lengths = elements(3, 3, "lengths");
   for (std::size_t i = 0; i < lengths.size(); ++i) size[i] = lengths[i].length();
   return size;
 }
 
-std::vector<Field> Field::elements(std::size_t low, std::size_t high, const std::string& things) const {
-  std::vector<Field> fields;
+std::vector<JsonField> JsonField::elements(std::size_t low, std::size_t high, const std::string& things) const {
+  std::vector<JsonField> fields;
   if (!value_->is_array() || value_->size() < low || value_->size() > high) {
     const std::string count = low == high ? std::to_string(low) : std::to_string(low) + " to " + std::to_string(high);
     expected("an array of " + count + " " + things);
@@ -105,7 +105,7 @@ std::vector<Field> Field::elements(std::size_t low, std::size_t high, const std:
   return fields;
 }
 
-Members::Members(const Field& object, std::span<const std::string_view> known) : object_(object) {
+Members::Members(const JsonField& object, std::span<const std::string_view> known) : object_(object) {
   if (!object_.is_object()) {
     object_.expected("an object");
     return;
@@ -114,22 +114,22 @@ Members::Members(const Field& object, std::span<const std::string_view> known) :
     if (std::find(known.begin(), known.end(), member.key()) != known.end()) continue;
     std::string names;
     for (const std::string_view name : known) names += (names.empty() ? "" : ", ") + std::string(name);
-    Field(member.value(), address(member.key()), *object_.error_).refuse("unknown field; there are " + names);
+    JsonField(member.value(), address(member.key()), *object_.error_).refuse("unknown field; there are " + names);
   }
 }
 
-std::optional<Field> Members::required(std::string_view name) const {
+std::optional<JsonField> Members::required(std::string_view name) const {
   auto field = optional(name);
   if (!field && object_.is_object())
-    Field(*object_.value_, address(name), *object_.error_).refuse("the field is missing");
+    JsonField(*object_.value_, address(name), *object_.error_).refuse("the field is missing");
   return field;
 }
 
-std::optional<Field> Members::optional(std::string_view name) const {
+std::optional<JsonField> Members::optional(std::string_view name) const {
   if (!object_.is_object()) return std::nullopt;
   const auto member = object_.value_->find(name);
   if (member == object_.value_->end()) return std::nullopt;
-  return Field(*member, address(name), *object_.error_);
+  return JsonField(*member, address(name), *object_.error_);
 }
 
 std::string Members::address(std::string_view name) const {

@@ -20,27 +20,28 @@ namespace proto {
 
 using engine::Name;
 
-/// A place in a document: a value and its address. The first failure below a document is noted in its error; after one,
-/// reading goes on with harmless values.
-class Field {
+/// A value of a JSON document with its address. The first failure in a document is noted in `error`, which its fields
+/// share; after one, reading goes on with harmless values.
+class JsonField {
  public:
-  Field(const nlohmann::json& value, std::string where, std::optional<engine::Error>& error)
+  JsonField(const nlohmann::json& value, std::string where, std::optional<engine::Error>& error)
       : value_(&value), where_(std::move(where)), error_(&error) {}
 
   /// A finite number, low <= x <= high.
   [[nodiscard]] double number(double low, double high) const;
   /// A number above 0, at most max_coordinate.
   [[nodiscard]] double length() const;
+  /// A whole number, low <= x <= high.
   [[nodiscard]] int whole(int low, int high) const;
   [[nodiscard]] std::uint64_t unsigned_number() const;
   [[nodiscard]] bool boolean() const;
-  [[nodiscard]] std::string text() const;  ///< Up to max_text_bytes.
-  [[nodiscard]] Point point() const;       ///< Coordinates within max_coordinate.
-  [[nodiscard]] Point edges() const;       ///< Three lengths.
+  [[nodiscard]] std::string text() const;  ///< A string of at most max_text_bytes.
+  [[nodiscard]] Point point() const;       ///< Three coordinates within max_coordinate.
+  [[nodiscard]] Point edges() const;       ///< Three length()s.
   template <class E, std::size_t N>
   [[nodiscard]] E one_of(const std::array<Name<E>, N>& names) const;
   /// The elements of an array of low to high of `things`.
-  [[nodiscard]] std::vector<Field> elements(std::size_t low, std::size_t high, const std::string& things) const;
+  [[nodiscard]] std::vector<JsonField> elements(std::size_t low, std::size_t high, const std::string& things) const;
 
   [[nodiscard]] bool is_object() const { return value_->is_object(); }
   [[nodiscard]] bool is_null() const { return value_->is_null(); }
@@ -61,22 +62,22 @@ class Field {
 /// The members of an object; those not in `known` are refused at once.
 class Members {
  public:
-  Members(const Field& object, std::span<const std::string_view> known);
-  Members(const Field& object, std::initializer_list<std::string_view> known)
+  Members(const JsonField& object, std::span<const std::string_view> known);
+  Members(const JsonField& object, std::initializer_list<std::string_view> known)
       : Members(object, std::span(known.begin(), known.size())) {}
 
   /// Refuses the object if the member is missing.
-  [[nodiscard]] std::optional<Field> required(std::string_view name) const;
-  [[nodiscard]] std::optional<Field> optional(std::string_view name) const;
+  [[nodiscard]] std::optional<JsonField> required(std::string_view name) const;
+  [[nodiscard]] std::optional<JsonField> optional(std::string_view name) const;
 
  private:
   [[nodiscard]] std::string address(std::string_view name) const;
 
-  Field object_;
+  JsonField object_;
 };
 
 template <class E, std::size_t N>
-E Field::one_of(const std::array<Name<E>, N>& names) const {
+E JsonField::one_of(const std::array<Name<E>, N>& names) const {
   if (value_->is_string())
     for (const Name<E>& name : names)
       if (value_->get_ref<const std::string&>() == name.text) return name.value;

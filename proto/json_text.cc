@@ -7,7 +7,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr std::size_t line_length = 100;
+constexpr std::size_t line_length = 100;  // characters that an array or object may take on its line; a choice
 
 std::string scalar(const ordered_json& value) {
   return value.dump(-1, ' ', false, ordered_json::error_handler_t::replace);

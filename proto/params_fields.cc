@@ -16,19 +16,19 @@ using engine::params::Range;
 using nlohmann::ordered_json;
 using Names = std::vector<std::string>;
 
-int read(const Field& field, const Range<int>& range) { return field.whole(range.low, range.high); }
-double read(const Field& field, const Range<double>& range) { return field.number(range.low, range.high); }
-bool read(const Field& field, const Range<bool>&) { return field.boolean(); }
-std::uint64_t read(const Field& field, const Range<std::uint64_t>&) { return field.unsigned_number(); }
+int read(const JsonField& field, const Range<int>& range) { return field.whole(range.low, range.high); }
+double read(const JsonField& field, const Range<double>& range) { return field.number(range.low, range.high); }
+bool read(const JsonField& field, const Range<bool>&) { return field.boolean(); }
+std::uint64_t read(const JsonField& field, const Range<std::uint64_t>&) { return field.unsigned_number(); }
 
-Names read(const Field& field, const Range<Names>& range) {
+Names read(const JsonField& field, const Range<Names>& range) {
   Names read;
-  for (const Field& name : field.elements(0, range.most, "names of views")) read.push_back(name.text());
+  for (const JsonField& name : field.elements(0, range.most, "names of views")) read.push_back(name.text());
   return read;
 }
 
 template <Named Enum>
-Enum read(const Field& field, const Range<Enum>&) {
+Enum read(const JsonField& field, const Range<Enum>&) {
   return field.one_of(engine::names<Enum>);
 }
 
@@ -86,7 +86,7 @@ ordered_json description_of(const Parameter<T>& parameter) {
 
 }  // namespace
 
-GivenParams read_params(const Field& field) {
+GivenParams read_params(const JsonField& field) {
   const Members members(field, engine::params::wire_names);
   GivenParams params;
   engine::params::for_each_parameter([&](const auto& parameter) {

@@ -10,7 +10,7 @@
 namespace proto {
 
 /// Reads an object of parameters; what it does not hold stays open.
-[[nodiscard]] engine::params::GivenParams read_params(const Field& field);
+[[nodiscard]] engine::params::GivenParams read_params(const JsonField& field);
 
 /// The object that read_params() reads back: what is given, in the order of the table.
 [[nodiscard]] nlohmann::ordered_json encode(const engine::params::GivenParams& params);

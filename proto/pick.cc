@@ -12,9 +12,9 @@ namespace {
 using engine::propagate;
 using nlohmann::ordered_json;
 
-constexpr double max_pixel = 1e6;
+constexpr double max_pixel = 1e6;  // absolute coordinate: far outside of any picture, and safe to compute with
 
-PickRequest read_sphere(const Field& field) {
+PickRequest read_sphere(const JsonField& field) {
   const Members members(field, {"point", "radius"});
   PickRequest request;
   if (const auto f = members.required("point")) request.point = f->point();
@@ -22,7 +22,7 @@ PickRequest read_sphere(const Field& field) {
   return request;
 }
 
-PickRequest read_pixel(const Field& field) {
+PickRequest read_pixel(const JsonField& field) {
   const Members members(field, {"camera", "view", "x", "y", "radius"});
   PickRequest request;
   request.viewpoint = read_viewpoint(field, members);
@@ -32,7 +32,7 @@ PickRequest read_pixel(const Field& field) {
   return request;
 }
 
-PickRequest read_request(const Field& field) {
+PickRequest read_request(const JsonField& field) {
   const Members members(field, {"camera", "view", "x", "y", "radius", "point"});
   return members.optional("point") ? read_sphere(field) : read_pixel(field);
 }
@@ -48,7 +48,7 @@ Result<PickRequest> parse_pick_request(std::string_view text, const JsonLimits& 
   const auto document = parse_document(text, limits);
   if (!document) return propagate(document);
   std::optional<engine::Error> error;
-  PickRequest request = read_request(Field(*document, "", error));
+  PickRequest request = read_request(JsonField(*document, "", error));
   if (error) return tl::make_unexpected(std::move(*error));
   return request;
 }

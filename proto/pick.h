@@ -1,4 +1,4 @@
-// What is under a pixel, and how much a sphere holds: request and answer.
+// Picking: what is under a pixel, and how many Gaussians a sphere holds. Request and answer.
 #pragma once
 
 #include <cstdint>
@@ -12,16 +12,17 @@ namespace proto {
 
 /// A pixel, with or without a radius; or a point with a radius.
 struct PickRequest {
-  std::optional<Viewpoint> viewpoint;  ///< Nothing: `point` is given.
+  std::optional<Viewpoint> viewpoint;  ///< Camera of the pixel; none where `point` is given.
   double x = 0, y = 0;                 ///< Pixels from the upper left corner of the picture; the first centre is 0.5.
-  std::optional<Point> point;          ///< World units.
-  std::optional<double> radius;        ///< World units, above 0.
+  std::optional<Point> point;          ///< Centre of the sphere, world units.
+  std::optional<double> radius;        ///< Radius of the sphere, world units, above 0.
   bool operator==(const PickRequest&) const = default;
 };
 
 /// Strict, as parse_edit_request(), with its errors. `where` is such as "camera.fx" or "x".
 [[nodiscard]] Result<PickRequest> parse_pick_request(std::string_view text, const JsonLimits& limits = {});
 
+/// What was found; fields without a value say that nothing was.
 struct PickResult {
   bool hit = false;
   std::optional<Point> point;             ///< On the surface, world units.

@@ -1,4 +1,4 @@
-// What the service answers when it does not do what was asked: application/problem+json (RFC 9457).
+// Answers of the service to requests that it refuses or fails at: application/problem+json (RFC 9457).
 #pragma once
 
 #include <string>
@@ -8,6 +8,7 @@
 
 namespace proto {
 
+/// One such answer.
 struct Problem {
   int status = 500;
   std::string code;    ///< For programs: "invalid_argument", "not_found", ...
@@ -24,7 +25,7 @@ struct Problem {
 /// The standard phrase of a status: "Not Found".
 [[nodiscard]] std::string_view status_phrase(int status);
 
-/// Bytes that are no UTF-8 become the replacement character.
+/// The problem as JSON. Bytes that are no UTF-8 become the replacement character.
 [[nodiscard]] std::string to_json(const Problem& problem);
 
 }  // namespace proto

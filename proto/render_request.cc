@@ -14,12 +14,12 @@ namespace {
 using engine::propagate;
 using nlohmann::json;
 
-constexpr std::array what_names{Name{What::color, "color"}, Name{What::depth, "depth"}, Name{What::alpha, "alpha"},
-                                Name{What::mask, "mask"}};
+constexpr std::array what_names{Name{PictureContent::color, "color"}, Name{PictureContent::depth, "depth"},
+                                Name{PictureContent::alpha, "alpha"}, Name{PictureContent::mask, "mask"}};
 constexpr std::array format_names{Name{PictureFormat::jpeg, "jpeg"}, Name{PictureFormat::png, "png"},
                                   Name{PictureFormat::exr, "exr"}};
 
-Point read_colour(const Field& field) {
+Point read_colour(const JsonField& field) {
   Point colour{};
   const auto channels = field.elements(3, 3, "numbers");
   for (std::size_t i = 0; i < channels.size(); ++i) colour[i] = channels[i].number(0, 1);
@@ -28,7 +28,7 @@ Point read_colour(const Field& field) {
 
 /// What both forms say in the same words.
 void read_options(const Members& members, RenderRequest& request) {
-  if (const auto f = members.optional("what")) request.what = f->one_of(what_names);
+  if (const auto f = members.optional("what")) request.content = f->one_of(what_names);
   if (const auto f = members.optional("format")) request.format = f->one_of(format_names);
   if (const auto f = members.optional("max_side")) request.max_side = f->whole(1, max_camera_side);
   if (const auto f = members.optional("background")) request.background = read_colour(*f);
@@ -36,7 +36,7 @@ void read_options(const Members& members, RenderRequest& request) {
   if (const auto f = members.optional("quality")) request.quality = f->whole(1, 100);
 }
 
-RenderRequest read_request(const Field& field) {
+RenderRequest read_request(const JsonField& field) {
   const Members members(field, {"camera", "view", "what", "format", "max_side", "background", "sh_degree", "quality"});
   RenderRequest request;
   request.viewpoint = read_viewpoint(field, members);
@@ -44,7 +44,7 @@ RenderRequest read_request(const Field& field) {
   return request;
 }
 
-RenderRequest read_query(const Field& field) {
+RenderRequest read_query(const JsonField& field) {
   const Members members(field, {"view", "eye", "target", "up", "fov", "width", "height", "what", "format", "max_side",
                                 "background", "sh_degree", "quality"});
   RenderRequest request;
@@ -94,9 +94,9 @@ json value_of(std::string_view name, const std::string& text) {
   return scalar(text);
 }
 
-Result<RenderRequest> decode(const json& document, RenderRequest (*read)(const Field&)) {
+Result<RenderRequest> decode(const json& document, RenderRequest (*read)(const JsonField&)) {
   std::optional<engine::Error> error;
-  RenderRequest request = read(Field(document, "", error));
+  RenderRequest request = read(JsonField(document, "", error));
   if (error) return tl::make_unexpected(std::move(*error));
   return request;
 }

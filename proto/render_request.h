@@ -1,4 +1,4 @@
-// What picture is wanted: as JSON, or as the query of a URL.
+// Requests for a picture: as JSON, or as the query of a URL.
 #pragma once
 
 #include <functional>
@@ -11,17 +11,19 @@
 
 namespace proto {
 
-enum class What { color, depth, alpha, mask };
+/// Which quantity of a rendering the picture shows.
+enum class PictureContent { color, depth, alpha, mask };
 enum class PictureFormat { jpeg, png, exr };
 
+/// One picture of a version.
 struct RenderRequest {
   Viewpoint viewpoint;
-  What what = What::color;
-  std::optional<PictureFormat> format;  ///< Nothing: what the client accepts.
-  std::optional<int> max_side;          ///< Pixels, from 1: the camera is scaled down to it.
-  Point background{};                   ///< Colour, each 0 to 1.
-  int sh_degree = 3;                    ///< 0 to 3: bands above are left out.
-  int quality = 90;                     ///< 1 to 100, of a JPEG.
+  PictureContent content = PictureContent::color;  ///< On the wire: `what`.
+  std::optional<PictureFormat> format;             ///< Without one, the format that the client accepts.
+  std::optional<int> max_side;                     ///< Pixels, from 1: the camera is scaled down to it.
+  Point background{};                              ///< Colour, each 0 to 1.
+  int sh_degree = 3;                               ///< 0 to 3: bands above are left out.
+  int quality = 90;                                ///< 1 to 100, of a JPEG.
   bool operator==(const RenderRequest&) const = default;
 };
 
@@ -32,8 +34,8 @@ struct RenderRequest {
 /// sh_degree, quality.
 [[nodiscard]] std::vector<std::string> render_queries();
 
-/// The same from a query: view=NAME, or eye=x,y,z&target=x,y,z&width=px&height=px with up=x,y,z and fov=degrees if they
-/// are wanted.
+/// Reads the request from a query: view=NAME, or eye=x,y,z&target=x,y,z&width=px&height=px with up=x,y,z and
+/// fov=degrees if they are wanted.
 ///   query   the parameter of that name, if it is there
 ///   errors  invalid_argument: `where` is the parameter
 [[nodiscard]] Result<RenderRequest> parse_render_query(

@@ -12,7 +12,7 @@ namespace {
 using engine::propagate;
 using nlohmann::ordered_json;
 
-constexpr std::size_t max_scene_name_bytes = 200;
+constexpr std::size_t max_scene_name_bytes = 200;  // as the store has it (server/scenes/catalogue/names.cc)
 
 template <class T>
 ordered_json or_null(const std::optional<T>& value) {
@@ -72,20 +72,20 @@ ordered_json encode(const View& view) {
           {"photo", view.photo}};
 }
 
-std::string read_name(const Field& field) {
+std::string read_name(const JsonField& field) {
   std::string name = field.text();
   if (name.empty() || name.size() > max_scene_name_bytes)
     field.refuse("expected a name of 1 to " + std::to_string(max_scene_name_bytes) + " bytes");
   return name;
 }
 
-std::string read_path(const Field& field) {
+std::string read_path(const JsonField& field) {
   std::string path = field.text();
   if (path.empty()) field.refuse("expected a path below the scene root");
   return path;
 }
 
-PathSource read_scene_source(const Field& field) {
+PathSource read_scene_source(const JsonField& field) {
   const Members members(field, {"path", "name"});
   PathSource source;
   if (const auto f = members.required("path")) source.path = read_path(*f);
@@ -93,14 +93,14 @@ PathSource read_scene_source(const Field& field) {
   return source;
 }
 
-PathSource read_dataset_source(const Field& field) {
+PathSource read_dataset_source(const JsonField& field) {
   const Members members(field, {"path"});
   PathSource source;
   if (const auto f = members.required("path")) source.path = read_path(*f);
   return source;
 }
 
-ScenePatch read_scene_patch(const Field& field) {
+ScenePatch read_scene_patch(const JsonField& field) {
   const Members members(field, {"name", "up"});
   ScenePatch patch;
   if (const auto f = members.optional("name")) patch.name = read_name(*f);
@@ -110,11 +110,11 @@ ScenePatch read_scene_patch(const Field& field) {
 }
 
 template <class T>
-Result<T> parse(std::string_view text, const JsonLimits& limits, T (*read)(const Field&)) {
+Result<T> parse(std::string_view text, const JsonLimits& limits, T (*read)(const JsonField&)) {
   const auto document = parse_document(text, limits);
   if (!document) return propagate(document);
   std::optional<engine::Error> error;
-  T value = read(Field(*document, "", error));
+  T value = read(JsonField(*document, "", error));
   if (error) return tl::make_unexpected(std::move(*error));
   return value;
 }

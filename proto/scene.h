@@ -1,4 +1,4 @@
-// Scenes on the wire: what the service says about them, and what it is told.
+// Scenes on the wire: what the service says about them, and what clients send.
 #pragma once
 
 #include <cstddef>
@@ -12,31 +12,33 @@
 
 namespace proto {
 
-/// Times are RFC 3339, UTC, milliseconds. Lengths are world units.
+/// One link of a scene's chain. Here and below, times are RFC 3339, UTC, milliseconds; lengths are world units.
 struct SceneVersion {
   int version = 0;
-  std::optional<int> parent;  ///< None for version 0.
-  std::string edit;           ///< That made it; empty for version 0.
+  std::optional<int> parent;  ///< Version that was edited; none for version 0.
+  std::string edit;           ///< Id of the edit that made it; empty for version 0.
   std::string created;
   std::size_t gaussians = 0;
-  std::uint64_t disk_bytes = 0;  ///< Beside version 0.
+  std::uint64_t disk_bytes = 0;  ///< What it takes beside version 0.
 };
 
+/// What is known of a scene's dataset. PSNR: renders of version 0 against photos, dB.
 struct SceneDataset {
   std::string kind;  ///< "colmap", "transforms", "inria"
   std::size_t views = 0, photos = 0;
   std::optional<double> psnr_mean_db, psnr_worst_db;
-  std::string psnr_worst_view;  ///< Empty where psnr_worst_db is.
+  std::string psnr_worst_view;  ///< Empty without psnr_worst_db.
   std::vector<std::string> warnings;
 };
 
+/// What is known of a scene: `low` and `high` bound the means, `centre` is their median.
 struct Scene {
   std::string id, name, created;
   std::string format;  ///< "ply", "compressed_ply", "splat", "spz"
   std::size_t gaussians = 0;
   int sh_degree = 0;
   Point low{}, high{}, centre{};
-  double radius = 0;
+  double radius = 0;  ///< Median distance of the means from the centre.
   std::optional<Point> up;
   std::uint64_t disk_bytes = 0, memory_bytes = 0;
   std::size_t views = 0;
@@ -47,25 +49,27 @@ struct Scene {
 [[nodiscard]] std::string to_json(const Scene& scene);
 [[nodiscard]] std::string to_json(const std::vector<Scene>& scenes);  ///< {"scenes": [...]}
 
+/// A view of a scene.
 struct View {
   std::string name;
   PinholeCamera camera;
-  bool photo = false;  ///< Whether the dataset has one of it.
+  bool photo = false;  ///< Whether the dataset has a photo of it.
 };
+/// {"kind": kind, "views": [...]}
 ///   kind  "dataset" or "virtual"
 [[nodiscard]] std::string to_json(const std::vector<View>& views, std::string_view kind);
 
 /// A file or folder below the scene root.
 struct PathSource {
   std::string path;
-  std::string name;  ///< Of the scene; empty: that of the file.
+  std::string name;  ///< Name of the scene; empty: that of the file.
   bool operator==(const PathSource&) const = default;
 };
 
 /// What is to change about a scene.
 struct ScenePatch {
   std::optional<std::string> name;
-  std::optional<std::optional<Point>> up;  ///< Given as nothing: forget it.
+  std::optional<std::optional<Point>> up;  ///< Present but empty: removes what was set.
   bool operator==(const ScenePatch&) const = default;
 };
 

@@ -8,20 +8,22 @@
 
 namespace proto {
 
-/// A part an edit request can name, and why it cannot be had.
+/// Something that an edit request can name, and, where it cannot be had, why.
 struct Capability {
   std::string name;
   bool available = true;
-  std::string reason;  ///< Of one that is not available.
+  std::string reason;  ///< Why it is not available; else empty.
 };
 
+/// Most of each thing that the service takes: bytes, counts, and pixels of a side.
 struct ServiceLimits {
   std::uint64_t upload_bytes = 0, json_bytes = 0, gaussians = 0, handles = 0, views = 0, render_side = 0,
                 image_side = 0, queued_edits = 0, scene_memory_bytes = 0, streams = 0, scenes = 0, dataset_bytes = 0;
 };
 
+/// What the service is and has.
 struct ServiceInfo {
-  std::string version;
+  std::string version;                      ///< Release of the program.
   std::string simd;                         ///< Instruction set in use.
   std::vector<std::string> simd_available;  ///< Best first.
   int threads = 0;

@@ -1,4 +1,4 @@
-// Moments as the wire writes them.
+// Points in time as the wire writes them.
 #pragma once
 
 #include <chrono>

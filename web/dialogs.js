@@ -29,7 +29,7 @@ function modal(element) {
 }
 
 /** Asks before something that cannot be undone. */
-export function confirmed({ title, detail, yes, danger = true }) {
+export function askConfirmation({ title, detail, yes, danger = true }) {
   return new Promise((resolve) => {
     const dialog = modal(
       h(
@@ -54,7 +54,7 @@ export function confirmed({ title, detail, yes, danger = true }) {
 }
 
 /** Asks for a line of text; null: given up. */
-export function asked({ title, label, value }) {
+export function askText({ title, label, value }) {
   return new Promise((resolve) => {
     const input = h("input", {
       type: "text",
@@ -88,7 +88,7 @@ export function asked({ title, label, value }) {
 }
 
 /** Asks to choose one of several; null: given up. */
-export function chosen({ title, options }) {
+export function askChoice({ title, options }) {
   return new Promise((resolve) => {
     const dialog = modal(
       h(

@@ -74,17 +74,17 @@ export const asking = (place, ask) => async () => {
  *    key(item)            what tells items apart
  *    make(item)           -> {element, update(item, index)} */
 export function keyedList(parent, key, make) {
-  const kept = new Map();
+  const entries = new Map();
   return (items) => {
     const wanted = new Set(items.map(key));
-    for (const [k, entry] of kept)
+    for (const [k, entry] of entries)
       if (!wanted.has(k)) {
         entry.element.remove();
-        kept.delete(k);
+        entries.delete(k);
       }
     items.forEach((item, i) => {
-      let entry = kept.get(key(item));
-      if (!entry) kept.set(key(item), (entry = make(item)));
+      let entry = entries.get(key(item));
+      if (!entry) entries.set(key(item), (entry = make(item)));
       entry.update?.(item, i);
       if (parent.children[i] !== entry.element) parent.insertBefore(entry.element, parent.children[i] ?? null);
     });

@@ -17,9 +17,10 @@ import { History } from "./history.js";
 import { previewKey, requestOf } from "./requests.js";
 import { follow, hasEnded, merged } from "./watch.js";
 
-const COUNT_DELAY_MS = 150;
-const PREVIEW_DELAY_MS = 300;
-const SAVE_DELAY_MS = 400;
+// Choices: how long after the last change of a handle or of the request something is done about it.
+const COUNT_DELAY_MS = 150; // Counting the Gaussians of handles: cheap.
+const PREVIEW_DELAY_MS = 300; // A preview: it costs the service a second or so.
+const SAVE_DELAY_MS = 400; // Writing to the browser's storage: nobody waits for it.
 
 /** What there is before a scene is open. */
 export const NOTHING_OPEN = {
@@ -53,8 +54,8 @@ export const NOTHING_OPEN = {
 };
 
 // What outlives a reload: as it is; and all, of which open() puts back what still fits the scene.
-const REMEMBERED = ["region", "mode", "preset", "prompt", "params", "autoPreview", "layer", "tab", "constraint"];
-const KEPT = ["pose", "version", "handles", "viewName", ...REMEMBERED];
+const LASTING_KEYS = ["region", "mode", "preset", "prompt", "params", "autoPreview", "layer", "tab", "constraint"];
+const STORED_KEYS = ["pose", "version", "handles", "viewName", ...LASTING_KEYS];
 
 /** The members of an object that have these names, as far as it has them. */
 const only = (names, from) =>
@@ -95,7 +96,7 @@ export class Editor {
     store.watch(["handles", "version", "region", "mode", "preset", "params", "autoPreview", "dragging"], () =>
       this.#requestChanged(),
     );
-    store.watch(KEPT, () => this.#saveSoon());
+    store.watch(STORED_KEYS, () => this.#saveSoon());
   }
 
   get state() {
@@ -110,21 +111,21 @@ export class Editor {
     const opening = this.#opened;
     const scene = await api.scene(id);
     if (opening !== this.#opened) return;
-    const kept = this.memory.load(scene) ?? {};
-    const version = scene.versions.some((v) => v.version === kept.version)
-      ? kept.version
+    const stored = this.memory.load(scene) ?? {};
+    const version = scene.versions.some((v) => v.version === stored.version)
+      ? stored.version
       : scene.versions.at(-1).version;
-    const handles = kept.version === version && Array.isArray(kept.handles) ? kept.handles : [];
+    const handles = stored.version === version && Array.isArray(stored.handles) ? stored.handles : [];
     this.#nextId = Math.max(0, ...handles.map((h) => h.id)) + 1;
-    const pose = isPose(kept.pose) ? kept.pose : null;
-    this.#lastView = kept.viewName ?? null;
+    const pose = isPose(stored.pose) ? stored.pose : null;
+    this.#lastView = stored.viewName ?? null;
     this.store.set({
-      ...only(REMEMBERED, kept),
+      ...only(LASTING_KEYS, stored),
       scene,
       version,
       handles,
       pose: pose ?? (scene.dataset ? null : firstPose(scene)),
-      viewName: pose ? (kept.viewName ?? null) : null,
+      viewName: pose ? (stored.viewName ?? null) : null,
     });
     await Promise.allSettled([this.#loadViews(opening), this.#loadEdits(opening)]);
   }
@@ -199,8 +200,8 @@ export class Editor {
     const { scene, version } = this.state;
     const camera = onTheWire({ ...pose, width: 200, height: 200 });
     try {
-      const found = await api.pick(scene.id, version, { camera, x: 100, y: 100 });
-      if (found.hit && this.state.pose === pose) this.store.set({ pose: pivotedAt(pose, found.point) });
+      const picked = await api.pick(scene.id, version, { camera, x: 100, y: 100 });
+      if (picked.hit && this.state.pose === pose) this.store.set({ pose: pivotedAt(pose, picked.point) });
     } catch {
       // The pivot stays near the scene's centre: good enough, and not worth a message.
     }
@@ -279,13 +280,13 @@ export class Editor {
     const abort = (this.#placing = new AbortController());
     const { scene, version } = this.state;
     try {
-      const found = await api.pick(scene.id, version, { camera: onTheWire(camera), x, y }, abort.signal);
+      const picked = await api.pick(scene.id, version, { camera: onTheWire(camera), x, y }, abort.signal);
       if (abort.signal.aborted) return;
-      if (!found.hit) return this.say("There is nothing here to take hold of.", { seconds: 3 });
+      if (!picked.hit) return this.say("There is nothing here to take hold of.", { seconds: 3 });
       const handle = {
         id: this.#nextId++,
-        source: found.point,
-        normal: found.normal ?? null,
+        source: picked.point,
+        normal: picked.normal ?? null,
         target: null,
         radius: this.#defaultRadius(),
         group: this.state.handles.at(-1)?.group ?? 0,
@@ -301,8 +302,8 @@ export class Editor {
   /** The point of the surface under a pixel; null if there is none. */
   async surfaceAt(camera, x, y) {
     const { scene, version } = this.state;
-    const found = await api.pick(scene.id, version, { camera: onTheWire(camera), x, y });
-    return found.hit ? found.point : null;
+    const picked = await api.pick(scene.id, version, { camera: onTheWire(camera), x, y });
+    return picked.hit ? picked.point : null;
   }
 
   /** Changes a handle. `note`: can be undone (not each step of a drag). */
@@ -376,8 +377,8 @@ export class Editor {
       if (this.state.counts[handle.id]?.key === key) continue;
       let count;
       try {
-        const found = await api.pick(scene.id, version, { point: handle.source, radius: handle.radius }, abort.signal);
-        count = { key, gaussians: found.gaussians_in_radius ?? 0 };
+        const picked = await api.pick(scene.id, version, { point: handle.source, radius: handle.radius }, abort.signal);
+        count = { key, gaussians: picked.gaussians_in_radius ?? 0 };
       } catch (error) {
         if (api.wasGivenUp(error)) return;
         count = { key, gaussians: null, error };
@@ -530,10 +531,10 @@ export class Editor {
       if (current?.how === how) return;
       current?.();
       const end = follow(edit.id, {
-        told: (news) => this.#editTold(news),
-        gone: () => this.#editGone(edit.id),
+        onUpdate: (update) => this.#editUpdated(update),
+        onGone: () => this.#editGone(edit.id),
         events: how === "events" ? api.editEvents : null,
-        ask: api.edit,
+        fetchEdit: api.edit,
         every: how === "events" ? 1000 : 3000,
       });
       this.#following.set(
@@ -543,7 +544,7 @@ export class Editor {
     });
   }
 
-  #editTold(edit) {
+  #editUpdated(edit) {
     const before = this.state.edits.find((e) => e.id === edit.id);
     this.store.set({ edits: merged(this.state.edits, edit) });
     if (!hasEnded(edit)) return;
@@ -584,11 +585,11 @@ export class Editor {
   }
 
   async stopEdit(id) {
-    this.#editTold(await api.stopEdit(id));
+    this.#editUpdated(await api.stopEdit(id));
   }
 
   async cancelEdit(id) {
-    this.#editTold(await api.cancelEdit(id));
+    this.#editUpdated(await api.cancelEdit(id));
   }
 
   async deleteEdit(id) {
@@ -605,7 +606,7 @@ export class Editor {
   #save() {
     const { scene } = this.state;
     const { thumbnail } = this.memory.load(scene) ?? {};
-    this.memory.save(scene, { ...only(KEPT, this.state), thumbnail });
+    this.memory.save(scene, { ...only(STORED_KEYS, this.state), thumbnail });
   }
 
   /** Keeps a small picture of the scene, for the list of scenes. */

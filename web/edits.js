@@ -1,9 +1,9 @@
 // The edits of a scene: the queue, the one that runs, those that ended.
 
-import { confirmed, say, showPictures } from "./dialogs.js";
+import { askConfirmation, say, showPictures } from "./dialogs.js";
 import { attrs, h, keyedList, problemPlace, showProblem, text } from "./dom.js";
 import { count, counted, duration, gaussians, loss, when } from "./format.js";
-import { warnings } from "./run.js";
+import { warnings } from "./request_panel.js";
 import { hasEnded } from "./watch.js";
 
 const STATES = {
@@ -108,7 +108,7 @@ function card(editor, id) {
       const started = current()?.state !== "queued";
       const sure =
         !started ||
-        (await confirmed({
+        (await askConfirmation({
           title: "Cancel this edit?",
           detail: "What it has done so far is lost.",
           yes: "Cancel the edit",

@@ -1,4 +1,4 @@
-// How pictures are asked for while the camera moves: how large, and in which order.
+// Requests for pictures while the camera moves: how large, and in which order.
 
 /** Chooses the size of pictures while moving so that one comes back in about `goal` ms. */
 export class AdaptiveSide {
@@ -24,25 +24,25 @@ export class AdaptiveSide {
   }
 }
 
-/** Asks for one picture at a time; of what was wished for meanwhile, only the latest is asked for next. An older answer
+/** Requests one picture at a time; of the requests made meanwhile, only the latest is carried out next. An older answer
  *  can therefore never replace a newer one.
- *    load(job, signal)     -> picture
- *    show(picture, job)    it arrived
- *    failed(error, job)    it did not (never for one that was given up)
- *  A job is {key, large, ...}: equal keys are equal pictures; a large one is given up as soon as another is wanted. */
+ *    load(job, signal)        returns the picture
+ *    onPicture(picture, job)  is called when it has arrived
+ *    onError(error, job)      is called when loading failed, but not for a picture that was given up
+ *  A job is {key, large, ...}: equal keys are equal pictures; a large one is given up as soon as another is requested. */
 export class FrameQueue {
   #running = null;
   #next = null;
 
-  constructor({ load, show, failed }) {
-    Object.assign(this, { load, show, failed });
+  constructor({ load, onPicture, onError }) {
+    Object.assign(this, { load, onPicture, onError });
   }
 
   get busy() {
     return this.#running !== null;
   }
 
-  want(job) {
+  request(job) {
     if (!this.#running) {
       this.#start(job);
     } else if (this.#running.job.key === job.key && !this.#running.abort.signal.aborted) {
@@ -65,26 +65,26 @@ export class FrameQueue {
     let outcome;
     try {
       const picture = await this.load(job, abort.signal);
-      outcome = () => this.show(picture, job);
+      outcome = () => this.onPicture(picture, job);
     } catch (error) {
-      outcome = () => this.failed(error, job);
+      outcome = () => this.onError(error, job);
     }
     this.#running = null;
     if (!abort.signal.aborted) outcome();
-    // What was shown may itself have led to a new wish, which is then under way.
+    // The call may itself have led to a new request, which is then under way.
     const next = this.#next;
     this.#next = null;
     if (next && !this.#running) this.#start(next);
   }
 }
 
-/** The last few things by key; the least recently used go first.
- *    dropped(value)  called for each that goes */
+/** A cache of the last few values by key; the least recently used go first.
+ *    onEvict(value)  is called for each that goes */
 export class Recent {
   #entries = new Map();
 
-  constructor(limit, dropped = () => {}) {
-    Object.assign(this, { limit, dropped });
+  constructor(limit, onEvict = () => {}) {
+    Object.assign(this, { limit, onEvict });
   }
 
   get(key) {
@@ -97,18 +97,18 @@ export class Recent {
 
   put(key, value) {
     const old = this.#entries.get(key);
-    if (old !== undefined && old !== value) this.dropped(old);
+    if (old !== undefined && old !== value) this.onEvict(old);
     this.#entries.delete(key);
     this.#entries.set(key, value);
     while (this.#entries.size > this.limit) {
       const [oldest, gone] = this.#entries.entries().next().value;
       this.#entries.delete(oldest);
-      this.dropped(gone);
+      this.onEvict(gone);
     }
   }
 
   clear() {
-    for (const value of this.#entries.values()) this.dropped(value);
+    for (const value of this.#entries.values()) this.onEvict(value);
     this.#entries.clear();
   }
 }

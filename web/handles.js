@@ -240,12 +240,12 @@ export class HandleList {
   }
 
   #counts(handle, i, held, note) {
-    const found = this.#editor.countOf(handle);
+    const answer = this.#editor.countOf(handle);
     const preview = this.#editor.previewIsCurrent ? this.#editor.state.preview : null;
     const own = preview?.handles[i]?.gaussians;
-    text(held, found === null ? "…" : found.gaussians === null ? "?" : gaussians(found.gaussians));
-    attrs(held, { "data-empty": found?.gaussians === 0 });
-    const shares = own !== undefined && found?.gaussians > own;
+    text(held, answer === null ? "…" : answer.gaussians === null ? "?" : gaussians(answer.gaussians));
+    attrs(held, { "data-empty": answer?.gaussians === 0 });
+    const shares = own !== undefined && answer?.gaussians > own;
     note.hidden = !shares;
     if (shares)
       text(note, `Moves ${count(own)} of them; the others are nearer to another handle, or outside of the region.`);
@@ -255,11 +255,11 @@ export class HandleList {
     const { problem } = this.#editor.state;
     const at = problem ? partOf(problem.error.where) : {};
     if (at.part === "handle" && at.index === i) return showProblem(place, problem.error);
-    const found = this.#editor.countOf(handle);
-    if (found?.error) return showProblem(place, found.error);
+    const answer = this.#editor.countOf(handle);
+    if (answer?.error) return showProblem(place, answer.error);
     showProblem(
       place,
-      found?.gaussians === 0
+      answer?.gaussians === 0
         ? { detail: "There is no Gaussian within the radius: raise it, or move the handle." }
         : null,
     );

@@ -4,6 +4,7 @@ export class History {
   #past = [];
   #future = [];
 
+  /** limit: entries that can be undone; a choice. */
   constructor(limit = 100) {
     this.limit = limit;
   }

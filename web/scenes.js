@@ -1,7 +1,7 @@
 // The first page: the scenes there are, and how to bring one.
 
 import * as api from "./api.js";
-import { asked, confirmed } from "./dialogs.js";
+import { askConfirmation, askText } from "./dialogs.js";
 import { asking, h, keyedList, problemPlace, showProblem, text } from "./dom.js";
 import { bytes, count, counted, gaussians, nameOfFile, when } from "./format.js";
 import { pathForm, showUpload } from "./uploads.js";
@@ -123,14 +123,14 @@ function card(id, { memory, open, refresh }) {
   const problem = problemPlace("scene-problem");
   let current = null;
   const rename = asking(problem, async () => {
-    const wish = await asked({ title: "Rename the scene", label: "Name", value: current.name });
+    const wish = await askText({ title: "Rename the scene", label: "Name", value: current.name });
     if (!wish) return;
     await api.patchScene(id, { name: wish });
     await refresh();
   });
   const remove = asking(problem, async () => {
     const n = current.versions.length - 1;
-    const sure = await confirmed({
+    const sure = await askConfirmation({
       title: `Delete “${current.name}”?`,
       detail: `The scene${n > 0 ? ` and its ${counted(n, "edited version")}` : ""} will be gone from the service. This cannot be undone.`,
       yes: "Delete",

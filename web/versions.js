@@ -1,11 +1,11 @@
 // The scene itself: its versions with undo and downloads, its dataset, its up direction.
 
 import * as api from "./api.js";
-import { asked, say } from "./dialogs.js";
+import { askText, say } from "./dialogs.js";
 import { asking, attrs, h, keyedList, problemPlace, text } from "./dom.js";
 import { parentOf } from "./editor.js";
 import { bytes, count, gaussians, point, when } from "./format.js";
-import { warnings } from "./run.js";
+import { warnings } from "./request_panel.js";
 import { pathForm, showUpload } from "./uploads.js";
 
 export function buildVersions(editor) {
@@ -70,7 +70,7 @@ export function buildVersions(editor) {
     "Rename",
     "rename",
     asking(problem, async () => {
-      const name = await asked({ title: "Rename the scene", label: "Name", value: store.state.scene.name });
+      const name = await askText({ title: "Rename the scene", label: "Name", value: store.state.scene.name });
       if (name) await editor.rename(name);
     }),
   );

@@ -20,11 +20,12 @@ import { AdaptiveSide, FrameQueue, Recent } from "./frames.js";
 import { Overlay } from "./overlay.js";
 import { partOf } from "./requests.js";
 
-const MAX_SIDE = 1600;
-const STILL_AFTER_MS = 160;
-const CLICK_PX = 4;
-const ORBIT_PER_PX = 0.0055; // Radians.
-const KEPT_PICTURES = 6;
+// All of these are choices, tried by hand.
+const MAX_SIDE = 1600; // Pixels of the longer side of a picture at rest: sharp enough on a large window.
+const STILL_AFTER_MS = 160; // Without a movement, before the picture is requested at its full size.
+const CLICK_PX = 4; // A pointer that moves less than this has clicked, not dragged.
+const ORBIT_PER_PX = 0.0055; // Radians: half a turn across 570 pixels.
+const MAX_CACHED_PICTURES = 6; // Enough to go back and forth between two versions and three layers.
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }; // Right, down.
 const THUMBNAIL = { width: 320, height: 200 };
 
@@ -41,8 +42,8 @@ export class Viewer {
   #canvas = byId("picture");
   #overlay;
   #adaptive = new AdaptiveSide();
-  #recent = new Recent(KEPT_PICTURES);
-  #shown = null; // {picture, job}: what is on the canvas.
+  #recent = new Recent(MAX_CACHED_PICTURES);
+  #displayed = null; // {picture, job}: what is on the canvas.
   #queue;
   #size = { width: 1, height: 1 };
   #pointers = new Map();
@@ -57,8 +58,8 @@ export class Viewer {
     this.#editor = editor;
     this.#queue = new FrameQueue({
       load: (job, signal) => this.#load(job, signal),
-      show: (picture, job) => this.#arrived(picture, job),
-      failed: (error, job) => this.#failed(error, job),
+      onPicture: (picture, job) => this.#arrived(picture, job),
+      onError: (error, job) => this.#failed(error, job),
     });
     this.#overlay = new Overlay(byId("overlay"), {
       grab: (id, event) => this.#grab(id, event),
@@ -81,16 +82,16 @@ export class Viewer {
   /** The camera of the picture on the screen, in CSS pixels: what the user sees is what they point at. */
   get camera() {
     const { pose } = this.#state;
-    const shown = this.#shown?.job;
-    const seen = shown && shown.scene === this.#state.scene?.id ? shown.pose : pose;
-    return seen && { ...seen, ...this.#size };
+    const displayed = this.#displayed?.job;
+    const shownPose = displayed && displayed.scene === this.#state.scene?.id ? displayed.pose : pose;
+    return shownPose && { ...shownPose, ...this.#size };
   }
 
   #sceneChanged(scene) {
-    if (this.#shown && this.#shown.job.scene !== scene?.id) {
+    if (this.#displayed && this.#displayed.job.scene !== scene?.id) {
       this.#queue.clear();
       this.#recent.clear();
-      this.#shown = null;
+      this.#displayed = null;
       this.#canvas.getContext("2d").clearRect(0, 0, this.#canvas.width, this.#canvas.height);
       this.#message("");
     }
@@ -129,34 +130,34 @@ export class Viewer {
     const { scene, pose } = this.#state;
     if (!scene || !pose || this.#size.width <= 1) return;
     const full = this.#job(true);
-    if (this.#shown?.job.key === full.key) return this.#queue.clear();
+    if (this.#displayed?.job.key === full.key) return this.#queue.clear();
     clearTimeout(this.#stillTimer);
-    const kept = this.#recent.get(full.key);
-    if (kept) {
+    const cached = this.#recent.get(full.key);
+    if (cached) {
       this.#queue.clear();
-      return this.#show(kept, full);
+      return this.#show(cached, full);
     }
     const small = this.#job(false);
-    if (!this.#shows(small)) this.#queue.want(small);
-    const left = this.#movingUntil - performance.now();
-    if (left > 0) this.#stillTimer = setTimeout(() => this.refresh(), left);
-    else this.#queue.want(full);
+    if (!this.#shows(small)) this.#queue.request(small);
+    const remaining = this.#movingUntil - performance.now();
+    if (remaining > 0) this.#stillTimer = setTimeout(() => this.refresh(), remaining);
+    else this.#queue.request(full);
     this.#busySoon();
   }
 
   /** Whether the picture on the screen is the one asked for, of whatever size. */
   #shows(job) {
-    const shown = this.#shown?.job;
+    const displayed = this.#displayed?.job;
     return (
-      !!shown &&
-      shown.version === job.version &&
-      shown.layer === job.layer &&
-      pictureKey(shown.pose) === pictureKey(job.pose)
+      !!displayed &&
+      displayed.version === job.version &&
+      displayed.layer === job.layer &&
+      pictureKey(displayed.pose) === pictureKey(job.pose)
     );
   }
 
   async #load(job, signal) {
-    const asked = performance.now();
+    const requestedAt = performance.now();
     const blob = await api.render(
       job.scene,
       job.version,
@@ -169,8 +170,8 @@ export class Viewer {
       signal,
     );
     const picture = await createImageBitmap(blob);
-    if (!job.large) this.#adaptive.record(performance.now() - asked);
-    return { picture, ms: performance.now() - asked };
+    if (!job.large) this.#adaptive.record(performance.now() - requestedAt);
+    return { picture, ms: performance.now() - requestedAt };
   }
 
   #arrived({ picture, ms }, job) {
@@ -184,7 +185,7 @@ export class Viewer {
   }
 
   #show(picture, job, ms = null) {
-    this.#shown = { picture, job };
+    this.#displayed = { picture, job };
     this.#paint();
     this.#drawOverlay();
     this.#notBusy();
@@ -198,10 +199,10 @@ export class Viewer {
   }
 
   #paint() {
-    if (!this.#shown) return;
+    if (!this.#displayed) return;
     const context = this.#canvas.getContext("2d");
     context.imageSmoothingQuality = "high";
-    context.drawImage(this.#shown.picture, 0, 0, this.#canvas.width, this.#canvas.height);
+    context.drawImage(this.#displayed.picture, 0, 0, this.#canvas.width, this.#canvas.height);
   }
 
   #failed(error, job) {
@@ -236,13 +237,13 @@ export class Viewer {
   #thumbnailSoon() {
     clearTimeout(this.#thumbnailTimer);
     this.#thumbnailTimer = setTimeout(() => {
-      if (this.#shown?.job.layer !== "color" || this.#shown.job.scene !== this.#state.scene?.id) return;
+      if (this.#displayed?.job.layer !== "color" || this.#displayed.job.scene !== this.#state.scene?.id) return;
       const small = Object.assign(document.createElement("canvas"), THUMBNAIL);
-      const { width, height } = this.#shown.picture;
+      const { width, height } = this.#displayed.picture;
       const factor = Math.max(THUMBNAIL.width / width, THUMBNAIL.height / height);
       const [w, h] = [width * factor, height * factor];
       const context = small.getContext("2d");
-      context.drawImage(this.#shown.picture, (THUMBNAIL.width - w) / 2, (THUMBNAIL.height - h) / 2, w, h);
+      context.drawImage(this.#displayed.picture, (THUMBNAIL.width - w) / 2, (THUMBNAIL.height - h) / 2, w, h);
       this.#editor.keepThumbnail(small.toDataURL("image/jpeg", 0.75));
     }, 1500);
   }

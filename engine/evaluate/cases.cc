@@ -23,17 +23,17 @@
 namespace engine::evaluate {
 namespace {
 
-namespace made = procedural;
-
 constexpr double pi = std::numbers::pi;
-constexpr std::uint64_t seed = 7;
-// A Gaussian that no camera of the capture blends with more than this is not in the scene: nothing would have trained
-// it.
-constexpr float least_weight = 0.02f;
-// One that they blend with less than this was hardly trained: its colour is off by up to so much, the less it is seen
-// the more.
+// These figures are choices, and part of the definition of the cases: whoever changes one cannot compare results with
+// docs/tradeoff.md any more.
+constexpr std::uint64_t seed = 7;  // of all that is random in a case
+// A Gaussian that no camera of the capture blends with more than this weight is not in the scene: nothing would have
+// trained it.
+constexpr float min_weight = 0.02f;
+// A Gaussian that the cameras blend with less than fair_weight was hardly trained: its colour (0..1) is off by up to
+// worst_colour_error, the more so the smaller its weight.
 constexpr float fair_weight = 0.05f, worst_colour_error = 0.5f;
-constexpr int held_out_every = 5;
+constexpr int held_out_every = 5;  // one camera in five judges and is not part of the capture
 
 /// How a point of the part moves: turned about the pivot, drawn to both sides of it, shifted.
 struct Motion {
@@ -51,7 +51,7 @@ struct Motion {
 
 /// A thing that is moved, or that only the edited scene has (what a drawn-out part grows).
 struct Part {
-  made::Object object;
+  procedural::Object object;
   Motion motion = {};
   bool only_after = false;
 };
@@ -59,12 +59,12 @@ struct Part {
 /// What a case is made from.
 struct Plan {
   std::string what;
-  std::vector<made::Object> surroundings = {};
+  std::vector<procedural::Object> surroundings = {};
   std::vector<Part> parts = {};
   edit::Request request = {};
-  float spacing = 0.018f;  ///< Of Gaussians, world units.
+  float spacing = 0.018f;  ///< Distance between Gaussians of a surface, world units.
   int views = 30, width = 480, height = 360;
-  double zoom = 1;  ///< Of the cameras; below 1 everything is smaller in the picture.
+  double zoom = 1;  ///< Factor of the focal lengths; below 1 everything is smaller in the picture.
   bool textured = true;
 };
 
@@ -72,8 +72,8 @@ Vec3 at(float x, float height, float z) { return {x, -height, z}; }
 DVec3 dat(double x, double height, double z) { return {x, -height, z}; }
 
 /// Even light: what is moved looks the same elsewhere.
-made::Light studio() {
-  made::Light light;
+procedural::Light studio() {
+  procedural::Light light;
   light.to_sun = glm::normalize(Vec3(-0.5f, -0.8f, -0.6f));
   light.sun = 1.6f * Vec3(1.0f, 0.95f, 0.88f);
   light.sky_up = 0.9f * Vec3(0.95f, 0.98f, 1.0f);
@@ -84,15 +84,15 @@ made::Light studio() {
   return light;
 }
 
-std::vector<made::Object> furnished_room() {
-  return {made::make_room(-1.5f), made::make_table({}, {3.7f, 1.5f, 2.1f}),
-          made::make_framed_print({at(-0.95f, 0.85f, 1.40f), 0}, 1.5f, 1.1f),
-          made::make_framed_print({at(0.95f, 0.85f, 1.40f), 0}, 1.5f, 1.1f)};
+std::vector<procedural::Object> furnished_room() {
+  return {procedural::make_room(-1.5f), procedural::make_table({}, {3.7f, 1.5f, 2.1f}),
+          procedural::make_framed_print({at(-0.95f, 0.85f, 1.40f), 0}, 1.5f, 1.1f),
+          procedural::make_framed_print({at(0.95f, 0.85f, 1.40f), 0}, 1.5f, 1.1f)};
 }
 
-made::Object crate(made::Placement placement, float side, float height) {
+procedural::Object crate(procedural::Placement placement, float side, float height) {
   return {"crate", placement,
-          made::box({0, 0, 0}, {side, height, side}, made::cloth_cover(made::srgb(60, 92, 150)), 2)};
+          procedural::box({0, 0, 0}, {side, height, side}, procedural::cloth_cover(procedural::srgb(60, 92, 150)), 2)};
 }
 
 edit::Handle handle(DVec3 source, std::optional<DVec3> target, double radius, int group = 0) {
@@ -127,19 +127,20 @@ Plan lift() {
   Plan plan{.what = "A hanging ball lifted before a wall with prints."};
   plan.surroundings = furnished_room();
   plan.parts = {
-      {made::make_ball({Vec3(foot), 0}, 0.26f, made::srgb(240, 232, 214), made::srgb(150, 40, 30)), {.shift = shift}}};
+      {procedural::make_ball({Vec3(foot), 0}, 0.26f, procedural::srgb(240, 232, 214), procedural::srgb(150, 40, 30)),
+       {.shift = shift}}};
   const DVec3 middle = foot + dat(0, 0.26, 0);
   plan.request = drag({handle(middle, middle + shift, 0.28)});
   return plan;
 }
 
 /// A pole of `blocks` rings in two colours; each is a thing of its own, so that a longer pole has the same Gaussians.
-made::Object ring(Vec3 foot, float radius, float height, bool red) {
-  const Vec3 colour = red ? made::srgb(190, 40, 30) : made::srgb(236, 230, 220);
+procedural::Object ring(Vec3 foot, float radius, float height, bool red) {
+  const Vec3 colour = red ? procedural::srgb(190, 40, 30) : procedural::srgb(236, 230, 220);
   return {"ring",
           {foot, 0},
-          {made::lathe({{radius, 0}, {radius, height}}, made::plain(colour, 0.1f), 2.0f, 40),
-           made::lathe({{radius, height}, {0, height}}, made::plain(colour, 0.1f), 2.0f, 40)}};
+          {procedural::lathe({{radius, 0}, {radius, height}}, procedural::plain(colour, 0.1f), 2.0f, 40),
+           procedural::lathe({{radius, height}, {0, height}}, procedural::plain(colour, 0.1f), 2.0f, 40)}};
 }
 
 Plan pole() {
@@ -169,11 +170,11 @@ Plan arm() {
   plan.surroundings.push_back(
       {"stand",
        {at(-0.85f, 0, -0.15f), 0},
-       made::box({0, 0, 0}, {0.16f, 0.3f, 0.16f}, made::plain(made::srgb(90, 90, 96), 0.1f), 2)});
-  const auto segment = [&](float along, const made::Material& material) {
-    return made::Object{"segment",
-                        {shoulder + Vec3(along + 0.5f * length, 0.5f * thick, 0), 0},
-                        made::box({0, 0, 0}, {length, thick, thick}, material, 2.2f)};
+       procedural::box({0, 0, 0}, {0.16f, 0.3f, 0.16f}, procedural::plain(procedural::srgb(90, 90, 96), 0.1f), 2)});
+  const auto segment = [&](float along, const procedural::Material& material) {
+    return procedural::Object{"segment",
+                              {shoulder + Vec3(along + 0.5f * length, 0.5f * thick, 0), 0},
+                              procedural::box({0, 0, 0}, {length, thick, thick}, material, 2.2f)};
   };
   const DVec3 from(shoulder), elbow = from + DVec3(double(length), 0, 0);
   const DQuat raise = glm::angleAxis(-35 * pi / 180, DVec3(0, 0, 1)),
@@ -181,8 +182,8 @@ Plan arm() {
   const Motion upper{.turn = raise, .pivot = from};
   const DVec3 moved_elbow = upper(elbow);
   const Motion lower{.turn = bend * raise, .pivot = elbow, .shift = moved_elbow - elbow};
-  plan.parts = {{segment(0, made::cloth_cover(made::srgb(170, 120, 40))), upper},
-                {segment(length, made::cloth_cover(made::srgb(60, 110, 70))), lower}};
+  plan.parts = {{segment(0, procedural::cloth_cover(procedural::srgb(170, 120, 40))), upper},
+                {segment(length, procedural::cloth_cover(procedural::srgb(60, 110, 70))), lower}};
   std::vector<edit::Handle> handles;
   for (const double along : {0.0, 0.17, 0.34}) {
     const DVec3 point = from + DVec3(along + 0.08, 0, 0);
@@ -199,19 +200,19 @@ Plan arm() {
 
 Plan bush() {
   constexpr float thick = 0.17f;
-  const DVec3 foot = dat(0, 0, -0.1), top = foot + dat(0, double(made::soil_height), 0);
+  const DVec3 foot = dat(0, 0, -0.1), top = foot + dat(0, double(procedural::soil_height), 0);
   Plan plan{.what = "A leafy bush on a post, widened to both sides.", .textured = false};
-  plan.surroundings = {
-      made::make_room(-1.5f),
-      made::make_table({}, {3.7f, 1.5f, 2.1f}),
-      {"post",
-       {Vec3(foot), 0.3f},
-       made::box({0, 0, 0}, {thick, made::soil_height, thick}, made::plain(made::srgb(178, 92, 60), 0.1f), 2)}};
-  const made::Plant plant = made::make_plant({Vec3(foot), 0}, 40, seed);
+  plan.surroundings = {procedural::make_room(-1.5f),
+                       procedural::make_table({}, {3.7f, 1.5f, 2.1f}),
+                       {"post",
+                        {Vec3(foot), 0.3f},
+                        procedural::box({0, 0, 0}, {thick, procedural::soil_height, thick},
+                                        procedural::plain(procedural::srgb(178, 92, 60), 0.1f), 2)}};
+  const procedural::Plant plant = procedural::make_plant({Vec3(foot), 0}, 40, seed);
   const Motion motion{.pivot = top, .widen = 0.8, .reach = 1.0};
   plan.parts = {{plant.object, motion}};
   std::vector<edit::Handle> handles;
-  for (const made::Blade& blade : plant.blades)
+  for (const procedural::Blade& blade : plant.blades)
     for (const float along : {0.15f, 0.55f, 0.95f}) {
       const DVec3 point = foot + DVec3(blade.midrib(along));
       handles.push_back(handle(point, motion(point), 0.3));
@@ -227,8 +228,8 @@ Plan apart() {
   const DVec3 to_left = dat(-0.5, 0, 0.05), to_right = dat(0.5, 0, -0.1);
   Plan plan{.what = "A mug and an apple moved apart, each by a group of its own."};
   plan.surroundings = furnished_room();
-  plan.parts = {{made::make_mug({Vec3(left), 2.4f}), {.shift = to_left}},
-                {made::make_apple({Vec3(right), 0.4f}, 0.18f), {.shift = to_right}}};
+  plan.parts = {{procedural::make_mug({Vec3(left), 2.4f}), {.shift = to_left}},
+                {procedural::make_apple({Vec3(right), 0.4f}, 0.18f), {.shift = to_right}}};
   const DVec3 mug = left + dat(0, 0.2, 0), apple = right + dat(0, 0.17, 0);
   plan.request = drag({handle(mug, mug + to_left, 0.36, 1), handle(apple, apple + to_right, 0.27, 2)},
                       edit::Region{dat(0, 0.304, -0.4), {1.4, 0.6, 0.9}});
@@ -239,7 +240,7 @@ Plan distance() {
   const DVec3 foot = dat(-1.35, 0, -0.55), shift = dat(2.6, 0, 0.35);
   Plan plan{.what = "An apple moved over the whole table, many radii far."};
   plan.surroundings = furnished_room();
-  plan.parts = {{made::make_apple({Vec3(foot), 0.4f}, 0.16f), {.shift = shift}}};
+  plan.parts = {{procedural::make_apple({Vec3(foot), 0.4f}, 0.16f), {.shift = shift}}};
   const DVec3 middle = foot + dat(0, 0.16, 0);
   plan.request = drag({handle(middle, middle + shift, 0.24)}, above_table(foot, 0.5, 0.5));
   return plan;
@@ -249,7 +250,7 @@ Plan speck() {
   const DVec3 foot = dat(0.1, 0, -0.3), shift = dat(0.28, 0, 0.1);
   Plan plan{.what = "An apple moved on a table far from the cameras."};
   plan.surroundings = furnished_room();
-  plan.parts = {{made::make_apple({Vec3(foot), 0.4f}, 0.12f), {.shift = shift}}};
+  plan.parts = {{procedural::make_apple({Vec3(foot), 0.4f}, 0.12f), {.shift = shift}}};
   const DVec3 middle = foot + dat(0, 0.12, 0);
   plan.request = drag({handle(middle, middle + shift, 0.19)}, above_table(foot, 0.4, 0.4));
   plan.spacing = 0.03f, plan.width = 240, plan.height = 180, plan.zoom = 0.6;
@@ -304,7 +305,7 @@ std::vector<std::uint32_t> range(std::size_t first, std::size_t last) {
 void spoil_colours(std::span<const float> weight, scene::GaussianCloud& cloud) {
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     if (weight[i] >= fair_weight) continue;
-    const float error = worst_colour_error * (fair_weight - weight[i]) / (fair_weight - least_weight);
+    const float error = worst_colour_error * (fair_weight - weight[i]) / (fair_weight - min_weight);
     Rng rng(seed, i);
     for (std::size_t c = 0; c < 3; ++c)
       cloud.sh_row(i)[c * scene::sh_coefficients(cloud.sh_degree)] += rng.uniform(-error, error) / float(scene::sh_c0);
@@ -312,7 +313,7 @@ void spoil_colours(std::span<const float> weight, scene::GaussianCloud& cloud) {
 }
 
 void place_cameras(const Plan& plan, Case& out) {
-  auto cameras = made::make_arc_cameras(plan.views, plan.width, plan.height);
+  auto cameras = procedural::make_arc_cameras(plan.views, plan.width, plan.height);
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     cameras[i].fx *= plan.zoom, cameras[i].fy *= plan.zoom;
     (i % held_out_every == held_out_every - 1 ? out.held_out : out.cameras).push_back(cameras[i]);
@@ -325,11 +326,11 @@ Case carry_out(const std::string& name, const Plan& plan) {
   out.request = plan.request;
   place_cameras(plan, out);
 
-  const made::Light light = studio();
-  const made::Surfels around = made::cover_all(plan.surroundings, light, out.cameras, plan.spacing, seed);
-  std::vector<made::Object> things;
+  const procedural::Light light = studio();
+  const procedural::Surfels around = procedural::cover_all(plan.surroundings, light, out.cameras, plan.spacing, seed);
+  std::vector<procedural::Object> things;
   for (const Part& part : plan.parts) things.push_back(part.object);
-  const made::Surfels moved = made::cover_all(things, light, out.cameras, plan.spacing, seed + 1);
+  const procedural::Surfels moved = procedural::cover_all(things, light, out.cameras, plan.spacing, seed + 1);
 
   const std::size_t rows_around = around.cloud.size(), rows_moved = moved.cloud.size();
   out.truth = around.cloud;
@@ -351,7 +352,7 @@ Case carry_out(const std::string& name, const Plan& plan) {
   std::vector<std::uint8_t> seen(whole.size());
   std::size_t kept = 0;
   for (std::size_t i = 0; i < seen.size(); ++i) {
-    seen[i] = weight[i] >= least_weight;
+    seen[i] = weight[i] >= min_weight;
     if (seen[i] && i >= rows_around) {
       out.part_before.push_back(std::uint32_t(kept));
       out.part_after.push_back(std::uint32_t(rows_around + there_before[i - rows_around]));

@@ -18,6 +18,7 @@
 
 namespace engine::evaluate {
 
+/// One such edit. Rows are indices.
 struct Case {
   std::string name;      ///< "slide"
   std::string what;      ///< One sentence for people.
@@ -26,25 +27,25 @@ struct Case {
   scene::GaussianCloud before;             ///< What is edited.
   scene::GaussianCloud truth;              ///< What it should become.
   std::vector<std::uint32_t> part;         ///< Rows of `truth` that the edit is about: those moved, those it grew.
-  std::vector<std::uint32_t> part_before;  ///< Rows of `before` that should move,
-  std::vector<std::uint32_t> part_after;   ///< and the row of `truth` that each should become.
-  std::vector<scene::Camera> cameras;      ///< Of the capture.
-  std::vector<scene::Camera> held_out;     ///< Between them; the edit never sees these.
+  std::vector<std::uint32_t> part_before;  ///< Rows of `before` that should move.
+  std::vector<std::uint32_t> part_after;   ///< For each of those, the row of `truth` that it should become.
+  std::vector<scene::Camera> cameras;      ///< Cameras of the capture.
+  std::vector<scene::Camera> held_out;     ///< Cameras between those; the edit never sees their pictures.
   edit::Request request;                   ///< Handles and mode; parameters are those of a preset or a sweep.
 };
 
 /// Names of all cases, in order.
 [[nodiscard]] const std::vector<std::string>& case_names();
 
-/// Is it quick enough for sweeps and for every change of the code? False if there is none of that name.
+/// Is the case quick enough for sweeps and for every change of the code? False if there is none of that name.
 [[nodiscard]] bool is_small(const std::string& name);
 
-/// Those of `names`, in their order; of all cases, if there are none in it.
+/// The cases of these names, in that order; all cases, if no names are given.
 ///   small_only  leaves out those that are not small
 ///   errors      not_found: as make_case(); invalid_argument: nothing is left
 [[nodiscard]] Result<std::vector<std::string>> choose_cases(const std::vector<std::string>& names, bool small_only);
 
-/// Makes one. The same bytes every time, for any number of threads.
+/// Makes the case of that name. The same bytes every time, for any number of threads.
 ///   errors  not_found: no case of that name; the message lists them
 [[nodiscard]] Result<Case> make_case(const std::string& name);
 

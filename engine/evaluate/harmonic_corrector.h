@@ -5,6 +5,7 @@
 
 namespace engine::evaluate {
 
+/// Replaces what is not trusted by the harmonic interpolation of what is around it (engine/correct/harmonic.h).
 class HarmonicCorrector final : public correct::Corrector {
  public:
   [[nodiscard]] Result<void> fine_tune(std::span<const correct::Example> buffer, int steps) override;

@@ -5,19 +5,19 @@
 #include <functional>
 #include <limits>
 
-#include "engine/working/footprint.h"
-#include "engine/repair/seed.h"
 #include "engine/mask/mask.h"
 #include "engine/neighbours/point_index.h"
 #include "engine/optim/losses.h"
 #include "engine/optim/picture_view.h"
 #include "engine/render/forward.h"
+#include "engine/repair/seed.h"
+#include "engine/working/footprint.h"
 
 namespace engine::evaluate {
 namespace {
 
-constexpr double identical_db = 100;
-constexpr int rim_px_at_360 = 4;
+constexpr double identical_db = 100;  // PSNR that equal pictures count as: infinity has no mean
+constexpr int rim_px_at_360 = 4;      // width of the rim around the part at a height of 360 pixels; a choice
 
 scene::Mask shown(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows, const scene::Camera& camera) {
   render::Workspace workspace;
@@ -80,7 +80,7 @@ std::size_t nearest_view(std::span<const scene::Camera> views, std::size_t v) {
   return nearest;
 }
 
-void LikenessSum::add(const scene::Image& result, const scene::Image& truth, const scene::Mask& counts) {
+void RegionQualitySum::add(const scene::Image& result, const scene::Image& truth, const scene::Mask& counts) {
   const std::size_t area = counts.area();
   if (area == 0) return;
   for (int c = 0; c < 3; ++c) {
@@ -98,7 +98,7 @@ void LikenessSum::add(const scene::Image& result, const scene::Image& truth, con
   pixels_ += area;
 }
 
-Likeness LikenessSum::likeness() const {
+RegionQuality RegionQualitySum::quality() const {
   if (pixels_ == 0) return {};
   return {psnr_db(squares_ / double(pixels_)), 1 - dissimilarity_ / double(pixels_), pixels_};
 }
@@ -114,8 +114,8 @@ scene::Mask complement(scene::Mask mask) {
   return mask;
 }
 
-Kinds kinds_of(const Case& the_case, const scene::Camera& camera) {
-  Kinds kinds;
+JudgedRegions judged_regions(const Case& the_case, const scene::Camera& camera) {
+  JudgedRegions kinds;
   kinds.arrived = shown(the_case.truth, the_case.part, camera);
   kinds.vacated = shown(the_case.before, the_case.part_before, camera);
   scene::Mask both = kinds.arrived;
@@ -127,21 +127,21 @@ Kinds kinds_of(const Case& the_case, const scene::Camera& camera) {
 }
 
 Quality judge(const Case& the_case, const scene::GaussianCloud& result) {
-  LikenessSum edited, vacated, arrived, outside;
+  RegionQualitySum edited, vacated, arrived, outside;
   for (const scene::Camera& camera : the_case.held_out) {
-    const Kinds kinds = kinds_of(the_case, camera);
+    const JudgedRegions kinds = judged_regions(the_case, camera);
     const scene::Image is = picture(result, camera), should_be = picture(the_case.truth, camera);
     edited.add(is, should_be, kinds.edited);
     vacated.add(is, should_be, kinds.vacated);
     arrived.add(is, should_be, kinds.arrived);
     outside.add(is, should_be, complement(kinds.edited));
   }
-  return {edited.likeness(), vacated.likeness(), arrived.likeness(), outside.likeness(), miss(the_case, result)};
+  return {edited.quality(), vacated.quality(), arrived.quality(), outside.quality(), miss(the_case, result)};
 }
 
 Agreement agreement(const Case& the_case, std::span<const scene::Camera> views,
                     std::span<const scene::Image> pictures) {
-  constexpr double same_surface = 0.01;  // relative difference of depths
+  constexpr double same_surface = 0.01;  // relative difference of depths; a choice
   if (views.size() < 2) return {};
   std::vector<scene::Image> depth;
   for (const scene::Camera& view : views) depth.push_back(true_depth(the_case.truth, view));
@@ -150,7 +150,7 @@ Agreement agreement(const Case& the_case, std::span<const scene::Camera> views,
   for (std::size_t v = 0; v < views.size(); ++v) {
     const std::size_t w = nearest_view(views, v);
     const scene::Camera &from = views[v], &to = views[w];
-    const scene::Mask vacated = kinds_of(the_case, from).vacated;
+    const scene::Mask vacated = judged_regions(the_case, from).vacated;
     for (int y = 0; y < from.height; ++y)
       for (int x = 0; x < from.width; ++x) {
         const double z = double(depth[v].at(x, y));

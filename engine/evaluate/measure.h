@@ -12,19 +12,19 @@
 
 namespace engine::evaluate {
 
-/// Likeness over the pixels of a kind, of all held-out views together.
-struct Likeness {
-  double psnr_db = 0;      ///< Of the mean square error over all of them; 100 where nothing differs.
+/// How near pictures come to the truth over one region, all held-out views together.
+struct RegionQuality {
+  double psnr_db = 0;      ///< Of the mean square error over its pixels; 100 where nothing differs.
   double ssim = 0;         ///< Mean of SSIM's map; windows reach beyond the pixels that count.
-  std::size_t pixels = 0;  ///< That count. 0: the rest says nothing.
+  std::size_t pixels = 0;  ///< Pixels of the region. 0: the rest says nothing.
 };
 
-/// Takes in picture after picture.
-class LikenessSum {
+/// Sums a RegionQuality up, picture by picture.
+class RegionQualitySum {
  public:
-  ///   counts  the pixels that do
+  ///   counts  the pixels of the region; all three have one size
   void add(const scene::Image& result, const scene::Image& truth, const scene::Mask& counts);
-  [[nodiscard]] Likeness likeness() const;
+  [[nodiscard]] RegionQuality quality() const;
 
  private:
   double squares_ = 0, dissimilarity_ = 0;
@@ -33,26 +33,28 @@ class LikenessSum {
 
 /// A render as a screen shows it.
 [[nodiscard]] scene::Image picture(const scene::GaussianCloud& cloud, const scene::Camera& camera);
+/// The pixels that are not in the mask.
 [[nodiscard]] scene::Mask complement(scene::Mask mask);
 
 /// The view that was taken nearest to view v from another place; v if there is none.
 [[nodiscard]] std::size_t nearest_view(std::span<const scene::Camera> views, std::size_t v);
 
+/// What judge() finds.
 struct Quality {
-  Likeness edited;   ///< What the part dominates before or after, and 4 pixels (at 360 of height) around it.
-  Likeness vacated;  ///< What it dominates before, and not after.
-  Likeness arrived;  ///< What it dominates after.
-  Likeness outside;  ///< All that is not `edited`.
+  RegionQuality edited;   ///< What the part dominates before or after, and 4 pixels (at 360 of height) around it.
+  RegionQuality vacated;  ///< What it dominates before, and not after.
+  RegionQuality arrived;  ///< What it dominates after.
+  RegionQuality outside;  ///< All that is not `edited`.
   /// Mean distance from where a Gaussian of the part should be to the nearest one there, world units: of those that the
   /// capture shows before the move.
   double miss = 0;
 };
 
-/// The pixels of one held-out view, by kind.
-struct Kinds {
+/// The judged regions in one held-out view; pixels may lie in several.
+struct JudgedRegions {
   scene::Mask edited, vacated, arrived;
 };
-[[nodiscard]] Kinds kinds_of(const Case& the_case, const scene::Camera& camera);
+[[nodiscard]] JudgedRegions judged_regions(const Case& the_case, const scene::Camera& camera);
 
 /// Judges `result`, which came of the_case.before.
 [[nodiscard]] Quality judge(const Case& the_case, const scene::GaussianCloud& result);
@@ -60,8 +62,8 @@ struct Kinds {
 /// How well corrected views of one edit agree where the part has gone: each pixel there, carried to the nearest other
 /// view by the true depth, against what that view shows.
 struct Agreement {
-  double psnr_db = 0;      ///< Of the mean square difference.
-  std::size_t pixels = 0;  ///< That two views show. 0: the rest says nothing.
+  double psnr_db = 0;      ///< Of the mean square difference over those pixels.
+  std::size_t pixels = 0;  ///< Pixels that two views show. 0: the rest says nothing.
 };
 ///   pictures  per view, in its size
 [[nodiscard]] Agreement agreement(const Case& the_case, std::span<const scene::Camera> views,

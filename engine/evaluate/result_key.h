@@ -12,9 +12,9 @@ namespace engine::evaluate {
 struct ResultOf {
   std::string subject;         ///< Name of a case, or "trip".
   std::string corrector;       ///< Name.
-  std::string scene, dataset;  ///< Of a trip: the files.
-  int pictures = 0;            ///< That are shown beside it.
-  int threads = 0;             ///< That it is worked out with.
+  std::string scene, dataset;  ///< Files of a trip.
+  int pictures = 0;            ///< Views that are shown beside it.
+  int threads = 0;             ///< Threads that it is worked out with.
   std::string simd;            ///< Instruction set.
   std::uint64_t program = 0;   ///< checksum_of_program().
 };
@@ -23,8 +23,8 @@ struct ResultOf {
 /// the region, the mode, those parameters that a benchmark varies, or what stands in `of`.
 [[nodiscard]] std::string result_key(const ResultOf& of, const edit::Request& request);
 
-/// Of the very program that runs, so that another build works its results out anew. The same number for all where the
-/// system does not show a program its own file.
+/// A checksum of the very program that runs, so that another build works its results out anew. The same number for all
+/// where the system does not show a program its own file.
 [[nodiscard]] std::uint64_t checksum_of_program();
 
 }  // namespace engine::evaluate

@@ -5,11 +5,11 @@
 #include <utility>
 
 #include "engine/edit/edit.h"
-#include "engine/working/footprint.h"
 #include "engine/mask/mask.h"
 #include "engine/neighbours/point_index.h"
 #include "engine/render/forward.h"
 #include "engine/scene/overlay.h"
+#include "engine/working/footprint.h"
 
 namespace engine::evaluate {
 namespace {
@@ -121,8 +121,8 @@ scene::Mask shown_change(const scene::GaussianCloud& input, const scene::Overlay
 
 }  // namespace
 
-Result<Likeness> zero_drag(const scene::GaussianCloud& scene, std::span<const scene::Camera> cameras,
-                           const edit::Request& request, correct::Corrector* corrector) {
+Result<RegionQuality> zero_drag(const scene::GaussianCloud& scene, std::span<const scene::Camera> cameras,
+                                const edit::Request& request, correct::Corrector* corrector) {
   edit::Request still = request;
   for (edit::Handle& handle : still.handles)
     if (handle.target) handle.target = handle.source;
@@ -131,10 +131,10 @@ Result<Likeness> zero_drag(const scene::GaussianCloud& scene, std::span<const sc
   const auto outcome = edit::run(scene, cameras, still, {.corrector = corrector});
   if (!outcome) return propagate(outcome);
   const scene::GaussianCloud edited = scene::flatten(scene, outcome->overlay);
-  LikenessSum inside;
+  RegionQualitySum inside;
   for (std::size_t v = 0; v < outcome->views.size(); ++v)
     inside.add(picture(edited, outcome->views[v]), picture(scene, outcome->views[v]), outcome->masks[v]);
-  return inside.likeness();
+  return inside.quality();
 }
 
 scene::Camera between(const scene::Camera& a, const scene::Camera& b) {
@@ -166,7 +166,7 @@ Result<RoundTrip> there_and_back(const scene::GaussianCloud& scene, std::span<co
   trip.back = scene::flatten(trip.halfway, back->overlay);
 
   trip.cameras = cameras_between(there->views);
-  LikenessSum inside, outside;
+  RegionQualitySum inside, outside;
   render::Workspace workspace;
   for (const scene::Camera& camera : trip.cameras) {
     const scene::Image is = picture(trip.back, camera), was = picture(scene, camera);
@@ -174,7 +174,7 @@ Result<RoundTrip> there_and_back(const scene::GaussianCloud& scene, std::span<co
     inside.add(is, was, mask);
     outside.add(is, was, complement(mask));
   }
-  trip.inside = inside.likeness(), trip.outside = outside.likeness();
+  trip.inside = inside.quality(), trip.outside = outside.quality();
   return trip;
 }
 

@@ -16,13 +16,14 @@
 
 namespace engine::evaluate {
 
+/// What there_and_back() finds.
 struct RoundTrip {
-  double arrived = 0;  ///< Part of the drag that the half-way scene shows near the handles' points: the least of them.
-  Likeness inside;     ///< Of the scene that came back to the input, where the part is or was half-way.
-  Likeness outside;    ///< Elsewhere.
-  double seconds = 0;  ///< The way there took.
+  double arrived = 0;  ///< Fraction of the drag that the half-way scene shows near a handle: the least of all handles.
+  RegionQuality inside;   ///< The scene that came back against the input, where the part is or was half-way.
+  RegionQuality outside;  ///< The same in all other pixels.
+  double seconds = 0;     ///< Time of the way there.
   scene::GaussianCloud halfway, back;
-  std::vector<scene::Camera> cameras;  ///< Between those of the edit: what is judged.
+  std::vector<scene::Camera> cameras;  ///< Cameras between those of the edit, at which it is judged.
 };
 
 /// Carries the request out, and then the one from where its handles have come to back to where they were.
@@ -37,8 +38,8 @@ struct RoundTrip {
 /// the input, in the edit's views within its masks.
 ///   corrector  null: none
 ///   errors     those of edit::run()
-[[nodiscard]] Result<Likeness> zero_drag(const scene::GaussianCloud& scene, std::span<const scene::Camera> cameras,
-                                         const edit::Request& request, correct::Corrector* corrector);
+[[nodiscard]] Result<RegionQuality> zero_drag(const scene::GaussianCloud& scene, std::span<const scene::Camera> cameras,
+                                              const edit::Request& request, correct::Corrector* corrector);
 
 /// A camera half-way between two: position, direction, lens. Name of the first with "+" and that of the second.
 [[nodiscard]] scene::Camera between(const scene::Camera& a, const scene::Camera& b);

@@ -93,7 +93,7 @@ std::string trial_table_row(const Trial& trial) {
   const Quality& quality = trial.result;
   std::ostringstream out;
   out << "| " << trial.name << " | " << trial.corrector << std::fixed;
-  for (const Likeness* kind : {&quality.edited, &quality.vacated, &quality.arrived, &quality.outside})
+  for (const RegionQuality* kind : {&quality.edited, &quality.vacated, &quality.arrived, &quality.outside})
     out << " | " << std::setprecision(2) << kind->psnr_db << " | " << std::setprecision(4) << kind->ssim;
   out << " | " << std::setprecision(4) << quality.miss << " | " << std::setprecision(2);
   if (trial.corrected_views.pixels > 0)

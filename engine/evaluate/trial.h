@@ -24,22 +24,23 @@ namespace engine::evaluate {
 
 /// What an edit of a case came to, and what it took.
 struct Trial {
-  std::string name;  ///< Of the case, and what it says of itself.
+  std::string name;  ///< Case::name and, below, Case::what.
   std::string what;
   std::string corrector;                ///< Name.
   bool textured = true;                 ///< See Case.
   std::size_t gaussians = 0, part = 0;  ///< Of the scene; of the part that moves.
-  std::size_t seeds = 0;                ///< That a repair has placed.
-  int intervals = 0;                    ///< T, as carried out.
-  Quality untouched;                    ///< Of the scene before the edit: what doing nothing would come to.
-  Quality result;                       ///< Of the edit.
-  Agreement corrected_views;            ///< Of the last correction.
-  double seconds = 0;                   ///< All stages.
+  std::size_t seeds = 0;                ///< Seeds that the repair has placed.
+  int intervals = 0;                    ///< T of the edit.
+  Quality untouched;                    ///< Quality of the scene before the edit: what doing nothing would come to.
+  Quality result;                       ///< Quality of the edited scene.
+  Agreement corrected_views;            ///< Agreement of the views of the last correction.
+  double seconds = 0;                   ///< Time of all stages.
   std::vector<edit::StageTime> stages;  ///< Without pictures that only the judge asked for.
   std::uint64_t peak_memory_bytes = 0;  ///< Above what the process held before; without what the judge took.
   std::vector<std::string> warnings;
 };
 
+/// A trial and the scene that it led to.
 struct CarriedOut {
   Trial trial;
   scene::GaussianCloud edited;

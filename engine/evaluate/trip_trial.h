@@ -20,10 +20,10 @@ struct TripTrial {
   std::string request;    ///< Name, where its file holds several.
   std::string corrector;  ///< Name.
   double arrived = 0;     ///< See RoundTrip, here and below.
-  Likeness inside, outside;
-  Likeness zero_drag;
-  std::size_t cameras = 0;  ///< That are judged at.
-  double seconds = 0;       ///< The way there.
+  RegionQuality inside, outside;
+  RegionQuality zero_drag;
+  std::size_t cameras = 0;  ///< Cameras at which it was judged.
+  double seconds = 0;       ///< Time of the way there.
 };
 
 /// Carries both out. Shows the input, half-way, and what came back side by side, as "trip_scene_0".

@@ -40,7 +40,7 @@ struct Range<double> {
 
 template <>
 struct Range<std::vector<std::string>> {
-  std::size_t most = 0;  ///< Elements.
+  std::size_t most = 0;  ///< Most elements.
 };
 
 /// What a parameter is if nobody gives it.

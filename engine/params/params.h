@@ -22,9 +22,9 @@
 
 namespace engine::params {
 
-constexpr int max_views = 1000;
-constexpr std::size_t max_excluded_views = 1000;
-constexpr int max_image_side = 16384;  ///< Pixels.
+constexpr int max_views = 1000;                   ///< End of a range, like the next two. A choice: far beyond use.
+constexpr std::size_t max_excluded_views = 1000;  ///< A choice.
+constexpr int max_image_side = 16384;             ///< Pixels; what a camera may have.
 
 /// A field per parameter, each in a slot: the value itself, or perhaps one. What they mean stands in the table.
 template <template <class> class Slot>

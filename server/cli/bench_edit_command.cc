@@ -65,8 +65,8 @@ ordered_json encode_params(const edit::Params& params) {
 }
 
 /// Where a result is kept.
-path kept_file(const BenchOptions& options, const Machine& machine, const std::string& subject,
-               const std::string& corrector, const edit::Request& request) {
+path cache_file(const BenchOptions& options, const Machine& machine, const std::string& subject,
+                const std::string& corrector, const edit::Request& request) {
   static const std::uint64_t program = evaluate::checksum_of_program();
   const std::string key = evaluate::result_key({.subject = subject,
                                                 .corrector = corrector,
@@ -91,13 +91,13 @@ Result<evaluate::Trial> trial_of(const evaluate::Case& the_case, const std::stri
                                  const BenchOptions& options, const Machine& machine) {
   edit::Request request = the_case.request;
   apply(options, request);
-  const path file = kept_file(options, machine, the_case.name, corrector, request);
-  return kept_or<evaluate::Trial>(file, [&]() -> Result<evaluate::Trial> {
+  const path file = cache_file(options, machine, the_case.name, corrector, request);
+  return cached_or_new<evaluate::Trial>(file, [&]() -> Result<evaluate::Trial> {
     auto done = evaluate::carry_out(the_case, request, corrector);
     if (!done) return propagate(done);
-    const auto shown = evaluate::show_pictures(the_case, request, corrector, done->edited,
-                                               std::size_t(options.pictures), picture_writer(options));
-    if (!shown) return propagate(shown);
+    const auto pictures = evaluate::show_pictures(the_case, request, corrector, done->edited,
+                                                  std::size_t(options.pictures), picture_writer(options));
+    if (!pictures) return propagate(pictures);
     return std::move(done->trial);
   });
 }
@@ -151,9 +151,9 @@ struct Capture {
 };
 
 Result<Capture> load_capture(const BenchOptions& options) {
-  const auto asked = read_request(options.request, options.name);
-  if (!asked) return propagate(asked);
-  auto request = edits::to_engine(asked->request);
+  const auto file = read_request(options.request, options.name);
+  if (!file) return propagate(file);
+  auto request = edits::to_engine(file->request);
   if (!request) return propagate(request);
   apply(options, *request);
   auto input = io::read_scene(options.scene);
@@ -169,8 +169,8 @@ Result<void> run_trips(const BenchOptions& options, const Machine& machine, Term
   if (!capture) return propagate(capture);
   ordered_json all = ordered_json::array();
   for (const std::string& corrector : options.correctors) {
-    const path file = kept_file(options, machine, "trip", corrector, capture->request);
-    const auto trial = kept_or<evaluate::TripTrial>(file, [&] {
+    const path file = cache_file(options, machine, "trip", corrector, capture->request);
+    const auto trial = cached_or_new<evaluate::TripTrial>(file, [&] {
       auto done = evaluate::carry_out_trip(capture->cloud, capture->cameras, capture->request, corrector,
                                            std::size_t(options.pictures), picture_writer(options));
       if (done) done->request = options.name;

@@ -13,7 +13,7 @@ namespace {
 namespace evaluate = engine::evaluate;
 using nlohmann::ordered_json;
 
-ordered_json encode(const evaluate::Likeness& likeness) {
+ordered_json encode(const evaluate::RegionQuality& likeness) {
   return {{"psnr_db", likeness.psnr_db}, {"ssim", likeness.ssim}, {"pixels", likeness.pixels}};
 }
 
@@ -31,7 +31,7 @@ ordered_json encode(const std::vector<engine::edit::StageTime>& times) {
   return stages;
 }
 
-void decode(const ordered_json& from, evaluate::Likeness& likeness) {
+void decode(const ordered_json& from, evaluate::RegionQuality& likeness) {
   from.at("psnr_db").get_to(likeness.psnr_db);
   from.at("ssim").get_to(likeness.ssim);
   from.at("pixels").get_to(likeness.pixels);
@@ -104,21 +104,21 @@ void decode(const ordered_json& from, evaluate::TripTrial& trial) {
   from.at("seconds").get_to(trial.seconds);
 }
 
-template <class Found>
-std::optional<Found> kept_result(const std::filesystem::path& file) {
+template <class ResultType>
+std::optional<ResultType> cached_result(const std::filesystem::path& file) {
   std::ifstream in(file);
-  const ordered_json kept = ordered_json::parse(in, nullptr, /*allow_exceptions=*/false);
-  if (kept.is_discarded()) return std::nullopt;
+  const ordered_json json = ordered_json::parse(in, nullptr, /*allow_exceptions=*/false);
+  if (json.is_discarded()) return std::nullopt;
   try {
-    Found found;
-    decode(kept, found);
+    ResultType found;
+    decode(json, found);
     return found;
   } catch (const nlohmann::json::exception&) {
     return std::nullopt;  // not what we wrote
   }
 }
-template std::optional<evaluate::Trial> kept_result(const std::filesystem::path& file);
-template std::optional<evaluate::TripTrial> kept_result(const std::filesystem::path& file);
+template std::optional<evaluate::Trial> cached_result(const std::filesystem::path& file);
+template std::optional<evaluate::TripTrial> cached_result(const std::filesystem::path& file);
 
 engine::Result<void> write_json(const std::filesystem::path& file, const ordered_json& what) {
   const std::string text = proto::pretty(what) + "\n";

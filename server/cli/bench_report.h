@@ -1,4 +1,4 @@
-// What `splatdrag bench-edit` found, as JSON: in bench.json and trips.json, and kept from one run to the next.
+// Results of `splatdrag bench-edit` as JSON: in bench.json and trips.json, and in a cache from one run to the next.
 #pragma once
 
 #include <filesystem>
@@ -12,32 +12,33 @@
 
 namespace server::cli {
 
+/// The JSON of a result.
 [[nodiscard]] nlohmann::ordered_json encode(const engine::evaluate::Trial& trial);
 [[nodiscard]] nlohmann::ordered_json encode(const engine::evaluate::TripTrial& trial);
 
-/// The reverse. Throw what nlohmann::json does where a field is missing or of another type.
+/// The reverse of encode(). Throw what nlohmann::json does where a field is missing or of another type.
 void decode(const nlohmann::ordered_json& from, engine::evaluate::Trial& trial);
 void decode(const nlohmann::ordered_json& from, engine::evaluate::TripTrial& trial);
 
-/// A result that the file holds whole, if it does.
-template <class Found>
-[[nodiscard]] std::optional<Found> kept_result(const std::filesystem::path& file);
-extern template std::optional<engine::evaluate::Trial> kept_result(const std::filesystem::path& file);
-extern template std::optional<engine::evaluate::TripTrial> kept_result(const std::filesystem::path& file);
+/// The result that the file holds; nothing if it is not there, damaged or of another form.
+template <class ResultType>
+[[nodiscard]] std::optional<ResultType> cached_result(const std::filesystem::path& file);
+extern template std::optional<engine::evaluate::Trial> cached_result(const std::filesystem::path& file);
+extern template std::optional<engine::evaluate::TripTrial> cached_result(const std::filesystem::path& file);
 
 /// Writes indented JSON with a line's end.
 ///   errors  those of engine::write_file()
 [[nodiscard]] engine::Result<void> write_json(const std::filesystem::path& file, const nlohmann::ordered_json& what);
 
-/// A result: kept in the file by an earlier run, or new and then kept there.
+/// The result that an earlier run left in the file, or else a new one, which is then written there.
 ///   errors  those of `find` and of write_json()
-template <class Found>
-[[nodiscard]] engine::Result<Found> kept_or(const std::filesystem::path& file,
-                                            const std::function<engine::Result<Found>()>& find) {
-  if (auto kept = kept_result<Found>(file)) return std::move(*kept);
+template <class ResultType>
+[[nodiscard]] engine::Result<ResultType> cached_or_new(const std::filesystem::path& file,
+                                                       const std::function<engine::Result<ResultType>()>& find) {
+  if (auto cached = cached_result<ResultType>(file)) return std::move(*cached);
   auto found = find();
   if (!found) return found;
-  if (auto kept = write_json(file, encode(*found)); !kept) return engine::propagate(kept);
+  if (auto written = write_json(file, encode(*found)); !written) return engine::propagate(written);
   return found;
 }
 

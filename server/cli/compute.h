@@ -1,4 +1,4 @@
-// Which threads and instructions a command computes with.
+// Threads and instruction set that a command computes with.
 #pragma once
 
 #include <functional>
@@ -8,6 +8,7 @@
 
 namespace server::cli {
 
+/// What the user chose.
 struct ComputeOptions {
   int threads = 0;   ///< 0: as many as the machine has cores.
   std::string simd;  ///< Instruction set; empty: the best this processor has.

@@ -53,23 +53,23 @@ void locate_in_file(engine::Error& error, const EditOptions& options, const prot
     }
 }
 
-/// The request in both forms: as asked, and for the engine.
+/// The request in both forms: as its file has it, and for the engine.
 struct BothRequests {
-  proto::RequestFile asked;
+  proto::RequestFile file;
   edit::Request engine;
 };
 
 Result<BothRequests> load_request(const EditOptions& options) {
-  auto asked = read_request(options.request, options.name);
-  if (!asked) return propagate(asked);
-  auto request = edits::to_engine(asked->request);
+  auto file = read_request(options.request, options.name);
+  if (!file) return propagate(file);
+  auto request = edits::to_engine(file->request);
   if (request)
     if (const auto valid = edit::validate(*request); !valid) request = propagate(valid);
   if (!request) {
-    locate_in_file(request.error(), options, *asked);
+    locate_in_file(request.error(), options, *file);
     return propagate(request);
   }
-  return BothRequests{std::move(*asked), std::move(*request)};
+  return BothRequests{std::move(*file), std::move(*request)};
 }
 
 Result<std::vector<scene::Camera>> load_cameras(const std::string& dataset) {
@@ -115,19 +115,19 @@ void summarise(std::ostream& out, const path& folder, const EditReport& report) 
   }
 }
 
-/// The edit itself, shown to the user as it goes.
-Result<edit::Outcome> run_shown(const scene::GaussianCloud& input, const std::vector<scene::Camera>& cameras,
-                                const BothRequests& request, Terminal& terminal) {
+/// Carries the edit out and shows its progress to the user.
+Result<edit::Outcome> run_with_progress(const scene::GaussianCloud& input, const std::vector<scene::Camera>& cameras,
+                                        const BothRequests& request, Terminal& terminal) {
   ProgressDisplay display(terminal);
   edit::Observer observer;
   observer.progress = [&](const edit::Progress& progress) { display.show(progress); };
-  const auto corrector = edits::make_corrector(request.asked.request);
+  const auto corrector = edits::make_corrector(request.file.request);
   return edit::run(input, cameras, request.engine, {.corrector = corrector.get()}, observer);
 }
 
-std::vector<std::string> all_warnings(const edit::Report& report, const proto::EditRequest& asked) {
+std::vector<std::string> all_warnings(const edit::Report& report, const proto::EditRequest& request) {
   std::vector<std::string> warnings = report.warnings;
-  for (std::string& warning : edits::warnings_about(asked)) warnings.push_back(std::move(warning));
+  for (std::string& warning : edits::warnings_about(request)) warnings.push_back(std::move(warning));
   return warnings;
 }
 
@@ -156,18 +156,18 @@ Result<void> run(const EditOptions& options, Terminal& terminal) {
     const auto cameras = load_cameras(options.dataset);
     if (!cameras) return propagate(cameras);
     const auto start = std::chrono::steady_clock::now();
-    auto outcome = run_shown(input->cloud, *cameras, *request, terminal);
+    auto outcome = run_with_progress(input->cloud, *cameras, *request, terminal);
     if (!outcome) {
-      locate_in_file(outcome.error(), options, request->asked);
+      locate_in_file(outcome.error(), options, request->file);
       return propagate(outcome);
     }
     EditReport report;
     report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     report.scene_file = path(options.scene).filename().string();
     report.machine = machine;
-    report.request = edits::resolved(request->asked.request, outcome->report.resolved);
+    report.request = edits::resolved(request->file.request, outcome->report.resolved);
     report.edit = outcome->report;
-    report.edit.warnings = all_warnings(outcome->report, request->asked.request);
+    report.edit.warnings = all_warnings(outcome->report, request->file.request);
     for (const std::string& warning : report.edit.warnings) terminal.err << "warning: " << warning << '\n';
     auto written = write_results(folder, std::size_t(options.pictures), *input, *outcome, report);
     if (written) summarise(terminal.out, folder, report);

@@ -39,30 +39,31 @@ ordered_json list_of(const Items& items, Encode encode_item) {
 
 std::string to_json(const EditReport& report) {
   const engine::edit::Report& edit = report.edit;
-  const ordered_json out{{"splatdrag", SPLATDRAG_VERSION},
-                         {"simd", report.machine.simd},
-                         {"threads", report.machine.threads},
-                         {"scene", report.scene_file},
-                         {"request", ordered_json::parse(proto::to_json(report.request))},
-                         {"gaussians",
-                          {{"input", edit.input_gaussians},
-                           {"output", edit.output_gaussians},
-                           {"removed", edit.removed},
-                           {"copies", edit.copies},
-                           {"changeable", edit.changeable}}},
-                         {"handles", list_of(edit.handles, [](const auto& handle) { return encode(handle); })},
-                         {"views", list_of(edit.views,
-                                           [](const auto& view) {
-                                             return ordered_json{{"name", view.name}, {"mask_area", view.mask_area}};
-                                           })},
-                         {"losses", edit.losses},
-                         {"pictures", list_of(report.pictures, [](const auto& pictures) { return encode(pictures); })},
-                         {"seconds", report.seconds},
-                         {"stages", list_of(edit.times,
-                                            [](const auto& time) {
-                                              return ordered_json{{"stage", engine::edit::name_of(time.stage)}, {"seconds", time.seconds}};
-                                            })},
-                         {"warnings", edit.warnings}};
+  const ordered_json out{
+      {"splatdrag", SPLATDRAG_VERSION},
+      {"simd", report.machine.simd},
+      {"threads", report.machine.threads},
+      {"scene", report.scene_file},
+      {"request", ordered_json::parse(proto::to_json(report.request))},
+      {"gaussians",
+       {{"input", edit.input_gaussians},
+        {"output", edit.output_gaussians},
+        {"removed", edit.removed},
+        {"copies", edit.copies},
+        {"changeable", edit.changeable}}},
+      {"handles", list_of(edit.handles, [](const auto& handle) { return encode(handle); })},
+      {"views", list_of(edit.views,
+                        [](const auto& view) {
+                          return ordered_json{{"name", view.name}, {"mask_area", view.mask_area}};
+                        })},
+      {"losses", edit.losses},
+      {"pictures", list_of(report.pictures, [](const auto& pictures) { return encode(pictures); })},
+      {"seconds", report.seconds},
+      {"stages", list_of(edit.times,
+                         [](const auto& time) {
+                           return ordered_json{{"stage", engine::edit::name_of(time.stage)}, {"seconds", time.seconds}};
+                         })},
+      {"warnings", edit.warnings}};
   return proto::pretty(out) + "\n";
 }
 

@@ -16,13 +16,14 @@ struct ViewPictures {
   double psnr_outside_db = 0;  ///< Before against after, outside the mask; infinity if not a bit differs.
 };
 
+/// What the report says.
 struct EditReport {
   std::string scene_file;      ///< Name of the input.
   Machine machine;             ///< What it was computed on.
-  proto::EditRequest request;  ///< As carried out.
+  proto::EditRequest request;  ///< The request as it was carried out.
   engine::edit::Report edit;
   std::vector<ViewPictures> pictures;
-  double seconds = 0;  ///< Of the edit, without reading and writing.
+  double seconds = 0;  ///< Time of the edit, without reading and writing.
 };
 
 /// Indented JSON. An infinite PSNR is null.

@@ -41,9 +41,10 @@ using engine::propagate;
 using std::filesystem::path;
 using Clock = std::chrono::steady_clock;
 
-constexpr int milestones = 20;
-constexpr std::size_t photos_per_milestone = 50;
-constexpr double least_seen = 0.1;  // of the start: with less, poses or units are hardly those of the points
+// Choices, not measurements:
+constexpr int milestones = 20;                    // lines of the history that a fit writes, evenly over its iterations
+constexpr std::size_t photos_per_milestone = 50;  // that a line is measured on, at most
+constexpr double min_visible_share = 0.1;  // of the start; with less, poses or units are hardly those of the points
 constexpr const char* checkpoint_name = "fit.checkpoint";
 
 struct FitCommandOptions {
@@ -117,15 +118,16 @@ Result<scene::GaussianCloud> load_start(const io::Dataset& dataset, const FitCom
 }
 
 /// A start that the cameras do not see leads nowhere, whatever the photos show.
-Result<void> check_seen(const scene::GaussianCloud& start, const std::vector<fit::Photo>& photos, Terminal& terminal) {
-  const std::size_t seen = fit::visible_count(start, photos);
-  if (seen == 0)
+Result<void> check_visibility(const scene::GaussianCloud& start, const std::vector<fit::Photo>& photos,
+                              Terminal& terminal) {
+  const std::size_t visible = fit::visible_count(start, photos);
+  if (visible == 0)
     return fail(ErrorCode::unprocessable,
                 "no camera sees any of the " + std::to_string(start.size()) +
                     " Gaussians to start from: poses must lead from world to camera, be of the points' own frame, and "
                     "leave more than 0.2 units between camera and subject");
-  if (double(seen) < least_seen * double(start.size()))
-    terminal.err << "warning: the cameras see only " << seen << " of the " << start.size()
+  if (double(visible) < min_visible_share * double(start.size()))
+    terminal.err << "warning: the cameras see only " << visible << " of the " << start.size()
                  << " Gaussians to start from: are poses and points of one reconstruction?\n";
   return {};
 }
@@ -256,7 +258,7 @@ Result<void> run(const FitCommandOptions& options, Terminal& terminal) {
     const auto start = load_start(*dataset, options);
     if (!start) return propagate(start);
 
-    if (auto seen = check_seen(*start, photos->training, terminal); !seen) return seen;
+    if (auto checked = check_visibility(*start, photos->training, terminal); !checked) return checked;
     RunningFit fitting(std::move(photos->training), *start, options, machine, terminal);
     if (auto resumed = fitting.resume(); !resumed) return resumed;
     {

@@ -1,4 +1,4 @@
-// What `splatdrag fit` writes down beside the scene.
+// report.json: what a fit did, for programs; `splatdrag fit` writes it beside the scene.
 #pragma once
 
 #include <cstddef>
@@ -12,12 +12,13 @@
 
 namespace server::cli {
 
+/// What the report says.
 struct FitReport {
   Machine machine;
   engine::fit::FitOptions options;
-  int max_side = 0;       ///< Pixels.
-  int hold_out = 0;       ///< Every so many views; 0: none.
-  std::size_t views = 0;  ///< Trained on.
+  int max_side = 0;       ///< Longer side of the photos, pixels.
+  int hold_out = 0;       ///< One view in so many is held out; 0: none.
+  std::size_t views = 0;  ///< Views that were trained on.
   std::size_t start_gaussians = 0, gaussians = 0;
   engine::fit::History history;
   engine::fit::FitQuality training;

@@ -1,4 +1,4 @@
-// Where results go.
+// Folders that commands write their results to.
 #pragma once
 
 #include <filesystem>

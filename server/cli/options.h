@@ -22,7 +22,8 @@ struct PictureSize {
   int width = 0, height = 0;
   bool operator==(const PictureSize&) const = default;
 };
-/// errors  invalid_argument: not WIDTHxHEIGHT, or a side outside 1 to 16384
+/// Reads a picture size.
+///   errors  invalid_argument: not WIDTHxHEIGHT, or a side outside 1 to 16384
 [[nodiscard]] Result<PictureSize> parse_size(const std::string& text);
 
 /// An option that takes three numbers, "0.5,0,-1".

@@ -36,7 +36,7 @@ ProgressDisplay::~ProgressDisplay() {
 
 void ProgressDisplay::show(double fraction, const std::string& doing, std::optional<double> seconds_left) {
   const int percent = int(std::floor(100 * std::clamp(fraction, 0.0, 1.0)));
-  if (!begun_at_) begun_at_ = fraction;
+  if (!first_fraction_) first_fraction_ = fraction;
   if (!seconds_left) seconds_left = guessed_seconds_left(fraction);
   const auto line = [&] {
     const std::string left = seconds_left && fraction < 1 ? time_left(*seconds_left) : "";
@@ -72,7 +72,7 @@ void ProgressDisplay::show(const engine::edit::Progress& progress) {
 
 std::optional<double> ProgressDisplay::guessed_seconds_left(double fraction) const {
   const double elapsed = Seconds(clock_() - start_).count();
-  const double done = fraction - begun_at_.value_or(0);  // since we look: work that goes on begins in its middle
+  const double done = fraction - first_fraction_.value_or(0);  // since we look: work that goes on begins in its middle
   // A guess from less than this would be noise.
   if (done < 0.05 || elapsed < 1) return std::nullopt;
   return elapsed * (1 - fraction) / done;

@@ -26,7 +26,7 @@ class ProgressDisplay {
   ProgressDisplay(const ProgressDisplay&) = delete;
   ProgressDisplay& operator=(const ProgressDisplay&) = delete;
 
-  /// How far it is, 0 to 1, and what is being done.
+  /// Shows progress, 0 to 1, and the name of the work at hand.
   ///   seconds_left  nothing: guessed from how far it has come since it was first shown
   void show(double fraction, const std::string& doing, std::optional<double> seconds_left = std::nullopt);
   void show(const engine::edit::Progress& progress);
@@ -38,8 +38,8 @@ class ProgressDisplay {
   Style style_;
   Clock clock_;
   std::chrono::steady_clock::time_point start_, drawn_;
-  std::optional<double> begun_at_;  ///< The first fraction shown.
-  int percent_ = -1;                ///< As last shown.
+  std::optional<double> first_fraction_;  ///< Of the first call of show(): a resumed edit does not begin at 0.
+  int percent_ = -1;                      ///< Of the last call of show().
 };
 
 }  // namespace server::cli

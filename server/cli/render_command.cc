@@ -18,8 +18,8 @@
 #include "server/cli/compute.h"
 #include "server/cli/folders.h"
 #include "server/pictures/photo_comparison.h"
+#include "server/pictures/picture_content.h"
 #include "server/pictures/picture_names.h"
-#include "server/pictures/shown_picture.h"
 
 namespace server::cli {
 namespace {
@@ -29,7 +29,7 @@ namespace scene = engine::scene;
 using engine::ErrorCode;
 using engine::fail;
 using engine::propagate;
-using pictures::Shown;
+using pictures::PictureContent;
 using std::filesystem::path;
 
 struct RenderOptions {
@@ -43,52 +43,53 @@ struct RenderOptions {
 };
 
 /// A view to render, and the name of its picture.
-struct Shot {
+struct RenderTask {
   io::View view;
   std::string picture;
 };
 
 engine::DVec3 to_vec(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 
-Result<std::vector<Shot>> own_shot(const RenderOptions& options) {
+Result<std::vector<RenderTask>> own_task(const RenderOptions& options) {
   const auto size = parse_size(options.size);
   if (!size) return fail(size.error().code, size.error().message, "--size");
-  Shot shot;
-  shot.view.camera = scene::look_at(to_vec(options.eye), to_vec(options.target), to_vec(options.up),
+  RenderTask task;
+  task.view.camera = scene::look_at(to_vec(options.eye), to_vec(options.target), to_vec(options.up),
                                     options.fov_deg * std::numbers::pi / 180, size->width, size->height);
-  shot.view.camera.name = shot.picture = "render";
-  if (!scene::validate(shot.view.camera))
+  task.view.camera.name = task.picture = "render";
+  if (!scene::validate(task.view.camera))
     return fail(ErrorCode::invalid_argument,
                 "the camera has no direction: eye and target are one point, or up is 0,0,0", "--eye, --target, --up");
-  return std::vector<Shot>{shot};
+  return std::vector<RenderTask>{task};
 }
 
 std::string some_names(const std::vector<io::View>& views) {
-  constexpr std::size_t enough = 10;
+  constexpr std::size_t max_listed = 10;  // names in a message: it stays readable
   std::string text;
-  for (std::size_t i = 0; i < std::min(views.size(), enough); ++i) text += (i == 0 ? "" : ", ") + views[i].camera.name;
-  return views.size() > enough ? text + ", ..." : text;
+  for (std::size_t i = 0; i < std::min(views.size(), max_listed); ++i)
+    text += (i == 0 ? "" : ", ") + views[i].camera.name;
+  return views.size() > max_listed ? text + ", ..." : text;
 }
 
-Result<std::vector<Shot>> dataset_shots(const RenderOptions& options) {
+Result<std::vector<RenderTask>> dataset_tasks(const RenderOptions& options) {
   auto dataset = io::read_dataset(options.dataset, {.points = false});
   if (!dataset) return propagate(dataset);
   const std::vector<scene::Camera> cameras = io::cameras_of(*dataset);
   const auto names = pictures::picture_names(cameras);
-  std::vector<Shot> shots;
+  std::vector<RenderTask> tasks;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     const auto& wanted = options.views;
     if (options.all || std::find(wanted.begin(), wanted.end(), cameras[i].name) != wanted.end())
-      shots.push_back({dataset->views[i], names[i]});
+      tasks.push_back({dataset->views[i], names[i]});
   }
   for (const std::string& name : options.views)
     if (std::none_of(cameras.begin(), cameras.end(), [&](const auto& camera) { return camera.name == name; }))
       return fail(ErrorCode::not_found,
                   "the dataset has no view \"" + name + "\"; there are " + some_names(dataset->views), "--view");
-  return shots;
+  return tasks;
 }
 
-Result<std::vector<Shot>> choose_shots(const RenderOptions& options) {
+Result<std::vector<RenderTask>> choose_tasks(const RenderOptions& options) {
   const auto wrong = [](std::string message, std::string where) {
     return fail(ErrorCode::invalid_argument, std::move(message), std::move(where));
   };
@@ -96,16 +97,16 @@ Result<std::vector<Shot>> choose_shots(const RenderOptions& options) {
   if (ways != 1)
     return wrong("choose one: --view NAME or --all with --dataset, or --eye with --target", "--view, --all, --eye");
   if (options.own_camera && options.compare) return wrong("only views of a dataset have photos", "--compare");
-  if (options.own_camera) return own_shot(options);
+  if (options.own_camera) return own_task(options);
   if (options.dataset.empty()) return wrong("views are those of a dataset: give its folder", "--dataset");
-  return dataset_shots(options);
+  return dataset_tasks(options);
 }
 
-/// Writes what is shown in the format that the file's name asks for.
-Result<void> write_picture(const path& file, const engine::render::Rendering& rendering, Shown shown) {
+/// Writes a picture of the rendering in the format that the file's name asks for.
+Result<void> write_picture(const path& file, const engine::render::Rendering& rendering, PictureContent content) {
   const auto format = io::format_of(file);
   if (!format) return propagate(format);
-  const auto bytes = pictures::encode_shown(rendering, shown, *format);
+  const auto bytes = pictures::encode_content(rendering, content, *format);
   if (!bytes) return propagate(bytes);
   return engine::write_file(file, *bytes);
 }
@@ -116,7 +117,7 @@ struct Destination {
   std::optional<path> file;
   std::string extension;
 
-  [[nodiscard]] path of(const Shot& shot) const { return file ? *file : folder / (shot.picture + extension); }
+  [[nodiscard]] path of(const RenderTask& task) const { return file ? *file : folder / (task.picture + extension); }
 };
 
 Result<Destination> destination(const RenderOptions& options, std::size_t pictures) {
@@ -137,16 +138,16 @@ Result<Destination> destination(const RenderOptions& options, std::size_t pictur
 Result<void> run(const RenderOptions& options, Terminal& terminal) {
   if (options.out.empty() && !options.compare)
     return fail(ErrorCode::invalid_argument, "say where the pictures go", "--out");
-  const auto shots = choose_shots(options);
-  if (!shots) return propagate(shots);
+  const auto tasks = choose_tasks(options);
+  if (!tasks) return propagate(tasks);
   std::optional<Destination> to;
   if (!options.out.empty()) {
-    auto found = destination(options, shots->size());
+    auto found = destination(options, tasks->size());
     if (!found) return propagate(found);
     to = std::move(*found);
-    for (const Shot& shot : *shots)
-      for (const path& input : {path(options.scene), shot.view.photo})
-        if (auto safe = keep_input_safe(input, to->of(shot)); !safe) return safe;
+    for (const RenderTask& task : *tasks)
+      for (const path& input : {path(options.scene), task.view.photo})
+        if (auto safe = keep_input_safe(input, to->of(task)); !safe) return safe;
   }
 
   return compute(options.compute, [&](const Machine&) -> Result<void> {
@@ -154,30 +155,32 @@ Result<void> run(const RenderOptions& options, Terminal& terminal) {
     if (!input) return propagate(input);
     engine::render::ForwardOptions forward;
     forward.background = engine::Vec3(to_vec(options.background));
-    const Shown shown = options.what == "depth" ? Shown::depth : options.what == "alpha" ? Shown::alpha : Shown::color;
-    forward.color = pictures::needs_color(shown) || options.compare;
+    const PictureContent content = options.what == "depth"   ? PictureContent::depth
+                                   : options.what == "alpha" ? PictureContent::alpha
+                                                             : PictureContent::color;
+    forward.color = pictures::needs_color(content) || options.compare;
     forward.depth = true;
     engine::render::Workspace workspace;
     engine::render::Rendering rendering;
     double psnr_sum = 0;
     terminal.out << std::fixed << std::setprecision(2);
-    for (const Shot& shot : *shots) {
-      scene::Camera camera = shot.view.camera;
+    for (const RenderTask& task : *tasks) {
+      scene::Camera camera = task.view.camera;
       if (options.max_side > 0) camera = scene::fit_within(camera, options.max_side);
       engine::render::forward(input->cloud, camera, forward, {}, workspace, rendering);
       if (to) {
-        const path file = to->of(shot);
-        if (auto saved = write_picture(file, rendering, shown); !saved) return saved;
+        const path file = to->of(task);
+        if (auto saved = write_picture(file, rendering, content); !saved) return saved;
         if (!options.compare) terminal.out << file.string() << '\n';
       }
       if (options.compare) {
-        const auto psnr = pictures::psnr_against_photo(shot.view, rendering.color);
+        const auto psnr = pictures::psnr_against_photo(task.view, rendering.color);
         if (!psnr) return propagate(psnr);
         psnr_sum += *psnr;
         terminal.out << camera.name << "  " << *psnr << " dB\n";
       }
     }
-    if (options.compare) terminal.out << "mean  " << psnr_sum / double(shots->size()) << " dB\n";
+    if (options.compare) terminal.out << "mean  " << psnr_sum / double(tasks->size()) << " dB\n";
     return {};
   });
 }

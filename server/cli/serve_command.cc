@@ -57,25 +57,25 @@ CLI::Option* add_count(CLI::App& command, const std::string& name, Number& value
   return command.add_option(name, value, description)->check(CLI::Range(low, high))->type_name("N");
 }
 
-void add_http_options(CLI::App& command, http::ServerOptions& options, http::GateOptions& gate) {
+void add_http_options(CLI::App& command, http::ServerOptions& options, http::AccessOptions& access) {
   command.add_option("--host", options.host, "Address to listen on")->type_name("HOST");
   command
       .add_option("--port", options.port, "Port to listen on; 0: any that is free, named in the first line of output")
       ->check(CLI::Range(0, 65535))
       ->type_name("N");
   command
-      .add_option("--allowed-host", gate.allowed_hosts,
+      .add_option("--allowed-host", access.allowed_hosts,
                   "A name the service goes by, beside --host and the loopback names; several may be given")
       ->type_name("NAME");
   command
-      .add_option("--allowed-origin", gate.allowed_origins,
+      .add_option("--allowed-origin", access.allowed_origins,
                   "Requests whose Origin is this one are taken, as those of the service's own page are: for a proxy "
                   "that puts the service under another name (https://name); several may be given")
       ->type_name("ORIGIN");
   add_count(command, "--max-connections", options.threads, "Connections served at a time");
   add_count(command, "--max-waiting", options.max_waiting, "Connections that may wait; more are turned away", 0);
   add_count(command, "--max-streams", options.dispatcher.max_streams, "Streams of events at a time", 0);
-  add_count(command, "--max-sessions", gate.max_sessions, "Pages signed in at a time; the oldest makes room");
+  add_count(command, "--max-sessions", access.max_sessions, "Pages signed in at a time; the oldest makes room");
   add_bytes(command, "--max-header-bytes", options.connection.max_head_bytes, "Head of a request");
   add_bytes(command, "--max-json-bytes", options.dispatcher.max_json_bytes, "JSON body of a request, up to 1MiB")
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{proto::JsonLimits().max_bytes}));
@@ -117,7 +117,7 @@ void add_store_options(CLI::App& command, ServeOptions& options) {
 void add_serve_command(CLI::App& program, Action& action) {
   CLI::App* const command = program.add_subcommand("serve", "Serves edits over HTTP, with a page to place points on");
   const auto options = std::make_shared<ServeCommandOptions>();
-  add_http_options(*command, options->http, options->gate);
+  add_http_options(*command, options->http, options->access);
   add_store_options(*command, *options);
   command
       ->add_option("--token-file", options->token_file,

@@ -31,7 +31,7 @@ proto::Corrector corrector_of(const proto::EditRequest& request) {
   return engine::params::filled_in(request.params, preset_of(request)).corrector;
 }
 
-bool corrects(const edit::Params& params) {
+bool uses_corrector(const edit::Params& params) {
   return params.iterations > 0 && params.corrector != proto::Corrector::none;
 }
 
@@ -60,11 +60,11 @@ engine::Result<edit::Request> to_engine(const proto::EditRequest& request) {
   edit::Request out;
   out.mode = request.mode;
   for (const proto::Handle& handle : request.handles) {
-    edit::Handle& made = out.handles.emplace_back();
-    made.source = to_vec(handle.source);
-    if (handle.target) made.target = to_vec(*handle.target);
-    made.radius = handle.radius;
-    made.group = handle.group;
+    edit::Handle& to = out.handles.emplace_back();
+    to.source = to_vec(handle.source);
+    if (handle.target) to.target = to_vec(*handle.target);
+    to.radius = handle.radius;
+    to.group = handle.group;
   }
   if (request.region) out.region = {to_vec(request.region->center), to_vec(request.region->size)};
   out.params = filled_in(request.params, preset_of(request), out);
@@ -72,9 +72,9 @@ engine::Result<edit::Request> to_engine(const proto::EditRequest& request) {
   return out;
 }
 
-proto::EditRequest resolved(const proto::EditRequest& asked, const edit::Params& used) {
-  proto::EditRequest out = asked;
-  out.preset = preset_of(asked);
+proto::EditRequest resolved(const proto::EditRequest& request, const edit::Params& used) {
+  proto::EditRequest out = request;
+  out.preset = preset_of(request);
   out.params = engine::params::as_given(used);
   return out;
 }
@@ -82,7 +82,7 @@ proto::EditRequest resolved(const proto::EditRequest& asked, const edit::Params&
 std::vector<std::string> fields_without_effect(const proto::EditRequest& request) {
   std::vector<std::string> fields;
   if (request.prompt) fields.emplace_back("prompt");  // no corrector of this build reads it
-  if (corrects(engine::params::filled_in(request.params, preset_of(request)))) return fields;
+  if (uses_corrector(engine::params::filled_in(request.params, preset_of(request)))) return fields;
   proto::Params given = request.params;
   if (given.corrector == proto::Corrector::none) given.corrector.reset();  // that was its effect
   engine::params::for_each_parameter([&](const auto& parameter) {

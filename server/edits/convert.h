@@ -1,4 +1,5 @@
-// Between the edit request on the wire and the one the engine runs: for the program and the service alike.
+// Conversion between the edit request on the wire and the one that the engine runs: for the program and the service
+// alike.
 #pragma once
 
 #include <memory>
@@ -16,7 +17,7 @@ namespace server::edits {
 ///   drag  its mode and handles, on which the intervals depend; its own parameters do not count
 [[nodiscard]] engine::edit::Params filled_in(const proto::Params& given, proto::Preset preset,
                                              const engine::edit::Request& drag);
-/// What a preset alone stands for.
+/// The parameters that a preset alone stands for.
 [[nodiscard]] engine::edit::Params preset_params(proto::Preset preset, const engine::edit::Request& drag = {});
 
 /// The preset of a request: `standard` if it names none.
@@ -25,10 +26,10 @@ namespace server::edits {
 /// The corrector of a request: that of its preset if it names none.
 [[nodiscard]] proto::Corrector corrector_of(const proto::EditRequest& request);
 
-/// Does a corrector do anything in this edit? It works for the optimisation only.
-[[nodiscard]] bool corrects(const engine::edit::Params& params);
+/// Does this edit use a corrector? A corrector works for the optimisation only.
+[[nodiscard]] bool uses_corrector(const engine::edit::Params& params);
 
-/// A new one of that kind; null: `none`. Precondition: to_engine(request) succeeds.
+/// A new corrector of the kind that the request names; null: `none`. Precondition: to_engine(request) succeeds.
 [[nodiscard]] std::unique_ptr<engine::correct::Corrector> make_corrector(const proto::EditRequest& request);
 
 /// Does this build have the corrector, the perceptual loss and the background that these parameters name?
@@ -39,8 +40,8 @@ namespace server::edits {
 ///   errors  as available()
 [[nodiscard]] engine::Result<engine::edit::Request> to_engine(const proto::EditRequest& request);
 
-/// The request as it was carried out: `asked`, with every parameter that the edit used filled in.
-[[nodiscard]] proto::EditRequest resolved(const proto::EditRequest& asked, const engine::edit::Params& used);
+/// The request as it was carried out: `request` with every parameter that the edit used filled in.
+[[nodiscard]] proto::EditRequest resolved(const proto::EditRequest& request, const engine::edit::Params& used);
 
 /// Fields of the request that are given, but without effect on this edit.
 [[nodiscard]] std::vector<std::string> fields_without_effect(const proto::EditRequest& request);

@@ -164,7 +164,7 @@ class Run {
                  .seconds = done.seconds,
                  .positions = to_points(done.positions),
                  .loss = done.loss,
-                 .renders = pictures_->of(done.interval)});
+                 .renders = pictures_->renders_of(done.interval)});
     keeper_.publish();
     if (done.interval <= context_.finished_intervals()) return {};  // made up for
     auto saved = context_.save_checkpoint(done.interval, edit::encode(done.state));
@@ -176,7 +176,7 @@ class Run {
 
   Result<void> publish(const edit::Outcome& outcome) {
     keeper_.enter(JobStage::publish);
-    const auto hold = workshop_.results.own(context_.id());
+    const auto hold = workshop_.results.lock(context_.id());
     // Asked once it can no longer be cancelled in between: a cancelled edit leaves no version.
     if (context_.cancel_token().stop_requested())
       return fail(ErrorCode::cancelled, context_.id() + " was interrupted before its result was published");

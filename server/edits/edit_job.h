@@ -6,7 +6,7 @@
 #include "engine/core/parallel.h"
 #include "engine/jobs/worker.h"
 #include "engine/optim/perceptual.h"
-#include "server/edits/gate.h"
+#include "server/edits/named_locks.h"
 #include "server/scenes/scene_store.h"
 
 namespace server::edits {
@@ -15,9 +15,10 @@ namespace server::edits {
 struct Workshop {
   scenes::SceneStore& scenes;
   engine::WorkArena& arena;
-  Gate& results;                     ///< An edit owns its id while it publishes its result: who cancels it shares it.
-  spdlog::logger* logger = nullptr;  ///< May be null.
-  int pictured_views = 4;            ///< Of each interval.
+  /// An edit locks its id alone while it publishes its result; whoever cancels it shares the lock.
+  NamedLocks& results;
+  spdlog::logger* logger = nullptr;                     ///< May be null.
+  int pictured_views = 4;                               ///< Of each interval.
   engine::optim::PerceptualLoss* perceptual = nullptr;  ///< As in engine::edit::run().
 };
 

@@ -14,10 +14,10 @@
 #include "server/edits/convert.h"
 #include "server/edits/edit_job.h"
 #include "server/edits/estimate.h"
-#include "server/edits/gate.h"
 #include "server/edits/interval_pictures.h"
+#include "server/edits/named_locks.h"
 #include "server/edits/status.h"
-#include "server/scenes/disk/plain_error.h"
+#include "server/scenes/disk/public_errors.h"
 
 namespace server::edits {
 namespace {
@@ -151,8 +151,8 @@ struct EditService::Impl {
   scenes::SceneStore& scenes;
   const ServiceOptions options;
   engine::WorkArena arena;
-  Gate scenes_in_use;  ///< Shared by scene while an edit of it is accepted, owned by while_idle().
-  Gate results;        ///< By edit; see Workshop.
+  NamedLocks scenes_in_use;  ///< By scene: shared while an edit of it is accepted, alone in while_idle().
+  NamedLocks results;        ///< By edit; see Workshop.
   std::unique_ptr<jobs::SqliteStore> records;
   std::unique_ptr<jobs::Queue> queue;
   std::optional<jobs::Worker> worker;  ///< Last: it uses all of the above until it ends.
@@ -175,7 +175,7 @@ Result<EditService::Submission> EditService::submit(const proto::EditRequest& re
   const auto earlier = impl_->earlier(idempotency_key, job);
   if (!earlier) return propagate(earlier);
   if (*earlier) return Submission{status_of(**earlier), false};
-  const auto hold = impl_->scenes_in_use.share(*asked->scene);
+  const auto hold = impl_->scenes_in_use.lock_shared(*asked->scene);
   if (const auto checked = check(impl_->scenes, *asked); !checked) return propagate(checked);
   const auto submission = impl_->queue->submit(job);
   if (!submission) return propagate(submission);
@@ -194,7 +194,7 @@ Result<proto::EditEstimate> EditService::estimate(const proto::EditRequest& requ
   edit::Request request_there = checked->request;
   if (info->up) request_there.up = *info->up;
   const Workload work = workload_of(checked->version.cloud, request_there, checked->preview, cameras_of(dataset->get()),
-                                    corrects(request_there.params), impl_->options.pictured_views);
+                                    uses_corrector(request_there.params), impl_->options.pictured_views);
 
   proto::EditEstimate estimate;
   estimate.handles = checked->handles();
@@ -259,7 +259,7 @@ Result<proto::EditStatus> EditService::cancel(const std::string& id) {
   const auto job = about_edit(impl_->queue->find(id), id);
   if (!job) return propagate(job);
   {
-    const auto hold = impl_->results.share(id);
+    const auto hold = impl_->results.lock_shared(id);
     if (jobs::is_final(job->state) || !version_made_by(impl_->scenes, job->lane, id))
       return shown(about_edit(impl_->queue->cancel(id), id));
   }
@@ -303,7 +303,7 @@ Result<std::string> EditService::interval_picture(const std::string& id, int int
 }
 
 Result<void> EditService::while_idle(const std::string& scene, const std::function<Result<void>()>& change) {
-  const auto hold = impl_->scenes_in_use.own(scene);
+  const auto hold = impl_->scenes_in_use.lock(scene);
   const auto active = impl_->queue->list({.lane = scene, .active_only = true, .limit = 1});
   if (!active) return propagate(active);
   if (!active->empty())

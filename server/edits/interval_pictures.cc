@@ -10,7 +10,7 @@
 namespace server::edits {
 namespace {
 
-constexpr int jpeg_quality = 90;
+constexpr int jpeg_quality = 90;  // 1 to 100; what POST .../render has by default. A choice.
 
 Result<std::string> encoded(const engine::scene::Image& picture) {
   const auto bytes = engine::io::encode_image(picture, engine::io::ImageFormat::jpeg, {.jpeg_quality = jpeg_quality});
@@ -34,15 +34,15 @@ Result<void> IntervalPictures::add(const engine::edit::Moment& moment) {
   }
   const std::size_t count = std::min(count_, moment.views.size());
   if (count == 0) return {};
-  std::vector<std::string> given;
+  std::vector<std::string> corrected;
   for (std::size_t v = 0; v < count && !moment.pictures.empty(); ++v) {
     auto jpeg = encoded(moment.pictures[v]);
     if (!jpeg) return engine::propagate(jpeg);
-    given.push_back(std::move(*jpeg));
+    corrected.push_back(std::move(*jpeg));
   }
-  if (given.empty() && (jpegs_.size() != count || shown_ != moment.overlay))
+  if (corrected.empty() && (cached_jpegs_.size() != count || cached_overlay_ != moment.overlay))
     if (auto rendered = render(moment); !rendered) return rendered;
-  const std::vector<std::string>& jpegs = given.empty() ? jpegs_ : given;
+  const std::vector<std::string>& jpegs = corrected.empty() ? cached_jpegs_ : corrected;
   Result<void> written = engine::jobs::create_folder(folder_);
   for (std::size_t v = 0; written && v < count; ++v)
     written = engine::jobs::write_durably(folder_ / picture_name(moment.interval, v, moment.stage), jpegs[v]);
@@ -58,24 +58,24 @@ Result<void> IntervalPictures::add(const engine::edit::Moment& moment) {
 }
 
 Result<void> IntervalPictures::render(const engine::edit::Moment& moment) {
-  const bool as_it_came = moment.overlay.removed.empty() && moment.overlay.rows.size() == 0;
+  const bool is_input = moment.overlay.removed.empty() && moment.overlay.rows.size() == 0;
   engine::scene::GaussianCloud edited;
-  if (!as_it_came) edited = engine::scene::flatten(input_, moment.overlay);
-  const engine::scene::GaussianCloud& cloud = as_it_came ? input_ : edited;
-  jpegs_.clear();
+  if (!is_input) edited = engine::scene::flatten(input_, moment.overlay);
+  const engine::scene::GaussianCloud& cloud = is_input ? input_ : edited;
+  cached_jpegs_.clear();
   engine::render::Workspace workspace;
   engine::render::Rendering picture;
   for (std::size_t v = 0; v < std::min(count_, moment.views.size()); ++v) {
     engine::render::forward(cloud, moment.views[v], {}, {}, workspace, picture);
     auto jpeg = encoded(picture.color);
     if (!jpeg) return engine::propagate(jpeg);
-    jpegs_.push_back(std::move(*jpeg));
+    cached_jpegs_.push_back(std::move(*jpeg));
   }
-  shown_ = moment.overlay;
+  cached_overlay_ = moment.overlay;
   return {};
 }
 
-std::vector<proto::IntervalRender> IntervalPictures::of(int interval) const {
+std::vector<proto::IntervalRender> IntervalPictures::renders_of(int interval) const {
   return interval == interval_ ? renders_ : std::vector<proto::IntervalRender>{};
 }
 

@@ -15,22 +15,22 @@ namespace server::edits {
 
 using engine::Result;
 
-/// "interval-2-view-0-before.jpg"
+/// Name of a file, such as "interval-2-view-0-before.jpg".
 [[nodiscard]] std::string picture_name(int interval, std::size_t view, std::string_view stage);
 
-/// Writes them as the moments come. The same moment gives the same bytes, in whatever run.
+/// Writes the pictures of each moment. The same moment gives the same bytes, whether the edit was resumed or not.
 class IntervalPictures {
  public:
-  /// folder  made if absent
-  /// input   of the edit; outlives this
-  /// views   that are pictured, of each moment's views the first
+  /// folder  is made if absent
+  /// input   cloud that the edit began with; outlives this
+  /// views   how many of each moment's views get pictures: the first ones
   IntervalPictures(std::filesystem::path folder, const engine::scene::GaussianCloud& input, int views);
 
   /// Renders the moment and puts its pictures on disk; they are there when this returns.
   ///   errors  no_space, unavailable: the message says what could not be written
   [[nodiscard]] Result<void> add(const engine::edit::Moment& moment);
-  /// Those of an interval, as its record lists them.
-  [[nodiscard]] std::vector<proto::IntervalRender> of(int interval) const;
+  /// The pictures of the interval that was added last, as its record lists them; of any other interval, none.
+  [[nodiscard]] std::vector<proto::IntervalRender> renders_of(int interval) const;
 
  private:
   [[nodiscard]] Result<void> render(const engine::edit::Moment& moment);
@@ -38,10 +38,10 @@ class IntervalPictures {
   std::filesystem::path folder_;
   const engine::scene::GaussianCloud& input_;
   std::size_t count_;
-  int interval_ = 0;  ///< That `renders_` is about.
+  int interval_ = 0;  ///< Interval that `renders_` lists.
   std::vector<proto::IntervalRender> renders_;
-  engine::scene::Overlay shown_;  ///< What `jpegs_` show: an interval begins as the one before it ended.
-  std::vector<std::string> jpegs_;
+  engine::scene::Overlay cached_overlay_;  ///< What `cached_jpegs_` show; an interval begins as the last one ended.
+  std::vector<std::string> cached_jpegs_;
 };
 
 }  // namespace server::edits

@@ -106,30 +106,30 @@ Result<std::string> read_text(Connection& connection, std::uint64_t limit, const
 
 const std::string& HttpCall::path(std::string_view name) const {
   static const std::string none;
-  const auto found = parts_.path.find(name);
-  return found == parts_.path.end() ? none : found->second;
+  const auto found = fields_.path.find(name);
+  return found == fields_.path.end() ? none : found->second;
 }
 
 std::optional<std::string> HttpCall::query(std::string_view name) const {
-  const auto found = parts_.query.find(name);
-  if (found == parts_.query.end()) return std::nullopt;
+  const auto found = fields_.query.find(name);
+  if (found == fields_.query.end()) return std::nullopt;
   return found->second;
 }
 
-std::string HttpCall::header(std::string_view name) const { return parts_.head.header(lower_case(name)); }
+std::string HttpCall::header(std::string_view name) const { return fields_.head.header(lower_case(name)); }
 
 bool HttpCall::has(const std::string& etag) const {
-  return parts_.head.only_reads() && names_etag(parts_.head.header("if-none-match"), etag);
+  return fields_.head.only_reads() && names_etag(fields_.head.header("if-none-match"), etag);
 }
 
 bool HttpCall::accepts(std::string_view media_type) const {
-  return http::accepts(parts_.head.header("accept"), media_type);
+  return http::accepts(fields_.head.header("accept"), media_type);
 }
 
-Result<Received> HttpCall::receive(const std::filesystem::path& path) const {
-  UploadFile file(path, parts_.max_upload_bytes);
+Result<UploadInfo> HttpCall::receive(const std::filesystem::path& path) const {
+  UploadFile file(path, fields_.max_upload_bytes);
   if (file.error()) return tl::make_unexpected(*file.error());
-  const bool is_form = media_type_of(parts_.head.header("content-type")) == "multipart/form-data";
+  const bool is_form = media_type_of(fields_.head.header("content-type")) == "multipart/form-data";
   auto received = is_form ? receive_form(file) : receive_raw(file);
   if (!received) return received;
   if (!file.keep()) return tl::make_unexpected(*file.error());
@@ -137,18 +137,18 @@ Result<Received> HttpCall::receive(const std::filesystem::path& path) const {
   return received;
 }
 
-Result<Received> HttpCall::receive_raw(UploadFile& file) const {
+Result<UploadInfo> HttpCall::receive_raw(UploadFile& file) const {
   std::vector<char> piece(256 * 1024);
   for (;;) {
-    const std::ptrdiff_t got = parts_.connection.read_body(piece.data(), piece.size());
-    if (got == 0) return Received{};
-    if (got < 0) return tl::make_unexpected(body_error(parts_.connection));
+    const std::ptrdiff_t got = fields_.connection.read_body(piece.data(), piece.size());
+    if (got == 0) return UploadInfo{};
+    if (got < 0) return tl::make_unexpected(body_error(fields_.connection));
     if (!file.append({piece.data(), std::size_t(got)})) return tl::make_unexpected(*file.error());
   }
 }
 
-Result<Received> HttpCall::receive_form(UploadFile& file) const {
-  Received received;
+Result<UploadInfo> HttpCall::receive_form(UploadFile& file) const {
+  UploadInfo received;
   int files = 0;
   bool in_file = false;
   std::uint64_t other_bytes = 0;
@@ -162,13 +162,13 @@ Result<Received> HttpCall::receive_form(UploadFile& file) const {
   const auto take = [&](std::string_view data) {
     if (in_file) return file.append(data);
     other_bytes += data.size();  // fields beside the file are of no interest, but not for ever
-    return other_bytes <= parts_.max_upload_bytes ||
-           file.fail(limit_error(parts_.max_upload_bytes, "--max-upload-bytes"));
+    return other_bytes <= fields_.max_upload_bytes ||
+           file.fail(limit_error(fields_.max_upload_bytes, "--max-upload-bytes"));
   };
-  const bool whole = parts_.form.read(begin_part, take);
+  const bool whole = fields_.form.read(begin_part, take);
   if (file.error()) return tl::make_unexpected(*file.error());
-  if (parts_.connection.body_failure() != Connection::BodyFailure::none)
-    return tl::make_unexpected(body_error(parts_.connection));
+  if (fields_.connection.body_failure() != Connection::BodyFailure::none)
+    return tl::make_unexpected(body_error(fields_.connection));
   if (!whole)
     return engine::fail(ErrorCode::invalid_argument, "the form is malformed, or ends before its last boundary");
   if (files == 0) return engine::fail(ErrorCode::invalid_argument, "the form holds no file");

@@ -14,14 +14,17 @@
 
 namespace server::http {
 
-/// The rest of a body, at most `limit` bytes.
-///   option  names the limit in messages
+/// Reads the rest of a body.
+///   limit   most bytes
+///   option  name of the limit in messages
 ///   errors  too_large, invalid_argument: it ended early or its framing is broken
 [[nodiscard]] Result<std::string> read_text(Connection& connection, std::uint64_t limit, const std::string& option);
 
+/// One request on its connection. Used by one thread.
 class HttpCall final : public Call {
  public:
-  struct Parts {
+  /// What the call is made of; references outlive it.
+  struct Fields {
     const RequestHead& head;
     const std::string& request_id;
     PathValues path;
@@ -32,23 +35,23 @@ class HttpCall final : public Call {
     FormReader& form;
     std::uint64_t max_upload_bytes;
   };
-  explicit HttpCall(Parts parts) : parts_(std::move(parts)) {}
+  explicit HttpCall(Fields fields) : fields_(std::move(fields)) {}
 
-  [[nodiscard]] const std::string& request_id() const override { return parts_.request_id; }
+  [[nodiscard]] const std::string& request_id() const override { return fields_.request_id; }
   [[nodiscard]] const std::string& path(std::string_view name) const override;
   [[nodiscard]] std::optional<std::string> query(std::string_view name) const override;
   [[nodiscard]] std::string header(std::string_view name) const override;
-  [[nodiscard]] const std::string& body() const override { return parts_.body; }
-  [[nodiscard]] bool is_json() const override { return parts_.is_json; }
-  [[nodiscard]] Result<Received> receive(const std::filesystem::path& file) const override;
+  [[nodiscard]] const std::string& body() const override { return fields_.body; }
+  [[nodiscard]] bool is_json() const override { return fields_.is_json; }
+  [[nodiscard]] Result<UploadInfo> receive(const std::filesystem::path& file) const override;
   [[nodiscard]] bool has(const std::string& etag) const override;
   [[nodiscard]] bool accepts(std::string_view media_type) const override;
 
  private:
-  [[nodiscard]] Result<Received> receive_raw(class UploadFile& file) const;
-  [[nodiscard]] Result<Received> receive_form(class UploadFile& file) const;
+  [[nodiscard]] Result<UploadInfo> receive_raw(class UploadFile& file) const;
+  [[nodiscard]] Result<UploadInfo> receive_form(class UploadFile& file) const;
 
-  Parts parts_;
+  Fields fields_;
 };
 
 }  // namespace server::http

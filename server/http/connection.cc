@@ -17,12 +17,12 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr std::size_t receive_bytes = 64 * 1024;
-constexpr std::size_t max_chunk_line = 256;  // a size and what extensions follow it
-constexpr std::size_t max_trailer_bytes = 8 * 1024;
-constexpr std::size_t max_empty_lines = 2;  // before a request (RFC 9112, section 2.2)
-constexpr auto crowd_check = 50ms;
-constexpr auto linger_time = 1s;
+constexpr std::size_t receive_bytes = 64 * 1024;     // per call of recv(); a choice
+constexpr std::size_t max_chunk_line = 256;          // bytes: a size and the extensions that follow it; a choice
+constexpr std::size_t max_trailer_bytes = 8 * 1024;  // of all trailer fields, which we ignore; a choice
+constexpr std::size_t max_empty_lines = 2;           // before a request (RFC 9112, section 2.2)
+constexpr auto crowd_check = 50ms;  // between two looks whether others wait, while a connection is idle; a choice
+constexpr auto linger_time = 1s;    // for a client to take the end of its answer; a choice
 constexpr std::string_view continue_line = "HTTP/1.1 100 Continue\r\n\r\n";
 
 bool would_block() { return errno == EAGAIN || errno == EWOULDBLOCK; }
@@ -36,18 +36,18 @@ Refusal not_http() { return {400, "invalid_argument", "that is no HTTP request",
 
 }  // namespace
 
-Connection::Connection(int socket, const ConnectionLimits& limits, Surroundings surroundings)
-    : socket_(socket), limits_(limits), surroundings_(std::move(surroundings)) {}
+Connection::Connection(int socket, const ConnectionLimits& limits, ConnectionHooks hooks)
+    : socket_(socket), limits_(limits), hooks_(std::move(hooks)) {}
 
 Connection::~Connection() { ::close(socket_); }
 
 bool Connection::stopping() const {
-  pollfd stop{surroundings_.stop_fd, POLLIN, 0};
-  return surroundings_.stop_fd >= 0 && ::poll(&stop, 1, 0) > 0;
+  pollfd stop{hooks_.stop_fd, POLLIN, 0};
+  return hooks_.stop_fd >= 0 && ::poll(&stop, 1, 0) > 0;
 }
 
 Connection::Wait Connection::wait(short events, Clock::time_point until, bool watch_stop) const {
-  std::array<pollfd, 2> watched{{{socket_, events, 0}, {watch_stop ? surroundings_.stop_fd : -1, POLLIN, 0}}};
+  std::array<pollfd, 2> watched{{{socket_, events, 0}, {watch_stop ? hooks_.stop_fd : -1, POLLIN, 0}}};
   // Time that is over is over even if there is something to read: a client that always has a byte more gains none.
   while (Clock::now() < until) {
     const int ready = ::poll(watched.data(), watched.size(), milliseconds_until(until));
@@ -63,10 +63,10 @@ Connection::Wait Connection::wait_while_idle(Clock::time_point until) const {
   for (;;) {
     const Wait waited = wait(POLLIN, std::min<Clock::time_point>(until, Clock::now() + crowd_check), true);
     if (waited != Wait::timeout || Clock::now() >= until) return waited;
-    // One that has had an answer, or has had the time to begin a request and did not, can do without its thread;
+    // A client that has had an answer, or has had the time to begin a request and did not, can do without its thread;
     // clients know to try again on a new connection.
-    const bool has_had_its_turn = answered_ || Clock::now() >= patient_until;
-    if (has_had_its_turn && surroundings_.crowded && surroundings_.crowded()) return Wait::timeout;
+    const bool has_had_its_turn = has_answered_ || Clock::now() >= patient_until;
+    if (has_had_its_turn && hooks_.crowded && hooks_.crowded()) return Wait::timeout;
   }
 }
 
@@ -86,7 +86,7 @@ std::ptrdiff_t Connection::receive() {
 }
 
 tl::expected<std::optional<std::string>, Refusal> Connection::read_head() {
-  std::optional<Clock::time_point> until;  // of the head; none before its first byte
+  std::optional<Clock::time_point> until;  // deadline of the head; none before its first byte
   const auto idle_until = Clock::now() + limits_.idle_timeout;
   std::size_t searched = 0, empty_lines = 0;
   for (;;) {
@@ -120,11 +120,11 @@ tl::expected<std::optional<std::string>, Refusal> Connection::read_head() {
 }
 
 void Connection::begin_body(const RequestHead& head) {
-  left_ = head.content_length.value_or(0);
-  framing_ = head.chunked ? Framing::chunk_size : left_ > 0 ? Framing::length : Framing::done;
+  remaining_ = head.content_length.value_or(0);
+  framing_ = head.chunked ? Framing::chunk_size : remaining_ > 0 ? Framing::length : Framing::done;
   trailer_bytes_ = 0;
-  owes_continue_ = head.expects_continue && framing_ != Framing::done;
-  waits_for_body_ = true;
+  continue_pending_ = head.expects_continue && framing_ != Framing::done;
+  may_wait_for_body_ = true;
   failure_ = BodyFailure::none;
   body_waited_ = {};
   body_bytes_ = 0;
@@ -140,10 +140,10 @@ bool Connection::too_slow(Clock::duration waited, std::uint64_t bytes) const {
   return double(bytes) < std::chrono::duration<double>(waited).count() * double(limits_.min_bytes_per_second);
 }
 
-/// Waits for more of the body.
-bool Connection::more_body() {
-  if (owes_continue_) {
-    owes_continue_ = false;
+/// Waits for more bytes of the body and appends them to the input.
+bool Connection::fill_body_buffer() {
+  if (continue_pending_) {
+    continue_pending_ = false;
     if (!write(continue_line)) return fail(BodyFailure::truncated);
   }
   for (;;) {
@@ -153,7 +153,7 @@ bool Connection::more_body() {
       return true;
     }
     if (got == 0 || (!would_block() && errno != EINTR)) return fail(BodyFailure::truncated);
-    if (!waits_for_body_) return fail(BodyFailure::too_slow);
+    if (!may_wait_for_body_) return fail(BodyFailure::too_slow);
     const auto began = Clock::now();
     const Wait waited = wait(POLLIN, began + limits_.stall_timeout, false);
     body_waited_ += Clock::now() - began;
@@ -166,7 +166,7 @@ std::optional<std::string> Connection::body_line() {
   for (;;) {
     const std::string_view arrived = std::string_view(input_).substr(consumed_);
     const std::size_t end = arrived.find("\r\n");
-    // Of a line that is not complete, the last byte may be half of its CRLF.
+    // The last byte of an incomplete line may be half of its CRLF.
     const bool ends_in_cr = end == std::string_view::npos && arrived.ends_with('\r');
     if (std::min(end, arrived.size()) > max_chunk_line ||
         !is_header_text(arrived.substr(0, std::min(end, arrived.size() - (ends_in_cr ? 1 : 0))))) {
@@ -178,7 +178,7 @@ std::optional<std::string> Connection::body_line() {
       consumed_ += end + 2;
       return line;
     }
-    if (!more_body()) return std::nullopt;
+    if (!fill_body_buffer()) return std::nullopt;
   }
 }
 
@@ -193,10 +193,10 @@ bool Connection::next_chunk() {
   if (framing_ == Framing::chunk_size) {
     const auto line = body_line();
     if (!line) return false;
-    const auto read = std::from_chars(line->data(), line->data() + line->size(), left_, 16);
+    const auto read = std::from_chars(line->data(), line->data() + line->size(), remaining_, 16);
     const std::string_view rest(read.ptr, std::size_t(line->data() + line->size() - read.ptr));
     if (read.ec != std::errc{} || !(rest.empty() || trim(rest).starts_with(';'))) return fail(BodyFailure::malformed);
-    framing_ = left_ > 0 ? Framing::chunk_data : Framing::trailer;
+    framing_ = remaining_ > 0 ? Framing::chunk_data : Framing::trailer;
   }
   while (framing_ == Framing::trailer) {
     const auto line = body_line();
@@ -213,23 +213,23 @@ std::ptrdiff_t Connection::read_body(char* to, std::size_t size) {
   if (framing_ != Framing::length && framing_ != Framing::chunk_data && framing_ != Framing::done && !next_chunk())
     return -1;
   if (framing_ == Framing::done) return 0;
-  if (consumed_ == input_.size() && !more_body()) return -1;
-  const std::size_t taken = std::size_t(std::min<std::uint64_t>({size, input_.size() - consumed_, left_}));
+  if (consumed_ == input_.size() && !fill_body_buffer()) return -1;
+  const std::size_t taken = std::size_t(std::min<std::uint64_t>({size, input_.size() - consumed_, remaining_}));
   std::memcpy(to, input_.data() + consumed_, taken);
   consumed_ += taken;
-  left_ -= taken;
-  if (left_ == 0) framing_ = framing_ == Framing::length ? Framing::done : Framing::chunk_end;
+  remaining_ -= taken;
+  if (remaining_ == 0) framing_ = framing_ == Framing::length ? Framing::done : Framing::chunk_end;
   return std::ptrdiff_t(taken);
 }
 
-bool Connection::finish_body(std::size_t most, bool wait) {
-  waits_for_body_ = wait;
+bool Connection::finish_body(std::size_t max_bytes, bool wait) {
+  may_wait_for_body_ = wait;
   if (framing_ == Framing::done) return true;
-  // A client that waits to be told to go on will not send what nobody asked for, or will: nobody knows. Close.
-  if (owes_continue_) return false;
-  std::array<char, 4096> forgotten;
-  for (std::size_t total = 0; total <= most;) {
-    const std::ptrdiff_t got = read_body(forgotten.data(), forgotten.size());
+  // A client that waits for "100 Continue" may send its body after all, or may not: nobody knows. Close.
+  if (continue_pending_) return false;
+  std::array<char, 4096> discarded;
+  for (std::size_t total = 0; total <= max_bytes;) {
+    const std::ptrdiff_t got = read_body(discarded.data(), discarded.size());
     if (got <= 0) return got == 0;
     total += std::size_t(got);
   }
@@ -237,7 +237,7 @@ bool Connection::finish_body(std::size_t most, bool wait) {
 }
 
 void Connection::begin_answer() {
-  answered_ = true;
+  has_answered_ = true;
   write_waited_ = {};
   written_ = 0;
 }
@@ -268,9 +268,9 @@ bool Connection::open() const {
 void Connection::linger() {
   ::shutdown(socket_, SHUT_WR);
   const auto until = Clock::now() + linger_time;
-  std::array<char, 16 * 1024> forgotten;
+  std::array<char, 16 * 1024> discarded;
   while (Clock::now() < until && wait(POLLIN, until, true) == Wait::ready) {
-    const ssize_t got = ::recv(socket_, forgotten.data(), forgotten.size(), 0);
+    const ssize_t got = ::recv(socket_, discarded.data(), discarded.size(), 0);
     if (got == 0 || (got < 0 && !would_block() && errno != EINTR)) return;
   }
 }

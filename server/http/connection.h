@@ -14,26 +14,28 @@
 
 namespace server::http {
 
+/// How long and how slow a client may be. All of it is a choice, none of it was measured: generous to a client on a bad
+/// line, and short enough that silent clients cannot hold all threads.
 struct ConnectionLimits {
   std::size_t max_head_bytes = 32 * 1024;
-  std::chrono::milliseconds head_timeout{10'000};        ///< For a whole request head, from its first byte.
-  std::chrono::milliseconds idle_timeout{5'000};         ///< Between requests, and before the first.
-  std::chrono::milliseconds patience_when_crowded{250};  ///< Before the first, while others wait for a thread.
-  std::chrono::milliseconds stall_timeout{10'000};       ///< Without a single byte of a body, or of an answer taken.
-  std::uint64_t min_bytes_per_second = 8 * 1024;  ///< Of bodies and answers, on the average, once `rate_grace` is over.
-  std::chrono::milliseconds rate_grace{10'000};
+  std::chrono::milliseconds head_timeout{10'000};        ///< Time for a whole request head, from its first byte.
+  std::chrono::milliseconds idle_timeout{5'000};         ///< Silence before the first request, and between two.
+  std::chrono::milliseconds patience_when_crowded{250};  ///< Silence before the first request while others wait.
+  std::chrono::milliseconds stall_timeout{10'000};       ///< Time in which at least a byte must come or be taken.
+  std::uint64_t min_bytes_per_second = 8 * 1024;  ///< Least average rate of a body or an answer after `rate_grace`.
+  std::chrono::milliseconds rate_grace{10'000};   ///< Time waited for a body or an answer before its rate counts.
 };
 
-/// What a connection asks those who own it.
-struct Surroundings {
+/// What a connection needs to know of the server around it.
+struct ConnectionHooks {
   int stop_fd = -1;               ///< Becomes readable when the server stops.
-  std::function<bool()> crowded;  ///< Whether other clients wait for a thread: an idle connection then ends.
+  std::function<bool()> crowded;  ///< Tells whether clients wait for a thread: idle connections then end.
 };
 
 /// Owns the socket, which is non-blocking. Used by one thread.
 class Connection {
  public:
-  Connection(int socket, const ConnectionLimits& limits, Surroundings surroundings);
+  Connection(int socket, const ConnectionLimits& limits, ConnectionHooks hooks);
   ~Connection();
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
@@ -50,12 +52,13 @@ class Connection {
   [[nodiscard]] std::ptrdiff_t read_body(char* to, std::size_t size);
   enum class BodyFailure { none, truncated, too_slow, malformed };
   [[nodiscard]] BodyFailure body_failure() const { return failure_; }
-  /// Whether all of the body has been read, so that the next request begins here. Reads and forgets up to `most` bytes
-  /// to get there.
-  ///   wait  for what is still on its way; else takes only what has arrived
-  [[nodiscard]] bool finish_body(std::size_t most, bool wait);
+  /// Whether all of the body has been read, so that the next request begins here. Reads and discards up to
+  /// `max_bytes` bytes to get there.
+  ///   wait  true: waits for what is still on its way; false: takes only what has arrived
+  [[nodiscard]] bool finish_body(std::size_t max_bytes, bool wait);
 
-  /// false: the client has gone or takes the answer too slowly.
+  /// Sends all of the bytes.
+  ///   returns  false: the client has gone or takes the answer too slowly
   [[nodiscard]] bool write(std::string_view bytes);
   /// An answer begins: its rate is measured from here.
   void begin_answer();
@@ -63,11 +66,11 @@ class Connection {
   /// Whether the client is still there and the server is not stopping. A client that has only finished sending is
   /// there; one that has closed is found out by the first bytes it no longer takes.
   [[nodiscard]] bool open() const;
-  /// Ends the answer, and waits a moment for the client to take it: closing on unread bytes would make the system drop
-  /// what is still on its way.
+  /// Ends the answer, and waits up to a second for the client to take it: closing on unread bytes would make the system
+  /// drop what is still on its way.
   void linger();
 
-  [[nodiscard]] std::string client() const;  ///< Its address.
+  [[nodiscard]] std::string client() const;  ///< The client's address.
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -79,24 +82,24 @@ class Connection {
   [[nodiscard]] Wait wait(short events, Clock::time_point until, bool watch_stop) const;
   [[nodiscard]] Wait wait_while_idle(Clock::time_point until) const;
   [[nodiscard]] std::ptrdiff_t receive();
-  [[nodiscard]] bool more_body();
+  [[nodiscard]] bool fill_body_buffer();
   [[nodiscard]] std::optional<std::string> body_line();
   [[nodiscard]] bool next_chunk();
-  bool fail(BodyFailure failure);  ///< false
+  bool fail(BodyFailure failure);  ///< Notes the failure; returns false.
   [[nodiscard]] bool too_slow(Clock::duration waited, std::uint64_t bytes) const;
 
   const int socket_;
   const ConnectionLimits limits_;
-  const Surroundings surroundings_;
-  std::string input_;  ///< Received, not yet consumed; begins at `consumed_`.
+  const ConnectionHooks hooks_;
+  std::string input_;  ///< UploadInfo, not yet consumed; begins at `consumed_`.
   std::size_t consumed_ = 0;
-  bool answered_ = false;
+  bool has_answered_ = false;
 
   Framing framing_ = Framing::done;
-  std::uint64_t left_ = 0;  ///< Of the body, or of the chunk.
+  std::uint64_t remaining_ = 0;  ///< Bytes to come of the body, or of the chunk.
   std::size_t trailer_bytes_ = 0;
-  bool owes_continue_ = false;
-  bool waits_for_body_ = true;
+  bool continue_pending_ = false;
+  bool may_wait_for_body_ = true;
   BodyFailure failure_ = BodyFailure::none;
   Clock::duration body_waited_{};
   std::uint64_t body_bytes_ = 0;

@@ -66,8 +66,9 @@ bool names_other_charset(const std::string& content_type) {
 
 }  // namespace
 
-struct Dispatcher::Asked {
-  Match match;
+/// A request that has passed the guards: its route is there, its query parameters are known.
+struct Dispatcher::CheckedRequest {
+  RouteMatch match;
   std::map<std::string, std::string, std::less<>> query;
 };
 
@@ -91,33 +92,33 @@ Answer Dispatcher::refused(const Refusal& refusal, const std::string& request_id
   return answer;
 }
 
-tl::expected<Dispatcher::Asked, Refusal> Dispatcher::check(const RequestHead& head, Answer& answer) const {
-  if (auto refusal = gate_.check_origin(head)) return tl::make_unexpected(std::move(*refusal));
+tl::expected<Dispatcher::CheckedRequest, Refusal> Dispatcher::check(const RequestHead& head, Answer& answer) const {
+  if (auto refusal = guard_.check_origin(head)) return tl::make_unexpected(std::move(*refusal));
   const auto segments = split_path(head.path);
-  Asked asked;
-  if (segments) asked.match = routes_.find(head.method, *segments);
+  CheckedRequest request;
+  if (segments) request.match = routes_.find(head.method, *segments);
   // Whoever has no token learns nothing about routes but those that are open to all.
-  const bool open = asked.match.route != nullptr && asked.match.route->access == Access::open;
-  if (!open && !gate_.admits(head))
+  const bool open = request.match.route != nullptr && request.match.route->access == Access::open;
+  if (!open && !guard_.admits(head))
     return refuse(401, "unauthorized", "this service wants a token: \"Authorization: Bearer ...\"");
   if (!segments) return tl::make_unexpected(refusal_of(segments.error()));
-  if (asked.match.route == nullptr && !asked.match.allow.empty()) {
-    answer.headers.emplace_back("Allow", asked.match.allow);
-    return refuse(405, "method_not_allowed", "this address takes " + asked.match.allow);
+  if (request.match.route == nullptr && !request.match.allow.empty()) {
+    answer.headers.emplace_back("Allow", request.match.allow);
+    return refuse(405, "method_not_allowed", "this address takes " + request.match.allow);
   }
-  if (asked.match.route == nullptr) return refuse(404, "not_found", "there is no such address in this service");
-  answer.route = asked.match.route->path;
+  if (request.match.route == nullptr) return refuse(404, "not_found", "there is no such address in this service");
+  answer.route = request.match.route->path;
   const auto query = parse_query(head.query);
   if (!query) return tl::make_unexpected(refusal_of(query.error()));
-  const auto& known = asked.match.route->queries;
+  const auto& known = request.match.route->queries;
   for (const auto& [name, value] : *query) {
     if (std::find(known.begin(), known.end(), name) == known.end())
       return refuse(400, "invalid_argument", "this address has no such query parameter", name);
-    if (!asked.query.emplace(name, value).second)
+    if (!request.query.emplace(name, value).second)
       return refuse(400, "invalid_argument", "this query parameter is given twice", name);
   }
-  if (const auto checked = check_body(head, *asked.match.route); !checked) return tl::make_unexpected(checked.error());
-  return asked;
+  if (const auto body = check_body(head, *request.match.route); !body) return tl::make_unexpected(body.error());
+  return request;
 }
 
 tl::expected<void, Refusal> Dispatcher::check_body(const RequestHead& head, const Route& route) const {
@@ -140,9 +141,9 @@ tl::expected<void, Refusal> Dispatcher::check_body(const RequestHead& head, cons
   return {};
 }
 
-Result<Reply> Dispatcher::handle(const Asked& asked, const RequestHead& head, const std::string& request_id,
+Result<Reply> Dispatcher::handle(const CheckedRequest& request, const RequestHead& head, const std::string& request_id,
                                  Connection& connection, FormReader& form) const {
-  const Route& route = *asked.match.route;
+  const Route& route = *request.match.route;
   const bool is_json = route.body == Body::upload && media_type_of(head.header("content-type")) == "application/json";
   std::string body;
   if (head.has_body() && (route.body != Body::upload || is_json)) {
@@ -152,8 +153,8 @@ Result<Reply> Dispatcher::handle(const Asked& asked, const RequestHead& head, co
       return engine::fail(ErrorCode::invalid_argument, "this address takes no body");
     if (route.body != Body::none) body = std::move(*text);
   }
-  const HttpCall call({head, request_id, asked.match.values, asked.query, std::move(body), is_json, connection, form,
-                       options_.max_upload_bytes});
+  const HttpCall call({head, request_id, request.match.values, request.query, std::move(body), is_json, connection,
+                       form, options_.max_upload_bytes});
   return route.handler(call);
 }
 
@@ -233,9 +234,9 @@ Answer Dispatcher::answer(const RequestHead& head, const std::string& request_id
     return refusing;
   };
   try {
-    const auto asked = check(head, answer);
-    if (!asked) return refuse_with(asked.error());
-    auto reply = handle(*asked, head, request_id, connection, form);
+    const auto request = check(head, answer);
+    if (!request) return refuse_with(request.error());
+    auto reply = handle(*request, head, request_id, connection, form);
     if (!reply && connection.body_failure() == Connection::BodyFailure::too_slow)
       return refuse_with({408, "request_timeout", "the request's body arrived too slowly", ""});
     if (!reply) {

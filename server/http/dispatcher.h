@@ -15,18 +15,19 @@
 #include <vector>
 
 #include "engine/core/file_descriptor.h"
+#include "server/http/access_guard.h"
 #include "server/http/connection.h"
-#include "server/http/gate.h"
 #include "server/http/request_head.h"
 #include "server/http/route_table.h"
 #include "server/http/router.h"
 
 namespace server::http {
 
+/// Limits of what a client may send and hold open.
 struct DispatcherOptions {
-  std::uint64_t max_json_bytes = 1024 * 1024;
-  std::uint64_t max_upload_bytes = std::uint64_t{4} << 30;
-  std::size_t max_streams = 16;
+  std::uint64_t max_json_bytes = 1024 * 1024;               ///< Of a JSON body.
+  std::uint64_t max_upload_bytes = std::uint64_t{4} << 30;  ///< Of an uploaded file.
+  std::size_t max_streams = 16;                             ///< Streams of events open at a time, each on a thread.
 };
 
 /// Takes a multipart form apart while it arrives.
@@ -40,7 +41,7 @@ class FormReader {
                                   const std::function<bool(std::string_view)>& data) = 0;
 };
 
-/// What is sent back.
+/// What is sent over the connection: a handler's Reply, a refusal or an error, with all headers.
 struct Answer {
   int status = 200;
   std::vector<std::pair<std::string, std::string>> headers;
@@ -53,16 +54,16 @@ struct Answer {
   std::optional<FilePart> file;
   std::function<void(EventSink&)> events;
   std::shared_ptr<const void> hold;  ///< Lives until the answer is sent.
-  std::string route = "-";           ///< As declared; "-" if the request found none.
+  std::string route = "-";           ///< Path of the route as declared; "-" if no route was found.
 };
 
-/// Safe to call from any thread. Gate and logger outlive it.
+/// Safe to call from any thread. The guard and the logger outlive it.
 class Dispatcher {
  public:
-  Dispatcher(Router router, const Gate& gate, spdlog::logger& logger, const DispatcherOptions& options,
+  Dispatcher(Router router, const AccessGuard& guard, spdlog::logger& logger, const DispatcherOptions& options,
              std::function<void(int)> count_stream)
       : routes_(std::move(router)),
-        gate_(gate),
+        guard_(guard),
         logger_(logger),
         options_(options),
         count_stream_(std::move(count_stream)) {}
@@ -70,22 +71,22 @@ class Dispatcher {
   /// Never throws what a handler threw: that is logged as a bug and answered by 500.
   [[nodiscard]] Answer answer(const RequestHead& head, const std::string& request_id, Connection& connection,
                               FormReader& form);
-  /// A refusal as an answer.
+  /// The answer that tells a client of a refusal.
   [[nodiscard]] static Answer refused(const Refusal& refusal, const std::string& request_id);
 
  private:
-  struct Asked;
+  struct CheckedRequest;
 
-  [[nodiscard]] tl::expected<Asked, Refusal> check(const RequestHead& head, Answer& answer) const;
+  [[nodiscard]] tl::expected<CheckedRequest, Refusal> check(const RequestHead& head, Answer& answer) const;
   [[nodiscard]] tl::expected<void, Refusal> check_body(const RequestHead& head, const Route& route) const;
-  [[nodiscard]] Result<Reply> handle(const Asked& asked, const RequestHead& head, const std::string& request_id,
-                                     Connection& connection, FormReader& form) const;
+  [[nodiscard]] Result<Reply> handle(const CheckedRequest& request, const RequestHead& head,
+                                     const std::string& request_id, Connection& connection, FormReader& form) const;
   [[nodiscard]] tl::expected<void, Refusal> fill(Answer& answer, Reply reply, const RequestHead& head);
   [[nodiscard]] tl::expected<void, Refusal> fill_with_file(Answer& answer, const Reply& reply,
                                                            const RequestHead& head) const;
 
   const RouteTable routes_;
-  const Gate& gate_;
+  const AccessGuard& guard_;
   spdlog::logger& logger_;
   const DispatcherOptions options_;
   const std::function<void(int)> count_stream_;

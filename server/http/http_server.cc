@@ -19,14 +19,16 @@
 #include "server/http/listener.h"
 #include "server/http/log.h"
 #include "server/http/negotiation.h"
-#include "server/http/thread_line.h"
+#include "server/http/thread_pool.h"
 
 namespace server::http {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::size_t forgettable_bytes = 64 * 1024;  // of a body nobody wanted, to keep its connection
+/// Most bytes of an unread body that are read and discarded so that its connection can be kept. A choice.
+constexpr std::size_t max_discarded_bytes = 64 * 1024;
+/// Bytes of a file that are read and sent at a time. A choice.
 constexpr std::size_t file_piece = 256 * 1024;
 
 /// A request as httplib gets to see it. What a client sent has been parsed and guarded before; httplib's own parsing of
@@ -144,20 +146,20 @@ std::string counted_method(const std::string& method) {
 }  // namespace
 
 struct HttpServer::Impl {
-  Impl(const ServerOptions& server_options, Router router, Gate& gate, Metrics& server_metrics,
+  Impl(const ServerOptions& server_options, Router router, AccessGuard& guard, Metrics& server_metrics,
        spdlog::logger& server_logger)
       : options(server_options),
         metrics(server_metrics),
         logger(server_logger),
-        dispatcher(std::move(router), gate, logger, options.dispatcher,
+        dispatcher(std::move(router), guard, logger, options.dispatcher,
                    [this](int change) { metrics.add_stream(change); }),
-        line(options.threads, options.max_waiting, [this] { return make_server(); }) {}
+        pool(options.threads, options.max_waiting, [this] { return make_server(); }) {}
   ~Impl() {
     if (listening >= 0) ::close(listening);
     if (stopping >= 0) ::close(stopping);
   }
 
-  [[nodiscard]] ThreadLine::Serve make_server();
+  [[nodiscard]] ThreadPool::Serve make_server();
   void accept_connections();
   void take(int socket);
   void turn_away(int socket);
@@ -174,15 +176,15 @@ struct HttpServer::Impl {
   std::set<int> sockets;  ///< Of the connections being served.
   std::once_flag stopped;
   std::thread acceptor;
-  ThreadLine line;  ///< Last: its threads use all of the above.
+  ThreadPool pool;  ///< Last: its threads use all of the above.
 };
 
 namespace {
 
 /// What one thread serves connections with.
-class Worker final : private httplib::Server {
+class ConnectionServer final : private httplib::Server {
  public:
-  Worker(const ServerOptions& options, Dispatcher& dispatcher, Metrics& metrics, spdlog::logger& logger)
+  ConnectionServer(const ServerOptions& options, Dispatcher& dispatcher, Metrics& metrics, spdlog::logger& logger)
       : options_(options), dispatcher_(dispatcher), metrics_(metrics), logger_(logger) {
     svr_sock_ = 0;  // to httplib, an invalid one means that the server stops
     Get("/", [this](const httplib::Request&, httplib::Response& response) { answer(response, nullptr); });
@@ -226,7 +228,7 @@ class Worker final : private httplib::Server {
   /// An answer under way: what it holds is given back however it ends.
   class Underway {
    public:
-    explicit Underway(Worker& worker) : worker_(worker) { worker_.metrics_.add_in_flight(1); }
+    explicit Underway(ConnectionServer& server) : worker_(server) { worker_.metrics_.add_in_flight(1); }
     ~Underway() {
       worker_.answer_ = {};
       worker_.metrics_.add_in_flight(-1);
@@ -235,7 +237,7 @@ class Worker final : private httplib::Server {
     Underway& operator=(const Underway&) = delete;
 
    private:
-    Worker& worker_;
+    ConnectionServer& worker_;
   };
 
   bool answer_to(const RequestHead& head, bool last) {
@@ -258,7 +260,7 @@ class Worker final : private httplib::Server {
     // The next request begins where this body ends. If that is far, the connection ends instead; and nobody waits for a
     // body to tell that it is not wanted.
     const bool refused = answer_.status >= 400;
-    keep_ = head_->keep_alive && !last_ && connection_->finish_body(forgettable_bytes, !refused) &&
+    keep_ = head_->keep_alive && !last_ && connection_->finish_body(max_discarded_bytes, !refused) &&
             connection_->open() && !(answer_.events && head_->is_http_1_0);
     response.status = answer_.status;
     for (const auto& [name, value] : answer_.headers) response.headers.emplace(name, value);
@@ -322,7 +324,7 @@ class Worker final : private httplib::Server {
   Dispatcher& dispatcher_;
   Metrics& metrics_;
   spdlog::logger& logger_;
-  // Of the connection being served, and of its request.
+  // What follows belongs to the connection being served, and to its request.
   Connection* connection_ = nullptr;
   const RequestHead* head_ = nullptr;
   std::string client_, request_id_;
@@ -333,24 +335,24 @@ class Worker final : private httplib::Server {
 
 }  // namespace
 
-ThreadLine::Serve HttpServer::Impl::make_server() {
-  const auto worker = std::make_shared<Worker>(options, dispatcher, metrics, logger);
-  return [this, worker](int socket) {
+ThreadPool::Serve HttpServer::Impl::make_server() {
+  const auto server = std::make_shared<ConnectionServer>(options, dispatcher, metrics, logger);
+  return [this, server](int socket) {
     {
-      Connection connection(socket, options.connection, {stopping, [this] { return line.crowded(); }});
+      Connection connection(socket, options.connection, {stopping, [this] { return pool.has_waiting(); }});
       {
         const std::lock_guard lock(mutex);
         sockets.insert(socket);
       }
       try {
-        worker->serve(connection);
+        server->serve(connection);
       } catch (const std::exception& bug) {
         log(logger, spdlog::level::err, std::string("bug: ") + bug.what());
       } catch (...) {
         log(logger, spdlog::level::err, "bug: something was thrown that is no exception");
       }
       const std::lock_guard lock(mutex);
-      sockets.erase(socket);  // before it is closed and its number used again
+      sockets.erase(socket);  // before the socket is closed and its number used again
     }
   };
 }
@@ -374,7 +376,7 @@ void HttpServer::Impl::accept_connections() {
 void HttpServer::Impl::take(int socket) {
   const int yes = 1;
   ::setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
-  if (!line.offer(socket)) turn_away(socket);
+  if (!pool.offer(socket)) turn_away(socket);
 }
 
 /// Never waits: this is the thread that accepts.
@@ -386,8 +388,8 @@ void HttpServer::Impl::turn_away(int socket) {
   [[maybe_unused]] const ssize_t sent = ::send(socket, text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
   ::shutdown(socket, SHUT_WR);
   // What the client has sent is read, or closing would take the answer back.
-  std::array<char, 4096> forgotten;
-  [[maybe_unused]] const ssize_t got = ::recv(socket, forgotten.data(), forgotten.size(), MSG_DONTWAIT);
+  std::array<char, 4096> discarded;
+  [[maybe_unused]] const ssize_t got = ::recv(socket, discarded.data(), discarded.size(), MSG_DONTWAIT);
   ::close(socket);
   log(logger, spdlog::level::warn, "connection refused: too many wait", {{"request_id", id}});
 }
@@ -403,11 +405,11 @@ void HttpServer::Impl::stop() {
   if (acceptor.joinable()) acceptor.join();
   ::close(listening);
   listening = -1;
-  line.close();
-  if (!line.rests_within(options.grace)) {
+  pool.close();
+  if (!pool.idle_within(options.grace)) {
     log(logger, spdlog::level::warn, "cutting connections that outlasted the grace period");
     cut_connections();
-    while (!line.rests_within(std::chrono::seconds(1))) cut_connections();
+    while (!pool.idle_within(std::chrono::seconds(1))) cut_connections();
   }
 }
 
@@ -415,16 +417,17 @@ HttpServer::HttpServer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 HttpServer::~HttpServer() { stop(); }
 
-engine::Result<std::unique_ptr<HttpServer>> HttpServer::start(const ServerOptions& options, Router router, Gate& gate,
-                                                              Metrics& metrics, spdlog::logger& logger) {
-  auto impl = std::make_unique<Impl>(options, std::move(router), gate, metrics, logger);
+engine::Result<std::unique_ptr<HttpServer>> HttpServer::start(const ServerOptions& options, Router router,
+                                                              AccessGuard& guard, Metrics& metrics,
+                                                              spdlog::logger& logger) {
+  auto impl = std::make_unique<Impl>(options, std::move(router), guard, metrics, logger);
   const auto socket = listen_on(options.host, options.port);
   if (!socket) return engine::propagate(socket);
   impl->listening = *socket;
   impl->stopping = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   if (impl->stopping < 0) return engine::fail(engine::ErrorCode::unavailable, "this process may open no more files");
   impl->port = bound_port(*socket);
-  gate.bound_to(options.host, impl->port);
+  guard.bound_to(options.host, impl->port);
   impl->acceptor = std::thread([raw = impl.get()] { raw->accept_connections(); });
   return std::unique_ptr<HttpServer>(new HttpServer(std::move(impl)));
 }

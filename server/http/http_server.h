@@ -9,21 +9,22 @@
 #include <string>
 
 #include "engine/core/result.h"
+#include "server/http/access_guard.h"
 #include "server/http/connection.h"
 #include "server/http/dispatcher.h"
-#include "server/http/gate.h"
 #include "server/http/metrics.h"
 #include "server/http/router.h"
 
 namespace server::http {
 
+/// Where the server listens and how much it serves at a time.
 struct ServerOptions {
   std::string host = "127.0.0.1";
-  int port = 8080;                         ///< 0: any that is free.
+  int port = 8080;                         ///< TCP port; 0: any that is free.
   std::size_t threads = 64;                ///< Connections served at a time.
   std::size_t max_waiting = 128;           ///< Connections that may wait for a thread; more are turned away with 503.
-  int max_requests = 1000;                 ///< Per connection.
-  std::chrono::milliseconds grace{5'000};  ///< For answers under way when the server stops.
+  int max_requests = 1000;                 ///< Requests on one connection; then it ends.
+  std::chrono::milliseconds grace{5'000};  ///< Time that answers under way get when the server stops.
   ConnectionLimits connection = {};
   DispatcherOptions dispatcher = {};
 };
@@ -31,11 +32,11 @@ struct ServerOptions {
 class HttpServer {
  public:
   /// Binds, listens and serves, from now on.
-  ///   gate, metrics, logger  outlive the server; `gate` is told what the server is bound to
+  ///   guard, metrics, logger  outlive the server; `guard` is told what the server is bound to
   ///   errors  invalid_argument: no such host; unavailable: the port is taken (by any other program, this one included)
   ///           or not permitted (`where` is "--host" or "--port")
   [[nodiscard]] static engine::Result<std::unique_ptr<HttpServer>> start(const ServerOptions& options, Router router,
-                                                                         Gate& gate, Metrics& metrics,
+                                                                         AccessGuard& guard, Metrics& metrics,
                                                                          spdlog::logger& logger);
   ~HttpServer();
 

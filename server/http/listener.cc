@@ -15,7 +15,7 @@ namespace {
 using engine::ErrorCode;
 using engine::Result;
 
-constexpr int backlog = 128;
+constexpr int backlog = 128;  // connections that wait in the system's own line; a choice
 
 Result<int> bind_to(const addrinfo& address, const std::string& host, int port) {
   const int socket =

@@ -19,19 +19,19 @@ const prometheus::Histogram::BucketBoundaries& buckets() {
   return seconds;
 }
 
-struct Asked {
+struct ComputedGauge {
   std::string name, help, label;
   std::function<std::map<std::string, double>()> values;
 };
 
-prometheus::MetricFamily family_of(const Asked& asked) {
+prometheus::MetricFamily family_of(const ComputedGauge& gauge) {
   prometheus::MetricFamily family;
-  family.name = asked.name;
-  family.help = asked.help;
+  family.name = gauge.name;
+  family.help = gauge.help;
   family.type = prometheus::MetricType::Gauge;
-  for (const auto& [value, number] : asked.values()) {
+  for (const auto& [value, number] : gauge.values()) {
     prometheus::ClientMetric metric;
-    if (!asked.label.empty()) metric.label.push_back({asked.label, value});
+    if (!gauge.label.empty()) metric.label.push_back({gauge.label, value});
     metric.gauge.value = number;
     family.metric.push_back(std::move(metric));
   }
@@ -63,8 +63,8 @@ struct Metrics::Impl {
                                      .Help("Connections turned away because too many waited.")
                                      .Register(registry)
                                      .Add({});
-  mutable std::mutex mutex;  ///< Guards asked.
-  std::vector<Asked> asked;
+  mutable std::mutex mutex;  ///< Guards computed_gauges.
+  std::vector<ComputedGauge> computed_gauges;
 };
 
 Metrics::Metrics() : impl_(std::make_unique<Impl>()) {}
@@ -92,17 +92,17 @@ void Metrics::add_gauge(std::string name, std::string help, std::function<double
 void Metrics::add_gauges(std::string name, std::string help, std::string label,
                          std::function<std::map<std::string, double>()> values) {
   const std::lock_guard lock(impl_->mutex);
-  impl_->asked.push_back({std::move(name), std::move(help), std::move(label), std::move(values)});
+  impl_->computed_gauges.push_back({std::move(name), std::move(help), std::move(label), std::move(values)});
 }
 
 std::string Metrics::text() const {
-  std::vector<Asked> asked;
+  std::vector<ComputedGauge> gauges;
   {
     const std::lock_guard lock(impl_->mutex);
-    asked = impl_->asked;
+    gauges = impl_->computed_gauges;
   }
   auto families = impl_->registry.Collect();
-  for (const Asked& one : asked) families.push_back(family_of(one));
+  for (const ComputedGauge& gauge : gauges) families.push_back(family_of(gauge));
   return prometheus::TextSerializer().Serialize(families);
 }
 

@@ -23,16 +23,16 @@ class Metrics {
   /// A connection was turned away because too many others waited.
   void count_refused_connection();
 
-  /// A value that is asked for whenever somebody looks.
+  /// A gauge whose value is computed whenever somebody reads the metrics.
   ///   name   "splatdrag_scenes"
   ///   value  called on a thread of the server; what it refers to outlives the metrics
   void add_gauge(std::string name, std::string help, std::function<double()> value);
-  /// Several values of one name, told apart by a label.
+  /// Several gauges of one name, told apart by a label.
   ///   values  by the label's value
   void add_gauges(std::string name, std::string help, std::string label,
                   std::function<std::map<std::string, double>()> values);
 
-  /// All of it, in the text format.
+  /// All metrics, in the text format of Prometheus.
   [[nodiscard]] std::string text() const;
   static constexpr std::string_view media_type = "text/plain; version=0.0.4; charset=utf-8";
 

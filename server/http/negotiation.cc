@@ -137,9 +137,9 @@ std::string base_name(std::string_view filename) {
   if (!is_utf8(name))
     for (char& c : name)
       if (static_cast<unsigned char>(c) >= 0x80) c = '_';
-  constexpr std::size_t most = 255;
-  if (name.size() > most) {
-    name.resize(most);
+  constexpr std::size_t max_bytes = 255;
+  if (name.size() > max_bytes) {
+    name.resize(max_bytes);
     while (!name.empty() && !is_utf8(name)) name.pop_back();
   }
   return name == "." || name == ".." ? std::string() : name;

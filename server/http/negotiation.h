@@ -18,14 +18,16 @@ namespace server::http {
 /// An entity tag for these bytes.
 [[nodiscard]] std::string etag_of(std::string_view bytes);
 
+/// Positions of the first and the last byte of a part.
 struct ByteRange {
   std::uint64_t first = 0, last = 0;  ///< Both included.
 };
 enum class RangeKind {
-  whole,  ///< No range that we know: several, another unit, or malformed. Send everything.
-  part,
-  unsatisfiable  ///< It begins beyond the end.
+  whole,         ///< No range that we know: several, another unit, or malformed. Send everything.
+  part,          ///< Send the bytes of the range.
+  unsatisfiable  ///< The range begins beyond the end.
 };
+/// What to send. `range` has a meaning for RangeKind::part only.
 struct RangeChoice {
   RangeKind kind = RangeKind::whole;
   ByteRange range;

@@ -20,16 +20,17 @@ struct Refusal {
   std::string where;
 };
 
+/// What the head says.
 struct RequestHead {
   std::string method;
-  std::string path;   ///< As sent, still escaped.
-  std::string query;  ///< As sent, after the '?'.
+  std::string path;   ///< Path as sent, still escaped.
+  std::string query;  ///< What follows the '?', as sent.
   bool is_http_1_0 = false;
   std::vector<std::pair<std::string, std::string>> headers;  ///< Names in lower case, values trimmed.
   std::optional<std::uint64_t> content_length;
   bool chunked = false;
   bool keep_alive = true;         ///< The client would send another request on this connection.
-  bool expects_continue = false;  ///< It waits for "100 Continue" before it sends the body.
+  bool expects_continue = false;  ///< The client waits for "100 Continue" before it sends the body.
 
   /// Whether it is a GET or a HEAD: only these know "not modified".
   [[nodiscard]] bool only_reads() const { return method == "GET" || method == "HEAD"; }
@@ -39,9 +40,10 @@ struct RequestHead {
   [[nodiscard]] std::size_t count(std::string_view name) const;
 };
 
-constexpr std::size_t max_header_fields = 100;
-constexpr std::size_t max_target_bytes = 8192;
+constexpr std::size_t max_header_fields = 100;  ///< Of one request; browsers send about 20. A choice.
+constexpr std::size_t max_target_bytes = 8192;  ///< Of path and query; RFC 9112 recommends 8000 at least.
 
+/// Takes a head apart.
 ///   text     up to and including the empty line
 ///   returns  the head, or a refusal: 400 malformed, 431 too many fields, 414 a target too long, 501 a transfer coding
 ///            other than chunked, 505 not HTTP/1.x

@@ -39,9 +39,9 @@ RouteTable::RouteTable(Router router) : router_(std::move(router)) {
     segments_.push_back(route.path == "/" ? std::vector<std::string>{""} : split(route.path));
 }
 
-Match RouteTable::find(std::string_view method, const std::vector<std::string>& segments) const {
+RouteMatch RouteTable::find(std::string_view method, const std::vector<std::string>& segments) const {
   const std::string_view wanted = method == "HEAD" ? "GET" : method;
-  Match match;
+  RouteMatch match;
   std::string best;
   std::vector<std::string> methods;
   for (std::size_t i = 0; i < segments_.size(); ++i) {

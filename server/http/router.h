@@ -21,10 +21,10 @@ namespace server::http {
 
 using engine::Result;
 
-/// An upload on its way to a file.
-struct Received {
-  std::string filename;  ///< As the client calls it, base name only; may be empty.
-  std::uint64_t bytes = 0;
+/// An upload that has arrived in a file.
+struct UploadInfo {
+  std::string filename;     ///< Base name that the client gave; may be empty.
+  std::uint64_t bytes = 0;  ///< Size of the file.
 };
 
 /// What a request says, to its handler.
@@ -47,15 +47,15 @@ class Call {
   /// this returns. On an error nothing is left of it.
   ///   errors  too_large: names the limit; invalid_argument: a form without a file or with several, a body that ends
   ///           early; no_space; unavailable
-  [[nodiscard]] virtual Result<Received> receive(const std::filesystem::path& file) const = 0;
-  /// Whether a GET names this version as one that its client has (If-None-Match): then Reply::not_modified() saves the
-  /// work.
+  [[nodiscard]] virtual Result<UploadInfo> receive(const std::filesystem::path& file) const = 0;
+  /// Whether a GET names this entity tag as one that its client has (If-None-Match): then Reply::not_modified() saves
+  /// the work.
   [[nodiscard]] virtual bool has(const std::string& etag) const = 0;
   /// Whether the Accept header takes this media type (none given: all).
   [[nodiscard]] virtual bool accepts(std::string_view media_type) const = 0;
 };
 
-/// Where a stream of server-sent events goes.
+/// The client's end of a stream of server-sent events.
 class EventSink {
  public:
   virtual ~EventSink() = default;
@@ -68,11 +68,13 @@ class EventSink {
   [[nodiscard]] virtual bool open() const = 0;
 };
 
+/// What a handler says to a request; the dispatcher makes an Answer of it.
 struct Reply {
   int status = 200;
   std::string media_type = "application/json";
   std::string body;
-  /// Strong, without quotes. Empty on a 200 to a GET with a JSON body: a hash of the body is used. A GET whose
+  /// The entity tag: strong, without quotes. If it is empty on a 200 to a GET with a JSON body, a hash of the body is
+  /// used. A GET whose
   /// If-None-Match names it is answered by 304 without body.
   std::string etag;
   std::vector<std::pair<std::string, std::string>> headers;
@@ -98,12 +100,13 @@ enum class Access {
   protected_  ///< Needs the token or a session cookie, where the service has a token.
 };
 
+/// One entry of the table.
 struct Route {
   std::string method;  ///< "GET", "POST", "PUT", "PATCH", "DELETE"
   std::string path;    ///< "/v1/scenes/{id}", as in openapi.yaml
   Handler handler;
   Body body = Body::none;
-  std::vector<std::string> queries;  ///< Known query parameters.
+  std::vector<std::string> queries;  ///< Names of the query parameters that the route knows.
   Access access = Access::protected_;
 };
 

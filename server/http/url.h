@@ -23,6 +23,7 @@ namespace server::http {
 ///   errors  as percent_decode(), with the parameter's name as `where`
 [[nodiscard]] engine::Result<std::vector<std::pair<std::string, std::string>>> parse_query(std::string_view query);
 
+/// Whether the bytes are well-formed UTF-8.
 [[nodiscard]] bool is_utf8(std::string_view text);
 
 }  // namespace server::http

@@ -33,7 +33,7 @@ std::vector<std::size_t> sample(std::size_t count) {
 
 std::vector<std::string> warnings_about(const PhotoComparison& found, std::size_t photos) {
   std::vector<std::string> warnings;
-  if (found.mean_db && *found.mean_db < least_believable_db)
+  if (found.mean_db && *found.mean_db < min_believable_db)
     warnings.push_back("renders reach only " + in_db(*found.mean_db) +
                        " against the photos: the cameras hardly belong to this scene, or live in another frame");
   if (found.compared > 0 && found.compared < photos)

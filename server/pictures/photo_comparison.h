@@ -18,12 +18,14 @@ namespace server::pictures {
 [[nodiscard]] engine::Result<double> psnr_against_photo(const engine::io::View& view,
                                                         const engine::scene::Image& color);
 
+// The three are choices, not measurements: 64 photos of this size take a few seconds to compare.
 constexpr std::size_t max_compared_photos = 64;
-constexpr int max_compared_side = 512;      ///< Pixels.
-constexpr double least_believable_db = 15;  ///< Below, cameras and scene hardly share a frame.
+constexpr int max_compared_side = 512;    ///< Pixels, of the longer side.
+constexpr double min_believable_db = 15;  ///< PSNR; with less, cameras and scene hardly share a frame.
 
+/// How near renders come to the photos: PSNR over each photo.
 struct PhotoComparison {
-  std::size_t compared = 0;                 ///< Photos.
+  std::size_t compared = 0;                 ///< Count of photos.
   std::optional<double> mean_db, worst_db;  ///< None if no photo could be compared.
   std::string worst_view;
   std::vector<std::string> warnings;  ///< What a user should know, one sentence each.

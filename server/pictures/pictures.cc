@@ -12,14 +12,14 @@ using engine::scene::Mask;
 
 Image with_mask_shown(const Image& picture, const Mask& mask) {
   constexpr std::array<float, 3> tint{1.0f, 0.1f, 0.6f};  // magenta: rare in photographs
-  constexpr float share = 0.5f;
-  Image shown = picture;
-  for (int c = 0; c < shown.channels; ++c) {
-    const auto plane = shown.plane(c);
+  constexpr float share = 0.5f;                           // of the tint: the picture still shows; a choice
+  Image tinted = picture;
+  for (int c = 0; c < tinted.channels; ++c) {
+    const auto plane = tinted.plane(c);
     for (std::size_t i = 0; i < plane.size(); ++i)
       if (mask.data[i] != 0) plane[i] += share * (tint[std::size_t(c)] - plane[i]);
   }
-  return shown;
+  return tinted;
 }
 
 double psnr_outside(const Image& a, const Image& b, const Mask& mask) {
@@ -57,7 +57,7 @@ Image shaded_depth(const Image& mean_depth) {
     nearest = std::min(nearest, z);
     farthest = std::max(farthest, z);
   }
-  constexpr float darkest = 0.1f;                                                // so that far is not nothing
+  constexpr float darkest = 0.1f;  // of 0..1, so that the farthest point differs from nothing; a choice
   const float range = std::max(farthest - nearest, 1e-6f * std::abs(farthest));  // a wall seen head-on has no range
   Image shades = mean_depth;
   for (float& z : shades.data) z = z <= 0 ? 0.0f : 1.0f - (1.0f - darkest) * (z - nearest) / range;

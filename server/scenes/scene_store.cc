@@ -7,7 +7,7 @@
 #include "server/scenes/catalogue/catalogue.h"
 #include "server/scenes/catalogue/names.h"
 #include "server/scenes/disk/bounded_cache.h"
-#include "server/scenes/disk/plain_error.h"
+#include "server/scenes/disk/public_errors.h"
 #include "server/scenes/uploads/datasets.h"
 #include "server/scenes/uploads/uploads.h"
 #include "server/scenes/versions/previews.h"
@@ -40,7 +40,7 @@ fs::path real_path(const fs::path& folder) {
 
 }  // namespace
 
-/// The parts of the store; each is told which others it works with.
+/// The parts of the store; each gets those it works with.
 struct SceneStore::Impl {
   explicit Impl(const StoreOptions& chosen)
       : options(completed(chosen)),
@@ -49,14 +49,14 @@ struct SceneStore::Impl {
 
   const StoreOptions options;
   BoundedCache memory, files;
-  const PlainErrors told{{options.folder, real_path(options.scene_root)}};
-  ScratchFolders scratch{options.folder / scratch_name, told};
-  Catalogue catalogue{options.folder, options.max_scenes, told};
+  const PublicErrors public_error{{options.folder, real_path(options.scene_root)}};
+  ScratchFolders scratch{options.folder / scratch_name, public_error};
+  Catalogue catalogue{options.folder, options.max_scenes, public_error};
   Previews previews{options, memory, files};
-  Versions versions{options, memory, catalogue, previews, scratch, told};
-  VersionFiles version_files{files, memory, catalogue, previews, versions, told};
-  Datasets datasets{options, memory, catalogue, scratch, told};
-  Uploads uploads{options, memory, catalogue, scratch, told};
+  Versions versions{options, memory, catalogue, previews, scratch, public_error};
+  VersionFiles version_files{files, memory, catalogue, previews, versions, public_error};
+  Datasets datasets{options, memory, catalogue, scratch, public_error};
+  Uploads uploads{options, memory, catalogue, scratch, public_error};
 
   /// What the manifest keeps, and what follows from it.
   SceneInfo info(const Manifest& manifest) {

@@ -59,7 +59,7 @@ class SceneStore {
   [[nodiscard]] Result<SceneInfo> find(const std::string& id) const;
   struct Patch {
     std::optional<std::string> name;
-    std::optional<std::optional<engine::DVec3>> up;  ///< Given as nothing: forget it.
+    std::optional<std::optional<engine::DVec3>> up;  ///< Present but empty: removes what was set.
   };
   [[nodiscard]] Result<SceneInfo> patch(const std::string& id, const Patch& patch);
   /// Whoever holds a version keeps it in memory; the files are gone.
@@ -98,7 +98,7 @@ class SceneStore {
 
   struct Usage {
     std::size_t scenes = 0, previews = 0;
-    std::uint64_t memory_bytes = 0;  ///< Of clouds, overlays and previews.
+    std::uint64_t memory_bytes = 0;  ///< Clouds, overlays and previews together.
     std::uint64_t memory_budget = 0;
   };
   [[nodiscard]] Usage usage() const;

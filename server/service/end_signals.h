@@ -16,8 +16,8 @@ class EndSignals {
   EndSignals(const EndSignals&) = delete;
   EndSignals& operator=(const EndSignals&) = delete;
 
-  /// The name of the one that came. Afterwards a second signal ends the program at once: nothing is lost by it but
-  /// time.
+  /// Waits for a signal and returns its name. Afterwards a second one ends the program at once: nothing but time is
+  /// lost.
   [[nodiscard]] std::string wait();
 
  private:

@@ -18,7 +18,8 @@ using engine::propagate;
 using engine::scene::Camera;
 using Clock = std::chrono::steady_clock;
 
-/// Larger pictures give their memory back: a canvas keeps what its largest picture needed.
+/// Pixels of the largest picture whose memory a canvas keeps for the next one; larger pictures give theirs back. Four
+/// megapixels hold any window of the page; a choice.
 constexpr std::int64_t max_kept_pixels = std::int64_t{1} << 22;
 
 double milliseconds_since(Clock::time_point begin) {
@@ -37,13 +38,13 @@ std::vector<float> weights_of_changes(const render::Layers& layers) {
 RenderService::RenderService(const RenderServiceOptions& options)
     : options_(options),
       arena_(options.threads, engine::Priority::high),
-      gate_(arena_.threads(), options.max_waiting) {}
+      slots_(arena_.threads(), options.max_waiting) {}
 
 std::string RenderService::etag(const scenes::LoadedVersion& version, const PictureOrder& order) const {
   const Camera& camera = order.camera;
   std::ostringstream text;
   text << std::hexfloat << version.key << ' ' << options_.program << ' ' << render::simd_target() << ' '
-       << int(order.shown) << ' ' << int(order.format) << ' ' << order.sh_degree << ' ' << order.quality << ' '
+       << int(order.content) << ' ' << int(order.format) << ' ' << order.sh_degree << ' ' << order.quality << ' '
        << camera.width << ' ' << camera.height;
   for (const double value : {camera.fx, camera.fy, camera.cx, camera.cy}) text << ' ' << value;
   for (int i = 0; i < 3; ++i) {
@@ -63,9 +64,9 @@ Result<void> RenderService::check(const Camera& camera) const {
               "max_side");
 }
 
-Result<void> RenderService::run(const std::function<void()>& work) {
-  const auto place = gate_.enter();
-  if (!place) return propagate(place);
+Result<void> RenderService::run_in_turn(const std::function<void()>& work) {
+  const auto slot = slots_.acquire();
+  if (!slot) return propagate(slot);
   try {
     arena_.run(work);
   } catch (const std::bad_alloc&) {
@@ -76,8 +77,8 @@ Result<void> RenderService::run(const std::function<void()>& work) {
 
 Result<void> RenderService::on_canvas(const Camera& camera, const std::function<void(Canvas&)>& work) {
   if (auto sound = check(camera); !sound) return sound;
-  const auto place = gate_.enter();
-  if (!place) return propagate(place);
+  const auto slot = slots_.acquire();
+  if (!slot) return propagate(slot);
   std::unique_ptr<Canvas> canvas;
   {
     const std::lock_guard lock(mutex_);
@@ -102,8 +103,8 @@ Result<Picture> RenderService::render(const scenes::LoadedVersion& version, cons
   render::ForwardOptions forward;
   forward.background = order.background;
   forward.max_sh_degree = order.sh_degree;
-  forward.color = pictures::needs_color(order.shown);
-  forward.depth = pictures::needs_depth(order.shown, order.format);
+  forward.color = pictures::needs_color(order.content);
+  forward.depth = pictures::needs_depth(order.content, order.format);
   Picture picture;
   Result<std::vector<std::byte>> encoded;
   auto done = on_canvas(order.camera, [&](Canvas& canvas) {
@@ -111,14 +112,14 @@ Result<Picture> RenderService::render(const scenes::LoadedVersion& version, cons
     arena_.run([&] {
       const render::DrawnVersion drawn(version.cloud);
       const render::Layers layers = drawn.layers();
-      const auto weights = order.shown == Shown::mask ? weights_of_changes(layers) : std::vector<float>();
+      const auto weights = order.content == PictureContent::mask ? weights_of_changes(layers) : std::vector<float>();
       render::forward(layers, order.camera, forward, weights, canvas.workspace, canvas.rendering);
     });
     picture.render_ms = milliseconds_since(begin);
     // Still at this place, since it takes a core as rendering does, but not in the arena: one thread does it.
     const auto rendered = Clock::now();
-    encoded = pictures::encode_shown(canvas.rendering, order.shown, order.format,
-                                     {.jpeg_quality = order.quality, .png_bits = 8});
+    encoded = pictures::encode_content(canvas.rendering, order.content, order.format,
+                                       {.jpeg_quality = order.quality, .png_bits = 8});
     picture.encode_ms = milliseconds_since(rendered);
   });
   if (!done) return propagate(done);

@@ -16,30 +16,31 @@
 #include "engine/render/forward.h"
 #include "engine/render/pick.h"
 #include "engine/scene/camera.h"
-#include "server/pictures/shown_picture.h"
+#include "server/pictures/picture_content.h"
 #include "server/scenes/scene_store.h"
-#include "server/service/fair_gate.h"
+#include "server/service/fair_semaphore.h"
 
 namespace server::service {
 
 using engine::Result;
-using pictures::Shown;
+using pictures::PictureContent;
 
+/// Limits of the renders that people wait for.
 struct RenderServiceOptions {
-  int threads = 0;               ///< 0: as many as the machine has cores. So many pictures are made at once.
-  std::size_t max_waiting = 64;  ///< Requests; more are busy.
-  int max_side = 4096;           ///< Pixels of a picture.
-  std::string program = {};      ///< Which makes the pictures: another one may make other bytes.
+  int threads = 0;               ///< Pictures made at a time; 0: as many as the machine has cores.
+  std::size_t max_waiting = 64;  ///< Requests that may wait for their turn; more are busy.
+  int max_side = 4096;           ///< Most pixels of a side of a picture.
+  std::string program = {};      ///< Release of the program: another one may make other bytes.
 };
 
-/// A picture that somebody wants.
+/// What a picture is to show, and how.
 struct PictureOrder {
   engine::scene::Camera camera;
-  Shown shown = Shown::color;
+  PictureContent content = PictureContent::color;
   engine::io::ImageFormat format = engine::io::ImageFormat::jpeg;
-  engine::Vec3 background{0.0f};  ///< Display-referred.
-  int sh_degree = engine::scene::max_sh_degree;
-  int quality = 90;  ///< Of a JPEG, 1 to 100.
+  engine::Vec3 background{0.0f};                 ///< Display-referred.
+  int sh_degree = engine::scene::max_sh_degree;  ///< Bands above are left out.
+  int quality = 90;                              ///< Quality of a JPEG, 1 to 100.
 };
 
 /// A picture as a file.
@@ -65,21 +66,21 @@ class RenderService {
   [[nodiscard]] Result<engine::scene::Image> colors(const scenes::LoadedVersion& version,
                                                     const engine::scene::Camera& camera);
 
-  /// As engine::render::pick(). Errors as render().
+  /// What engine::render::pick() finds. Errors as render().
   [[nodiscard]] Result<std::optional<engine::render::PixelHit>> pick(const scenes::LoadedVersion& version,
                                                                      const engine::scene::Camera& camera,
                                                                      engine::DVec2 pixel);
 
-  /// Other work that somebody waits for, in its turn and on the same threads.
+  /// Does other work that somebody waits for, in its turn and on the same threads.
   ///   errors  busy; too_large: it does not fit into memory
-  [[nodiscard]] Result<void> run(const std::function<void()>& work);
+  [[nodiscard]] Result<void> run_in_turn(const std::function<void()>& work);
 
-  /// How many wait for their turn.
-  [[nodiscard]] std::size_t waiting() const { return gate_.waiting(); }
+  /// Requests that wait for their turn.
+  [[nodiscard]] std::size_t waiting() const { return slots_.waiting(); }
   [[nodiscard]] const RenderServiceOptions& options() const { return options_; }
 
  private:
-  /// What a picture is made in.
+  /// Memory that pictures are made in, one after the other.
   struct Canvas {
     engine::render::Workspace workspace;
     engine::render::Rendering rendering;
@@ -91,7 +92,7 @@ class RenderService {
 
   const RenderServiceOptions options_;
   engine::WorkArena arena_;
-  FairGate gate_;
+  FairSemaphore slots_;
   std::mutex mutex_;  ///< Guards canvases_.
   /// Not one per thread: while a thread waits within a rendering, oneTBB may have it begin another one.
   std::vector<std::unique_ptr<Canvas>> canvases_;

@@ -17,6 +17,7 @@ using engine::fail;
 using engine::propagate;
 using engine::scene::Camera;
 
+/// Budget of the virtual cameras that are remembered, bytes: those of a thousand scenes.
 constexpr std::uint64_t virtual_memory_bytes = std::uint64_t{16} << 20;
 const DVec3 default_up{0.0, -1.0, 0.0};  // COLMAP's habit: y down
 
@@ -66,25 +67,25 @@ Result<std::shared_ptr<const ViewSet>> SceneViews::virtual_views(const scenes::S
   options.up = scene.up.value_or(default_up);
   options.radius = scene.radius;
   const std::uint64_t bytes = virtual_view_count * sizeof(SceneView);
-  const auto make = [&]() -> Result<scenes::BoundedCache::Made> {
+  const auto make = [&]() -> Result<scenes::BoundedCache::CachedObject> {
     const auto loaded = store_.load(scene.id, "0");
     if (!loaded) return propagate(loaded);
     auto set = std::make_shared<ViewSet>();
     set->is_virtual = true;
-    auto done = renders_.run([&] {
+    auto done = renders_.run_in_turn([&] {
       for (const Camera& camera :
            engine::views::virtual_cameras(*loaded->cloud.base, around(scene.centre, scene.radius), options))
         set->views.push_back({camera, false});
     });
     if (!done) return propagate(done);
-    return scenes::BoundedCache::Made{set, bytes};
+    return scenes::BoundedCache::CachedObject{set, bytes};
   };
   std::ostringstream name;
   name << std::hexfloat << scene.id << ' ' << options.up.x << ' ' << options.up.y << ' ' << options.up.z;
   return virtual_.get<ViewSet>(name.str(), bytes, make);
 }
 
-Result<std::shared_ptr<const ViewSet>> SceneViews::of(const std::string& scene) {
+Result<std::shared_ptr<const ViewSet>> SceneViews::views_of(const std::string& scene) {
   const auto about = store_.find(scene);
   if (!about) return propagate(about);
   const auto dataset = store_.dataset(scene);
@@ -104,7 +105,7 @@ Result<Camera> SceneViews::resolve(const std::string& scene, const proto::Viewpo
     return to_camera(std::get<proto::LookAtCamera>(*camera), about->up.value_or(default_up), where);
   }
   const auto& name = std::get<std::string>(viewpoint);
-  const auto set = of(scene);
+  const auto set = views_of(scene);
   if (!set) return propagate(set);
   const auto& views = (*set)->views;
   const auto found = std::ranges::find(views, name, [](const SceneView& view) { return view.camera.name; });

@@ -14,34 +14,36 @@
 
 namespace server::service {
 
-/// Cameras around a scene without a dataset.
+/// Number of cameras around a scene without a dataset. A choice: as many as an edit looks through by default.
 constexpr std::size_t virtual_view_count = 50;
 
+/// A camera of a scene.
 struct SceneView {
   engine::scene::Camera camera;
-  bool photo = false;  ///< Whether the dataset has one of it.
+  bool photo = false;  ///< Whether the dataset has a photo of it.
 };
 
+/// The views of one scene.
 struct ViewSet {
-  bool is_virtual = false;
+  bool is_virtual = false;  ///< Cameras around the scene, for want of a dataset.
   std::vector<SceneView> views;
 };
 
 /// Safe to call from any thread.
 class SceneViews {
  public:
-  /// Both outlive this object.
+  /// The store and the renders outlive this object.
   SceneViews(scenes::SceneStore& store, RenderService& renders);
 
-  /// The dataset's views, else 50 cameras on a dome around the scene's centre, with the scene's up. The latter are
+  /// The dataset's views, else 50 cameras on a dome around the scene's centre, with the scene's up. The dome is
   /// found by looking at version 0, which takes a second or two, once.
   ///   errors  those of SceneStore::dataset() and load(); busy
-  [[nodiscard]] Result<std::shared_ptr<const ViewSet>> of(const std::string& scene);
+  [[nodiscard]] Result<std::shared_ptr<const ViewSet>> views_of(const std::string& scene);
 
   /// The camera that a request means.
   ///   where   address of the viewpoint's fields: "camera.", or "" in a query
   ///   errors  not_found: no view of that name (`where` is "view"); invalid_argument: a camera without direction; as
-  ///   of()
+  ///   views_of()
   [[nodiscard]] Result<engine::scene::Camera> resolve(const std::string& scene, const proto::Viewpoint& viewpoint,
                                                       const std::string& where);
 

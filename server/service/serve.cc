@@ -47,7 +47,7 @@ proto::ServiceInfo service_info(const ServeOptions& options) {
                  .streams = options.http.dispatcher.max_streams,
                  .scenes = options.scenes.max_scenes,
                  .dataset_bytes = options.scenes.max_dataset_bytes};
-  info.token_required = !options.gate.token.empty();
+  info.token_required = !options.access.token.empty();
   info.scene_root = !options.scenes.scene_root.empty();
   return info;
 }
@@ -82,7 +82,7 @@ void add_gauges(http::Metrics& metrics, scenes::SceneStore& scenes, edits::EditS
 /// Tells the parts what they have to know of the whole.
 void share_out(ServeOptions& options, spdlog::logger& logger) {
   options.scenes.folder = options.data_dir / "scenes";
-  options.scenes.program_version = SPLATDRAG_VERSION;
+  options.scenes.program_release = SPLATDRAG_VERSION;
   options.scenes.preview_lifetime = std::chrono::seconds(options.preview_seconds);
   options.edits.folder = options.data_dir / "edits";
   options.edits.threads = options.threads;
@@ -99,9 +99,9 @@ Result<void> check_token(ServeOptions& options, spdlog::logger& logger) {
     auto token = read_token(options.token_file, warning);
     if (!token) return propagate(token);
     if (!warning.empty()) http::log(logger, spdlog::level::warn, warning);
-    options.gate.token = std::move(*token);
+    options.access.token = std::move(*token);
   }
-  if (options.gate.token.empty() && !is_loopback(options.http.host)) {
+  if (options.access.token.empty() && !is_loopback(options.http.host)) {
     if (!options.insecure)
       return engine::fail(ErrorCode::invalid_argument,
                           "a service that other machines can reach needs a token: give --token-file, or --insecure to "
@@ -124,12 +124,12 @@ Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& lo
   if (!edits) return propagate(edits);
   RenderService renders(options.renders);
   SceneViews views(**scenes, renders);
-  http::Gate gate(options.gate);
+  http::AccessGuard guard(options.access);
   http::Metrics metrics;
   add_gauges(metrics, **scenes, **edits, renders);
   http::Router router = routes::all_routes(
-      {**scenes, **edits, options.edit_limits, renders, views, gate, metrics, service_info(options)});
-  auto server = http::HttpServer::start(options.http, std::move(router), gate, metrics, logger);
+      {**scenes, **edits, options.edit_limits, renders, views, guard, metrics, service_info(options)});
+  auto server = http::HttpServer::start(options.http, std::move(router), guard, metrics, logger);
   if (!server) return propagate(server);
   out << "splatdrag " << SPLATDRAG_VERSION << " is listening on " << (*server)->url() << std::endl;
   http::log(logger, spdlog::level::info, "listening",

@@ -9,7 +9,7 @@
 
 #include "engine/core/result.h"
 #include "server/edits/edit_service.h"
-#include "server/http/gate.h"
+#include "server/http/access_guard.h"
 #include "server/http/http_server.h"
 #include "server/scenes/scene_store.h"
 #include "server/service/end_signals.h"
@@ -22,21 +22,21 @@ namespace server::service {
 struct ServeOptions {
   std::filesystem::path data_dir;    ///< Exists. Scenes and edits get a folder of their own in it.
   std::filesystem::path token_file;  ///< Empty: no token.
-  bool insecure = false;             ///< Other machines may come in without a token.
-  int drain_seconds = 30;            ///< So long may a running edit finish its interval.
-  int preview_seconds = 600;         ///< So long does a preview live that nobody looks at.
+  bool insecure = false;             ///< Lets other machines in without a token.
+  int drain_seconds = 30;            ///< Time that a running edit gets to finish its interval.
+  int preview_seconds = 600;         ///< Life of a preview that nobody looks at.
   http::ServerOptions http;
-  http::GateOptions gate;
+  http::AccessOptions access;
   scenes::StoreOptions scenes;
   edits::ServiceOptions edits;
   routes::EditLimits edit_limits;
   RenderServiceOptions renders;
-  int threads = 0;       ///< That edits and renders compute with; 0: one per core.
-  int threads_here = 0;  ///< How many that comes to on this machine: what the service says of itself.
-  std::string simd;      ///< Instruction set in use, likewise.
+  int threads = 0;       ///< Threads of edits and renders; 0: one per core.
+  int threads_here = 0;  ///< `threads` on this machine, as /v1/info says it.
+  std::string simd;      ///< Instruction set in use, as /v1/info says it.
 };
 
-/// Reads the token into options.gate. Writes warnings to the log.
+/// Reads the token into options.access. Writes warnings to the log.
 ///   errors  those of read_token(); invalid_argument: a host that others can reach, no token, and not `insecure`
 [[nodiscard]] engine::Result<void> check_token(ServeOptions& options, spdlog::logger& logger);
 

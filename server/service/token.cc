@@ -18,8 +18,8 @@ Result<std::string> read_token(const std::filesystem::path& file, std::string& w
     return engine::fail(errno == ENOENT ? ErrorCode::not_found : ErrorCode::unavailable,
                         std::string("the token file cannot be read: ") + std::strerror(errno), file.string());
   std::ifstream in(file, std::ios::binary);
-  constexpr std::size_t most = 4096;
-  std::string text(most + 1, '\0');
+  constexpr std::size_t max_bytes = 4096;  // of the file: more is no token
+  std::string text(max_bytes + 1, '\0');
   in.read(text.data(), std::streamsize(text.size()));
   text.resize(std::size_t(in.gcount()));
   if (in.bad() || (text.empty() && !in.eof()))
@@ -28,7 +28,7 @@ Result<std::string> read_token(const std::filesystem::path& file, std::string& w
   while (!text.empty() && is_blank(text.back())) text.pop_back();
   text.erase(text.begin(), std::find_if_not(text.begin(), text.end(), is_blank));
   if (text.empty()) return engine::fail(ErrorCode::invalid_argument, "the token file is empty", file.string());
-  if (text.size() > most || std::any_of(text.begin(), text.end(), [](char c) { return c <= 0x20 || c >= 0x7f; }))
+  if (text.size() > max_bytes || std::any_of(text.begin(), text.end(), [](char c) { return c <= 0x20 || c >= 0x7f; }))
     return engine::fail(ErrorCode::invalid_argument,
                         "a token is one word of printable ASCII, up to 4096 bytes; make one with: openssl rand -hex 32",
                         file.string());

@@ -53,7 +53,7 @@ TEST(RenderRequest, ReadsAPinholeCamera) {
   ASSERT_TRUE(request) << request.error().message;
   const auto& camera = std::get<PinholeCamera>(std::get<Camera>(request->viewpoint));
   EXPECT_EQ(camera, (PinholeCamera{64, 48, 50, 51, 32, 24, {{{1, 0, 0, 1}, {0, 1, 0, 2}, {0, 0, 1, 3}}}}));
-  EXPECT_EQ(request->what, What::color);
+  EXPECT_EQ(request->content, PictureContent::color);
   EXPECT_FALSE(request->format);
   EXPECT_EQ(request->quality, 90);
 }
@@ -65,7 +65,7 @@ TEST(RenderRequest, ReadsACameraThatLooksAtAPoint) {
   ASSERT_TRUE(request) << request.error().message;
   EXPECT_EQ(std::get<LookAtCamera>(std::get<Camera>(request->viewpoint)),
             (LookAtCamera{{1, 2, 3}, {0, 0, 0}, Point{0, 0, 1}, 40, 8, 9}));
-  EXPECT_EQ(request->what, What::depth);
+  EXPECT_EQ(request->content, PictureContent::depth);
   EXPECT_EQ(request->format, PictureFormat::exr);
   EXPECT_EQ(request->max_side, 100);
   EXPECT_EQ(request->background, (Point{0, 0.5, 1}));

@@ -40,7 +40,7 @@ GivenParams all_given() {
 
 std::optional<engine::Error> refusal(const json& document, GivenParams* params = nullptr) {
   std::optional<engine::Error> error;
-  const GivenParams read = read_params(Field(document, "params", error));
+  const GivenParams read = read_params(JsonField(document, "params", error));
   if (params != nullptr) *params = read;
   return error;
 }

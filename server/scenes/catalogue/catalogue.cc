@@ -86,11 +86,11 @@ void Catalogue::take_up(const fs::path& folder) {
 
   auto lease = unpacked.empty() ? nullptr : std::make_shared<Lease>(folder / unpacked);
   const std::string id = manifest->scene.id;
-  scenes_[id] = std::make_shared<Scene>(std::move(*manifest), folder, std::move(lease));
+  scenes_[id] = std::make_shared<CatalogueEntry>(std::move(*manifest), folder, std::move(lease));
 }
 
 Result<void> Catalogue::open() {
-  if (auto made = make_folder(folder_); !made) return made;
+  if (auto status = make_folder(folder_); !status) return status;
   if (auto synced = engine::sync_folder(folder_.parent_path()); !synced) return synced;
   if (auto locked = lock_folder(); !locked) return locked;
   if (auto read = read_counter(); !read) return read;
@@ -135,19 +135,19 @@ std::size_t Catalogue::size() const {
   return scenes_.size();
 }
 
-Catalogue::Place::~Place() {
+Catalogue::Reservation::~Reservation() {
   if (catalogue_ == nullptr) return;
   const std::lock_guard lock(catalogue_->mutex_);
-  --catalogue_->adding_;
+  --catalogue_->reserved_;
 }
 
-Result<Catalogue::Place> Catalogue::reserve() {
+Result<Catalogue::Reservation> Catalogue::reserve() {
   const std::lock_guard lock(mutex_);
-  if (scenes_.size() + adding_ >= max_scenes_)
+  if (scenes_.size() + reserved_ >= max_scenes_)
     return fail(ErrorCode::too_large, "there are " + std::to_string(scenes_.size()) +
                                           " scenes, as many as the limit (--max-scenes) allows: delete one first");
-  ++adding_;
-  return Place(*this);
+  ++reserved_;
+  return Reservation(*this);
 }
 
 Result<std::uint64_t> Catalogue::next_number() {
@@ -160,22 +160,22 @@ Result<std::uint64_t> Catalogue::next_number() {
 
 Result<Snapshot> Catalogue::add(Manifest manifest, const fs::path& base_file, const fs::path& staging) {
   const auto number = next_number();
-  if (!number) return told_(number);
+  if (!number) return public_error_(number);
   const std::string id = manifest.scene.id = engine::numbered_id(id_kind, *number);
   // Everything is on disk before the folder gets its name.
   const fs::path whole = staging / "scene", folder = folder_ / id;
-  if (auto made = make_folder(whole); !made) return told_(made, staging);
-  if (auto moved = move_durably(base_file, whole / manifest.base); !moved) return told_(moved, staging);
-  if (auto synced = sync_file(whole / manifest.base); !synced) return told_(synced, staging);
-  if (auto written = write_manifest(whole, manifest); !written) return told_(written, staging);
+  if (auto status = make_folder(whole); !status) return public_error_(status, staging);
+  if (auto moved = move_durably(base_file, whole / manifest.base); !moved) return public_error_(moved, staging);
+  if (auto synced = sync_file(whole / manifest.base); !synced) return public_error_(synced, staging);
+  if (auto written = write_manifest(whole, manifest); !written) return public_error_(written, staging);
   if (auto moved = move_durably(whole, folder); !moved) {
     remove_renamed(folder);
-    return told_(moved, staging);
+    return public_error_(moved, staging);
   }
-  const auto made = std::make_shared<Scene>(std::move(manifest), folder, nullptr);
-  const Snapshot at{made, made->manifest, nullptr};
+  const auto entry = std::make_shared<CatalogueEntry>(std::move(manifest), folder, nullptr);
+  const Snapshot at{entry, entry->manifest, nullptr};
   const std::lock_guard lock(mutex_);
-  scenes_[id] = made;
+  scenes_[id] = entry;
   return at;
 }
 
@@ -188,13 +188,13 @@ Result<ManifestPtr> Catalogue::change(const Snapshot& at, const std::function<Re
   if (auto changed = change(*manifest); !changed) return propagate(changed);
   const auto written = write_manifest(at.scene->folder->path(), *manifest);
   // What the next start would find is what counts, even if it was not known to be on disk.
-  if (!written && !is_written(at.scene->folder->path(), *manifest)) return told_(written);
+  if (!written && !is_written(at.scene->folder->path(), *manifest)) return public_error_(written);
   {
     const std::lock_guard lock(mutex_);
     at.scene->manifest = manifest;
     if (dataset_folder) std::swap(at.scene->dataset_folder, *dataset_folder);
   }
-  if (!written) return told_(written);
+  if (!written) return public_error_(written);
   return manifest;
 }
 
@@ -205,7 +205,8 @@ Result<void> Catalogue::remove(const std::string& id) {
   if (const auto still = snapshot(id); !still) return propagate(still);
   // Marked by its manifest's name: should we be killed now, the next start removes it.
   const fs::path folder = at->scene->folder->path();
-  if (auto marked = move_durably(folder / manifest_name, folder / removed_manifest_name); !marked) return told_(marked);
+  if (auto marked = move_durably(folder / manifest_name, folder / removed_manifest_name); !marked)
+    return public_error_(marked);
   {
     const std::lock_guard lock(mutex_);
     scenes_.erase(id);

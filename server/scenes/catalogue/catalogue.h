@@ -15,15 +15,16 @@
 #include "engine/core/result.h"
 #include "server/scenes/catalogue/manifest.h"
 #include "server/scenes/disk/disk.h"
-#include "server/scenes/disk/plain_error.h"
+#include "server/scenes/disk/public_errors.h"
 
 namespace server::scenes {
 
 using engine::Result;
 using ManifestPtr = std::shared_ptr<const Manifest>;
 
-struct Scene {
-  Scene(Manifest about, const std::filesystem::path& path, std::shared_ptr<Lease> unpacked)
+/// One scene in the list.
+struct CatalogueEntry {
+  CatalogueEntry(Manifest about, const std::filesystem::path& path, std::shared_ptr<Lease> unpacked)
       : id(about.scene.id),
         folder(std::make_shared<Lease>(path)),
         manifest(std::make_shared<const Manifest>(std::move(about))),
@@ -31,18 +32,17 @@ struct Scene {
 
   const std::string id;
   const std::shared_ptr<Lease> folder;
-  /// Whoever changes the manifest holds this from reading the old one until the new one is on disk, against the rule
-  /// that no lock is held over I/O: two changes at once would lose one of them. Nobody who only reads ever waits for
-  /// it.
+  /// Whoever changes the manifest holds this lock from reading the old manifest until the new one is on disk, against
+  /// the rule that no lock is held over I/O: two changes at once would lose one of them. Readers never wait for it.
   std::mutex writer;
-  // Under the lock of the catalogue:
+  // The lock of the catalogue guards what follows.
   ManifestPtr manifest;
-  std::shared_ptr<Lease> dataset_folder;  ///< Of an unpacked dataset.
+  std::shared_ptr<Lease> dataset_folder;  ///< Folder of an unpacked dataset; else null.
 };
 
-/// A scene as it was at some moment. Holding it keeps its files, even if it is removed or changed meanwhile.
+/// A scene as it was at one time. Holding it keeps its files, even if it is removed or changed meanwhile.
 struct Snapshot {
-  std::shared_ptr<Scene> scene;
+  std::shared_ptr<CatalogueEntry> scene;
   ManifestPtr manifest;
   std::shared_ptr<Lease> dataset_folder;
 };
@@ -50,10 +50,10 @@ struct Snapshot {
 /// Safe to call from any thread once it is open. Its lock is never held over I/O.
 class Catalogue {
  public:
-  /// folder  absolute
-  /// told    how errors are called outside; outlives this
-  Catalogue(std::filesystem::path folder, std::size_t max_scenes, const PlainErrors& told)
-      : folder_(std::move(folder)), max_scenes_(max_scenes), told_(told) {}
+  /// folder        absolute
+  /// public_error  words errors for strangers; outlives this
+  Catalogue(std::filesystem::path folder, std::size_t max_scenes, const PublicErrors& public_error)
+      : folder_(std::move(folder)), max_scenes_(max_scenes), public_error_(public_error) {}
 
   /// Makes the folder or takes up what is in it, without what a crash left there.
   ///   errors  conflict: another process has it; corrupt_data: its counter; those of file_error(), with full paths
@@ -61,27 +61,31 @@ class Catalogue {
   /// Scenes that could not be taken up; their folders are left as they are.
   [[nodiscard]] const std::vector<engine::Error>& damaged() const { return damaged_; }
 
+  /// The scene as it is now.
   ///   errors  not_found: `where` is "scene"
   [[nodiscard]] Result<Snapshot> snapshot(const std::string& id) const;
-  /// Whether it has not been removed. What is put into a cache for a snapshot may be too late: whoever removes forgets
-  /// first, and once. So whoever has put something there asks this, and forgets it again.
+  /// Whether the scene has not been removed since. A removal empties the caches of the scene once, before the scene
+  /// goes. So whoever has put something into a cache for a snapshot calls this afterwards, and forgets it again if it
+  /// is false.
   [[nodiscard]] bool has(const Snapshot& at) const;
-  [[nodiscard]] std::vector<ManifestPtr> manifests() const;  ///< By id.
+  [[nodiscard]] std::vector<ManifestPtr> manifests() const;  ///< In the order of ids.
   [[nodiscard]] std::size_t size() const;
 
-  /// Counts a scene on its way in, as long as it lives: a thousand uploads at once do not pass the limit together.
-  class Place {
+  /// Counts a scene that is being added, as long as this lives: a thousand uploads at once do not pass the limit
+  /// together.
+  class Reservation {
    public:
-    explicit Place(Catalogue& catalogue) : catalogue_(&catalogue) {}
-    Place(Place&& other) noexcept : catalogue_(std::exchange(other.catalogue_, nullptr)) {}
-    Place& operator=(Place&&) = delete;
-    ~Place();
+    explicit Reservation(Catalogue& catalogue) : catalogue_(&catalogue) {}
+    Reservation(Reservation&& other) noexcept : catalogue_(std::exchange(other.catalogue_, nullptr)) {}
+    Reservation& operator=(Reservation&&) = delete;
+    ~Reservation();
 
    private:
     Catalogue* catalogue_;
   };
-  ///   errors  too_large: as many scenes as there may be
-  [[nodiscard]] Result<Place> reserve();
+  /// Reserves a place in the count of scenes.
+  ///   errors  too_large: there are as many scenes as there may be
+  [[nodiscard]] Result<Reservation> reserve();
   /// A new scene, on disk when this returns: it appears whole or not at all.
   ///   manifest   without id
   ///   base_file  what becomes its version 0; moved
@@ -94,7 +98,7 @@ class Catalogue {
   ///   errors          not_found: removed meanwhile; those of `change` and of write_manifest()
   [[nodiscard]] Result<ManifestPtr> change(const Snapshot& at, const std::function<Result<void>(Manifest&)>& change,
                                            std::shared_ptr<Lease>* dataset_folder = nullptr);
-  /// Its files go once nobody reads from them any more.
+  /// Removes the scene from the list; its files go once nobody reads from them any more.
   [[nodiscard]] Result<void> remove(const std::string& id);
 
  private:
@@ -105,13 +109,13 @@ class Catalogue {
 
   const std::filesystem::path folder_;
   const std::size_t max_scenes_;
-  const PlainErrors& told_;
+  const PublicErrors& public_error_;
   engine::FileDescriptor folder_lock_;
-  std::vector<engine::Error> damaged_;  ///< Written by open() alone.
+  std::vector<engine::Error> damaged_;  ///< Only open() writes it.
 
   mutable std::mutex mutex_;  ///< Guards what follows, and the scenes' own manifests.
-  std::map<std::string, std::shared_ptr<Scene>> scenes_;
-  std::size_t adding_ = 0;  ///< Scenes on their way in.
+  std::map<std::string, std::shared_ptr<CatalogueEntry>> scenes_;
+  std::size_t reserved_ = 0;  ///< Scenes that are being added.
 
   /// Held while the number of the next scene goes to disk: it must not be written twice, nor go back.
   std::mutex counter_writer_;

@@ -19,7 +19,8 @@ using engine::propagate;
 using nlohmann::json;
 using nlohmann::ordered_json;
 
-constexpr int manifest_format = 1;
+constexpr int manifest_format = 1;  // format number of scene.json
+/// A larger file is refused before it is read: a hundred thousand versions come to less. A choice.
 constexpr std::uint64_t max_manifest_bytes = std::uint64_t{64} << 20;
 
 /// The first thing wrong with a manifest. Thrown and caught in this file only: a manifest has dozens of fields, none of
@@ -111,11 +112,11 @@ ordered_json or_null(const std::optional<T>& value) {
   return value ? ordered_json(*value) : ordered_json(nullptr);
 }
 
-ordered_json encoded(const DatasetInfo& info, const DatasetPlace& place) {
+ordered_json encoded(const DatasetInfo& info, const DatasetLocation& location) {
   return {{"kind", info.kind},
-          {"folder", place.folder},
-          {"below_root", place.below_root},
-          {"disk_bytes", place.disk_bytes},
+          {"folder", location.folder},
+          {"below_root", location.below_root},
+          {"disk_bytes", location.disk_bytes},
           {"views", info.views},
           {"photos", info.photos},
           {"psnr_mean_db", or_null(info.psnr_mean_db)},
@@ -138,7 +139,7 @@ void read_dataset(const json& value, Manifest& manifest) {
     if (!warning.is_string()) throw Wrong{"expected a string", in.address("warnings")};
     info.warnings.push_back(warning.get<std::string>());
   }
-  manifest.dataset = DatasetPlace{in.relative("folder"), in.boolean("below_root"), in.count("disk_bytes")};
+  manifest.dataset = DatasetLocation{in.relative("folder"), in.boolean("below_root"), in.count("disk_bytes")};
   manifest.scene.dataset = std::move(info);
 }
 

@@ -14,20 +14,21 @@ namespace server::scenes {
 
 using engine::Result;
 
-/// Where a dataset is.
-struct DatasetPlace {
-  std::string folder;  ///< With the cameras. Below the scene's folder, or below the scene root. Relative.
-  bool below_root = false;
-  std::uint64_t disk_bytes = 0;  ///< In the scene's folder.
+/// Where the files of a dataset are.
+struct DatasetLocation {
+  std::string folder;            ///< Holds the cameras. Relative to the scene's folder, or to the scene root.
+  bool below_root = false;       ///< Whether `folder` is relative to the scene root.
+  std::uint64_t disk_bytes = 0;  ///< Bytes that it takes in the scene's folder.
 };
 
+/// What scene.json says, field by field.
 struct Manifest {
-  SceneInfo scene;    ///< memory_bytes and disk_bytes are not kept here.
+  SceneInfo scene;    ///< Without memory_bytes and disk_bytes, which are computed.
   std::string nonce;  ///< Random: a scene of the same id in another data folder is another one.
   std::string base;   ///< File name of version 0.
   std::uint64_t base_disk_bytes = 0, base_memory_bytes = 0;
-  std::vector<std::uint64_t> overlay_memory_bytes;  ///< Per version; 0 for version 0.
-  std::optional<DatasetPlace> dataset;              ///< There iff scene.dataset is.
+  std::vector<std::uint64_t> overlay_memory_bytes;  ///< One entry per version; 0 for version 0.
+  std::optional<DatasetLocation> dataset;           ///< Present exactly where scene.dataset is.
   int next_dataset = 1;                             ///< Number of the next dataset's folder.
 };
 

@@ -8,7 +8,7 @@
 namespace server::scenes {
 namespace {
 
-constexpr std::size_t max_name_bytes = 200;
+constexpr std::size_t max_name_bytes = 200;  // of a scene's or file's name: file systems take 255. A choice.
 
 bool is_control(unsigned char c) { return c < 0x20 || c == 0x7f; }
 
@@ -33,8 +33,8 @@ Result<std::string> checked_name(const std::string& name) {
   return name;
 }
 
-Result<std::string> name_for(const std::string& asked, const std::string& file_name) {
-  if (!asked.empty()) return checked_name(asked);
+Result<std::string> name_for(const std::string& given_name, const std::string& file_name) {
+  if (!given_name.empty()) return checked_name(given_name);
   const std::string stem = std::filesystem::path(file_name).stem().string();
   return stem.empty() ? "scene" : stem;
 }

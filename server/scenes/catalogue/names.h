@@ -1,4 +1,4 @@
-// What files and scenes are called: as strangers ask for it, and as it is fit for folders and messages.
+// Names of files and scenes: strangers give them; here they are made fit for folders and messages.
 #pragma once
 
 #include <string>
@@ -16,10 +16,10 @@ using engine::Result;
 ///   errors  invalid_argument: empty, longer than 200 bytes, or with control characters (`where` is "name")
 [[nodiscard]] Result<std::string> checked_name(const std::string& name);
 
-/// The name asked for, else that of the file without its extension. Errors as checked_name().
-[[nodiscard]] Result<std::string> name_for(const std::string& asked, const std::string& file_name);
+/// The name that the user gave, else that of the file without its extension. Errors as checked_name().
+[[nodiscard]] Result<std::string> name_for(const std::string& given_name, const std::string& file_name);
 
-/// 16 random hexadecimal digits: tells things of one name apart that belong to different folders or runs.
+/// 16 random hexadecimal digits: tells things of one name apart that belong to different folders or processes.
 [[nodiscard]] std::string random_nonce();
 
 }  // namespace server::scenes

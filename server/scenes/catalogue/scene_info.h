@@ -20,13 +20,14 @@ using Time = std::chrono::sys_time<std::chrono::milliseconds>;
 /// One link of a scene's chain. Version 0 is the file as it came.
 struct VersionInfo {
   int version = 0;
-  std::optional<int> parent;  ///< None for version 0.
+  std::optional<int> parent;  ///< Version that was edited; none for version 0.
   std::string edit;           ///< Id of the edit that made it; empty for version 0.
   Time created{};
   std::size_t gaussians = 0;
-  std::uint64_t disk_bytes = 0;  ///< Of what this version needs beside version 0.
+  std::uint64_t disk_bytes = 0;  ///< What this version takes beside version 0.
 };
 
+/// What is known of a scene's dataset.
 struct DatasetInfo {
   std::string kind;  ///< "colmap", "transforms", "inria"
   std::size_t views = 0, photos = 0;
@@ -34,9 +35,10 @@ struct DatasetInfo {
   std::optional<double> psnr_worst_db;
   std::string psnr_worst_view;
   std::vector<std::string> warnings;
-  int number = 0;  ///< Which of the scene's datasets, one after the other, it is; not kept in a manifest.
+  int number = 0;  ///< Counts the datasets that the scene has had; not in a manifest.
 };
 
+/// What is known of a scene. Lengths are world units.
 struct SceneInfo {
   std::string id;  ///< "s000001": counts up, never used twice.
   std::string name;
@@ -46,17 +48,17 @@ struct SceneInfo {
   engine::DVec3 low{0.0}, high{0.0};  ///< Box of the means, world units.
   engine::DVec3 centre{0.0};          ///< Median of the means.
   double radius = 0;                  ///< Half of the means are nearer to the centre than this.
-  std::optional<engine::DVec3> up;    ///< As the user set it.
+  std::optional<engine::DVec3> up;    ///< World direction that the user set, if any.
   std::uint64_t disk_bytes = 0;
-  std::uint64_t memory_bytes = 0;  ///< Held in memory right now.
+  std::uint64_t memory_bytes = 0;  ///< What it takes in memory now.
   std::optional<DatasetInfo> dataset;
-  std::vector<VersionInfo> versions;  ///< By number.
+  std::vector<VersionInfo> versions;  ///< In the order of their numbers.
 };
 
 /// A version in memory. Holding it keeps it there.
 struct LoadedVersion {
   engine::scene::LayeredCloud cloud;
-  std::string key;  ///< Names these very Gaussians, as this version of the program reads and draws them, for ever,
+  std::string key;  ///< Names these very Gaussians, as this release of the program reads and draws them, for ever,
                     ///< across restarts: for ETags.
 };
 

@@ -16,8 +16,8 @@ using engine::propagate;
 
 std::string in_mib(std::uint64_t bytes) { return std::to_string((bytes + (1 << 20) - 1) >> 20) + " MiB"; }
 
-/// What `make` gives, or what it throws as an error: those who wait must hear of it.
-Result<BoundedCache::Made> made_by(const std::function<Result<BoundedCache::Made>()>& make) {
+/// The result of `make`; an exception becomes an error: other threads wait for the outcome.
+Result<BoundedCache::CachedObject> call_guarded(const std::function<Result<BoundedCache::CachedObject>()>& make) {
   try {
     return make();
   } catch (const std::bad_alloc&) {
@@ -29,7 +29,7 @@ Result<BoundedCache::Made> made_by(const std::function<Result<BoundedCache::Made
 
 }  // namespace
 
-BoundedCache::Room::~Room() {
+BoundedCache::Reservation::~Reservation() {
   if (bytes_ > 0) cache_->give_back(bytes_);
 }
 
@@ -39,7 +39,7 @@ void BoundedCache::give_back(std::uint64_t bytes) {
 }
 
 void BoundedCache::drop_forgotten() {
-  std::erase_if(forgotten_, [&](const Forgotten& entry) {
+  std::erase_if(forgotten_, [&](const ForgottenObject& entry) {
     if (!entry.object.expired()) return false;
     used_ -= entry.bytes;
     return true;
@@ -48,7 +48,7 @@ void BoundedCache::drop_forgotten() {
 
 Result<void> BoundedCache::take(std::uint64_t bytes, Garbage& garbage) {
   drop_forgotten();
-  // Held by nobody else, and under the lock nobody can begin to hold it.
+  // One reference is the cache's own. Nobody can begin to hold the object while the lock is held.
   const auto is_idle = [](const Entry& entry) { return entry.object.use_count() == 1; };
   if (when_full_ == WhenFull::refuse) {
     if (bytes > budget_)
@@ -85,7 +85,7 @@ BoundedCache::Object BoundedCache::find_any(const std::string& name) {
 }
 
 Result<BoundedCache::Object> BoundedCache::get_any(const std::string& name, std::uint64_t bytes,
-                                                   const std::function<Result<Made>()>& make) {
+                                                   const std::function<Result<CachedObject>()>& make) {
   Garbage garbage;
   std::promise<Result<Object>> promise;
   std::optional<std::shared_future<Result<Object>>> others;
@@ -96,24 +96,25 @@ Result<BoundedCache::Object> BoundedCache::get_any(const std::string& name, std:
       entry->second.last_use = ++clock_;
       return entry->second.object;
     }
-    if (const auto making = making_.find(name); making != making_.end()) {
-      others = making->second.result;
+    if (const auto build = in_progress_.find(name); build != in_progress_.end()) {
+      others = build->second.result;
     } else {
       if (auto taken = take(bytes, garbage); !taken) return propagate(taken);
       number = ++clock_;
-      making_[name] = {promise.get_future().share(), number};
+      in_progress_[name] = {promise.get_future().share(), number};
     }
   }
   garbage.clear();
   if (others) return others->get();
 
-  Result<Made> made = made_by(make);
+  Result<CachedObject> made = call_guarded(make);
   Result<Object> object = made ? Result<Object>(made->object) : Result<Object>(propagate(made));
   {
     const std::lock_guard lock(mutex_);
-    const auto making = making_.find(name);
-    const bool wanted = making != making_.end() && making->second.number == number;  // else it was forgotten meanwhile
-    if (wanted) making_.erase(making);
+    const auto build = in_progress_.find(name);
+    // Else the name was forgotten meanwhile.
+    const bool wanted = build != in_progress_.end() && build->second.number == number;
+    if (wanted) in_progress_.erase(build);
     used_ -= bytes;
     if (made) {
       used_ += made->bytes;
@@ -127,21 +128,21 @@ Result<BoundedCache::Object> BoundedCache::get_any(const std::string& name, std:
   return object;
 }
 
-void BoundedCache::put(const std::string& name, Made made, Room room) {
+void BoundedCache::put(const std::string& name, CachedObject object, Reservation reservation) {
   const std::lock_guard lock(mutex_);
-  if (entries_.contains(name) || making_.contains(name)) return;  // and `room` is given back after the lock
-  entries_[name] = {std::move(made.object), made.bytes, ++clock_, made.can_be_made_again};
-  used_ += made.bytes;
-  used_ -= std::exchange(room.bytes_, 0);
+  if (entries_.contains(name) || in_progress_.contains(name)) return;  // and the reservation ends after the lock
+  entries_[name] = {std::move(object.object), object.bytes, ++clock_, object.can_be_made_again};
+  used_ += object.bytes;
+  used_ -= std::exchange(reservation.bytes_, 0);
 }
 
-Result<BoundedCache::Room> BoundedCache::room(std::uint64_t bytes) {
+Result<BoundedCache::Reservation> BoundedCache::reserve(std::uint64_t bytes) {
   Garbage garbage;
   {
     const std::lock_guard lock(mutex_);
     if (auto taken = take(bytes, garbage); !taken) return propagate(taken);
   }
-  return Room(*this, bytes);
+  return Reservation(*this, bytes);
 }
 
 void BoundedCache::forget(const std::string& prefix) {
@@ -152,8 +153,8 @@ void BoundedCache::forget(const std::string& prefix) {
     garbage.push_back(std::move(entry->second.object));
     entry = entries_.erase(entry);
   }
-  for (auto making = making_.lower_bound(prefix); making != making_.end() && making->first.starts_with(prefix);)
-    making = making_.erase(making);
+  for (auto build = in_progress_.lower_bound(prefix); build != in_progress_.end() && build->first.starts_with(prefix);)
+    build = in_progress_.erase(build);
 }
 
 std::uint64_t BoundedCache::used() {

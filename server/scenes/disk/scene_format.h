@@ -16,7 +16,7 @@ struct SceneFormat {
   const char* extension;  ///< "ply", "spz", "splat"
 };
 
-/// Of a file that io::read_scene() reads.
+/// The format of a file that io::read_scene() reads.
 ///   errors  those of InputFile
 [[nodiscard]] Result<SceneFormat> detect_format(const std::filesystem::path& file);
 

@@ -17,7 +17,7 @@ Result<void> ScratchFolders::open() {
 
 Result<Scratch> ScratchFolders::make() {
   const std::filesystem::path folder = folder_ / std::to_string(++last_);
-  if (auto made = make_folder(folder); !made) return told_(made, folder);
+  if (auto status = make_folder(folder); !status) return public_error_(status, folder);
   return Scratch(folder);
 }
 

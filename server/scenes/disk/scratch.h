@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "engine/core/result.h"
-#include "server/scenes/disk/plain_error.h"
+#include "server/scenes/disk/public_errors.h"
 
 namespace server::scenes {
 
@@ -28,18 +28,21 @@ class Scratch {
 /// Safe to call from any thread.
 class ScratchFolders {
  public:
-  /// folder  of them all
-  /// told    outlives this
-  ScratchFolders(std::filesystem::path folder, const PlainErrors& told) : folder_(std::move(folder)), told_(told) {}
+  /// folder        holds them all
+  /// public_error  outlives this
+  ScratchFolders(std::filesystem::path folder, const PublicErrors& public_error)
+      : folder_(std::move(folder)), public_error_(public_error) {}
 
-  /// Makes the folder of them all, without what an earlier run left in it. Errors those of make_folder().
+  /// Makes that folder, without what an earlier process left in it.
+  ///   errors  those of make_folder()
   [[nodiscard]] Result<void> open();
-  /// A new, empty one. Errors those of make_folder().
+  /// A new, empty folder.
+  ///   errors  those of make_folder()
   [[nodiscard]] Result<Scratch> make();
 
  private:
   const std::filesystem::path folder_;
-  const PlainErrors& told_;
+  const PublicErrors& public_error_;
   std::atomic<std::uint64_t> last_{0};
 };
 

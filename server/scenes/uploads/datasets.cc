@@ -59,13 +59,14 @@ Result<ManifestPtr> Datasets::put_zip(const Snapshot& at, const fs::path& zip, c
   const auto staging = scratch_.make();
   if (!staging) return propagate(staging);
   const fs::path into = staging->folder() / "dataset";
-  if (auto made = make_folder(into); !made) return told_(made, staging->folder());
+  if (auto status = make_folder(into); !status) return public_error_(status, staging->folder());
   const ZipLimits limits{.max_bytes = options_.max_dataset_bytes, .max_files = options_.max_dataset_files};
-  if (auto unpacked = unzip(zip, safe_file_name(filename), into, limits); !unpacked) return told_(unpacked, into);
+  if (auto unpacked = unzip(zip, safe_file_name(filename), into, limits); !unpacked)
+    return public_error_(unpacked, into);
   const fs::path root = dataset_root(into);
   const auto found = io::read_dataset(root, {.points = false});
-  if (!found) return told_(found, into);
-  if (auto synced = sync_file_system(into); !synced) return told_(synced, staging->folder());
+  if (!found) return public_error_(found, into);
+  if (auto synced = sync_file_system(into); !synced) return public_error_(synced, staging->folder());
   return replace(at, *found, {root.lexically_relative(into).string(), false, bytes_below(into)}, into);
 }
 
@@ -77,7 +78,7 @@ Result<ManifestPtr> Datasets::put_path(const Snapshot& at, const std::string& pa
   auto found = io::read_dataset(*folder, {.points = false});
   if (!found) {
     if (found.error().where == folder->string()) found.error().where = "path";
-    return told_(found);
+    return public_error_(found);
   }
   for (const io::View& view : found->views)
     if (!view.photo.empty() && !lies_below(scene_root, view.photo))
@@ -88,7 +89,7 @@ Result<ManifestPtr> Datasets::put_path(const Snapshot& at, const std::string& pa
   return replace(at, *found, {relative.string(), true, 0}, std::nullopt);
 }
 
-Result<ManifestPtr> Datasets::replace(const Snapshot& at, const io::Dataset& found, DatasetPlace place,
+Result<ManifestPtr> Datasets::replace(const Snapshot& at, const io::Dataset& found, DatasetLocation location,
                                       const std::optional<fs::path>& unpacked) {
   std::shared_ptr<Lease> lease;  // of the new folder; once that is the scene's, of the one before
   std::shared_ptr<Lease> fresh;
@@ -99,11 +100,12 @@ Result<ManifestPtr> Datasets::replace(const Snapshot& at, const io::Dataset& fou
           const fs::path name = "dataset." + std::to_string(manifest.next_dataset);
           const fs::path folder = at.scene->folder->path() / name;
           fresh = lease = std::make_shared<Lease>(folder);
-          if (auto moved = move_durably(*unpacked, folder); !moved) return told_(moved, unpacked->parent_path());
-          place.folder = (name / place.folder).lexically_normal().string();
+          if (auto moved = move_durably(*unpacked, folder); !moved)
+            return public_error_(moved, unpacked->parent_path());
+          location.folder = (name / location.folder).lexically_normal().string();
         }
         ++manifest.next_dataset;
-        manifest.dataset = place;
+        manifest.dataset = location;
         manifest.scene.dataset = about(found);
         return {};
       },
@@ -119,7 +121,7 @@ Result<std::shared_ptr<const io::Dataset>> Datasets::get(const Snapshot& at) {
   const Manifest& manifest = *at.manifest;
   if (!manifest.dataset) return std::shared_ptr<const io::Dataset>();
   const std::uint64_t bytes = dataset_memory_bytes(manifest.scene.dataset->views);
-  const auto read = [&]() -> Result<BoundedCache::Made> {
+  const auto read = [&]() -> Result<BoundedCache::CachedObject> {
     fs::path folder = at.scene->folder->path() / manifest.dataset->folder;
     if (manifest.dataset->below_root) {
       auto below = below_root(options_.scene_root, manifest.dataset->folder);
@@ -127,9 +129,9 @@ Result<std::shared_ptr<const io::Dataset>> Datasets::get(const Snapshot& at) {
       folder = std::move(*below);
     }
     auto found = io::read_dataset(folder, {.points = false});
-    if (!found) return told_(found);
-    return BoundedCache::Made{std::make_shared<const HeldDataset>(HeldDataset{std::move(*found), at.dataset_folder}),
-                              bytes};
+    if (!found) return public_error_(found);
+    return BoundedCache::CachedObject{
+        std::make_shared<const HeldDataset>(HeldDataset{std::move(*found), at.dataset_folder}), bytes};
   };
   const std::string& id = at.scene->id;
   const std::string name = id + "/dataset." + std::to_string(manifest.next_dataset);

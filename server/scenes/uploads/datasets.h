@@ -20,8 +20,8 @@ class Datasets {
  public:
   /// All outlive this.
   Datasets(const StoreOptions& options, BoundedCache& memory, Catalogue& catalogue, ScratchFolders& scratch,
-           const PlainErrors& told)
-      : options_(options), memory_(memory), catalogue_(catalogue), scratch_(scratch), told_(told) {}
+           const PublicErrors& public_error)
+      : options_(options), memory_(memory), catalogue_(catalogue), scratch_(scratch), public_error_(public_error) {}
 
   /// Replaces the scene's dataset by what is in a zip file, which is unpacked into the store; the new manifest.
   ///   errors  those of unzip() and io::read_dataset()
@@ -41,15 +41,16 @@ class Datasets {
                                                 std::vector<std::string> warnings);
 
  private:
-  /// unpacked  if given: a folder, which becomes the scene's and which `place` is relative to
-  [[nodiscard]] Result<ManifestPtr> replace(const Snapshot& at, const engine::io::Dataset& found, DatasetPlace place,
+  /// unpacked  if given: a folder, which becomes the scene's and which `location` is relative to
+  [[nodiscard]] Result<ManifestPtr> replace(const Snapshot& at, const engine::io::Dataset& found,
+                                            DatasetLocation location,
                                             const std::optional<std::filesystem::path>& unpacked);
 
   const StoreOptions& options_;
   BoundedCache& memory_;
   Catalogue& catalogue_;
   ScratchFolders& scratch_;
-  const PlainErrors& told_;
+  const PublicErrors& public_error_;
 };
 
 }  // namespace server::scenes

@@ -35,16 +35,16 @@ Result<fs::path> below_root(const fs::path& root, const std::string& path) {
                 "this service opens no files by path: start it with --scene-root, or upload the file", "path");
   if (path.empty() || path.find('\0') != std::string::npos)
     return fail(ErrorCode::invalid_argument, "expected the path of a file below the scene root", "path");
-  const fs::path asked(path);
-  if (std::find(asked.begin(), asked.end(), "..") != asked.end()) return leads_out();
+  const fs::path given(path);
+  if (std::find(given.begin(), given.end(), "..") != given.end()) return leads_out();
   std::error_code error;
   const fs::path real_root = fs::canonical(root, error);
   if (error) return fail(ErrorCode::unavailable, "the scene root cannot be opened: " + error.message(), "path");
   // What lies outside is refused before it is looked for: the answer must not tell what exists there.
-  if (asked.is_absolute() && !begins_with(asked.lexically_normal(), real_root) &&
-      !begins_with(asked.lexically_normal(), fs::absolute(root, error).lexically_normal()))
+  if (given.is_absolute() && !begins_with(given.lexically_normal(), real_root) &&
+      !begins_with(given.lexically_normal(), fs::absolute(root, error).lexically_normal()))
     return leads_out();
-  const fs::path real = fs::canonical(real_root / asked, error);
+  const fs::path real = fs::canonical(real_root / given, error);
   if (error) return fail(ErrorCode::not_found, "there is no " + path + " below the scene root", "path");
   if (!begins_with(real, real_root)) return leads_out();
   return real;

@@ -24,19 +24,19 @@ Result<Uploads::Upload> Uploads::read(const fs::path& file) {
     return tl::make_unexpected(std::move(error));
   };
   const std::uint64_t expected = expected_memory_bytes(file);
-  auto room = std::make_optional(memory_.room(expected));
-  if (!*room) return no_room(room->error());
+  auto reservation = std::make_optional(memory_.reserve(expected));
+  if (!*reservation) return no_room(reservation->error());
   // One at a time: what an .spz file unpacks to shows only when it is there.
   const std::lock_guard one_at_a_time(reading_);
   auto scene = io::read_scene(file, options_.read);
-  if (!scene) return told_(scene, file.parent_path());
+  if (!scene) return public_error_(scene, file.parent_path());
   const std::uint64_t bytes = memory_bytes(*scene);
   if (bytes > expected) {
-    room.reset();
-    room.emplace(memory_.room(bytes));
-    if (!*room) return no_room(room->error());
+    reservation.reset();
+    reservation.emplace(memory_.reserve(bytes));
+    if (!*reservation) return no_room(reservation->error());
   }
-  return Upload{std::make_shared<const io::SceneFile>(std::move(*scene)), std::move(**room)};
+  return Upload{std::make_shared<const io::SceneFile>(std::move(*scene)), std::move(**reservation)};
 }
 
 Result<ManifestPtr> Uploads::add_staged(const fs::path& file, const fs::path& staging, const std::string& name) {
@@ -45,7 +45,7 @@ Result<ManifestPtr> Uploads::add_staged(const fs::path& file, const fs::path& st
   auto upload = read(file);
   if (!upload) return propagate(upload);
   const auto format = detect_format(file);
-  if (!format) return told_(format, file.parent_path());
+  if (!format) return public_error_(format, file.parent_path());
   const auto& cloud = upload->file->cloud;
 
   Manifest manifest;
@@ -69,22 +69,22 @@ Result<ManifestPtr> Uploads::add_staged(const fs::path& file, const fs::path& st
   const auto at = catalogue_.add(std::move(manifest), file, staging);
   if (!at) return propagate(at);
   const std::string& id = at->scene->id;
-  memory_.put(id + "/base", {upload->file, at->manifest->base_memory_bytes}, std::move(upload->room));
+  memory_.put(id + "/base", {upload->file, at->manifest->base_memory_bytes}, std::move(upload->reservation));
   if (!catalogue_.has(*at)) memory_.forget(id + "/");
   return at->manifest;
 }
 
 Result<ManifestPtr> Uploads::add(const fs::path& file, const std::string& filename, const std::string& name) {
-  const auto place = catalogue_.reserve();
-  if (!place) return propagate(place);
+  const auto counted = catalogue_.reserve();
+  if (!counted) return propagate(counted);
   const auto staging = scratch_.make();
   if (!staging) return propagate(staging);
   // Under its user's name: that is what error addresses begin with.
   const fs::path folder = staging->folder() / "upload", uploaded = folder / safe_file_name(filename);
-  if (auto made = make_folder(folder); !made) return told_(made, folder);
+  if (auto status = make_folder(folder); !status) return public_error_(status, folder);
   std::error_code error;
   fs::rename(file, uploaded, error);
-  if (error) return told_(engine::file_error(error.value(), "take", uploaded), folder);
+  if (error) return public_error_(engine::file_error(error.value(), "take", uploaded), folder);
   return add_staged(uploaded, staging->folder(), name);
 }
 
@@ -96,7 +96,7 @@ Result<ManifestPtr> Uploads::add_path(const std::string& path, const std::string
   const fs::path copy = staging->folder() / "copy";
   if (auto copied = scenes::copy_file(*found, copy); !copied) {
     if (copied.error().where == found->string()) copied.error().where = "path";
-    return told_(copied, staging->folder());
+    return public_error_(copied, staging->folder());
   }
   return add(copy, fs::path(path).filename().string(), name);
 }

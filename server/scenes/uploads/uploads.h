@@ -19,8 +19,8 @@ class Uploads {
  public:
   /// All outlive this.
   Uploads(const StoreOptions& options, BoundedCache& memory, Catalogue& catalogue, ScratchFolders& scratch,
-          const PlainErrors& told)
-      : options_(options), memory_(memory), catalogue_(catalogue), scratch_(scratch), told_(told) {}
+          const PublicErrors& public_error)
+      : options_(options), memory_(memory), catalogue_(catalogue), scratch_(scratch), public_error_(public_error) {}
 
   /// A new scene of an uploaded file, which is moved into the store.
   ///   filename  as its user calls it
@@ -33,10 +33,10 @@ class Uploads {
   [[nodiscard]] Result<ManifestPtr> add_path(const std::string& path, const std::string& name);
 
  private:
-  /// A file in memory, and the room it takes until the cache takes that over.
+  /// A file in memory, and the memory reserved for it until the cache counts it.
   struct Upload {
     std::shared_ptr<const engine::io::SceneFile> file;
-    BoundedCache::Room room;
+    BoundedCache::Reservation reservation;
   };
   [[nodiscard]] Result<Upload> read(const std::filesystem::path& file);
   [[nodiscard]] Result<ManifestPtr> add_staged(const std::filesystem::path& file, const std::filesystem::path& staging,
@@ -46,7 +46,7 @@ class Uploads {
   BoundedCache& memory_;
   Catalogue& catalogue_;
   ScratchFolders& scratch_;
-  const PlainErrors& told_;
+  const PublicErrors& public_error_;
   /// One upload at a time is read: how much memory a file takes shows only when it is there.
   std::mutex reading_;
 };

@@ -10,9 +10,10 @@ namespace server::scenes {
 
 using engine::Result;
 
+/// What an end record says.
 struct ZipDirectory {
   std::uint64_t entries = 0;
-  std::uint64_t bytes = 0;  ///< Of the directory itself.
+  std::uint64_t bytes = 0;  ///< Size of the directory itself.
 };
 
 /// The largest numbers that any end record within reach of the file's end gives, in its form for large files (zip64)

@@ -159,9 +159,9 @@ class Unzip {
     for (fs::path made = parent; !made.empty() && folders_.insert(made.string()).second;) made = made.parent_path();
     if (files_.size() + folders_.size() > limits_.max_files)
       return too_many(name_, "more files and folders than are allowed", limits_.max_files);
-    if (auto made = make_folder(into_ / parent); !made)
-      return fail(made.error().code == ErrorCode::no_space ? ErrorCode::no_space : ErrorCode::corrupt_data,
-                  made.error().message, where);
+    if (auto status = make_folder(into_ / parent); !status)
+      return fail(status.error().code == ErrorCode::no_space ? ErrorCode::no_space : ErrorCode::corrupt_data,
+                  status.error().message, where);
     return folder ? Result<void>() : unpack(index, into_ / *path, where);
   }
 

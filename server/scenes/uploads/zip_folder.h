@@ -1,4 +1,4 @@
-// Zip files from strangers.
+// Unpacks zip files from strangers, within limits.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,7 @@ struct ZipLimits {
   std::size_t max_files = 20'000;
   /// Unpacked bytes per byte of the zip file. Photos come to 1, text files of cameras to 5.
   std::uint64_t max_ratio = 100;
-  /// So much may be unpacked whatever the ratio: small files of zeros are no attack.
+  /// Bytes that may be unpacked whatever the ratio: small files of zeros are no attack.
   std::uint64_t free_bytes = std::uint64_t{64} << 20;
 };
 

@@ -8,7 +8,7 @@
 
 namespace server::scenes {
 
-Preview Previews::add(const Snapshot& at, BoundedCache::Made overlay, BoundedCache::Room room) {
+Preview Previews::add(const Snapshot& at, BoundedCache::CachedObject overlay, BoundedCache::Reservation reservation) {
   const std::string& scene = at.scene->id;
   std::string name;
   std::optional<std::pair<std::string, std::string>> oldest;
@@ -23,16 +23,16 @@ Preview Previews::add(const Snapshot& at, BoundedCache::Made overlay, BoundedCac
   }
   if (oldest) forget(oldest->first, oldest->second);
   overlay.can_be_made_again = false;
-  memory_.put(scene + "/" + name, std::move(overlay), std::move(room));
+  memory_.put(scene + "/" + name, std::move(overlay), std::move(reservation));
   const Time expires = expiry();
   const std::lock_guard lock(mutex_);
-  records_[name] = {scene, scene + "-" + at.manifest->nonce + "-" + name + "-" + run_, expires};
+  records_[name] = {scene, scene + "-" + at.manifest->nonce + "-" + name + "-" + process_nonce_, expires};
   return {name, expires};
 }
 
-std::optional<Previews::Held> Previews::find(const std::string& scene, const std::string& preview) {
+std::optional<Previews::LoadedPreview> Previews::find(const std::string& scene, const std::string& preview) {
   expire();
-  Held held;
+  LoadedPreview held;
   {
     const std::lock_guard lock(mutex_);
     const auto record = records_.find(preview);

@@ -29,19 +29,21 @@ class Previews {
   Previews(const StoreOptions& options, BoundedCache& memory, BoundedCache& files)
       : options_(options), memory_(memory), files_(files) {}
 
-  /// Forgets those whose time is over.
+  /// Forgets the previews whose time is over.
   void expire();
-  /// A new one; if there are as many as there may be, the one that would expire first makes room.
-  ///   overlay  over version 0
-  ///   room     that of the overlay, taken before
-  [[nodiscard]] Preview add(const Snapshot& at, BoundedCache::Made overlay, BoundedCache::Room room);
-  struct Held {
+  /// Adds a preview. At StoreOptions::max_previews, the one that would expire first is dropped for it.
+  ///   overlay      over version 0
+  ///   reservation  of the memory that the overlay takes
+  [[nodiscard]] Preview add(const Snapshot& at, BoundedCache::CachedObject overlay,
+                            BoundedCache::Reservation reservation);
+  /// A preview in memory. Holding it keeps it there.
+  struct LoadedPreview {
     std::shared_ptr<const engine::scene::Overlay> overlay;
     std::string key;  ///< See LoadedVersion.
   };
-  /// One of a scene's, which is kept for a while longer; nothing for one that is not there any more.
-  [[nodiscard]] std::optional<Held> find(const std::string& scene, const std::string& preview);
-  [[nodiscard]] bool has(const std::string& preview) const;  ///< Whatever its scene.
+  /// A preview of the scene, which lives for a while longer from now; nothing if it is not there any more.
+  [[nodiscard]] std::optional<LoadedPreview> find(const std::string& scene, const std::string& preview);
+  [[nodiscard]] bool has(const std::string& preview) const;  ///< Of any scene.
   [[nodiscard]] std::size_t size();
 
   void forget(const std::string& scene, const std::string& preview);
@@ -58,7 +60,7 @@ class Previews {
   const StoreOptions& options_;
   BoundedCache& memory_;
   BoundedCache& files_;
-  const std::string run_ = random_nonce();  ///< Previews of another run of the service are others.
+  const std::string process_nonce_ = random_nonce();  ///< Previews of another process of the service are others.
 
   mutable std::mutex mutex_;  ///< Guards what follows.
   std::map<std::string, Record> records_;

@@ -13,7 +13,7 @@ namespace fs = std::filesystem;
 namespace io = engine::io;
 using engine::propagate;
 
-constexpr std::uint64_t most_packed_bytes = 64;  ///< Per Gaussian, of a .splat or .spz file.
+constexpr std::uint64_t max_packed_row_bytes = 64;  ///< Of a Gaussian in a .splat or .spz file, at most.
 
 /// A file in a scene's folder that goes when nobody holds it.
 struct HeldFile {
@@ -53,21 +53,21 @@ Result<VersionFile> VersionFiles::written(const Snapshot& at, const std::string&
   if (!base) return propagate(base);
   const io::PlyLayout& layout = (*base)->layout;
   const std::string extension = extension_of(format);
-  const auto write = [&]() -> Result<BoundedCache::Made> {
+  const auto write = [&]() -> Result<BoundedCache::CachedObject> {
     const fs::path folder = at.scene->folder->path() / "files";
-    if (auto made = make_folder(folder); !made) return told_(made);
+    if (auto status = make_folder(folder); !status) return public_error_(status);
     // A name of its own: one of the same version that was dropped may be about to be removed.
     const fs::path path = folder / (version + "-" + std::to_string(++last_) + "." + extension);
     const std::uint64_t flat_bytes = engine::scene::memory_bytes(*loaded->cloud.base) +
                                      (loaded->cloud.overlay ? engine::scene::memory_bytes(*loaded->cloud.overlay) : 0);
-    const auto room = memory_.room(flat_bytes);
-    if (!room) return propagate(room);
+    const auto reservation = memory_.reserve(flat_bytes);
+    if (!reservation) return propagate(reservation);
     const io::SceneFile file{engine::scene::flatten(loaded->cloud), layout};
-    if (auto saved = io::write_scene(path, file, to_io(format)); !saved) return told_(saved);
-    return BoundedCache::Made{std::make_shared<const HeldFile>(at.scene->folder, path), bytes_below(path)};
+    if (auto saved = io::write_scene(path, file, to_io(format)); !saved) return public_error_(saved);
+    return BoundedCache::CachedObject{std::make_shared<const HeldFile>(at.scene->folder, path), bytes_below(path)};
   };
   const std::string name = at.scene->id + "/" + version + "." + extension;
-  const std::uint64_t row_bytes = format == FileFormat::ply ? layout.vertex().stride : most_packed_bytes;
+  const std::uint64_t row_bytes = format == FileFormat::ply ? layout.vertex().stride : max_packed_row_bytes;
   const auto held = files_.get<HeldFile>(name, loaded->cloud.size() * row_bytes, write);
   if (!catalogue_.has(at) || (is_preview(version) && !previews_.has(version))) files_.forget(name);
   if (!held) return propagate(held);

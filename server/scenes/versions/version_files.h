@@ -19,8 +19,13 @@ class VersionFiles {
  public:
   /// All outlive this.
   VersionFiles(BoundedCache& files, BoundedCache& memory, Catalogue& catalogue, Previews& previews, Versions& versions,
-               const PlainErrors& told)
-      : files_(files), memory_(memory), catalogue_(catalogue), previews_(previews), versions_(versions), told_(told) {}
+               const PublicErrors& public_error)
+      : files_(files),
+        memory_(memory),
+        catalogue_(catalogue),
+        previews_(previews),
+        versions_(versions),
+        public_error_(public_error) {}
 
   /// The file of a version or preview. Version 0 in its own format is the file as it came, byte for byte.
   ///   errors  those of Versions::load() and io::write_scene()
@@ -34,7 +39,7 @@ class VersionFiles {
   Catalogue& catalogue_;
   Previews& previews_;
   Versions& versions_;
-  const PlainErrors& told_;
+  const PublicErrors& public_error_;
   std::atomic<std::uint64_t> last_{0};
 };
 

@@ -61,13 +61,13 @@ void Versions::forget_if_removed(const Snapshot& at) {
 
 Result<std::shared_ptr<const io::SceneFile>> Versions::base(const Snapshot& at) {
   const Manifest& manifest = *at.manifest;
-  const auto read = [&]() -> Result<BoundedCache::Made> {
+  const auto read = [&]() -> Result<BoundedCache::CachedObject> {
     auto file = io::read_scene(at.scene->folder->path() / manifest.base, options_.read);
-    if (!file) return told_(file);
+    if (!file) return public_error_(file);
     const std::uint64_t bytes = memory_bytes(*file);
     if (file->cloud.size() != manifest.scene.versions[0].gaussians || bytes > manifest.base_memory_bytes)
       return fail(ErrorCode::corrupt_data, "the scene's file is not the one that was uploaded", manifest.base);
-    return BoundedCache::Made{std::make_shared<const io::SceneFile>(std::move(*file)), bytes};
+    return BoundedCache::CachedObject{std::make_shared<const io::SceneFile>(std::move(*file)), bytes};
   };
   auto held = memory_.get<io::SceneFile>(at.scene->id + "/base", manifest.base_memory_bytes, read);
   forget_if_removed(at);
@@ -77,11 +77,11 @@ Result<std::shared_ptr<const io::SceneFile>> Versions::base(const Snapshot& at) 
 Result<std::shared_ptr<const Overlay>> Versions::overlay(const Snapshot& at, int version, const GaussianCloud& base) {
   if (version == 0) return std::shared_ptr<const Overlay>();
   const std::uint64_t expected = at.manifest->overlay_memory_bytes[std::size_t(version)];
-  const auto read = [&]() -> Result<BoundedCache::Made> {
+  const auto read = [&]() -> Result<BoundedCache::CachedObject> {
     auto rows = io::read_overlay(at.scene->folder->path() / overlay_name(version), base);
-    if (!rows) return told_(rows);
+    if (!rows) return public_error_(rows);
     const std::uint64_t bytes = engine::scene::memory_bytes(*rows);
-    return BoundedCache::Made{std::make_shared<const Overlay>(std::move(*rows)), bytes};
+    return BoundedCache::CachedObject{std::make_shared<const Overlay>(std::move(*rows)), bytes};
   };
   auto held = memory_.get<Overlay>(at.scene->id + "/" + std::to_string(version), expected, read);
   forget_if_removed(at);
@@ -96,7 +96,7 @@ Result<LoadedVersion> Versions::load(const Snapshot& at, const std::string& vers
   if (!file) return propagate(file);
   auto rows = overlay(at, *number, (*file)->cloud);
   if (!rows) return propagate(rows);
-  const std::string& program = options_.program_version;
+  const std::string& program = options_.program_release;
   return LoadedVersion{
       {cloud_of(*file), std::move(*rows)},
       at.scene->id + "-" + at.manifest->nonce + "-" + version + (program.empty() ? "" : "-") + program};
@@ -121,12 +121,12 @@ Result<Versions::OverBase> Versions::over_base(const Snapshot& at, int parent, c
   const LayeredCloud& below = lower->cloud;
   if (auto sound = check_overlay(overlay, *below.base); !sound) return propagate(sound);
   // The rows of both at most, and as many lists of rows.
-  auto room = memory_.room(engine::scene::memory_bytes(overlay) +
-                           (below.overlay ? engine::scene::memory_bytes(*below.overlay) : 0));
-  if (!room) return propagate(room);
+  auto reservation = memory_.reserve(engine::scene::memory_bytes(overlay) +
+                                     (below.overlay ? engine::scene::memory_bytes(*below.overlay) : 0));
+  if (!reservation) return propagate(reservation);
   auto composed = below.overlay ? engine::scene::compose(below.base->size(), *below.overlay, overlay) : overlay;
   const std::uint64_t bytes = engine::scene::memory_bytes(composed);
-  return OverBase{std::make_shared<const Overlay>(std::move(composed)), bytes, below.base, std::move(*room)};
+  return OverBase{std::make_shared<const Overlay>(std::move(composed)), bytes, below.base, std::move(*reservation)};
 }
 
 Result<int> Versions::add(const Snapshot& at, int parent, const std::string& edit, const Overlay& overlay) {
@@ -138,7 +138,7 @@ Result<int> Versions::add(const Snapshot& at, int parent, const std::string& edi
   if (!staging) return propagate(staging);
   const fs::path staged = staging->folder() / "overlay", folder = at.scene->folder->path();
   if (auto written = io::write_overlay(staged, rows, *composed->base); !written)
-    return told_(written, staging->folder());
+    return public_error_(written, staging->folder());
   int number = 0;
   const auto changed = catalogue_.change(at, [&](Manifest& manifest) -> Result<void> {
     if (const auto before = made_by(edit, manifest)) {  // by another thread meanwhile
@@ -147,9 +147,9 @@ Result<int> Versions::add(const Snapshot& at, int parent, const std::string& edi
     }
     number = int(manifest.scene.versions.size());
     const fs::path file = folder / overlay_name(number);
-    if (auto ready = make_folder(file.parent_path()); !ready) return told_(ready);
-    if (auto moved = move_durably(staged, file); !moved) return told_(moved, staging->folder());
-    if (auto synced = engine::sync_folder(folder); !synced) return told_(synced);
+    if (auto ready = make_folder(file.parent_path()); !ready) return public_error_(ready);
+    if (auto moved = move_durably(staged, file); !moved) return public_error_(moved, staging->folder());
+    if (auto synced = engine::sync_folder(folder); !synced) return public_error_(synced);
     manifest.scene.versions.push_back({.version = number,
                                        .parent = parent,
                                        .edit = edit,
@@ -161,7 +161,7 @@ Result<int> Versions::add(const Snapshot& at, int parent, const std::string& edi
   });
   if (!changed) return propagate(changed);
   memory_.put(at.scene->id + "/" + std::to_string(number), {composed->overlay, composed->bytes},
-              std::move(composed->room));
+              std::move(composed->reservation));
   forget_if_removed(at);
   return number;
 }
@@ -170,7 +170,7 @@ Result<Preview> Versions::add_preview(const Snapshot& at, int parent, const Over
   previews_.expire();
   auto composed = over_base(at, parent, overlay);
   if (!composed) return propagate(composed);
-  auto preview = previews_.add(at, {composed->overlay, composed->bytes}, std::move(composed->room));
+  auto preview = previews_.add(at, {composed->overlay, composed->bytes}, std::move(composed->reservation));
   if (const auto still = catalogue_.snapshot(at.scene->id); !still) {  // removed meanwhile
     previews_.forget(at.scene->id, preview.version);
     return propagate(still);

@@ -19,13 +19,13 @@ class Versions {
  public:
   /// All outlive this.
   Versions(const StoreOptions& options, BoundedCache& memory, Catalogue& catalogue, Previews& previews,
-           ScratchFolders& scratch, const PlainErrors& told)
+           ScratchFolders& scratch, const PublicErrors& public_error)
       : options_(options),
         memory_(memory),
         catalogue_(catalogue),
         previews_(previews),
         scratch_(scratch),
-        told_(told) {}
+        public_error_(public_error) {}
 
   /// Version 0 with its file's layout. Errors as load().
   [[nodiscard]] Result<std::shared_ptr<const engine::io::SceneFile>> base(const Snapshot& at);
@@ -44,12 +44,12 @@ class Versions {
   [[nodiscard]] Result<Preview> add_preview(const Snapshot& at, int parent, const engine::scene::Overlay& overlay);
 
  private:
-  /// An overlay over version 0, and the room it takes until the cache takes that over.
+  /// An overlay over version 0, and the memory reserved for it until the cache counts it.
   struct OverBase {
     std::shared_ptr<const engine::scene::Overlay> overlay;
     std::uint64_t bytes = 0;
     std::shared_ptr<const engine::scene::GaussianCloud> base;
-    BoundedCache::Room room;
+    BoundedCache::Reservation reservation;
   };
 
   [[nodiscard]] Result<std::shared_ptr<const engine::scene::Overlay>> overlay(const Snapshot& at, int version,
@@ -63,7 +63,7 @@ class Versions {
   Catalogue& catalogue_;
   Previews& previews_;
   ScratchFolders& scratch_;
-  const PlainErrors& told_;
+  const PublicErrors& public_error_;
 };
 
 }  // namespace server::scenes

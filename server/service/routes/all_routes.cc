@@ -7,16 +7,17 @@
 
 namespace server::service::routes {
 
-http::Router all_routes(const ServiceParts& parts) {
+http::Router all_routes(const RouteDependencies& dependencies) {
   http::Router router;
-  add_scene_routes(router, {parts.scenes, parts.renders, parts.views,
-                            [&edits = parts.edits](const std::string& scene, const auto& change) {
+  add_scene_routes(router, {dependencies.scenes, dependencies.renders, dependencies.views,
+                            [&edits = dependencies.edits](const std::string& scene, const auto& change) {
                               return edits.while_idle(scene, change);
                             }});
-  add_render_routes(router, parts.scenes, parts.views, parts.renders);
-  add_edit_routes(router, parts.edits, {.limits = parts.edit_limits});
-  add_system_routes(router, {parts.gate, parts.metrics, parts.info, [&edits = parts.edits] { return edits.trouble(); },
-                             page_files(), contract_files().front().bytes});
+  add_render_routes(router, dependencies.scenes, dependencies.views, dependencies.renders);
+  add_edit_routes(router, dependencies.edits, {.limits = dependencies.edit_limits});
+  add_system_routes(router, {dependencies.guard, dependencies.metrics, dependencies.info,
+                             [&edits = dependencies.edits] { return edits.trouble(); }, page_files(),
+                             contract_files().front().bytes});
   return router;
 }
 

@@ -3,7 +3,7 @@
 
 #include "proto/service_info.h"
 #include "server/edits/edit_service.h"
-#include "server/http/gate.h"
+#include "server/http/access_guard.h"
 #include "server/http/metrics.h"
 #include "server/http/router.h"
 #include "server/scenes/scene_store.h"
@@ -13,19 +13,19 @@
 
 namespace server::service::routes {
 
-/// What the routes are made over. All of it outlives the router.
-struct ServiceParts {
+/// What the routes work with. All of it outlives the router.
+struct RouteDependencies {
   scenes::SceneStore& scenes;
   edits::EditService& edits;
   EditLimits edit_limits;
   RenderService& renders;
   SceneViews& views;
-  http::Gate& gate;
+  http::AccessGuard& guard;
   http::Metrics& metrics;
   proto::ServiceInfo info;
 };
 
 /// A router with every path of the contract, and the files of the page.
-[[nodiscard]] http::Router all_routes(const ServiceParts& parts);
+[[nodiscard]] http::Router all_routes(const RouteDependencies& dependencies);
 
 }  // namespace server::service::routes

@@ -23,9 +23,10 @@ using http::Call;
 using http::Reply;
 using std::chrono::steady_clock;
 
-constexpr int most_listed = 1000;
-constexpr std::size_t longest_key = 200;
-constexpr std::chrono::milliseconds look_around_every{500};  // a stream notices so fast that it is to end
+// Choices, not measurements:
+constexpr int max_listed = 1000;                             // edits in one answer, as openapi.yaml says
+constexpr std::size_t max_key_bytes = 200;                   // of an Idempotency-Key, as openapi.yaml says
+constexpr std::chrono::milliseconds look_around_every{500};  // between two looks of a stream whether it is to end
 
 Result<bool> flag(const Call& call, const std::string& name) {
   const auto text = call.query(name);
@@ -43,13 +44,13 @@ Result<int> number_in_path(const Call& call, const std::string& name) {
 Result<std::string> idempotency_key(const Call& call) {
   const std::string key = call.header("Idempotency-Key");
   const bool printable = std::all_of(key.begin(), key.end(), [](char c) { return c >= ' ' && c <= '~'; });
-  if (key.size() <= longest_key && printable) return key;
+  if (key.size() <= max_key_bytes && printable) return key;
   return fail(ErrorCode::invalid_argument, "an idempotency key has 1 to 200 printable ASCII characters",
               "Idempotency-Key");
 }
 
 /// A 200 with the edit, or the error.
-Result<Reply> shown(const Result<proto::EditStatus>& status) {
+Result<Reply> reply_with(const Result<proto::EditStatus>& status) {
   if (!status) return propagate(status);
   return Reply::json(proto::to_json(*status));
 }
@@ -121,7 +122,7 @@ Result<Reply> list_edits(const Call& call, EditService& service) {
   filter.active_only = *active;
   if (const auto text = call.query("limit")) {
     const auto limit = engine::number_in<int>(*text);
-    if (!limit || *limit < 1 || *limit > most_listed)
+    if (!limit || *limit < 1 || *limit > max_listed)
       return fail(ErrorCode::invalid_argument, "limit is a whole number from 1 to 1000", "limit");
     filter.limit = std::size_t(*limit);
   }
@@ -204,14 +205,15 @@ void add_edit_routes(http::Router& router, EditService& service, const EditRoute
   add("POST", "/v1/edits", [limits](const Call& call, EditService& s) { return post_edit(call, s, limits); },
       Body::json, {"validate_only"});
   add("GET", "/v1/edits", list_edits, Body::none, {"scene", "active", "limit"});
-  add("GET", "/v1/edits/{id}", [](const Call& call, EditService& s) { return shown(s.find(call.path("id"))); });
+  add("GET", "/v1/edits/{id}", [](const Call& call, EditService& s) { return reply_with(s.find(call.path("id"))); });
   add("DELETE", "/v1/edits/{id}", delete_edit);
   add("GET", "/v1/edits/{id}/events",
       [options](const Call& call, EditService& s) { return get_events(call, s, options); });
   add("GET", "/v1/edits/{id}/intervals/{u}/renders/{k}", get_interval_render, Body::none, {"stage"});
-  add("POST", "/v1/edits/{id}/stop", [](const Call& call, EditService& s) { return shown(s.stop(call.path("id"))); });
+  add("POST", "/v1/edits/{id}/stop",
+      [](const Call& call, EditService& s) { return reply_with(s.stop(call.path("id"))); });
   add("POST", "/v1/edits/{id}/cancel",
-      [](const Call& call, EditService& s) { return shown(s.cancel(call.path("id"))); });
+      [](const Call& call, EditService& s) { return reply_with(s.cancel(call.path("id"))); });
 }
 
 }  // namespace server::service::routes

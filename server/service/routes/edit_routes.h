@@ -15,12 +15,13 @@ namespace server::service::routes {
 struct EditLimits {
   std::size_t handles = proto::max_handles;
   int views = engine::params::max_views;
-  int image_side = proto::max_camera_side;  ///< Pixels, of the pictures an edit works on.
+  int image_side = proto::max_camera_side;  ///< Pixels of the longer side of the pictures an edit works on.
 };
 
+/// How the routes work.
 struct EditRouteOptions {
   EditLimits limits = {};
-  std::chrono::milliseconds keep_alive{15'000};  ///< A stream of events without news says that it lives so often.
+  std::chrono::milliseconds keep_alive{15'000};  ///< Longest silence of a stream of events; then a comment is sent.
 };
 
 /// Adds these routes.

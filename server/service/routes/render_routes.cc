@@ -27,7 +27,7 @@ using proto::PictureFormat;
 using scenes::LoadedVersion;
 
 /// What both routes work with.
-struct Parts {
+struct Dependencies {
   scenes::SceneStore& store;
   SceneViews& views;
   RenderService& renders;
@@ -51,24 +51,24 @@ ImageFormat to_engine(PictureFormat format) {
                                         : ImageFormat::exr;
 }
 
-Shown to_engine(proto::What what) {
-  switch (what) {
-    case proto::What::depth:
-      return Shown::depth;
-    case proto::What::alpha:
-      return Shown::alpha;
-    case proto::What::mask:
-      return Shown::mask;
-    case proto::What::color:
+PictureContent to_engine(proto::PictureContent content) {
+  switch (content) {
+    case proto::PictureContent::depth:
+      return PictureContent::depth;
+    case proto::PictureContent::alpha:
+      return PictureContent::alpha;
+    case proto::PictureContent::mask:
+      return PictureContent::mask;
+    case proto::PictureContent::color:
       break;
   }
-  return Shown::color;
+  return PictureContent::color;
 }
 
 /// The format that the client accepts and that suits best: JPEG for colours; PNG for the rest, whose edges it keeps.
-std::optional<PictureFormat> accepted_format(const Call& call, proto::What what) {
+std::optional<PictureFormat> accepted_format(const Call& call, proto::PictureContent content) {
   std::array<PictureFormat, 3> formats{PictureFormat::jpeg, PictureFormat::png, PictureFormat::exr};
-  if (what != proto::What::color) std::swap(formats[0], formats[1]);
+  if (content != proto::PictureContent::color) std::swap(formats[0], formats[1]);
   for (const PictureFormat format : formats)
     if (call.accepts(media_type(format))) return format;
   return std::nullopt;
@@ -81,63 +81,65 @@ std::string server_timing(const Picture& picture) {
 }
 
 /// where  address of the camera's fields: "camera.", or "" in a query
-Result<Reply> render(const Call& call, const Parts& parts, const proto::RenderRequest& request,
+Result<Reply> render(const Call& call, const Dependencies& dependencies, const proto::RenderRequest& request,
                      const std::string& where) {
   const std::string& id = call.path("id");
-  const auto format = request.format ? request.format : accepted_format(call, request.what);
+  const auto format = request.format ? request.format : accepted_format(call, request.content);
   if (!format)
     return Reply::refusal({406, "not_acceptable",
                            "pictures are image/jpeg, image/png or image/x-exr; Accept takes none of them", "Accept"},
                           call.request_id());
-  auto camera = parts.views.resolve(id, request.viewpoint, where);
+  auto camera = dependencies.views.resolve(id, request.viewpoint, where);
   if (!camera) return propagate(camera);
-  const auto version = parts.store.load(id, call.path("v"));
+  const auto version = dependencies.store.load(id, call.path("v"));
   if (!version) return propagate(version);
   PictureOrder order;
   order.camera = request.max_side ? engine::scene::fit_within(*camera, *request.max_side) : *camera;
-  order.shown = to_engine(request.what);
+  order.content = to_engine(request.content);
   order.format = to_engine(*format);
   for (int i = 0; i < 3; ++i) order.background[i] = float(request.background[std::size_t(i)]);
   order.sh_degree = request.sh_degree;
   order.quality = request.quality;
   Reply reply;
   reply.media_type = media_type(*format);
-  reply.etag = parts.renders.etag(*version, order);
+  reply.etag = dependencies.renders.etag(*version, order);
   if (!request.format) reply.headers.emplace_back("Vary", "Accept");
   if (call.has(reply.etag)) {
     reply.status = 304;
     return reply;
   }
-  auto picture = parts.renders.render(*version, order);
+  auto picture = dependencies.renders.render(*version, order);
   if (!picture) return propagate(picture);
   reply.headers.emplace_back("Server-Timing", server_timing(*picture));
   reply.body = std::move(picture->bytes);
   return reply;
 }
 
-Result<Reply> get_render(const Call& call, const Parts& parts) {
+Result<Reply> get_render(const Call& call, const Dependencies& dependencies) {
   const auto request = proto::parse_render_query([&](std::string_view name) { return call.query(name); });
   if (!request) return propagate(request);
-  return render(call, parts, *request, "");
+  return render(call, dependencies, *request, "");
 }
 
-Result<Reply> post_render(const Call& call, const Parts& parts) {
+Result<Reply> post_render(const Call& call, const Dependencies& dependencies) {
   const auto request = proto::parse_render_request(call.body());
   if (!request) return propagate(request);
-  return render(call, parts, *request, "camera.");
+  return render(call, dependencies, *request, "camera.");
 }
 
 /// How many Gaussians a sphere holds.
-Result<std::size_t> count(const Parts& parts, const LoadedVersion& version, engine::DVec3 point, double radius) {
+Result<std::size_t> count(const Dependencies& dependencies, const LoadedVersion& version, engine::DVec3 point,
+                          double radius) {
   std::size_t within = 0;
-  auto done = parts.renders.run([&] { within = engine::scene::count_within(version.cloud, point, radius); });
+  auto done =
+      dependencies.renders.run_in_turn([&] { within = engine::scene::count_within(version.cloud, point, radius); });
   if (!done) return propagate(done);
   return within;
 }
 
-Result<proto::PickResult> pick_point(const Parts& parts, const LoadedVersion& version,
+Result<proto::PickResult> pick_point(const Dependencies& dependencies, const LoadedVersion& version,
                                      const proto::PickRequest& request) {
-  const auto within = count(parts, version, edits::to_vec(*request.point), *request.radius);
+  const auto within = count(dependencies, version, edits::to_vec(*request.point), *request.radius);
   if (!within) return propagate(within);
   proto::PickResult result;
   result.hit = true;
@@ -161,14 +163,14 @@ bool is_nameable(engine::DVec3 point) {
   return std::max({std::abs(point.x), std::abs(point.y), std::abs(point.z)}) <= proto::max_coordinate;
 }
 
-Result<proto::PickResult> pick_pixel(const std::string& id, const Parts& parts, const LoadedVersion& version,
-                                     const proto::PickRequest& request) {
-  const auto camera = parts.views.resolve(id, *request.viewpoint, "camera.");
+Result<proto::PickResult> pick_pixel(const std::string& id, const Dependencies& dependencies,
+                                     const LoadedVersion& version, const proto::PickRequest& request) {
+  const auto camera = dependencies.views.resolve(id, *request.viewpoint, "camera.");
   if (!camera) return propagate(camera);
   if (auto inside = check_pixel(request, *camera); !inside) return propagate(inside);
   // The limit is one of pictures, and nobody asked for one: a smaller camera sees the same point.
-  const auto scaled = engine::scene::fit_within(*camera, parts.renders.options().max_side);
-  const auto hit = parts.renders.pick(
+  const auto scaled = engine::scene::fit_within(*camera, dependencies.renders.options().max_side);
+  const auto hit = dependencies.renders.pick(
       version, scaled, {request.x * scaled.width / camera->width, request.y * scaled.height / camera->height});
   if (!hit) return propagate(hit);
   proto::PickResult result;
@@ -180,21 +182,21 @@ Result<proto::PickResult> pick_pixel(const std::string& id, const Parts& parts, 
   result.normal = edits::to_point(found.normal);
   result.gaussian = found.row;
   if (request.radius) {
-    const auto within = count(parts, version, found.point, *request.radius);
+    const auto within = count(dependencies, version, found.point, *request.radius);
     if (!within) return propagate(within);
     result.gaussians_in_radius = *within;
   }
   return result;
 }
 
-Result<Reply> post_pick(const Call& call, const Parts& parts) {
+Result<Reply> post_pick(const Call& call, const Dependencies& dependencies) {
   const auto request = proto::parse_pick_request(call.body());
   if (!request) return propagate(request);
   const std::string& id = call.path("id");
-  const auto version = parts.store.load(id, call.path("v"));
+  const auto version = dependencies.store.load(id, call.path("v"));
   if (!version) return propagate(version);
   const auto result =
-      request->point ? pick_point(parts, *version, *request) : pick_pixel(id, parts, *version, *request);
+      request->point ? pick_point(dependencies, *version, *request) : pick_pixel(id, dependencies, *version, *request);
   if (!result) return propagate(result);
   return Reply::json(proto::to_json(*result));
 }
@@ -202,20 +204,20 @@ Result<Reply> post_pick(const Call& call, const Parts& parts) {
 }  // namespace
 
 void add_render_routes(http::Router& router, scenes::SceneStore& store, SceneViews& views, RenderService& renders) {
-  const Parts parts{store, views, renders};
+  const Dependencies dependencies{store, views, renders};
   const std::string version = "/v1/scenes/{id}/versions/{v}";
   router.add({.method = "GET",
               .path = version + "/render",
-              .handler = [parts](const Call& call) { return get_render(call, parts); },
+              .handler = [dependencies](const Call& call) { return get_render(call, dependencies); },
               .queries = proto::render_queries()});
   router.add({.method = "POST",
               .path = version + "/render",
-              .handler = [parts](const Call& call) { return post_render(call, parts); },
+              .handler = [dependencies](const Call& call) { return post_render(call, dependencies); },
               .body = http::Body::json,
               .queries = {}});
   router.add({.method = "POST",
               .path = version + "/pick",
-              .handler = [parts](const Call& call) { return post_pick(call, parts); },
+              .handler = [dependencies](const Call& call) { return post_pick(call, dependencies); },
               .body = http::Body::json,
               .queries = {}});
 }

@@ -53,7 +53,7 @@ proto::Scene to_proto(const SceneInfo& scene) {
   return out;
 }
 
-Result<Reply> shown(const Result<SceneInfo>& scene) {
+Result<Reply> reply_with(const Result<SceneInfo>& scene) {
   if (!scene) return propagate(scene);
   return Reply::json(proto::to_json(to_proto(*scene)));
 }
@@ -97,45 +97,45 @@ Result<Reply> list_scenes(SceneStore& store) {
   return Reply::json(proto::to_json(all));
 }
 
-Result<Reply> patch_scene(const Call& call, const SceneRouteParts& parts) {
+Result<Reply> patch_scene(const Call& call, const SceneRouteDependencies& dependencies) {
   const auto wanted = proto::parse_scene_patch(call.body());
   if (!wanted) return propagate(wanted);
   SceneStore::Patch patch;
   patch.name = wanted->name;
   if (wanted->up) patch.up = *wanted->up ? std::optional(to_vec(**wanted->up)) : std::nullopt;
   const std::string& id = call.path("id");
-  if (!patch.up) return shown(parts.store.patch(id, patch));
+  if (!patch.up) return reply_with(dependencies.store.patch(id, patch));
   // Which views an edit chooses depends on what is up: it must not change while one waits or is carried out.
   std::optional<Result<SceneInfo>> patched;
-  const auto done = parts.while_idle(id, [&]() -> Result<void> {
-    patched = parts.store.patch(id, patch);
+  const auto done = dependencies.while_idle(id, [&]() -> Result<void> {
+    patched = dependencies.store.patch(id, patch);
     return {};
   });
-  return done ? shown(*patched) : propagate(done);
+  return done ? reply_with(*patched) : propagate(done);
 }
 
-Result<pictures::PhotoComparison> compare_photos(const SceneInfo& scene, const SceneRouteParts& parts) {
-  const auto dataset = parts.store.dataset(scene.id);
+Result<pictures::PhotoComparison> compare_photos(const SceneInfo& scene, const SceneRouteDependencies& dependencies) {
+  const auto dataset = dependencies.store.dataset(scene.id);
   if (!dataset) return propagate(dataset);
   if (!*dataset) return pictures::PhotoComparison{};
-  const auto version = parts.store.load(scene.id, "0");
+  const auto version = dependencies.store.load(scene.id, "0");
   if (!version) return propagate(version);
   return pictures::compare_with_photos(
-      **dataset, [&](const engine::scene::Camera& camera) { return parts.renders.colors(*version, camera); });
+      **dataset, [&](const engine::scene::Camera& camera) { return dependencies.renders.colors(*version, camera); });
 }
 
 /// Notes how well renders of version 0 agree with the photos of a dataset that has just been put. Put it is, whatever
 /// becomes of this: a failure is a warning.
-SceneInfo with_quality(SceneInfo scene, const SceneRouteParts& parts) {
+SceneInfo with_quality(SceneInfo scene, const SceneRouteDependencies& dependencies) {
   if (scene.dataset->photos == 0) return scene;
-  auto found = compare_photos(scene, parts);
+  auto found = compare_photos(scene, dependencies);
   if (!found) {
     const std::string why = found.error().message;
     found.emplace();
     found->warnings.push_back("the photos could not be compared with renders of the scene: " + why);
   }
-  const auto noted = parts.store.set_dataset_quality(scene.id, scene.dataset->number, found->mean_db, found->worst_db,
-                                                     found->worst_view, found->warnings);
+  const auto noted = dependencies.store.set_dataset_quality(scene.id, scene.dataset->number, found->mean_db,
+                                                            found->worst_db, found->worst_view, found->warnings);
   if (noted) return *noted;
   scene.dataset->warnings = found->warnings;
   scene.dataset->warnings.push_back("what the comparison with its photos found could not be kept: " +
@@ -143,13 +143,13 @@ SceneInfo with_quality(SceneInfo scene, const SceneRouteParts& parts) {
   return scene;
 }
 
-Result<Reply> put_dataset(const Call& call, const SceneRouteParts& parts) {
+Result<Reply> put_dataset(const Call& call, const SceneRouteDependencies& dependencies) {
   const std::string& id = call.path("id");
-  if (const auto known = parts.store.find(id); !known) return propagate(known);  // before gigabytes are received
+  if (const auto known = dependencies.store.find(id); !known) return propagate(known);  // before gigabytes are received
   // An edit that is interrupted goes on with the cameras it began with.
   const auto change = [&](const std::function<Result<SceneInfo>()>& replace) {
     Result<SceneInfo> scene;
-    const auto done = parts.while_idle(id, [&]() -> Result<void> {
+    const auto done = dependencies.while_idle(id, [&]() -> Result<void> {
       scene = replace();
       if (!scene) return propagate(scene);
       return {};
@@ -158,19 +158,19 @@ Result<Reply> put_dataset(const Call& call, const SceneRouteParts& parts) {
   };
   const auto put = [&]() -> Result<SceneInfo> {
     if (!call.is_json())
-      return with_upload(call, parts.store, [&](const std::filesystem::path& file, const std::string& filename) {
-        return change([&] { return parts.store.put_dataset_zip(id, file, filename); });
+      return with_upload(call, dependencies.store, [&](const std::filesystem::path& file, const std::string& filename) {
+        return change([&] { return dependencies.store.put_dataset_zip(id, file, filename); });
       });
     const auto source = proto::parse_dataset_source(call.body());
     if (!source) return propagate(source);
-    return change([&] { return parts.store.put_dataset_path(id, source->path); });
+    return change([&] { return dependencies.store.put_dataset_path(id, source->path); });
   }();
   if (!put) return propagate(put);
-  return shown(with_quality(*put, parts));
+  return reply_with(with_quality(*put, dependencies));
 }
 
 Result<Reply> get_views(const Call& call, SceneViews& views) {
-  const auto set = views.of(call.path("id"));
+  const auto set = views.views_of(call.path("id"));
   if (!set) return propagate(set);
   std::vector<proto::View> out;
   for (const SceneView& view : (*set)->views)
@@ -217,9 +217,9 @@ Result<Reply> get_file(const Call& call, SceneStore& store) {
 
 }  // namespace
 
-void add_scene_routes(http::Router& router, const SceneRouteParts& parts) {
-  SceneStore& store = parts.store;
-  SceneViews& views = parts.views;
+void add_scene_routes(http::Router& router, const SceneRouteDependencies& dependencies) {
+  SceneStore& store = dependencies.store;
+  SceneViews& views = dependencies.views;
   router.add({.method = "GET",
               .path = "/v1/scenes",
               .handler = [&store](const Call&) { return list_scenes(store); },
@@ -231,25 +231,25 @@ void add_scene_routes(http::Router& router, const SceneRouteParts& parts) {
               .queries = {"name"}});
   router.add({.method = "GET",
               .path = "/v1/scenes/{id}",
-              .handler = [&store](const Call& call) { return shown(store.find(call.path("id"))); },
+              .handler = [&store](const Call& call) { return reply_with(store.find(call.path("id"))); },
               .queries = {}});
   router.add({.method = "PATCH",
               .path = "/v1/scenes/{id}",
-              .handler = [parts](const Call& call) { return patch_scene(call, parts); },
+              .handler = [dependencies](const Call& call) { return patch_scene(call, dependencies); },
               .body = http::Body::json,
               .queries = {}});
   router.add({.method = "DELETE",
               .path = "/v1/scenes/{id}",
-              .handler = [parts](const Call& call) -> Result<Reply> {
+              .handler = [dependencies](const Call& call) -> Result<Reply> {
                 const std::string& id = call.path("id");
-                const auto removed = parts.while_idle(id, [&] { return parts.store.remove(id); });
+                const auto removed = dependencies.while_idle(id, [&] { return dependencies.store.remove(id); });
                 if (!removed) return propagate(removed);
                 return Reply::no_content();
               },
               .queries = {}});
   router.add({.method = "PUT",
               .path = "/v1/scenes/{id}/dataset",
-              .handler = [parts](const Call& call) { return put_dataset(call, parts); },
+              .handler = [dependencies](const Call& call) { return put_dataset(call, dependencies); },
               .body = http::Body::upload,
               .queries = {}});
   router.add({.method = "GET",

@@ -12,8 +12,8 @@
 
 namespace server::service::routes {
 
-/// Parts of the service that outlive the router.
-struct SceneRouteParts {
+/// What these routes work with. All of it outlives the router.
+struct SceneRouteDependencies {
   scenes::SceneStore& store;
   RenderService& renders;
   SceneViews& views;
@@ -23,6 +23,6 @@ struct SceneRouteParts {
 };
 
 /// Adds these routes.
-void add_scene_routes(http::Router& router, const SceneRouteParts& parts);
+void add_scene_routes(http::Router& router, const SceneRouteDependencies& dependencies);
 
 }  // namespace server::service::routes

@@ -50,22 +50,22 @@ void add_page(http::Router& router, const std::vector<EmbeddedFile>& page) {
 
 /// A cookie that scripts cannot read and that no other site's request carries.
 std::string cookie(const std::string& value, const std::string& more) {
-  return std::string(http::Gate::cookie_name) + "=" + value + "; HttpOnly; SameSite=Strict; Path=/" + more;
+  return std::string(http::AccessGuard::cookie_name) + "=" + value + "; HttpOnly; SameSite=Strict; Path=/" + more;
 }
 
-void add_session(http::Router& router, http::Gate& gate) {
-  const auto open = [&gate](const Call& call) -> Result<Reply> {
+void add_session(http::Router& router, http::AccessGuard& guard) {
+  const auto open = [&guard](const Call& call) -> Result<Reply> {
     Reply reply = Reply::no_content();
-    if (!gate.needs_token()) return reply;
-    if (!gate.is_token(call.header("authorization")))
+    if (!guard.needs_token()) return reply;
+    if (!guard.is_token(call.header("authorization")))
       return Reply::refusal(
           {401, "unauthorized", "that is not this service's token (\"Authorization: Bearer ...\")", ""},
           call.request_id());
-    reply.headers.emplace_back("Set-Cookie", cookie(gate.open_session(), ""));
+    reply.headers.emplace_back("Set-Cookie", cookie(guard.open_session(), ""));
     return reply;
   };
-  const auto close = [&gate](const Call& call) -> Result<Reply> {
-    gate.close_session(call.header("cookie"));
+  const auto close = [&guard](const Call& call) -> Result<Reply> {
+    guard.close_session(call.header("cookie"));
     Reply reply = Reply::no_content();
     reply.headers.emplace_back("Set-Cookie", cookie("", "; Max-Age=0"));
     return reply;
@@ -76,33 +76,32 @@ void add_session(http::Router& router, http::Gate& gate) {
 
 }  // namespace
 
-void add_system_routes(http::Router& router, const SystemParts& parts) {
+void add_system_routes(http::Router& router, const SystemRouteDependencies& dependencies) {
   get(
       router, "/healthz", [](const Call&) -> Result<Reply> { return Reply::json(R"({"status":"ok"})"); }, Access::open);
-  const auto ready = [trouble = parts.trouble](const Call&) -> Result<Reply> {
+  const auto ready = [trouble = dependencies.trouble](const Call&) -> Result<Reply> {
     if (const auto error = trouble())
       return engine::fail(engine::ErrorCode::unavailable, "the service cannot work: " + error->message, error->where);
     return Reply::json(R"({"ready":true})");
   };
   get(router, "/readyz", ready, Access::open);
-  const auto metrics = [&metrics = parts.metrics](const Call&) -> Result<Reply> {
+  const auto metrics = [&metrics = dependencies.metrics](const Call&) -> Result<Reply> {
     Reply reply;
     reply.media_type = http::Metrics::media_type;
     reply.body = metrics.text();
     return reply;
   };
   get(router, "/metrics", metrics, Access::protected_);
-  const auto contract = [bytes = parts.contract, etag = http::etag_of(parts.contract)](const Call&) -> Result<Reply> {
-    return file_reply("openapi.yaml", bytes, etag);
-  };
+  const auto contract = [bytes = dependencies.contract, etag = http::etag_of(dependencies.contract)](
+                            const Call&) -> Result<Reply> { return file_reply("openapi.yaml", bytes, etag); };
   get(router, "/openapi.yaml", contract, Access::protected_);
   // Who gets as far as the handler is authorised.
-  const auto info = [text = proto::to_json(parts.info, true)](const Call&) -> Result<Reply> {
+  const auto info = [text = proto::to_json(dependencies.info, true)](const Call&) -> Result<Reply> {
     return Reply::json(text);
   };
   get(router, "/v1/info", info, Access::protected_);
-  add_session(router, parts.gate);
-  add_page(router, parts.page);
+  add_session(router, dependencies.guard);
+  add_page(router, dependencies.page);
 }
 
 }  // namespace server::service::routes

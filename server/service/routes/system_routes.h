@@ -8,16 +8,16 @@
 
 #include "engine/core/result.h"
 #include "proto/service_info.h"
-#include "server/http/gate.h"
+#include "server/http/access_guard.h"
 #include "server/http/metrics.h"
 #include "server/http/router.h"
 #include "server/service/embedded_files.h"
 
 namespace server::service::routes {
 
-/// What these routes tell of.
-struct SystemParts {
-  http::Gate& gate;  ///< Outlives the router, as the metrics do.
+/// What these routes work with.
+struct SystemRouteDependencies {
+  http::AccessGuard& guard;  ///< Outlives the router, as the metrics do.
   const http::Metrics& metrics;
   proto::ServiceInfo info;
   std::function<std::optional<engine::Error>()> trouble;  ///< What keeps the service from working, if anything does.
@@ -26,6 +26,6 @@ struct SystemParts {
 };
 
 /// Adds these routes.
-void add_system_routes(http::Router& router, const SystemParts& parts);
+void add_system_routes(http::Router& router, const SystemRouteDependencies& dependencies);
 
 }  // namespace server::service::routes

@@ -17,7 +17,7 @@ const Case& speck() {
 
 TEST(Judge, TheTruthIsPerfect) {
   const Quality quality = judge(speck(), speck().truth);
-  for (const Likeness& likeness : {quality.edited, quality.vacated, quality.arrived, quality.outside}) {
+  for (const RegionQuality& likeness : {quality.edited, quality.vacated, quality.arrived, quality.outside}) {
     EXPECT_GT(likeness.pixels, 100u);
     EXPECT_EQ(likeness.psnr_db, 100);
     EXPECT_NEAR(likeness.ssim, 1, 1e-9);
@@ -35,7 +35,7 @@ TEST(Judge, DoingNothingIsRightOutsideAndWrongInside) {
 
 TEST(Judge, PixelsOfAKindAreThoseOfItsName) {
   const scene::Camera& camera = speck().held_out.front();
-  const Kinds kinds = kinds_of(speck(), camera);
+  const JudgedRegions kinds = judged_regions(speck(), camera);
   for (std::size_t i = 0; i < kinds.edited.data.size(); ++i) {
     EXPECT_FALSE(kinds.vacated.data[i] && kinds.arrived.data[i]);
     EXPECT_TRUE(kinds.edited.data[i] || !(kinds.vacated.data[i] || kinds.arrived.data[i]));

@@ -69,8 +69,8 @@ TEST(KeptResult, IsNotFoundAgain) {
     ++found;
     return sample_trial();
   };
-  ASSERT_TRUE(kept_or<evaluate::Trial>(file, find));
-  const auto again = kept_or<evaluate::Trial>(file, find);
+  ASSERT_TRUE(cached_or_new<evaluate::Trial>(file, find));
+  const auto again = cached_or_new<evaluate::Trial>(file, find);
   ASSERT_TRUE(again);
   EXPECT_EQ(encode(*again).dump(), encode(sample_trial()).dump());
   EXPECT_EQ(found, 1);
@@ -84,16 +84,16 @@ TEST(KeptResult, ThatIsDamagedIsFoundAgain) {
   for (const std::string& bytes :
        {std::string(), whole.substr(0, whole.size() / 2), std::string("{}"), std::string("[1]"), std::string("null")}) {
     support::write_file(file, bytes);
-    EXPECT_FALSE(kept_result<evaluate::Trial>(file)) << bytes;
+    EXPECT_FALSE(cached_result<evaluate::Trial>(file)) << bytes;
   }
   support::write_file(file, whole);
-  EXPECT_TRUE(kept_result<evaluate::Trial>(file));
+  EXPECT_TRUE(cached_result<evaluate::Trial>(file));
 }
 
 TEST(KeptResult, IsNotMadeOfAFailure) {
   const support::TempDir folder;
   const auto file = folder.path() / "slide.json";
-  const auto failed = kept_or<evaluate::Trial>(
+  const auto failed = cached_or_new<evaluate::Trial>(
       file, []() -> engine::Result<evaluate::Trial> { return engine::fail(engine::ErrorCode::cancelled, "stopped"); });
   ASSERT_FALSE(failed);
   EXPECT_EQ(failed.error().code, engine::ErrorCode::cancelled);

@@ -52,7 +52,7 @@ TEST_F(IntervalPicturesTest, ShowsTheFirstViewsAtEachMoment) {
   const auto untouched = without(0), changed = without(100);
   value(pictures.add(moment(1, "before", untouched)));
   value(pictures.add(moment(1, "deformed", changed)));
-  const auto renders = pictures.of(1);
+  const auto renders = pictures.renders_of(1);
   ASSERT_EQ(renders.size(), 2u);
   EXPECT_EQ(renders[1].view, "view_1");
   EXPECT_EQ(renders[1].stages, (std::vector<std::string>{"before", "deformed"}));
@@ -74,8 +74,8 @@ TEST_F(IntervalPicturesTest, AnotherRunWritesTheSameBytes) {
   value(resumed.add(moment(2, "deformed", more)));
   EXPECT_EQ(picture(2, 2, "before"), first);
   EXPECT_EQ(picture(2, 2, "deformed"), last);
-  EXPECT_EQ(resumed.of(2)[0].stages, whole.of(2)[0].stages);
-  EXPECT_TRUE(resumed.of(1).empty());
+  EXPECT_EQ(resumed.renders_of(2)[0].stages, whole.renders_of(2)[0].stages);
+  EXPECT_TRUE(resumed.renders_of(1).empty());
 }
 
 TEST_F(IntervalPicturesTest, ShowsThePicturesThatAMomentBrings) {
@@ -94,7 +94,7 @@ TEST_F(IntervalPicturesTest, ShowsThePicturesThatAMomentBrings) {
     for (const std::size_t i : {std::size_t{0}, shown.data.size() / 2, shown.data.size() - 1})
       EXPECT_NEAR(shown.data[i], given[v].data[i], 0.02) << i;
   }
-  EXPECT_EQ(pictures.of(1)[1].stages, (std::vector<std::string>{"deformed", "corrected"}));
+  EXPECT_EQ(pictures.renders_of(1)[1].stages, (std::vector<std::string>{"deformed", "corrected"}));
   EXPECT_FALSE(std::filesystem::exists(folder / picture_name(1, 2, "corrected"))) << "of two views only";
 }
 
@@ -124,11 +124,11 @@ TEST_F(IntervalPicturesTest, PicturesThatAMomentBringsStandForNoOtherMoment) {
 TEST_F(IntervalPicturesTest, TakesWhatViewsThereAre) {
   IntervalPictures many(folder, input, 100);
   value(many.add(moment(1, "before", without(0))));
-  EXPECT_EQ(many.of(1).size(), 3u);
+  EXPECT_EQ(many.renders_of(1).size(), 3u);
   views.clear();
   IntervalPictures none(folder / "none", input, 4);
   value(none.add(moment(1, "before", without(0))));
-  EXPECT_TRUE(none.of(1).empty());
+  EXPECT_TRUE(none.renders_of(1).empty());
 }
 
 TEST_F(IntervalPicturesTest, AFullDiskIsAnErrorThatSaysWhatToDo) {
@@ -145,7 +145,7 @@ TEST_F(IntervalPicturesTest, AFullDiskIsAnErrorThatSaysWhatToDo) {
   EXPECT_NE(error.message.find("pictures of interval 3"), std::string::npos) << error.message;
   EXPECT_NE(error.message.find("free some space"), std::string::npos) << error.message;
   EXPECT_EQ(error.where, "");
-  EXPECT_TRUE(pictures.of(3).empty());
+  EXPECT_TRUE(pictures.renders_of(3).empty());
   value(pictures.add(moment(3, "before", untouched)));
 }
 

@@ -116,9 +116,9 @@ TEST(HttpServer, WantsItsTokenEverywhereButOnOpenRoutes) {
     EXPECT_EQ(ask_with("/nowhere", wrong).status, 401) << "tells which routes there are";
   }
   EXPECT_EQ(ask_with("/json", "Authorization: bearer correct horse\r\n").status, 200);
-  const std::string secret = server.gate.open_session();
+  const std::string secret = server.guard.open_session();
   EXPECT_EQ(ask_with("/json", "Cookie: a=b; splatdrag_session=" + secret + "\r\n").status, 200);
-  server.gate.close_session("splatdrag_session=" + secret);
+  server.guard.close_session("splatdrag_session=" + secret);
   EXPECT_EQ(ask_with("/json", "Cookie: splatdrag_session=" + secret + "\r\n").status, 401);
 }
 
@@ -366,10 +366,10 @@ TEST(HttpServer, SaysThatAPortIsTaken) {
   TestServer first(sample_routes(folder.path()));
   ServerOptions options;
   options.port = first.port();
-  Gate gate{GateOptions{}};
+  AccessGuard guard{AccessOptions{}};
   Metrics metrics;
   LogText log;
-  const auto second = HttpServer::start(options, Router(), gate, metrics, log.logger());
+  const auto second = HttpServer::start(options, Router(), guard, metrics, log.logger());
   ASSERT_FALSE(second);
   EXPECT_EQ(second.error().code, engine::ErrorCode::unavailable);
   EXPECT_EQ(second.error().where, "--port");
@@ -379,10 +379,10 @@ TEST(HttpServer, SaysThatAPortIsTaken) {
 TEST(HttpServer, SaysThatAHostIsNone) {
   ServerOptions options;
   options.host = "no such host";
-  Gate gate{GateOptions{}};
+  AccessGuard guard{AccessOptions{}};
   Metrics metrics;
   LogText log;
-  const auto started = HttpServer::start(options, Router(), gate, metrics, log.logger());
+  const auto started = HttpServer::start(options, Router(), guard, metrics, log.logger());
   ASSERT_FALSE(started);
   EXPECT_EQ(started.error().where, "--host");
 }

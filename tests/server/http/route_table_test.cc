@@ -19,7 +19,7 @@ Router routes() {
 TEST(RouteTable, PrefersWhatIsSpeltOut) {
   const RouteTable table(routes());
   EXPECT_EQ(table.find("GET", {"v1", "edits", "latest"}).route->path, "/v1/edits/latest");
-  const Match match = table.find("GET", {"v1", "edits", "e1"});
+  const RouteMatch match = table.find("GET", {"v1", "edits", "e1"});
   EXPECT_EQ(match.route->path, "/v1/edits/{id}");
   EXPECT_EQ(match.values.at("id"), "e1");
   EXPECT_EQ(table.find("GET", {""}).route->path, "/");
@@ -28,7 +28,7 @@ TEST(RouteTable, PrefersWhatIsSpeltOut) {
 
 TEST(RouteTable, ListsTheMethodsOfAPath) {
   const RouteTable table(routes());
-  const Match match = table.find("PUT", {"v1", "edits", "e1"});
+  const RouteMatch match = table.find("PUT", {"v1", "edits", "e1"});
   EXPECT_EQ(match.route, nullptr);
   EXPECT_EQ(match.allow, "DELETE, GET, HEAD");
   EXPECT_EQ(table.find("GET", {"v1", "edits"}).allow, "");

@@ -9,9 +9,10 @@ using engine::ErrorCode;
 using engine::Result;
 using namespace std::chrono_literals;
 
-TestServer::TestServer(Router routes, ServerOptions options, GateOptions gate_options) : gate(std::move(gate_options)) {
+TestServer::TestServer(Router routes, ServerOptions options, AccessOptions access_options)
+    : guard(std::move(access_options)) {
   options.port = 0;
-  auto started = HttpServer::start(options, std::move(routes), gate, metrics, log.logger());
+  auto started = HttpServer::start(options, std::move(routes), guard, metrics, log.logger());
   if (!started) throw std::runtime_error(started.error().message);
   server = std::move(*started);
 }

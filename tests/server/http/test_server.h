@@ -26,12 +26,12 @@ class LogText {
 };
 
 struct TestServer {
-  explicit TestServer(Router routes, ServerOptions options = {}, GateOptions gate_options = {});
+  explicit TestServer(Router routes, ServerOptions options = {}, AccessOptions access_options = {});
 
   [[nodiscard]] int port() const { return server->port(); }
 
   LogText log;
-  Gate gate;
+  AccessGuard guard;
   Metrics metrics;
   std::unique_ptr<HttpServer> server;
 };

@@ -470,7 +470,7 @@ TEST_F(SceneStoreTest, GivesOtherKeysUnderAnotherVersionOfTheProgram) {
   const std::string id = add();
   const std::string key = store->load(id, "0")->key, original = store->file(id, "0", FileFormat::ply)->etag,
                     made = store->file(id, "0", FileFormat::spz)->etag;
-  options.program_version = "1.2.3";
+  options.program_release = "1.2.3";
   open();
   EXPECT_NE(store->load(id, "0")->key, key);
   EXPECT_NE(store->file(id, "0", FileFormat::spz)->etag, made);

@@ -5,36 +5,36 @@ import { AdaptiveSide, FrameQueue, Recent } from "../../../web/frames.js";
 
 /** A queue whose loads are answered by hand. */
 function byHand() {
-  const asked = [];
+  const loads = [];
   const shown = [];
   const failed = [];
   const queue = new FrameQueue({
     load: (job, signal) =>
       new Promise((resolve, reject) => {
-        asked.push({ job, resolve, reject, signal });
+        loads.push({ job, resolve, reject, signal });
         signal.addEventListener("abort", () => reject(Object.assign(new Error("given up"), { name: "AbortError" })));
       }),
-    show: (picture, job) => shown.push([picture, job.key]),
-    failed: (error, job) => failed.push([error.message, job.key]),
+    onPicture: (picture, job) => shown.push([picture, job.key]),
+    onError: (error, job) => failed.push([error.message, job.key]),
   });
-  return { queue, asked, shown, failed };
+  return { queue, loads, shown, failed };
 }
 const settle = () => new Promise((resolve) => setImmediate(resolve));
 
 test("one picture is asked for at a time, and of those wished for meanwhile only the latest", async () => {
-  const { queue, asked, shown } = byHand();
-  for (const key of ["a", "b", "c", "d"]) queue.want({ key });
+  const { queue, loads, shown } = byHand();
+  for (const key of ["a", "b", "c", "d"]) queue.request({ key });
   assert.deepEqual(
-    asked.map((a) => a.job.key),
+    loads.map((a) => a.job.key),
     ["a"],
   );
-  asked[0].resolve("A");
+  loads[0].resolve("A");
   await settle();
   assert.deepEqual(
-    asked.map((a) => a.job.key),
+    loads.map((a) => a.job.key),
     ["a", "d"],
   );
-  asked[1].resolve("D");
+  loads[1].resolve("D");
   await settle();
   assert.deepEqual(shown, [
     ["A", "a"],
@@ -44,51 +44,51 @@ test("one picture is asked for at a time, and of those wished for meanwhile only
 });
 
 test("a large picture is given up for a newer wish, and is never shown", async () => {
-  const { queue, asked, shown, failed } = byHand();
-  queue.want({ key: "large", large: true });
-  queue.want({ key: "small" });
-  asked[0].resolve("too late");
+  const { queue, loads, shown, failed } = byHand();
+  queue.request({ key: "large", large: true });
+  queue.request({ key: "small" });
+  loads[0].resolve("too late");
   await settle();
-  assert.ok(asked[0].signal.aborted);
+  assert.ok(loads[0].signal.aborted);
   assert.deepEqual(
-    asked.map((a) => a.job.key),
+    loads.map((a) => a.job.key),
     ["large", "small"],
   );
-  asked[1].resolve("S");
+  loads[1].resolve("S");
   await settle();
   assert.deepEqual(shown, [["S", "small"]]);
   assert.deepEqual(failed, []);
 });
 
 test("a wish for what is under way cancels what was wished for in between", async () => {
-  const { queue, asked } = byHand();
-  queue.want({ key: "a" });
-  queue.want({ key: "b" });
-  queue.want({ key: "a" });
-  asked[0].resolve("A");
+  const { queue, loads } = byHand();
+  queue.request({ key: "a" });
+  queue.request({ key: "b" });
+  queue.request({ key: "a" });
+  loads[0].resolve("A");
   await settle();
-  assert.equal(asked.length, 1);
+  assert.equal(loads.length, 1);
 });
 
 test("after a failure the next wish is still met", async () => {
-  const { queue, asked, failed } = byHand();
-  queue.want({ key: "a" });
-  queue.want({ key: "b" });
-  asked[0].reject(new Error("no"));
+  const { queue, loads, failed } = byHand();
+  queue.request({ key: "a" });
+  queue.request({ key: "b" });
+  loads[0].reject(new Error("no"));
   await settle();
   assert.deepEqual(failed, [["no", "a"]]);
-  assert.equal(asked[1].job.key, "b");
+  assert.equal(loads[1].job.key, "b");
 });
 
 test("a queue that was cleared shows nothing more", async () => {
-  const { queue, asked, shown } = byHand();
-  queue.want({ key: "a" });
-  queue.want({ key: "b" });
+  const { queue, loads, shown } = byHand();
+  queue.request({ key: "a" });
+  queue.request({ key: "b" });
   queue.clear();
-  asked[0].resolve("A");
+  loads[0].resolve("A");
   await settle();
   assert.deepEqual(shown, []);
-  assert.equal(asked.length, 1);
+  assert.equal(loads.length, 1);
   assert.equal(queue.busy, false);
 });
 

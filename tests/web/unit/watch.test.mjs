@@ -20,30 +20,31 @@ class FakeEvents extends EventTarget {
 
 test("events are passed on, and the stream is closed after the last", () => {
   const events = new FakeEvents();
-  const told = [];
-  follow("e1", { told: (e) => told.push(e.state), events: () => events, ask: () => assert.fail("need not ask") });
+  const states = [];
+  const fetchEdit = () => assert.fail("need not ask");
+  follow("e1", { onUpdate: (e) => states.push(e.state), events: () => events, fetchEdit });
   events.send({ state: "running" });
   events.send({ state: "succeeded" });
-  assert.deepEqual(told, ["running", "succeeded"]);
+  assert.deepEqual(states, ["running", "succeeded"]);
   assert.ok(events.closed);
 });
 
 test("without a stream it is asked every second, with the ETag, until the end", async () => {
   const events = new FakeEvents();
-  const told = [];
+  const states = [];
   const waits = [];
   const etags = [];
   const answers = [{ edit: { state: "running" }, etag: '"1"' }, null, { edit: { state: "cancelled" }, etag: '"2"' }];
   follow("e1", {
-    told: (e) => told.push(e.state),
+    onUpdate: (e) => states.push(e.state),
     events: () => events,
-    ask: async (id, etag) => (etags.push(etag), answers.shift()),
+    fetchEdit: async (id, etag) => (etags.push(etag), answers.shift()),
     wait: async (ms) => void waits.push(ms),
   });
   events.fail();
   for (let i = 0; i < 10; ++i) await settle();
   assert.ok(events.closed);
-  assert.deepEqual(told, ["running", "cancelled"]);
+  assert.deepEqual(states, ["running", "cancelled"]);
   assert.deepEqual(etags, [null, '"1"', '"1"']);
   assert.ok(waits.every((ms) => ms === 1000));
 });
@@ -51,10 +52,10 @@ test("without a stream it is asked every second, with the ETag, until the end", 
 test("a service that does not answer is asked again, less and less often", async () => {
   const waits = [];
   let failures = 5;
-  const told = [];
+  const states = [];
   follow("e1", {
-    told: (e) => told.push(e.state),
-    ask: async () => {
+    onUpdate: (e) => states.push(e.state),
+    fetchEdit: async () => {
       if (failures-- > 0) throw Object.assign(new Error("down"), { status: 0 });
       return { edit: { state: "succeeded" }, etag: "x" };
     },
@@ -62,16 +63,16 @@ test("a service that does not answer is asked again, less and less often", async
   });
   for (let i = 0; i < 20; ++i) await settle();
   assert.deepEqual(waits.slice(0, 5), [2000, 4000, 8000, 8000, 8000]);
-  assert.deepEqual(told, ["succeeded"]);
+  assert.deepEqual(states, ["succeeded"]);
 });
 
 test("an edit whose record is gone is not asked for again", async () => {
   let asked = 0;
   let gone = 0;
   follow("e1", {
-    told: () => assert.fail(),
-    gone: () => ++gone,
-    ask: async () => {
+    onUpdate: () => assert.fail(),
+    onGone: () => ++gone,
+    fetchEdit: async () => {
       ++asked;
       throw Object.assign(new Error("gone"), { status: 404 });
     },
@@ -81,9 +82,9 @@ test("an edit whose record is gone is not asked for again", async () => {
   assert.deepEqual([asked, gone], [1, 1]);
 });
 
-test("after its end nothing is told any more", () => {
+test("after its end there are no more updates", () => {
   const events = new FakeEvents();
-  const end = follow("e1", { told: () => assert.fail(), events: () => events, ask: () => null });
+  const end = follow("e1", { onUpdate: () => assert.fail(), events: () => events, fetchEdit: () => null });
   end();
   events.send({ state: "running" });
   assert.ok(events.closed);

@@ -24,7 +24,7 @@ Manifest full_manifest() {
   manifest.base = "base.ply";
   manifest.base_disk_bytes = 1, manifest.base_memory_bytes = 2;
   manifest.overlay_memory_bytes = {0, 99};
-  manifest.dataset = DatasetPlace{"dataset.3/chair", false, 1234};
+  manifest.dataset = DatasetLocation{"dataset.3/chair", false, 1234};
   manifest.next_dataset = 4;
   return manifest;
 }

@@ -43,9 +43,9 @@ TEST(AllRoutes, AreThoseOfTheContract) {
   ASSERT_TRUE(edits) << edits.error().message;
   RenderService renders({});
   SceneViews views(**scenes, renders);
-  http::Gate gate({});
+  http::AccessGuard guard({});
   http::Metrics metrics;
-  const http::Router router = all_routes({**scenes, **edits, {}, renders, views, gate, metrics, {}});
+  const http::Router router = all_routes({**scenes, **edits, {}, renders, views, guard, metrics, {}});
 
   std::set<std::string> page;
   for (const EmbeddedFile& file : page_files()) page.insert("GET /" + std::string(file.name));

@@ -36,7 +36,7 @@ struct Request : http::Call {
   }
   const std::string& body() const override { return text; }
   bool is_json() const override { return true; }
-  Result<http::Received> receive(const std::filesystem::path&) const override {
+  Result<http::UploadInfo> receive(const std::filesystem::path&) const override {
     return engine::fail(ErrorCode::internal, "no route of edits takes a file");
   }
   bool has(const std::string& etag) const override { return etag == known_etag; }

@@ -160,7 +160,7 @@ TEST_F(RenderRoutes, UseTheSceneSUp) {
 
 TEST_F(RenderRoutes, LookThroughEveryViewOfTheScene) {
   const std::string id = add_wall();
-  const auto set = views->of(id);
+  const auto set = views->views_of(id);
   ASSERT_TRUE(set) << set.error().message;
   EXPECT_TRUE((*set)->is_virtual);
   ASSERT_FALSE((*set)->views.empty());

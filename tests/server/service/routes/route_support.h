@@ -34,9 +34,9 @@ struct FakeCall : http::Call {
   std::string header(std::string_view) const override { return {}; }
   const std::string& body() const override { return text; }
   bool is_json() const override { return json_body; }
-  engine::Result<http::Received> receive(const std::filesystem::path& file) const override {
+  engine::Result<http::UploadInfo> receive(const std::filesystem::path& file) const override {
     support::write_file(file, upload);
-    return http::Received{upload_name, upload.size()};
+    return http::UploadInfo{upload_name, upload.size()};
   }
   bool has(const std::string& etag) const override { return etag == known_etag; }
   bool accepts(std::string_view media_type) const override { return http::accepts(accept, media_type); }

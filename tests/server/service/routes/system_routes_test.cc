@@ -17,19 +17,19 @@ class SystemRoutes : public testing::Test {
   /// The routes are made over the parts of the server that is to serve them, so those come first.
   struct Service {
     explicit Service(std::string token, std::optional<engine::Error> trouble = std::nullopt)
-        : gate({.token = std::move(token), .allowed_hosts = {}, .allowed_origins = {}}) {
+        : guard({.token = std::move(token), .allowed_hosts = {}, .allowed_origins = {}}) {
       http::Router router;
       proto::ServiceInfo info;
       info.version = "1.2.3";
       info.correctors = {{"none", true, ""}, {"sd", false, "this build has no libtorch"}};
       info.limits.handles = 256;
-      info.token_required = gate.needs_token();
+      info.token_required = guard.needs_token();
       const std::vector<EmbeddedFile> page{
           {"index.html", "<!doctype html>"}, {"main.js", "start()"}, {"icons/a.svg", "<svg/>"}};
-      add_system_routes(router, {gate, metrics, info, [trouble] { return trouble; }, page, "openapi: 3.1.0\n"});
+      add_system_routes(router, {guard, metrics, info, [trouble] { return trouble; }, page, "openapi: 3.1.0\n"});
       http::ServerOptions options;
       options.port = 0;
-      server = http::HttpServer::start(options, std::move(router), gate, metrics, log.logger()).value();
+      server = http::HttpServer::start(options, std::move(router), guard, metrics, log.logger()).value();
     }
     RawAnswer get(const std::string& path, const std::string& more = "") const {
       return http::ask(server->port(), "GET", path, more);
@@ -39,7 +39,7 @@ class SystemRoutes : public testing::Test {
     }
 
     http::LogText log;
-    http::Gate gate;
+    http::AccessGuard guard;
     http::Metrics metrics;
     std::unique_ptr<http::HttpServer> server;
   };

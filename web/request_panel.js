@@ -1,6 +1,6 @@
-// What is asked for besides handles, and the buttons that ask: preview, estimate, run; import and export.
+// The panel of the request besides its handles, with its buttons: preview, estimate, run; import and export.
 
-import { chosen, say } from "./dialogs.js";
+import { askChoice, say } from "./dialogs.js";
 import { attrs, h, problemPlace, problemText, showProblem, text } from "./dom.js";
 import { choice, labelled, pointField, segments, toggle } from "./fields.js";
 import { bytes, count, counted, duration, gaussians } from "./format.js";
@@ -18,7 +18,7 @@ const CONSTRAINTS = [
 /** Presets that make sense for a run: `preview` is what the Preview button does. */
 const runPresets = (info) => (info?.presets ?? ["draft", "standard", "paper"]).filter((name) => name !== "preview");
 
-export function buildRun(editor) {
+export function buildRequestPanel(editor) {
   const { store } = editor;
   const setParam = (name, value) => {
     const { [name]: _, ...rest } = store.state.params;
@@ -272,7 +272,7 @@ export async function importFile(editor, file, place) {
     const name =
       requests.length === 1
         ? requests[0].name
-        : await chosen({ title: `Which request of ${file.name}?`, options: requests.map((r) => r.name) });
+        : await askChoice({ title: `Which request of ${file.name}?`, options: requests.map((r) => r.name) });
     if (name === null) return;
     const { request } = requests.find((r) => r.name === name);
     editor.load(request);

@@ -1,4 +1,4 @@
-#include "server/scenes/disk/plain_error.h"
+#include "server/scenes/disk/public_errors.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@ namespace {
 using engine::Error;
 using engine::ErrorCode;
 
-TEST(PlainError, NamesFilesRelativeToTheFolder) {
+TEST(PublicErrors, NamesFilesRelativeToTheFolder) {
   const Error error =
       without_folder({ErrorCode::no_space, "cannot move /srv/data/scenes/a.ply to /srv/data/scenes/s1/base.ply: full",
                       "/srv/data/scenes/s1/base.ply"},
@@ -18,14 +18,14 @@ TEST(PlainError, NamesFilesRelativeToTheFolder) {
   EXPECT_EQ(error.code, ErrorCode::no_space);
 }
 
-TEST(PlainError, CallsTheFolderItselfByItsName) {
+TEST(PublicErrors, CallsTheFolderItselfByItsName) {
   EXPECT_EQ(
       without_folder({ErrorCode::internal, "cannot open /srv/data/scenes: no", "/srv/data/scenes"}, "/srv/data/scenes")
           .where,
       "scenes");
 }
 
-TEST(PlainError, LeavesTheRestAsItIs) {
+TEST(PublicErrors, LeavesTheRestAsItIs) {
   const Error error{ErrorCode::internal, "a/b and /c", "handles[2].radius"};
   for (const char* folder : {"", "/", "/srv"}) EXPECT_EQ(without_folder(error, folder).message, error.message);
 }

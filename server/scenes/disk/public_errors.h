@@ -10,18 +10,18 @@
 namespace server::scenes {
 
 /// Paths below the folder become relative to it, the folder itself becomes its name: "/srv/scenes/s000001/base.ply" is
-/// "s000001/base.ply". What is said of other places stays.
+/// "s000001/base.ply". Other paths stay as they are.
 ///   folder  absolute, as errors spell it
 [[nodiscard]] engine::Error without_folder(engine::Error error, const std::filesystem::path& folder);
 
-/// Errors on their way out of the store: without its folders, and with the engine's limits called as the service's
-/// options are.
-class PlainErrors {
+/// Words errors on their way out of the store: without its folders, and with the engine's limits called as the
+/// service's options are.
+class PublicErrors {
  public:
-  explicit PlainErrors(std::vector<std::filesystem::path> folders) : folders_(std::move(folders)) {}
+  explicit PublicErrors(std::vector<std::filesystem::path> folders) : folders_(std::move(folders)) {}
 
-  /// What a failure is called outside.
-  ///   within  paths are relative to it first, if given
+  /// A failure as strangers may read it.
+  ///   within  folder that paths are made relative to first, if given
   template <class T>
   [[nodiscard]] tl::unexpected<engine::Error> operator()(const engine::Result<T>& failed,
                                                          const std::filesystem::path& within = {}) const {

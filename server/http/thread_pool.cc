@@ -1,4 +1,4 @@
-#include "server/http/thread_line.h"
+#include "server/http/thread_pool.h"
 
 #include <unistd.h>
 
@@ -8,15 +8,15 @@
 
 namespace server::http {
 
-ThreadLine::ThreadLine(std::size_t max_threads, std::size_t max_waiting, std::function<Serve()> make_server)
+ThreadPool::ThreadPool(std::size_t max_threads, std::size_t max_waiting, std::function<Serve()> make_server)
     : max_threads_(max_threads), max_waiting_(max_waiting), make_server_(std::move(make_server)) {}
 
-ThreadLine::~ThreadLine() {
+ThreadPool::~ThreadPool() {
   close();
   for (std::thread& thread : threads_) thread.join();
 }
 
-bool ThreadLine::offer(int socket) {
+bool ThreadPool::offer(int socket) {
   const std::lock_guard lock(mutex_);
   if (closed_) return false;
   const bool will_be_taken = waiting_.size() < idle_;
@@ -31,13 +31,13 @@ bool ThreadLine::offer(int socket) {
     return false;
   }
   waiting_.push_back(socket);
-  // Those that an idle thread is about to take do not make a crowd.
+  // Connections that an idle thread is about to take do not count as waiting.
   waiting_count_ = waiting_.size() > idle_ ? waiting_.size() - idle_ : 0;
   changed_.notify_all();
   return true;
 }
 
-void ThreadLine::work() {
+void ThreadPool::work() {
   const Serve serve = make_server_();
   std::unique_lock lock(mutex_);
   for (;;) {
@@ -58,7 +58,7 @@ void ThreadLine::work() {
   }
 }
 
-void ThreadLine::close() {
+void ThreadPool::close() {
   const std::lock_guard lock(mutex_);
   closed_ = true;
   for (const int socket : waiting_) ::close(socket);
@@ -67,7 +67,7 @@ void ThreadLine::close() {
   changed_.notify_all();
 }
 
-bool ThreadLine::rests_within(std::chrono::milliseconds timeout) {
+bool ThreadPool::idle_within(std::chrono::milliseconds timeout) {
   std::unique_lock lock(mutex_);
   return changed_.wait_for(lock, timeout, [&] { return serving_ == 0; });
 }

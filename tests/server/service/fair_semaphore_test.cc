@@ -1,4 +1,4 @@
-#include "server/service/fair_gate.h"
+#include "server/service/fair_semaphore.h"
 
 #include <gtest/gtest.h>
 
@@ -11,17 +11,17 @@ namespace server::service {
 namespace {
 
 /// Until so many wait.
-void await_waiting(const FairGate& gate, std::size_t count) {
-  while (gate.waiting() != count) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+void await_waiting(const FairSemaphore& semaphore, std::size_t count) {
+  while (semaphore.waiting() != count) std::this_thread::sleep_for(std::chrono::milliseconds(1));
 }
 
-TEST(FairGate, LetsNoMoreInThanItHasPlaces) {
-  FairGate gate(2, 100);
+TEST(FairSemaphore, LetsNoMoreInThanItHasSlots) {
+  FairSemaphore semaphore(2, 100);
   std::atomic<int> inside{0}, most{0};
   std::vector<std::thread> threads;
   for (int t = 0; t < 6; ++t)
     threads.emplace_back([&] {
-      const auto place = gate.enter();
+      const auto slot = semaphore.acquire();
       const int now = ++inside;
       int seen = most;
       while (now > seen && !most.compare_exchange_weak(seen, now)) {
@@ -33,36 +33,36 @@ TEST(FairGate, LetsNoMoreInThanItHasPlaces) {
   EXPECT_EQ(most, 2);
 }
 
-TEST(FairGate, ServesThoseWhoWaitInTheirOrder) {
-  FairGate gate(1, 100);
+TEST(FairSemaphore, ServesThoseWhoWaitInTheirOrder) {
+  FairSemaphore semaphore(1, 100);
   std::vector<int> order;  // written by whoever is inside
   std::vector<std::thread> threads;
   {
-    const auto place = gate.enter();
-    ASSERT_TRUE(place);
+    const auto slot = semaphore.acquire();
+    ASSERT_TRUE(slot);
     for (int t = 0; t < 5; ++t) {
       threads.emplace_back([&, t] {
-        const auto mine = gate.enter();
+        const auto mine = semaphore.acquire();
         order.push_back(t);
       });
-      await_waiting(gate, std::size_t(t) + 1);
+      await_waiting(semaphore, std::size_t(t) + 1);
     }
   }
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(order, (std::vector<int>{0, 1, 2, 3, 4}));
 }
 
-TEST(FairGate, TurnsAwayWhomItCannotSeat) {
-  FairGate gate(1, 1);
-  auto place = std::make_unique<engine::Result<FairGate::Place>>(gate.enter());
-  std::thread waiting([&] { EXPECT_TRUE(gate.enter()); });
-  await_waiting(gate, 1);
-  const auto refused = gate.enter();
+TEST(FairSemaphore, TurnsAwayWhomItCannotSeat) {
+  FairSemaphore semaphore(1, 1);
+  auto slot = std::make_unique<engine::Result<FairSemaphore::Slot>>(semaphore.acquire());
+  std::thread waiting([&] { EXPECT_TRUE(semaphore.acquire()); });
+  await_waiting(semaphore, 1);
+  const auto refused = semaphore.acquire();
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, engine::ErrorCode::busy);
-  place.reset();
+  slot.reset();
   waiting.join();
-  EXPECT_TRUE(gate.enter()) << "once there is room again";
+  EXPECT_TRUE(semaphore.acquire()) << "once there is room again";
 }
 
 }  // namespace

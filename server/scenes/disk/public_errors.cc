@@ -1,4 +1,4 @@
-#include "server/scenes/disk/plain_error.h"
+#include "server/scenes/disk/public_errors.h"
 
 #include <array>
 #include <string>
@@ -18,7 +18,7 @@ engine::Error without_folder(engine::Error error, const std::filesystem::path& f
   return error;
 }
 
-tl::unexpected<engine::Error> PlainErrors::operator()(engine::Error error, const std::filesystem::path& within) const {
+tl::unexpected<engine::Error> PublicErrors::operator()(engine::Error error, const std::filesystem::path& within) const {
   error = without_folder(std::move(error), within);
   for (const std::filesystem::path& folder : folders_) error = without_folder(std::move(error), folder);
   constexpr std::array<std::pair<std::string_view, std::string_view>, 2> limits{

@@ -14,20 +14,22 @@
 
 namespace server::http {
 
-struct GateOptions {
-  std::string token;                         ///< Empty: none is needed.
-  std::vector<std::string> allowed_hosts;    ///< Beside the bound host and the loopback names: "name", or "name:port".
-  std::vector<std::string> allowed_origins;  ///< Beside the service's own: "https://example.org".
-  std::size_t max_sessions = 1000;           ///< The oldest makes room.
-  std::chrono::seconds session_lifetime{7 * 24 * 3600};
+/// Who is let in.
+struct AccessOptions {
+  std::string token;  ///< Secret that clients must send; empty: none is needed.
+  std::vector<std::string>
+      allowed_hosts;  ///< Names beside the bound host and the loopback ones: "name" or "name:port".
+  std::vector<std::string> allowed_origins;              ///< Origins beside the service's own: "https://example.org".
+  std::size_t max_sessions = 1000;                       ///< Sessions open at a time; a new one ends the oldest.
+  std::chrono::seconds session_lifetime{7 * 24 * 3600};  ///< From opening on; a week is a choice.
 };
 
 /// Safe to call from any thread.
-class Gate {
+class AccessGuard {
  public:
-  explicit Gate(GateOptions options) : options_(std::move(options)) {}
+  explicit AccessGuard(AccessOptions options) : options_(std::move(options)) {}
 
-  /// Names the service goes by; called once, before the first request.
+  /// Tells the guard which names the service goes by; called once, before the first request.
   void bound_to(const std::string& host, int port);
 
   /// Whether a request is meant for this service and comes from no foreign page. A browser sends a page's requests with
@@ -55,10 +57,10 @@ class Gate {
   [[nodiscard]] bool is_own_host(std::string_view host) const;
   [[nodiscard]] bool has_session(std::string_view cookies) const;
 
-  const GateOptions options_;
+  const AccessOptions options_;
   std::vector<std::string> own_hosts_;
   mutable std::mutex mutex_;                           ///< Guards sessions_.
-  std::map<std::string, Clock::time_point> sessions_;  ///< By secret: when it was opened.
+  std::map<std::string, Clock::time_point> sessions_;  ///< Time of opening by secret.
 };
 
 /// 32 random hexadecimal digits, from the system's own source.

@@ -12,24 +12,27 @@
 
 namespace server::http {
 
-class ThreadLine {
+/// Safe to call from any thread.
+class ThreadPool {
  public:
   /// Serves one connection, given its socket, which it closes.
   using Serve = std::function<void(int socket)>;
 
-  ///   make_server  called once by each thread, for what it serves with
-  ThreadLine(std::size_t max_threads, std::size_t max_waiting, std::function<Serve()> make_server);
-  ~ThreadLine();
+  ///   max_threads  connections served at a time
+  ///   max_waiting  connections that may wait beside
+  ///   make_server  called once by each thread; what it returns serves that thread's connections
+  ThreadPool(std::size_t max_threads, std::size_t max_waiting, std::function<Serve()> make_server);
+  ~ThreadPool();
 
   /// Hands a connection over. Threads are started as they are needed.
   ///   returns  false: all threads are busy and the line is full, or the line is closed; the socket stays the caller's
   [[nodiscard]] bool offer(int socket);
-  /// Whether a connection waits.
-  [[nodiscard]] bool crowded() const { return waiting_count_ > 0; }
-  /// Takes no more connections, closes those that wait.
+  /// Whether a connection waits that no idle thread is about to take.
+  [[nodiscard]] bool has_waiting() const { return waiting_count_ > 0; }
+  /// Ends the intake and closes the connections that wait.
   void close();
-  /// Whether all threads come to rest before `timeout`. After close().
-  [[nodiscard]] bool rests_within(std::chrono::milliseconds timeout);
+  /// Waits until no thread serves a connection; false: some still do after `timeout`. To be called after close().
+  [[nodiscard]] bool idle_within(std::chrono::milliseconds timeout);
 
  private:
   void work();
@@ -39,7 +42,7 @@ class ThreadLine {
   std::mutex mutex_;  ///< Guards what follows.
   std::condition_variable changed_;
   std::deque<int> waiting_;
-  std::atomic<std::size_t> waiting_count_ = 0;  ///< Of waiting_; read without the lock.
+  std::atomic<std::size_t> waiting_count_ = 0;  ///< Size of waiting_ beyond idle_; read without the lock.
   std::size_t idle_ = 0, serving_ = 0;
   bool closed_ = false;
   std::vector<std::thread> threads_;

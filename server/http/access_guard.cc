@@ -1,4 +1,4 @@
-#include "server/http/gate.h"
+#include "server/http/access_guard.h"
 
 #include <sys/random.h>
 
@@ -21,9 +21,9 @@ bool same_secret(std::string_view given, std::string_view expected) {
 
 std::string cookie_in(std::string_view cookies) {
   for (const std::string_view cookie : split_list(cookies, ';'))
-    if (cookie.size() > Gate::cookie_name.size() && cookie.starts_with(Gate::cookie_name) &&
-        cookie[Gate::cookie_name.size()] == '=')
-      return std::string(cookie.substr(Gate::cookie_name.size() + 1));
+    if (cookie.size() > AccessGuard::cookie_name.size() && cookie.starts_with(AccessGuard::cookie_name) &&
+        cookie[AccessGuard::cookie_name.size()] == '=')
+      return std::string(cookie.substr(AccessGuard::cookie_name.size() + 1));
   return {};
 }
 
@@ -43,7 +43,7 @@ std::string random_id() {
   return text;
 }
 
-void Gate::bound_to(const std::string& host, int port) {
+void AccessGuard::bound_to(const std::string& host, int port) {
   const std::string bracketed = host.find(':') == std::string::npos ? host : "[" + host + "]";
   for (const std::string& name :
        {bracketed, std::string("localhost"), std::string("127.0.0.1"), std::string("[::1]")}) {
@@ -52,7 +52,7 @@ void Gate::bound_to(const std::string& host, int port) {
   }
 }
 
-bool Gate::is_own_host(std::string_view host) const {
+bool AccessGuard::is_own_host(std::string_view host) const {
   const std::string given = lower_case(host);
   if (std::find(own_hosts_.begin(), own_hosts_.end(), given) != own_hosts_.end()) return true;
   const std::size_t colon = given.rfind(':');
@@ -63,7 +63,7 @@ bool Gate::is_own_host(std::string_view host) const {
   });
 }
 
-std::optional<Refusal> Gate::check_origin(const RequestHead& head) const {
+std::optional<Refusal> AccessGuard::check_origin(const RequestHead& head) const {
   const std::string host = head.header("host");
   if (!is_own_host(host))
     return Refusal{421, "misdirected_request",
@@ -89,14 +89,14 @@ std::optional<Refusal> Gate::check_origin(const RequestHead& head) const {
   return std::nullopt;
 }
 
-bool Gate::is_token(std::string_view authorization) const {
+bool AccessGuard::is_token(std::string_view authorization) const {
   constexpr std::string_view scheme = "bearer ";
   if (authorization.size() < scheme.size() || !same_ignoring_case(authorization.substr(0, scheme.size()), scheme))
     return false;
   return needs_token() && same_secret(trim(authorization.substr(scheme.size())), options_.token);
 }
 
-bool Gate::has_session(std::string_view cookies) const {
+bool AccessGuard::has_session(std::string_view cookies) const {
   const std::string secret = cookie_in(cookies);
   if (secret.empty()) return false;
   const std::lock_guard lock(mutex_);
@@ -106,11 +106,11 @@ bool Gate::has_session(std::string_view cookies) const {
   return found;
 }
 
-bool Gate::admits(const RequestHead& head) const {
+bool AccessGuard::admits(const RequestHead& head) const {
   return !needs_token() || is_token(head.header("authorization")) || has_session(head.header("cookie"));
 }
 
-std::string Gate::open_session() {
+std::string AccessGuard::open_session() {
   const std::string secret = random_id();
   const std::lock_guard lock(mutex_);
   std::erase_if(sessions_, [&](const auto& s) { return Clock::now() - s.second >= options_.session_lifetime; });
@@ -121,7 +121,7 @@ std::string Gate::open_session() {
   return secret;
 }
 
-void Gate::close_session(std::string_view cookies) {
+void AccessGuard::close_session(std::string_view cookies) {
   const std::lock_guard lock(mutex_);
   sessions_.erase(cookie_in(cookies));
 }

@@ -1,4 +1,4 @@
-#include "server/edits/gate.h"
+#include "server/edits/named_locks.h"
 
 #include <gtest/gtest.h>
 
@@ -13,15 +13,15 @@ namespace {
 
 using namespace std::chrono_literals;
 
-TEST(Gate, SharersDoNotWaitForEachOther) {
-  Gate gate;
-  const auto one = gate.share("a");
-  const auto two = gate.share("a");
-  const auto other = gate.own("b");
+TEST(NamedLocks, SharedLocksDoNotWaitForEachOther) {
+  NamedLocks locks;
+  const auto one = locks.lock_shared("a");
+  const auto two = locks.lock_shared("a");
+  const auto other = locks.lock("b");
 }
 
-TEST(Gate, AnOwnerIsAlone) {
-  Gate gate;
+TEST(NamedLocks, AnExclusiveLockIsAlone) {
+  NamedLocks locks;
   int owners = 0, sharers = 0;  // plain: the sanitizer sees who is not kept apart
   std::atomic<int> sharing = 0;
   std::vector<std::thread> threads;
@@ -29,12 +29,12 @@ TEST(Gate, AnOwnerIsAlone) {
     threads.emplace_back([&, t] {
       for (int i = 0; i < 200; ++i) {
         if (t % 2 == 0) {
-          const auto hold = gate.own("a");
+          const auto lock = locks.lock("a");
           EXPECT_EQ(sharing, 0);
           ++owners;
           sharers = 0;
         } else {
-          const auto hold = gate.share("a");
+          const auto lock = locks.lock_shared("a");
           ++sharing;
           EXPECT_GE(owners, 0);
           --sharing;
@@ -46,18 +46,18 @@ TEST(Gate, AnOwnerIsAlone) {
   EXPECT_EQ(sharers, 0);
 }
 
-TEST(Gate, AWaitingOwnerIsNotOvertakenByNewSharers) {
-  Gate gate;
+TEST(NamedLocks, AWaitingExclusiveLockIsNotOvertakenByNewSharedOnes) {
+  NamedLocks locks;
   std::atomic<bool> owned = false, shared_late = false;
-  std::optional<Gate::Hold> first(gate.share("a"));
+  std::optional<NamedLocks::Lock> first(locks.lock_shared("a"));
   std::thread owner([&] {
-    const auto hold = gate.own("a");
+    const auto lock = locks.lock("a");
     EXPECT_FALSE(shared_late);
     owned = true;
   });
   std::this_thread::sleep_for(20ms);
   std::thread sharer([&] {
-    const auto hold = gate.share("a");
+    const auto lock = locks.lock_shared("a");
     EXPECT_TRUE(owned);
     shared_late = true;
   });
@@ -70,13 +70,13 @@ TEST(Gate, AWaitingOwnerIsNotOvertakenByNewSharers) {
   EXPECT_TRUE(shared_late);
 }
 
-TEST(Gate, AMovedHoldIsReleasedOnce) {
-  Gate gate;
+TEST(NamedLocks, AMovedLockIsReleasedOnce) {
+  NamedLocks locks;
   {
-    auto hold = gate.own("a");
-    const auto moved = std::move(hold);
+    auto lock = locks.lock("a");
+    const auto moved = std::move(lock);
   }
-  const auto again = gate.own("a");
+  const auto again = locks.lock("a");
 }
 
 }  // namespace
