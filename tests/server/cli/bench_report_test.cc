@@ -61,7 +61,7 @@ TEST(BenchReport, HasTheFieldsThatOthersRead) {
                                              "stages", "peak_memory_bytes", "warnings"}));
 }
 
-TEST(KeptResult, IsNotFoundAgain) {
+TEST(CachedResult, IsNotFoundAgain) {
   const support::TempDir folder;
   const auto file = folder.path() / "slide.json";
   int found = 0;
@@ -76,7 +76,7 @@ TEST(KeptResult, IsNotFoundAgain) {
   EXPECT_EQ(found, 1);
 }
 
-TEST(KeptResult, ThatIsDamagedIsFoundAgain) {
+TEST(CachedResult, ThatIsDamagedIsFoundAgain) {
   const support::TempDir folder;
   const auto file = folder.path() / "slide.json";
   ASSERT_TRUE(write_json(file, encode(sample_trial())));
@@ -90,7 +90,7 @@ TEST(KeptResult, ThatIsDamagedIsFoundAgain) {
   EXPECT_TRUE(cached_result<evaluate::Trial>(file));
 }
 
-TEST(KeptResult, IsNotMadeOfAFailure) {
+TEST(CachedResult, IsNotMadeOfAFailure) {
   const support::TempDir folder;
   const auto file = folder.path() / "slide.json";
   const auto failed = cached_or_new<evaluate::Trial>(
