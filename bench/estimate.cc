@@ -215,9 +215,9 @@ void add_planned(const EditRequest& asked, Service& service, Run& run) {
   const auto preview = value(engine::edit::preview(version.cloud, request));
   const auto dataset = value(service.store().dataset(*asked.scene));
   const auto work = edits::workload_of(version.cloud, request, preview, edits::cameras_of(dataset.get()),
-                                       edits::corrects(asked, request.params), pictured_views);
+                                       edits::uses_corrector(request.params), pictured_views);
   for (const auto& planned : engine::edit::plan_of(work.edit))
-    run.stages[std::string(name_of(planned.stage))].first += planned.seconds;
+    run.stages[std::string(engine::edit::name_of(planned.stage))].first += planned.seconds;
   std::printf("    dragged %zu, covered %.3f, frame %.2f ms + %.2f ns a pixel, views %zu of %zu pixels\n",
               work.edit.dragged, work.edit.covered, 1e3 * work.edit.frame.gaussians, 1e9 * work.edit.frame.pixel,
               work.edit.views, work.edit.view_pixels);

@@ -16,8 +16,8 @@ struct DragLength {
   double step = 0;      ///< As far as one interval may go, > 0: tau, say.
 };
 
-/// T = ceil(max_i distance_i / step_i), limited to 1..max_intervals. With tau for a step none carries a handle out of its
-/// own sphere, unless the drag is longer than 20 radii.
+/// T = ceil(max_i distance_i / step_i), limited to 1..max_intervals. With tau for a step none carries a handle out of
+/// its own sphere, unless the drag is longer than 20 radii.
 [[nodiscard]] int default_intervals(std::span<const DragLength> drags);
 
 /// p_t'(u) = p_h + (u / T) (p_t - p_h), u = 1..T, from the handle as the user placed it. p_t'(T) is p_t exactly.

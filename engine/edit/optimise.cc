@@ -17,7 +17,7 @@ constexpr float held_by_trust = 1.0f;
 
 /// The rows of M, as the trainer takes them.
 train::TrainedRows changeable_rows(const working::WorkingScene& working, std::span<const std::uint32_t> members,
-                                  const repair::Corrected& corrected) {
+                                   const repair::Corrected& corrected) {
   train::TrainedRows changeable;
   changeable.cloud.sh_degree = working.cloud().sh_degree;
   changeable.cloud.extra_stride = working.cloud().extra_stride;

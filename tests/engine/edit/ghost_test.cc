@@ -57,8 +57,8 @@ double least_psnr_of_vacated(const FaintScene& faint, const Outcome& outcome) {
     const DVec2 middle = view.pixel_from_cam(view.cam_from_world(DVec3(0)));
     for (int y = 0; y < view.height; ++y)
       for (int x = 0; x < view.width; ++x) vacated.at(x, y) = glm::distance(middle, DVec2(x, y)) < 8;
-    least = std::min(least, psnr_where(render::forward(faint.wall, view).color, render::forward(after, view).color,
-                                       vacated, 1));
+    least = std::min(
+        least, psnr_where(render::forward(faint.wall, view).color, render::forward(after, view).color, vacated, 1));
   }
   return least;
 }
@@ -71,13 +71,14 @@ TEST(Ghost, NothingComesBackThatThePicturesDoNotAskFor) {
   ASSERT_TRUE(deformed);
   const double alone = least_psnr_of_vacated(plain, *deformed);
   correct::SceneCorrector corrector;
-  for (correct::Corrector* const used : {static_cast<correct::Corrector*>(nullptr),
-                                         static_cast<correct::Corrector*>(&corrector)}) {
+  for (correct::Corrector* const used :
+       {static_cast<correct::Corrector*>(nullptr), static_cast<correct::Corrector*>(&corrector)}) {
     const auto optimised = run(faint.cloud, faint.cameras, faint.request, {.corrector = used});
     ASSERT_TRUE(optimised) << optimised.error().message;
     const auto& removed = optimised->overlay.removed;
-    EXPECT_EQ(std::count_if(removed.begin(), removed.end(), [&](std::uint32_t row) { return row >= faint.wall.size(); }),
-              FaintScene::faint_rows);
+    EXPECT_EQ(
+        std::count_if(removed.begin(), removed.end(), [&](std::uint32_t row) { return row >= faint.wall.size(); }),
+        FaintScene::faint_rows);
     EXPECT_GT(least_psnr_of_vacated(faint, *optimised), alone - 1) << "dB; 9 where they had come back";
   }
 }

@@ -116,7 +116,8 @@ TEST_F(RecordKeeperTest, TellsIterationAndLossAsLongAsItOptimises) {
     EXPECT_EQ(published().iteration, i);
     EXPECT_EQ(published().loss, 1.0 / i);
   }
-  keeper.advance({.interval = 1, .intervals = 2, .stage = engine::edit::Stage::relocate, .fraction = 0.4, .iterations = 3});
+  keeper.advance(
+      {.interval = 1, .intervals = 2, .stage = engine::edit::Stage::relocate, .fraction = 0.4, .iterations = 3});
   EXPECT_EQ(published().iteration, 0);
   EXPECT_EQ(published().loss, std::nullopt);
 }
