@@ -221,7 +221,7 @@ TEST_F(Cli, EditWritesSceneReportAndPictures) {
                                  quick("ball") + " --out " + at("out/deep"));
   ASSERT_EQ(run.status, 0) << run.err;
   EXPECT_NE(run.err.find("100 %"), std::string::npos) << run.err;
-  EXPECT_NE(run.err.find("interval 1 of "), std::string::npos) << run.err;
+  EXPECT_NE(run.err.find(" of 4  mask"), std::string::npos) << run.err;
   const json said = report("out/deep");
   const auto before = io::read_scene(demo("scene.ply")), after = io::read_scene(at("out/deep/scene.ply"));
   ASSERT_TRUE(after) << after.error().message;
