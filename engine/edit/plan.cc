@@ -15,7 +15,7 @@ constexpr std::array<std::string_view, stage_count> names{"assign",   "views",  
 
 // What follows was measured on edits of the demo scene (150 k Gaussians; a ball of 4,245 and a leaf of 1,279, and the
 // ball with three times its radius; with its cameras and without; presets preview, draft and standard; move and extend)
-// on two cores of an Intel Xeon with AVX-512, as the smallest of several runs of each stage. docs/estimates.md has
+// on two cores of an Intel Xeon with AVX-512, as the smallest of several runs of each stage. bench/estimate has
 // those edits, and others that had no part in it. Seconds are those of that machine: Workload::slowness says how this
 // one compares. Frames are measured where the edit runs.
 
