@@ -1,6 +1,7 @@
 #include "engine/edit/checkpoint.h"
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 #include <utility>
 
@@ -260,6 +261,8 @@ bool is_of(const Request& request, const Contents& contents) {
     fits = scene::validate(state.views[v]).has_value() && state.masks[v].width == state.views[v].width &&
            state.masks[v].height == state.views[v].height;
   for (const std::uint16_t handle : contents.members.handle) fits = fits && handle <= handles;
+  for (const DVec3& position : state.positions)
+    fits = fits && std::isfinite(position.x) && std::isfinite(position.y) && std::isfinite(position.z);
   return fits;
 }
 

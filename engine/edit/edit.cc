@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "engine/edit/annealing.h"
+#include "engine/edit/handles.h"
 #include "engine/edit/masks.h"
 #include "engine/edit/messages.h"
 #include "engine/edit/publish.h"
@@ -119,12 +120,22 @@ Result<void> validate_cameras(std::span<const scene::Camera> cameras) {
   return {};
 }
 
+/// Could an edit of this scene by this request be in this state? What decode() gives is.
+bool is_possible(const State& state, const scene::GaussianCloud& scene, const Request& request) {
+  return state.interval >= 1 && state.interval <= resolved_intervals(request) &&
+         state.report.resolved.intervals == resolved_intervals(request) && state.scene.input_rows() == scene.size() &&
+         state.scene.check() && state.positions.size() == request.handles.size() &&
+         state.report.handles.size() == request.handles.size() && state.masks.size() == state.views.size();
+}
+
 }  // namespace
 
 Result<Outcome> run(const scene::GaussianCloud& scene, std::span<const scene::Camera> cameras, const Request& request,
                     const Tools& tools, const Observer& observer, std::optional<State> from) {
   if (const auto valid = validate(request); !valid) return propagate(valid);
   if (const auto valid = validate_cameras(cameras); !valid) return propagate(valid);
+  if (from && !is_possible(*from, scene, request))
+    return fail(ErrorCode::invalid_argument, "the state is of another edit", "checkpoint");
   optim::MsSsimLoss ms_ssim;
   Edit edit{scene,
             request,

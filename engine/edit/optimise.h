@@ -40,7 +40,7 @@ struct OptimiseOutcome {
 /// I_o is the render of the input. Only rows of M change. Children are appended: they inherit handle, parent and
 /// mean_at_deform; those of members of P_h are copies, those of seeds seeds, others a trail.
 ///   masks      per view, dilated; views without a set pixel are left out. If none is left, nothing happens.
-///   corrected  without pictures (`corrector: "none"`): I_e is what a view shows now. Rounded to 8 bits.
+///   corrected  without pictures: I_e is what a view shows now. Rounded to 8 bits.
 ///   round      names the random choices
 ///   advance    called after every view that is set up and every iteration; its error ends the optimisation
 ///   errors     internal: a value is not finite; `where` names it by the input's row ("gaussian[12].opacity")
@@ -50,10 +50,5 @@ struct OptimiseOutcome {
                                                const repair::Corrected& corrected, const Params& params,
                                                const repair::Round& round, optim::PerceptualLoss& perceptual,
                                                const std::function<Result<void>(const OptimiseProgress&)>& advance);
-
-/// Of each interval: all corrections together.
-[[nodiscard]] inline int iterations_of_interval(const Params& params) {
-  return params.annealing_steps * params.iterations;
-}
 
 }  // namespace engine::edit

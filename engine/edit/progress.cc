@@ -7,10 +7,9 @@
 namespace engine::edit {
 namespace {
 
-// How much of a plan must have been carried out until what was seen of it counts as much as the plan itself. Frames
-// that were measured make it trustworthy; without them it knows nothing of the machine. Of one kind, little is enough:
-// its stages are alike.
-constexpr double measured_trust = 0.1, unmeasured_trust = 0.01, kind_trust = 0.05;
+// How much of a plan must have been carried out until what was seen of it counts as much as the plan itself. Of one
+// kind, little is enough: its stages are alike.
+constexpr double plan_trust = 0.1, kind_trust = 0.05;
 
 bool is_measured(const Workload& work) { return work.frame.gaussians > 0 || work.frame.pixel > 0; }
 
@@ -110,8 +109,7 @@ double ProgressMeter::seconds_left(double part) const {
   }
   Done all;
   for (const Done& kind : done) all.planned += kind.planned, all.took += kind.took;
-  const double trust = is_measured(work_) ? measured_trust : unmeasured_trust;
-  const double expected = slowness(all.took, all.planned, 1, trust * (before_.back() - before_[first_]));
+  const double expected = slowness(all.took, all.planned, 1, plan_trust * (before_.back() - before_[first_]));
   double sum = 0;
   for (std::size_t k = 0; k < stage_count; ++k)
     sum += left[k] * slowness(done[k].took, done[k].planned, expected, kind_trust * of_kind[k]);

@@ -15,10 +15,10 @@ namespace {
 using working::Mode;
 using working::Role;
 
-/// Opacity from which on an original was asked for by the pictures, and not lifted by noise: Adam takes no notice of
-/// how small a gradient is. What is asked for heads for the opacity it had; noise made of 0.01 at most 0.017 in 200
-/// iterations, and of nine in ten less than 0.05 in 500 (the demo scene's leaf, `draft` and `standard`, without a
-/// corrector). The price: an original that was fainter than this before does not come back.
+/// Opacity from which on an original, or a child of one, was asked for by the pictures, and not lifted by noise: Adam
+/// takes no notice of how small a gradient is. What is asked for heads for the opacity it had; noise made of 0.01 at
+/// most 0.017 in 200 iterations, and of nine in ten less than 0.05 in 500 (the demo scene's leaf, `draft` and
+/// `standard`, without a corrector). The price: an original that was fainter than this before does not come back.
 constexpr double wanted_back = 0.05;
 
 bool same_bits(float a, float b) { return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b); }
@@ -49,14 +49,14 @@ Published publish(const working::WorkingScene& working, const scene::GaussianClo
   for (std::size_t k = 0; k < members.size(); ++k) {
     const std::uint32_t row = members[k];
     const bool is_input = row < working.input_rows();
-    const bool is_original = working.role()[row] == Role::original;
+    const bool has_left = working::has_left(working.role()[row]);
     const bool is_changed = !is_input || !same_row(working.cloud(), row, unedited, k);
     const float logit = working.cloud().opacity_logit[row];
     const bool is_faint = is_changed && render::opacity<double>(logit) < render::min_alpha;
-    const bool goes = is_original ? render::opacity<double>(logit) < wanted_back : is_faint;
+    const bool goes = has_left ? render::opacity<double>(logit) < wanted_back : is_faint;
     if (mode == Mode::move && goes) {
       if (is_input) out.overlay.removed.push_back(row);
-      if (!is_original) ++out.faint;
+      if (!has_left) ++out.faint;
       continue;
     }
     ++out.changeable;

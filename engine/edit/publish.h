@@ -17,9 +17,9 @@ struct Published {
 };
 
 /// What an edit has come to, of the world. Surviving input rows are the input's bytes, but for those of M that the edit
-/// changed. In a move, originals stay only if their opacity has clearly risen from the one they were lowered to (0.05
-/// or more: the pictures asked for them), and what else of M the edit has made or changed only if it can be seen
-/// (opacity 1/255 or more). Other rows that the edit has not changed always stay, however faint.
+/// changed. In a move, originals and their children stay only if their opacity has clearly risen from the one they were
+/// lowered to (0.05 or more: the pictures asked for them), and what else of M the edit has made or changed only if it
+/// can be seen (opacity 1/255 or more). Other rows that the edit has not changed always stay, however faint.
 [[nodiscard]] Published publish(const working::WorkingScene& working, const scene::GaussianCloud& input,
                                 working::Mode mode);
 

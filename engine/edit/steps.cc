@@ -37,9 +37,11 @@ repair::Repair make_repair(const State& state, const Edit& edit) {
 
 /// Without a corrector I_e is what the deformation shows. In a move that is the scene without what has left: a
 /// picture with the originals in it, however faint, would ask for them, and where there are many they came back.
-repair::Corrected uncorrected(const State& state, const Edit& edit) {
+Result<repair::Corrected> uncorrected(const State& state, Edit& edit) {
   repair::Corrected out;
-  const Rows gone = state.scene.rows_of(working::Role::original);
+  Rows gone;
+  for (std::uint32_t row = 0; row < state.scene.size(); ++row)
+    if (working::has_left(state.scene.role()[row])) gone.push_back(row);
   if (edit.request.mode != Mode::move || gone.empty()) return out;
   render::Layers layers(state.scene.cloud());
   layers.hidden = gone;
@@ -48,6 +50,7 @@ repair::Corrected uncorrected(const State& state, const Edit& edit) {
     render::Rendering rendering;
     render::forward(layers, state.scene.frame().edit_from_world(view), {}, {}, workspace, rendering);
     out.pictures.push_back(std::move(rendering.color));
+    if (auto going = edit.progress.advance(0); !going) return propagate(going);
   }
   return out;
 }
@@ -141,7 +144,11 @@ Result<repair::Corrected> correct(State& state, Edit& edit, std::span<const scen
 Result<double> optimise(State& state, Edit& edit, std::span<const scene::Mask> masks, repair::Corrected corrected,
                         const repair::Round& round) {
   if (auto going = edit.progress.enter(Stage::set_up, round.interval); !going) return propagate(going);
-  if (edit.corrector == nullptr) corrected = uncorrected(state, edit);
+  if (edit.corrector == nullptr) {
+    auto pictures = uncorrected(state, edit);
+    if (!pictures) return propagate(pictures);
+    corrected = std::move(*pictures);
+  }
   const int before = (round.correction - 1) * edit.params().iterations;
   const auto advance = [&](const OptimiseProgress& at) {
     if (at.set_up < 1) return edit.progress.advance(at.set_up);

@@ -193,9 +193,10 @@ Result<Corrected> Repair::correct(WorkingScene& working, std::span<const scene::
 Repair::Rows Repair::rows_of(const WorkingScene& working) const {
   Rows rows;
   for (std::uint32_t i = 0; i < working.size(); ++i) {
-    const bool is_gone = working.role()[i] == Role::original && mode_ == Mode::move;
+    const bool is_gone = working::has_left(working.role()[i]) && mode_ == Mode::move;
     const bool is_moved = working.role()[i] == Role::copy;
     if (is_gone) rows.gone.push_back(i);
+    if (is_gone && i < working.input_rows()) rows.vacating.push_back(i);
     if (is_moved) rows.moved.push_back(i);
     if (is_gone || is_moved) rows.dragged.push_back(i);
   }
@@ -205,7 +206,7 @@ Repair::Rows Repair::rows_of(const WorkingScene& working) const {
 void Repair::note_vacated(const Rows& rows, std::span<const scene::Mask> masks) {
   vacated_.resize(views_.size());
   for (std::size_t v = 0; v < views_.size(); ++v) {
-    const scene::Image share = working::footprint(original_, rows.gone, views_[v], workspace_);
+    const scene::Image share = working::footprint(original_, rows.vacating, views_[v], workspace_);
     vacated_[v] = mask::dilate(mask::mask2d(share), std::max(1, views_[v].height / 128));
     buffer_[v].excluded = mask::mask2d(share, trace);
     buffer_[v].box = scene::bounding_box(masks[v]);

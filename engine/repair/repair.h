@@ -64,9 +64,10 @@ class Repair {
   struct ViewNow;
   enum class Purpose : std::uint32_t;
   struct Rows {
-    std::vector<std::uint32_t> gone;     ///< Left their place, in a move.
-    std::vector<std::uint32_t> moved;    ///< Copies.
-    std::vector<std::uint32_t> dragged;  ///< Both, ascending.
+    std::vector<std::uint32_t> gone;      ///< Left their place, in a move.
+    std::vector<std::uint32_t> vacating;  ///< Those of them that are the input's.
+    std::vector<std::uint32_t> moved;     ///< Copies.
+    std::vector<std::uint32_t> dragged;   ///< Gone or moved, ascending.
   };
   /// What a view shows behind the dragged part.
   struct Background {

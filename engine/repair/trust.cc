@@ -72,7 +72,7 @@ std::vector<float> trust_of_rows(const WorkingScene& working, std::span<const fl
   std::vector<std::uint32_t> copies;
   for (std::uint32_t row = 0; row < trust.size(); ++row) {
     trust[row] = observed[working.parent()[row]];
-    if (working.role()[row] == Role::original && mode == Mode::move) trust[row] = 0;
+    if (working::has_left(working.role()[row]) && mode == Mode::move) trust[row] = 0;
     if (working.role()[row] == Role::seed) trust[row] = 1;
     if (working.role()[row] == Role::copy) copies.push_back(row);
   }

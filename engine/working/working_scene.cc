@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <numeric>
 #include <utility>
 
@@ -26,6 +27,15 @@ bool is_whole(const Members& members) {
   return members.inputs.size() <= count && members.role.size() == count && members.handle.size() == count &&
          members.parent.size() == count && members.mean_at_deform.x.size() == count &&
          members.mean_at_deform.y.size() == count && members.mean_at_deform.z.size() == count;
+}
+
+/// Every number is one: what comes from disk may be anything.
+bool is_finite(const Members& members) {
+  const auto all = [](const std::vector<float>& values) {
+    return std::all_of(values.begin(), values.end(), [](float value) { return std::isfinite(value); });
+  };
+  return !scene::first_not_finite(members.cloud) && all(members.mean_at_deform.x) && all(members.mean_at_deform.y) &&
+         all(members.mean_at_deform.z);
 }
 
 }  // namespace
@@ -128,7 +138,7 @@ Members members_of(const WorkingScene& working) {
 
 Result<WorkingScene> restore(const Members& members, const scene::GaussianCloud& input, const Frame& frame) {
   const auto of_another = [] { return fail(ErrorCode::invalid_argument, "the rows are those of another scene"); };
-  if (!is_whole(members) || members.cloud.sh_degree != input.sh_degree ||
+  if (!is_whole(members) || !is_finite(members) || members.cloud.sh_degree != input.sh_degree ||
       members.cloud.extra_stride != input.extra_stride)
     return of_another();
   WorkingScene working(input, frame, HandleColumn(input.size(), 0));

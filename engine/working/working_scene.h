@@ -28,6 +28,8 @@ enum class Role : std::uint8_t {
 
 /// Are rows of this role members of P_h?
 [[nodiscard]] constexpr bool is_dragged(Role role) { return role == Role::held || role == Role::copy; }
+/// Have rows of this role left their place, in a move? Originals have, and children that the optimisation gave them.
+[[nodiscard]] constexpr bool has_left(Role role) { return role == Role::original || role == Role::trail; }
 /// May rows of this role be the input's?
 [[nodiscard]] constexpr bool is_of_input(Role role) {
   return role == Role::frozen || role == Role::held || role == Role::original;

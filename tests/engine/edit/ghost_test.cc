@@ -83,6 +83,18 @@ TEST(Ghost, NothingComesBackThatThePicturesDoNotAskFor) {
   }
 }
 
+TEST(Ghost, ChildrenOfWhatHasLeftStayAwayToo) {
+  FaintScene faint;
+  faint.request.params.intervals = 2;
+  faint.request.params.iterations = 200;  // enough for originals to be given children
+  FaintScene plain;
+  plain.request.params.iterations = 0;
+  const auto deformed = run(plain.cloud, plain.cameras, plain.request);
+  const auto optimised = run(faint.cloud, faint.cameras, faint.request);
+  ASSERT_TRUE(deformed && optimised);
+  EXPECT_GT(least_psnr_of_vacated(faint, *optimised), least_psnr_of_vacated(plain, *deformed) - 1);
+}
+
 TEST(Ghost, OnlyWhatHasClearlyRisenStays) {
   const FaintScene faint;
   working::WorkingScene working(faint.cloud, {}, working::HandleColumn(faint.cloud.size(), 1));
@@ -94,6 +106,10 @@ TEST(Ghost, OnlyWhatHasClearlyRisenStays) {
   leave_at(0, 0.01), leave_at(1, 0.017), leave_at(2, 0.0499), leave_at(3, 0.0501), leave_at(4, 0.9);
   EXPECT_EQ(publish(working, faint.cloud, Mode::move).overlay.removed, (std::vector<std::uint32_t>{0, 1, 2}));
   EXPECT_TRUE(publish(working, faint.cloud, Mode::extend).overlay.removed.empty());
+  // A child of an original goes by the same rule.
+  const std::vector<std::uint32_t> parents{0, 4};
+  working.append(working.cloud(), parents, std::vector<working::Role>(2, working::Role::trail), parents);
+  EXPECT_EQ(publish(working, faint.cloud, Mode::move).overlay.added(), 1u);
 }
 
 }  // namespace
