@@ -263,6 +263,8 @@ TEST(Members, ThatBreakAnInvariantMakeNoScene) {
       {"means at deform too few: z", [](Members& m) { m.mean_at_deform.z.pop_back(); }},
       {"Gaussians too few", [](Members& m) { m.cloud.resize(m.cloud.size() - 1); }},
       {"Gaussians too many", [](Members& m) { m.cloud.resize(m.cloud.size() + 1); }},
+      {"a scale that is no number", [](Members& m) { m.cloud.log_scale.y[1] = std::nanf(""); }},
+      {"a mean at deform that is infinite", [](Members& m) { m.mean_at_deform.z[0] = -INFINITY; }},
   };
   for (const auto& [what, spoil] : cases) {
     Members bad = good;
