@@ -29,7 +29,6 @@ function(splatdrag_tests target label folder library)
   list(TRANSFORM ARGN PREPEND ${CMAKE_SOURCE_DIR}/tests/${folder}/)
   add_executable(${target} ${ARGN})
   target_link_libraries(${target} PRIVATE ${library} splatdrag_test_support splatdrag_warnings GTest::gtest_main)
-  target_compile_definitions(${target} PRIVATE SPLATDRAG_SOURCE_DIR="${CMAKE_SOURCE_DIR}")  # __FILE__ may be relative
   include(GoogleTest)
   gtest_discover_tests(${target} TEST_PREFIX ${folder}/ DISCOVERY_TIMEOUT 60 PROPERTIES LABELS ${label} TIMEOUT 900)
 endfunction()

@@ -9,6 +9,7 @@
 #include <array>
 #include <cassert>
 #include <concepts>
+#include <optional>
 #include <string_view>
 
 namespace engine {
@@ -39,6 +40,14 @@ template <Named E>
   const auto found = std::ranges::find(names<E>, value, &Name<E>::value);
   assert(found != names<E>.end());
   return found->text;
+}
+
+/// The value of that name; nothing for another text.
+template <Named E>
+[[nodiscard]] constexpr std::optional<E> value_named(std::string_view text) {
+  const auto found = std::ranges::find(names<E>, text, &Name<E>::text);
+  if (found == names<E>.end()) return std::nullopt;
+  return found->value;
 }
 
 }  // namespace engine

@@ -1,7 +1,6 @@
 #include "engine/edit/checkpoint.h"
 
 #include <algorithm>
-#include <cmath>
 #include <span>
 #include <utility>
 
@@ -250,22 +249,6 @@ Result<Contents> read_contents(std::span<const std::byte> bytes) {
   return contents;
 }
 
-/// Does it belong to this request? What it says of the scene, working::restore() checks.
-bool is_of(const Request& request, const Contents& contents) {
-  const State& state = contents.state;
-  const std::size_t handles = request.handles.size();
-  bool fits = state.interval >= 1 && state.interval <= resolved_intervals(request) &&
-              state.report.resolved.intervals == resolved_intervals(request) && state.positions.size() == handles &&
-              state.report.handles.size() == handles && state.masks.size() == state.views.size();
-  for (std::size_t v = 0; fits && v < state.views.size(); ++v)
-    fits = scene::validate(state.views[v]).has_value() && state.masks[v].width == state.views[v].width &&
-           state.masks[v].height == state.views[v].height;
-  for (const std::uint16_t handle : contents.members.handle) fits = fits && handle <= handles;
-  for (const DVec3& position : state.positions)
-    fits = fits && std::isfinite(position.x) && std::isfinite(position.y) && std::isfinite(position.z);
-  return fits;
-}
-
 }  // namespace
 
 std::string encode(const State& state) {
@@ -287,7 +270,9 @@ Result<State> decode(std::string_view text, const scene::GaussianCloud& input, c
   if (!bytes) return propagate(bytes);
   auto contents = read_contents(*bytes);
   if (!contents) return propagate(contents);
-  if (!is_of(request, *contents))
+  const auto& handle = contents->members.handle;
+  if (!is_of(request, contents->state) ||
+      std::ranges::any_of(handle, [&](std::uint16_t owner) { return owner > request.handles.size(); }))
     return fail(ErrorCode::invalid_argument, "the checkpoint is of another edit", "checkpoint");
   auto scene = working::restore(contents->members, input, frame_of(request));
   if (!scene) return fail(ErrorCode::invalid_argument, "the checkpoint is of an edit of another scene", "checkpoint");

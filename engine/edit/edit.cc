@@ -1,12 +1,10 @@
 #include "engine/edit/edit.h"
 
-#include <algorithm>
 #include <chrono>
 #include <string>
 #include <utility>
 
 #include "engine/edit/annealing.h"
-#include "engine/edit/handles.h"
 #include "engine/edit/masks.h"
 #include "engine/edit/messages.h"
 #include "engine/edit/publish.h"
@@ -120,12 +118,16 @@ Result<void> validate_cameras(std::span<const scene::Camera> cameras) {
   return {};
 }
 
-/// Could an edit of this scene by this request be in this state? What decode() gives is.
-bool is_possible(const State& state, const scene::GaussianCloud& scene, const Request& request) {
-  return state.interval >= 1 && state.interval <= resolved_intervals(request) &&
-         state.report.resolved.intervals == resolved_intervals(request) && state.scene.input_rows() == scene.size() &&
-         state.scene.check() && state.positions.size() == request.handles.size() &&
-         state.report.handles.size() == request.handles.size() && state.masks.size() == state.views.size();
+/// What is known of the work before anything is looked at.
+///   finished  intervals, by an edit that goes on
+Workload work_ahead(const scene::GaussianCloud& scene, const Request& request, const Tools& tools,
+                    const Observer& observer, int finished) {
+  Workload work = workload_of(scene.size(), request, tools.corrector != nullptr);
+  work.finished = finished;
+  work.shown = bool(observer.moment);
+  work.pictured = observer.pictured;
+  work.kept = bool(observer.interval_done);
+  return work;
 }
 
 }  // namespace
@@ -134,7 +136,7 @@ Result<Outcome> run(const scene::GaussianCloud& scene, std::span<const scene::Ca
                     const Tools& tools, const Observer& observer, std::optional<State> from) {
   if (const auto valid = validate(request); !valid) return propagate(valid);
   if (const auto valid = validate_cameras(cameras); !valid) return propagate(valid);
-  if (from && !is_possible(*from, scene, request))
+  if (from && (!is_of(request, *from) || from->scene.input_rows() != scene.size() || !from->scene.check()))
     return fail(ErrorCode::invalid_argument, "the state is of another edit", "checkpoint");
   optim::MsSsimLoss ms_ssim;
   Edit edit{scene,
@@ -142,8 +144,7 @@ Result<Outcome> run(const scene::GaussianCloud& scene, std::span<const scene::Ca
             observer,
             tools.perceptual != nullptr ? *tools.perceptual : ms_ssim,
             tools.corrector,
-            ProgressMeter(observer,
-                          workload_of(scene, request, tools.corrector != nullptr, observer, from ? from->interval : 0),
+            ProgressMeter(observer, work_ahead(scene, request, tools, observer, from ? from->interval : 0),
                           from ? from->report.times : std::vector<StageTime>())};
   Result<State> state = begin(edit, cameras, std::move(from));
   const auto is_enough = [&] { return state->interval > 0 && observer.keep && observer.keep(); };

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <numeric>
-#include <utility>
 
 #include "engine/train/trainer.h"
 
@@ -19,9 +18,7 @@ constexpr float held_by_trust = 1.0f;
 train::TrainedRows changeable_rows(const working::WorkingScene& working, std::span<const std::uint32_t> members,
                                    const repair::Corrected& corrected) {
   train::TrainedRows changeable;
-  changeable.cloud.sh_degree = working.cloud().sh_degree;
-  changeable.cloud.extra_stride = working.cloud().extra_stride;
-  scene::append_rows(changeable.cloud, working.cloud(), members);
+  changeable.cloud = scene::gather(working.cloud(), members);
   for (const std::uint32_t row : members) {
     changeable.name.push_back(working.parent()[row]);
     if (!corrected.trust.empty()) changeable.mobility.push_back(1 - held_by_trust * corrected.trust[row]);
@@ -47,11 +44,11 @@ void take_over(const train::Trainer& trainer, std::span<const std::uint32_t> mem
 
 }  // namespace
 
-Result<OptimiseOutcome> optimise(working::WorkingScene& working, const scene::GaussianCloud& input,
-                                 std::span<const scene::Camera> views, std::span<const scene::Mask> masks,
-                                 const repair::Corrected& corrected, const Params& params, const repair::Round& round,
-                                 optim::PerceptualLoss& perceptual,
-                                 const std::function<Result<void>(const OptimiseProgress&)>& advance) {
+Result<double> optimise(working::WorkingScene& working, const scene::GaussianCloud& input,
+                        std::span<const scene::Camera> views, std::span<const scene::Mask> masks,
+                        const repair::Corrected& corrected, const Params& params, const repair::Round& round,
+                        optim::PerceptualLoss& perceptual,
+                        const std::function<Result<void>(const OptimiseProgress&)>& advance) {
   const std::vector<std::uint32_t> members = working.member_rows();
   const scene::GaussianCloud originals = working.unedited(input, members);
   train::Trainer trainer({&working.cloud(), members}, changeable_rows(working, members, corrected),
@@ -64,8 +61,7 @@ Result<OptimiseOutcome> optimise(working::WorkingScene& working, const scene::Ga
     }
     if (auto going = advance({.set_up = double(v + 1) / double(views.size())}); !going) return propagate(going);
   }
-  OptimiseOutcome outcome;
-  if (trainer.views() == 0) return outcome;
+  if (trainer.views() == 0) return 0.0;
 
   std::vector<double> losses(trainer.views(), 0.0);
   trainer.begin_correction({params.seed, round.interval, round.correction}, params.iterations);
@@ -76,10 +72,8 @@ Result<OptimiseOutcome> optimise(working::WorkingScene& working, const scene::Ga
     if (auto going = advance({1, i + 1, params.iterations, done->loss}); !going) return propagate(going);
   }
   const auto seen = std::min(trainer.views(), std::size_t(params.iterations));
-  outcome.loss = std::accumulate(losses.begin(), losses.end(), 0.0) / double(seen);
-  outcome.children = trainer.cloud().size() - members.size();
   take_over(trainer, members, working);
-  return outcome;
+  return std::accumulate(losses.begin(), losses.end(), 0.0) / double(seen);
 }
 
 }  // namespace engine::edit

@@ -31,11 +31,6 @@ struct OptimiseProgress {
   std::optional<double> loss = {};  ///< Of the last iteration.
 };
 
-struct OptimiseOutcome {
-  double loss = 0;           ///< Mean over the views of the last epoch.
-  std::size_t children = 0;  ///< Rows that densification added and the guard against floaters left.
-};
-
 /// The optimisation after a correction: params.iterations iterations.
 /// I_o is the render of the input. Only rows of M change. Children are appended: they inherit handle, parent and
 /// mean_at_deform; those of members of P_h are copies, those of seeds seeds, others a trail.
@@ -43,12 +38,13 @@ struct OptimiseOutcome {
 ///   corrected  without pictures: I_e is what a view shows now. Rounded to 8 bits.
 ///   round      names the random choices
 ///   advance    called after every view that is set up and every iteration; its error ends the optimisation
+///   returns    the mean loss over the views of the last epoch; 0 if no view is left
 ///   errors     internal: a value is not finite; `where` names it by the input's row ("gaussian[12].opacity")
 /// On an error the working scene is as it was.
-[[nodiscard]] Result<OptimiseOutcome> optimise(working::WorkingScene& working, const scene::GaussianCloud& input,
-                                               std::span<const scene::Camera> views, std::span<const scene::Mask> masks,
-                                               const repair::Corrected& corrected, const Params& params,
-                                               const repair::Round& round, optim::PerceptualLoss& perceptual,
-                                               const std::function<Result<void>(const OptimiseProgress&)>& advance);
+[[nodiscard]] Result<double> optimise(working::WorkingScene& working, const scene::GaussianCloud& input,
+                                      std::span<const scene::Camera> views, std::span<const scene::Mask> masks,
+                                      const repair::Corrected& corrected, const Params& params,
+                                      const repair::Round& round, optim::PerceptualLoss& perceptual,
+                                      const std::function<Result<void>(const OptimiseProgress&)>& advance);
 
 }  // namespace engine::edit

@@ -1,17 +1,12 @@
 #include "engine/edit/plan.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "engine/edit/views.h"
 
 namespace engine::edit {
 namespace {
-
-constexpr std::array<std::string_view, stage_count> names{"assign",   "views",    "deform",     "mask",
-                                                          "observe",  "correct",  "set_up",     "optimise",
-                                                          "relocate", "pictures", "checkpoint", "finish"};
 
 // What follows was measured on edits of the demo scene (150 k Gaussians; a ball of 4,245 and a leaf of 1,279, and the
 // ball with three times its radius; with its cameras and without; presets preview, draft and standard; move and extend)
@@ -138,14 +133,6 @@ class Maker {
 };
 
 }  // namespace
-
-std::string_view name_of(Stage stage) { return names[std::size_t(stage)]; }
-
-std::optional<Stage> stage_named(std::string_view name) {
-  const auto found = std::find(names.begin(), names.end(), name);
-  if (found == names.end()) return std::nullopt;
-  return Stage(found - names.begin());
-}
 
 std::vector<PlannedStage> plan_of(const Workload& work) { return Maker(work)(); }
 

@@ -2,12 +2,13 @@
 // the time that is left and the estimate of an edit that has not begun all come from here.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
-#include <string_view>
 #include <vector>
+
+#include "engine/core/names.h"
 
 namespace engine::edit {
 
@@ -26,11 +27,15 @@ enum class Stage : std::uint8_t {
   checkpoint,  ///< The state is handed to an observer that wants to keep it (Observer::interval_done).
   finish,      ///< What has become of the input is put together.
 };
-constexpr std::size_t stage_count = 12;
-
-[[nodiscard]] std::string_view name_of(Stage stage);
-/// The stage of that name; nothing for another text.
-[[nodiscard]] std::optional<Stage> stage_named(std::string_view name);
+constexpr auto names_of(Stage) {
+  return std::array{
+      Name{Stage::assign, "assign"},     Name{Stage::views, "views"},           Name{Stage::deform, "deform"},
+      Name{Stage::mask, "mask"},         Name{Stage::observe, "observe"},       Name{Stage::correct, "correct"},
+      Name{Stage::set_up, "set_up"},     Name{Stage::optimise, "optimise"},     Name{Stage::relocate, "relocate"},
+      Name{Stage::pictures, "pictures"}, Name{Stage::checkpoint, "checkpoint"}, Name{Stage::finish, "finish"}};
+}
+using engine::name_of;
+constexpr std::size_t stage_count = names<Stage>.size();
 
 /// Time that a whole frame of a scene takes on a machine: a part that goes with the Gaussians, and one that goes with
 /// the pixels.

@@ -5,6 +5,7 @@
 
 #include "engine/core/vec.h"
 #include "engine/edit/report.h"
+#include "engine/edit/request.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/image.h"
 #include "engine/working/working_scene.h"
@@ -22,5 +23,8 @@ struct State {
   std::vector<scene::Mask> masks;    ///< Per view, in its size: what the part has covered so far, not dilated yet.
   Report report;                     ///< So far.
 };
+
+/// Could an edit by this request be in this state? Its scene is not looked at.
+[[nodiscard]] bool is_of(const Request& request, const State& state);
 
 }  // namespace engine::edit

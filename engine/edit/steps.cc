@@ -39,9 +39,7 @@ repair::Repair make_repair(const State& state, const Edit& edit) {
 /// picture with the originals in it, however faint, would ask for them, and where there are many they came back.
 Result<repair::Corrected> uncorrected(const State& state, Edit& edit) {
   repair::Corrected out;
-  Rows gone;
-  for (std::uint32_t row = 0; row < state.scene.size(); ++row)
-    if (working::has_left(state.scene.role()[row])) gone.push_back(row);
+  const Rows gone = state.scene.rows_that_left();
   if (edit.request.mode != Mode::move || gone.empty()) return out;
   render::Layers layers(state.scene.cloud());
   layers.hidden = gone;
@@ -155,10 +153,8 @@ Result<double> optimise(State& state, Edit& edit, std::span<const scene::Mask> m
     if (at.iteration == 0) return edit.progress.enter(Stage::optimise, round.interval);
     return edit.progress.advance(double(at.iteration) / at.iterations, before + at.iteration, at.loss);
   };
-  const auto outcome = edit::optimise(state.scene, edit.input, state.views, masks, corrected, edit.params(), round,
-                                      edit.perceptual, advance);
-  if (!outcome) return propagate(outcome);
-  return outcome->loss;
+  return edit::optimise(state.scene, edit.input, state.views, masks, corrected, edit.params(), round, edit.perceptual,
+                        advance);
 }
 
 Result<void> relocate_handles(State& state, Edit& edit, int u) {

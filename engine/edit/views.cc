@@ -36,10 +36,7 @@ struct DryRun {
 /// Where the whole drag would take the dragged rows: a function of what moves alone.
 DryRun dry_run(const WorkingScene& begun, const scene::GaussianCloud& input, const Request& request, int intervals) {
   std::vector<std::uint32_t> rows = begun.dragged_rows();
-  scene::GaussianCloud gaussians;
-  gaussians.sh_degree = input.sh_degree;
-  gaussians.extra_stride = input.extra_stride;
-  scene::append_rows(gaussians, input, rows);
+  const scene::GaussianCloud gaussians = scene::gather(input, rows);
   const DraggedAlone drag =
       drag_alone(std::move(rows), gaussians, begun.handle(), request, intervals, /*rotate_sh=*/false);
   const WorkingScene& alone = drag.working;
@@ -54,9 +51,7 @@ DryRun dry_run(const WorkingScene& begun, const scene::GaussianCloud& input, con
     out.copies.push_back(added_from + row);
     out.parents.push_back(drag.rows[alone.parent()[row]]);
   }
-  out.top.sh_degree = input.sh_degree;
-  out.top.extra_stride = input.extra_stride;
-  scene::append_rows(out.top, alone.cloud(), taken);
+  out.top = scene::gather(alone.cloud(), taken);
   std::sort(out.parents.begin(), out.parents.end());
   out.parents.erase(std::unique(out.parents.begin(), out.parents.end()), out.parents.end());
   return out;

@@ -99,19 +99,14 @@ std::size_t view_pixels(std::span<const scene::Camera> cameras, int max_image_si
   return cameras.empty() ? 0 : sum / cameras.size();
 }
 
-Workload workload_of(const scene::GaussianCloud& scene, const Request& request, bool corrected,
-                     const Observer& observer, int finished) {
+Workload workload_of(std::size_t gaussians, const Request& request, bool corrected) {
   Workload work;
-  work.gaussians = scene.size();
+  work.gaussians = gaussians;
   work.intervals = resolved_intervals(request);
-  work.finished = finished;
   work.corrections = request.params.annealing_steps;
   work.iterations = request.params.iterations;
   work.corrected = corrected;
   work.vacates = request.mode == Mode::move;
-  work.shown = bool(observer.moment);
-  work.pictured = observer.pictured;
-  work.kept = bool(observer.interval_done);
   return work;
 }
 

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <span>
 
-#include "engine/edit/observer.h"
 #include "engine/edit/plan.h"
 #include "engine/edit/request.h"
 #include "engine/edit/state.h"
@@ -32,11 +31,10 @@ namespace engine::edit {
 /// Pixels of one view as the edit works on it: mean over the cameras.
 [[nodiscard]] std::size_t view_pixels(std::span<const scene::Camera> cameras, int max_image_side);
 
-/// What is known of an edit before anything is looked at.
+/// What a request says of the work, before anything is looked at.
+///   gaussians  of the scene
 ///   corrected  by a corrector
-///   finished   intervals that were finished before, by an edit that goes on
-[[nodiscard]] Workload workload_of(const scene::GaussianCloud& scene, const Request& request, bool corrected,
-                                   const Observer& observer, int finished);
+[[nodiscard]] Workload workload_of(std::size_t gaussians, const Request& request, bool corrected);
 
 /// The same once the dragged part is found, and cameras that may look at it: measured.
 ///   candidates  of which views are chosen, or were

@@ -57,16 +57,20 @@ void append_rows(GaussianCloud& to, const GaussianCloud& from, std::span<const s
   append_blocks(to.extra, from.extra, to.extra_stride, rows);
 }
 
+GaussianCloud gather(const GaussianCloud& cloud, std::span<const std::uint32_t> rows) {
+  GaussianCloud gathered;
+  gathered.sh_degree = cloud.sh_degree;
+  gathered.extra_stride = cloud.extra_stride;
+  append_rows(gathered, cloud, rows);
+  return gathered;
+}
+
 GaussianCloud select(const GaussianCloud& cloud, std::span<const std::uint8_t> keep) {
   assert(keep.size() == cloud.size());
   std::vector<std::uint32_t> rows;
   for (std::size_t i = 0; i < keep.size(); ++i)
     if (keep[i]) rows.push_back(std::uint32_t(i));
-  GaussianCloud kept;
-  kept.sh_degree = cloud.sh_degree;
-  kept.extra_stride = cloud.extra_stride;
-  append_rows(kept, cloud, rows);
-  return kept;
+  return gather(cloud, rows);
 }
 
 void drop_empty_sh_bands(GaussianCloud& cloud) {

@@ -51,6 +51,9 @@ struct GaussianCloud {
 /// Both clouds have the same sh_degree and extra_stride (asserted).
 void append_rows(GaussianCloud& to, const GaussianCloud& from, std::span<const std::uint32_t> rows);
 
+/// A cloud of copies of these rows, in the order given, everything included.
+[[nodiscard]] GaussianCloud gather(const GaussianCloud& cloud, std::span<const std::uint32_t> rows);
+
 /// The rows with keep[i] != 0, in order. keep: [N].
 [[nodiscard]] GaussianCloud select(const GaussianCloud& cloud, std::span<const std::uint8_t> keep);
 

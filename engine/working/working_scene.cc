@@ -58,6 +58,8 @@ WorkingScene::WorkingScene(const scene::GaussianCloud& input, const Frame& frame
 
 std::vector<std::uint32_t> WorkingScene::dragged_rows() const { return rows_where(role_, is_dragged); }
 
+std::vector<std::uint32_t> WorkingScene::rows_that_left() const { return rows_where(role_, has_left); }
+
 std::vector<std::uint32_t> WorkingScene::member_rows() const {
   return rows_where(role_, [](Role role) { return role != Role::frozen; });
 }
@@ -102,14 +104,10 @@ bool WorkingScene::check() const {
 
 scene::GaussianCloud WorkingScene::unedited(const scene::GaussianCloud& input,
                                             std::span<const std::uint32_t> rows) const {
-  scene::GaussianCloud out;
-  out.sh_degree = input.sh_degree;
-  out.extra_stride = input.extra_stride;
   std::vector<std::uint32_t> of_input;
   for (const std::uint32_t row : rows)
     if (row < input_rows_) of_input.push_back(row);
-  scene::append_rows(out, input, of_input);
-  return frame_.edit_from_world(std::move(out));
+  return frame_.edit_from_world(scene::gather(input, of_input));
 }
 
 void copy_row(const scene::GaussianCloud& from, std::size_t a, scene::GaussianCloud& to, std::size_t b) {
@@ -130,9 +128,7 @@ Members members_of(const WorkingScene& working) {
     members.parent.push_back(working.parent_[row]);
     members.mean_at_deform.push_back(working.mean_at_deform_.get(row));
   }
-  members.cloud.sh_degree = working.cloud_.sh_degree;
-  members.cloud.extra_stride = working.cloud_.extra_stride;
-  scene::append_rows(members.cloud, working.cloud_, rows);
+  members.cloud = scene::gather(working.cloud_, rows);
   return members;
 }
 

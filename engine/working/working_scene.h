@@ -61,8 +61,9 @@ class WorkingScene {
   /// Of members of P_h: where they were before the interval's deformation.
   [[nodiscard]] const Array3& mean_at_deform() const { return mean_at_deform_; }
 
-  /// Rows of P_h, of M, of one role; ascending.
+  /// Rows of P_h, that have left their place (has_left()), of M, of one role; ascending.
   [[nodiscard]] std::vector<std::uint32_t> dragged_rows() const;
+  [[nodiscard]] std::vector<std::uint32_t> rows_that_left() const;
   [[nodiscard]] std::vector<std::uint32_t> member_rows() const;
   [[nodiscard]] std::vector<std::uint32_t> rows_of(Role role) const;
 

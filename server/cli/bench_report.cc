@@ -87,7 +87,7 @@ void decode(const ordered_json& from, evaluate::Trial& trial) {
   from.at("corrected_views_agree").at("pixels").get_to(trial.corrected_views.pixels);
   from.at("seconds").get_to(trial.seconds);
   for (const auto& [name, seconds] : from.at("stages").items())
-    if (const auto stage = engine::edit::stage_named(name))
+    if (const auto stage = engine::value_named<engine::edit::Stage>(name))
       trial.stages.push_back({*stage, seconds.template get<double>()});
   from.at("peak_memory_bytes").get_to(trial.peak_memory_bytes);
   from.at("warnings").get_to(trial.warnings);

@@ -30,10 +30,8 @@ std::vector<scene::Camera> some_virtual_cameras(const scene::GaussianCloud& clou
 }  // namespace
 
 std::vector<scene::Camera> cameras_of(const engine::io::Dataset* dataset) {
-  std::vector<scene::Camera> cameras;
-  if (dataset != nullptr)
-    for (const engine::io::View& view : dataset->views) cameras.push_back(view.camera);
-  return cameras;
+  if (dataset == nullptr) return {};
+  return engine::io::cameras_of(*dataset);
 }
 
 Workload workload_of(const scene::LayeredCloud& version, const edit::Request& request,
@@ -51,24 +49,17 @@ Workload workload_of(const scene::LayeredCloud& version, const edit::Request& re
   work.row_bytes = cloud.size() == 0 ? 0 : scene::memory_bytes(cloud) / cloud.size();
   work.layered = version.overlay != nullptr;
   work.copies = preview.overlay.added();
-  work.edit = {.gaussians = version.size(),
-               .dragged = std::accumulate(preview.counts.begin(), preview.counts.end(), std::size_t{0}),
-               .covered = edit::covered_part(copies, rows, cameras),
-               .intervals = preview.intervals,
-               .corrections = params.annealing_steps,
-               .iterations = params.iterations,
-               .corrected = corrected,
-               .vacates = request.mode == edit::Mode::move,
-               .candidates = dataset.empty() ? std::size_t(params.views) : dataset.size(),
-               .virtual_views = dataset.empty(),
-               .views = dataset.empty() ? std::size_t(params.views) : edit::views_at_most(dataset, params),
-               .view_pixels = edit::view_pixels(cameras, params.max_image_side),
-               .shown = true,
-               .pictured = std::size_t(std::max(0, pictured)),
-               .kept = true,
-               .frame = edit::measured_frames(cloud, cameras, params.max_image_side),
-               .slowness = edit::measured_slowness()};
-  work.edit.pictured = std::min(work.edit.pictured, work.edit.views);
+  work.edit = edit::workload_of(version.size(), request, corrected);
+  work.edit.dragged = std::accumulate(preview.counts.begin(), preview.counts.end(), std::size_t{0});
+  work.edit.covered = edit::covered_part(copies, rows, cameras);
+  work.edit.candidates = dataset.empty() ? std::size_t(params.views) : dataset.size();
+  work.edit.virtual_views = dataset.empty();
+  work.edit.views = dataset.empty() ? std::size_t(params.views) : edit::views_at_most(dataset, params);
+  work.edit.view_pixels = edit::view_pixels(cameras, params.max_image_side);
+  work.edit.shown = work.edit.kept = true;
+  work.edit.pictured = std::min(std::size_t(std::max(0, pictured)), work.edit.views);
+  work.edit.frame = edit::measured_frames(cloud, cameras, params.max_image_side);
+  work.edit.slowness = edit::measured_slowness();
   return work;
 }
 

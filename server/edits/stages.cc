@@ -2,12 +2,9 @@
 
 namespace server::edits {
 
-std::string_view name_of(JobStage stage) { return stage == JobStage::load ? "load" : "publish"; }
-
 std::vector<std::string_view> stage_names() {
   std::vector<std::string_view> names{name_of(JobStage::load)};
-  for (std::size_t k = 0; k < engine::edit::stage_count; ++k)
-    names.push_back(engine::edit::name_of(engine::edit::Stage(k)));
+  for (const auto& stage : engine::names<engine::edit::Stage>) names.push_back(stage.text);
   names.push_back(name_of(JobStage::publish));
   return names;
 }

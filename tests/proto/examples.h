@@ -1,7 +1,6 @@
 // The example payloads of proto/, which are also the tests' fixtures.
 #pragma once
 
-#include <filesystem>
 #include <string>
 
 #include "tests/support/data.h"
@@ -9,7 +8,7 @@
 namespace proto {
 
 inline std::string example(const std::string& name) {
-  return support::read_file(std::filesystem::path(SPLATDRAG_SOURCE_DIR) / "proto/examples" / name);
+  return support::read_file(support::source_dir() / "proto/examples" / name);
 }
 
 }  // namespace proto

@@ -1,0 +1,24 @@
+#include "engine/edit/state.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/edit/handles.h"
+
+namespace engine::edit {
+
+bool is_of(const Request& request, const State& state) {
+  const std::size_t handles = request.handles.size();
+  const int intervals = resolved_intervals(request);
+  bool fits = state.interval >= 1 && state.interval <= intervals && state.report.resolved.intervals == intervals &&
+              state.positions.size() == handles && state.report.handles.size() == handles &&
+              state.masks.size() == state.views.size();
+  for (std::size_t v = 0; fits && v < state.views.size(); ++v)
+    fits = scene::validate(state.views[v]).has_value() && state.masks[v].width == state.views[v].width &&
+           state.masks[v].height == state.views[v].height;
+  return fits && std::ranges::all_of(state.positions, [](const DVec3& p) {
+           return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
+         });
+}
+
+}  // namespace engine::edit
