@@ -50,6 +50,7 @@ using std::filesystem::path;
 
 constexpr int pictured_views = 4;  // the service's default
 constexpr auto look_every = std::chrono::milliseconds(20);
+constexpr double resolution = 0.2;  // of the time left: it is told ten times a second at most, and to a tenth
 constexpr std::array<double, 3> moments{0.1, 0.25, 0.5};  // of an edit's time, at which the time left is judged
 
 template <class T>
@@ -184,7 +185,7 @@ std::vector<Sample> fox_samples(Service& service) {
 struct Run {
   double estimated = 0, seconds = 0;
   std::array<double, moments.size()> left{};  ///< Time left as told, over the true one; 0: nothing was told.
-  double worst_left = 1;                      ///< Of all between a tenth and nine tenths of the time, the farthest off.
+  double worst_left = 1;  ///< Between a tenth and nine tenths, the farthest off beyond `resolution`.
   std::map<std::string, std::pair<double, double>> stages;  ///< Planned, taken.
 };
 
@@ -197,15 +198,17 @@ struct Told {
 };
 
 void judge(const std::vector<Told>& told, Run& run) {
-  const auto ratio_at = [&](double time) {
+  const auto ratio_at = [&](double time, double tolerance) {
     const Told* last = nullptr;
     for (const Told& each : told)
       if (each.at <= time) last = &each;
-    return last != nullptr && last->left ? *last->left / (run.seconds - time) : 0.0;
+    if (last == nullptr || !last->left) return 0.0;
+    const double left = run.seconds - time;
+    return std::clamp(left, *last->left - tolerance, *last->left + tolerance) / left;
   };
-  for (std::size_t k = 0; k < moments.size(); ++k) run.left[k] = ratio_at(moments[k] * run.seconds);
+  for (std::size_t k = 0; k < moments.size(); ++k) run.left[k] = ratio_at(moments[k] * run.seconds, 0);
   for (double part = 0.1; part <= 0.9; part += 0.01)
-    if (const double ratio = ratio_at(part * run.seconds); ratio > 0 && off(ratio) > off(run.worst_left))
+    if (const double ratio = ratio_at(part * run.seconds, resolution); ratio > 0 && off(ratio) > off(run.worst_left))
       run.worst_left = ratio;
 }
 
@@ -311,7 +314,7 @@ std::string page_of(const std::string& rows, int runs) {
          "`fitted`\nthe constants of the plan (`engine/edit/plan.cc`) were measured; the others are a test of them.\n\n"
          "The right half is about the time left that a running edit tells (`eta_seconds`), over the true one: when a "
          "tenth, a\nquarter and half of the time have passed, and where it is farthest off between a tenth and nine "
-         "tenths.\n\n"
+         "tenths, beyond the 0.2 s\nthat its rounding and its rate (ten times a second) account for.\n\n"
          "| edit | | estimated, s | took, s | ratio | left at 10 % | at 25 % | at 50 % | farthest off |\n"
          "| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n" +
          rows;

@@ -16,12 +16,12 @@ constexpr float held_by_trust = 1.0f;
 
 /// The rows of M, as the trainer takes them.
 train::TrainedRows changeable_rows(const working::WorkingScene& working, std::span<const std::uint32_t> members,
-                                   const repair::Corrected& corrected) {
+                                   std::span<const float> trust) {
   train::TrainedRows changeable;
   changeable.cloud = scene::gather(working.cloud(), members);
   for (const std::uint32_t row : members) {
     changeable.name.push_back(working.parent()[row]);
-    if (!corrected.trust.empty()) changeable.mobility.push_back(1 - held_by_trust * corrected.trust[row]);
+    if (!trust.empty()) changeable.mobility.push_back(1 - held_by_trust * trust[row]);
   }
   return changeable;
 }
@@ -45,19 +45,18 @@ void take_over(const train::Trainer& trainer, std::span<const std::uint32_t> mem
 }  // namespace
 
 Result<double> optimise(working::WorkingScene& working, const scene::GaussianCloud& input,
-                        std::span<const scene::Camera> views, std::span<const scene::Mask> masks,
-                        const repair::Corrected& corrected, const Params& params, const repair::Round& round,
-                        optim::PerceptualLoss& perceptual,
+                        std::span<const scene::Camera> views, std::span<const scene::Mask> masks, const Goal& goal,
+                        const Params& params, const repair::Round& round, optim::PerceptualLoss& perceptual,
                         const std::function<Result<void>(const OptimiseProgress&)>& advance) {
   const std::vector<std::uint32_t> members = working.member_rows();
   const scene::GaussianCloud originals = working.unedited(input, members);
-  train::Trainer trainer({&working.cloud(), members}, changeable_rows(working, members, corrected),
+  train::Trainer trainer({&working.cloud(), members}, changeable_rows(working, members, goal.trust),
                          scene::capture_extent(views), {}, perceptual);
   for (std::size_t v = 0; v < views.size(); ++v) {
-    const bool added = trainer.add_view(working.frame().edit_from_world(views[v]), masks[v], originals);
-    if (added && !corrected.pictures.empty()) {
+    if (trainer.add_view(working.frame().edit_from_world(views[v]), masks[v], originals)) {
       const std::size_t last = trainer.views() - 1;
-      trainer.set_edited(last, scene::cut_out(corrected.pictures[v], trainer.view(last).frozen.region()));
+      if (const auto picture = goal.picture(v))
+        trainer.set_edited(last, scene::cut_out(*picture, trainer.view(last).frozen.region()));
     }
     if (auto going = advance({.set_up = double(v + 1) / double(views.size())}); !going) return propagate(going);
   }

@@ -31,11 +31,18 @@ struct OptimiseProgress {
   std::optional<double> loss = {};  ///< Of the last iteration.
 };
 
+/// What the views should show.
+struct Goal {
+  /// I_e of view v, in its size, rounded to 8 bits when it is taken; without a value, what the view shows now.
+  std::function<std::optional<scene::Image>(std::size_t v)> picture;
+  std::span<const float> trust;  ///< As in repair::Corrected; empty: no row is held.
+};
+
 /// The optimisation after a correction: params.iterations iterations.
 /// I_o is the render of the input. Only rows of M change. Children are appended: they inherit handle, parent and
 /// mean_at_deform; those of members of P_h are copies, those of seeds seeds, others a trail.
 ///   masks      per view, dilated; views without a set pixel are left out. If none is left, nothing happens.
-///   corrected  without pictures: I_e is what a view shows now. Rounded to 8 bits.
+///   goal       asked once for each view that is not left out, as it is set up
 ///   round      names the random choices
 ///   advance    called after every view that is set up and every iteration; its error ends the optimisation
 ///   returns    the mean loss over the views of the last epoch; 0 if no view is left
@@ -43,8 +50,8 @@ struct OptimiseProgress {
 /// On an error the working scene is as it was.
 [[nodiscard]] Result<double> optimise(working::WorkingScene& working, const scene::GaussianCloud& input,
                                       std::span<const scene::Camera> views, std::span<const scene::Mask> masks,
-                                      const repair::Corrected& corrected, const Params& params,
-                                      const repair::Round& round, optim::PerceptualLoss& perceptual,
+                                      const Goal& goal, const Params& params, const repair::Round& round,
+                                      optim::PerceptualLoss& perceptual,
                                       const std::function<Result<void>(const OptimiseProgress&)>& advance);
 
 }  // namespace engine::edit

@@ -10,9 +10,9 @@ namespace {
 
 // What follows was measured on edits of the demo scene (150 k Gaussians; a ball of 4,245 and a leaf of 1,279, and the
 // ball with three times its radius; with its cameras and without; presets preview, draft and standard; move and extend)
-// on two cores of an Intel Xeon with AVX-512, as the smallest of several runs of each stage. bench/estimate has
-// those edits, and others that had no part in it. Seconds are those of that machine: Workload::slowness says how this
-// one compares. Frames are measured where the edit runs.
+// on two cores of an Intel Xeon with AVX-512. docs/estimates.md has those edits, and others that had no part in it.
+// Seconds are those of that machine: Workload::slowness says how this one compares. Frames are measured where the edit
+// runs.
 
 // A frame of a million Gaussians there, for plans without a measured one.
 constexpr double frame_of_a_million_seconds = 25e-3, frame_pixel_seconds = 8e-9;
@@ -20,19 +20,19 @@ constexpr double frame_of_a_million_seconds = 25e-3, frame_pixel_seconds = 8e-9;
 // A footprint renders the box around the part alone: what it takes of a frame's time for the Gaussians grows with the
 // side of the box, which is the root of the part of the picture it covers; pixels are those of the box.
 constexpr double footprint_part = 0.05, footprint_side_part = 1.1;
-constexpr double unite_pixel_seconds = 1e-9;             // to make a mask of it and unite it with others
-constexpr double dilate_pixel_seconds = 4e-9;            // the box filter of a dilation
-constexpr double row_seconds = 2e-8;                     // to copy one Gaussian, or look at it
-constexpr double dome_row_seconds = 4e-7;                // rays of virtual cameras through a scene
-constexpr double drag_row_seconds = 2e-7;                // to deform, paste or relocate one dragged Gaussian
-constexpr double observe_frames = 1.1;                   // largest weights, or depth beside colour
-constexpr double look_frames = 1.3;                      // depth and trust beside colour
-constexpr double index_row_seconds = 1e-6;               // a search tree of the scene, for seeds
-constexpr double fill_seconds = 4e-5, fill_power = 0.7;  // of the pixels of the box: large holes have coarse scales
+constexpr double unite_pixel_seconds = 1e-9;               // to make a mask of it and unite it with others
+constexpr double dilate_pixel_seconds = 4e-9;              // the box filter of a dilation
+constexpr double row_seconds = 2e-8;                       // to copy one Gaussian, or look at it
+constexpr double dome_row_seconds = 4e-7;                  // rays of virtual cameras through a scene
+constexpr double drag_row_seconds = 2e-7;                  // to deform, paste or relocate one dragged Gaussian
+constexpr double observe_frames = 1.1;                     // largest weights, or depth beside colour
+constexpr double look_frames = 1.3;                        // depth and trust beside colour
+constexpr double index_row_seconds = 4e-7;                 // a search tree of the scene, for seeds
+constexpr double fill_seconds = 3.2e-4, fill_power = 0.5;  // of the pixels of the box: large holes have coarse scales
 constexpr double set_up_frames = 1.3,
                  set_up_row_seconds = 1e-6;  // a view projected, and what is dragged laid over it, twice
-constexpr double iteration_seconds = 5e-4, iteration_row_seconds = 3.1e-7,
-                 iteration_pixel_seconds = 1.05e-7;  // of the box
+constexpr double iteration_seconds = 6.2e-4, iteration_row_seconds = 3.9e-7,
+                 iteration_pixel_seconds = 1.3e-7;  // of the box
 constexpr double jpeg_pixel_seconds = 1.5e-8;
 constexpr double write_seconds = 2e-3;               // until a picture or a checkpoint is on disk
 constexpr double checkpoint_pixel_seconds = 1.1e-9;  // masks, packed
@@ -116,13 +116,14 @@ class Maker {
   void add_correction(int u, int a) {
     const bool first = u == work_.finished + 1 && a == 1;
     if (first)
-      add(Stage::observe, u, observe_frames * (double(work_.candidates) + views_) * frame() + slow(row_seconds * n_));
+      add(Stage::observe, u,
+          observe_frames * (double(work_.candidates) + views_) * frame() +
+              slow((row_seconds + (work_.vacates ? index_row_seconds : 0)) * n_));
     // In a move each view is looked at without the part as well, and filled: two footprints say where.
     const double filled =
         work_.vacates ? look_frames * frame() + 2 * footprint(pixels_) + slow(fill_seconds * std::pow(box_, fill_power))
                       : 0;
-    const double index = first && work_.vacates ? slow(index_row_seconds * n_) : 0;
-    add(Stage::correct, u, index + views_ * (look_frames * frame() + filled));
+    add(Stage::correct, u, views_ * (look_frames * frame() + filled));
     if (a == work_.corrections) add_pictures(u, Shows::given);
   }
 

@@ -1,6 +1,7 @@
 #include "engine/edit/steps.h"
 
 #include <algorithm>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -37,21 +38,25 @@ repair::Repair make_repair(const State& state, const Edit& edit) {
 
 /// Without a corrector I_e is what the deformation shows. In a move that is the scene without what has left: a
 /// picture with the originals in it, however faint, would ask for them, and where there are many they came back.
-Result<repair::Corrected> uncorrected(const State& state, Edit& edit) {
-  repair::Corrected out;
-  const Rows gone = state.scene.rows_that_left();
-  if (edit.request.mode != Mode::move || gone.empty()) return out;
-  render::Layers layers(state.scene.cloud());
-  layers.hidden = gone;
-  render::Workspace workspace;
-  for (const scene::Camera& view : state.views) {
-    render::Rendering rendering;
-    render::forward(layers, state.scene.frame().edit_from_world(view), {}, {}, workspace, rendering);
-    out.pictures.push_back(std::move(rendering.color));
-    if (auto going = edit.progress.advance(0); !going) return propagate(going);
+class Uncorrected {
+ public:
+  Uncorrected(const State& state, Mode mode) : state_(state), layers_(state.scene.cloud()) {
+    if (mode == Mode::move) gone_ = state.scene.rows_that_left();
+    layers_.hidden = gone_;
   }
-  return out;
-}
+  [[nodiscard]] std::optional<scene::Image> picture(std::size_t v) {
+    if (gone_.empty()) return std::nullopt;
+    render::Rendering rendering;
+    render::forward(layers_, state_.scene.frame().edit_from_world(state_.views[v]), {}, {}, workspace_, rendering);
+    return std::move(rendering.color);
+  }
+
+ private:
+  const State& state_;
+  Rows gone_;
+  render::Layers layers_;  ///< Points at gone_.
+  render::Workspace workspace_;
+};
 
 }  // namespace
 
@@ -142,19 +147,18 @@ Result<repair::Corrected> correct(State& state, Edit& edit, std::span<const scen
 Result<double> optimise(State& state, Edit& edit, std::span<const scene::Mask> masks, repair::Corrected corrected,
                         const repair::Round& round) {
   if (auto going = edit.progress.enter(Stage::set_up, round.interval); !going) return propagate(going);
-  if (edit.corrector == nullptr) {
-    auto pictures = uncorrected(state, edit);
-    if (!pictures) return propagate(pictures);
-    corrected = std::move(*pictures);
-  }
+  Uncorrected uncorrected(state, edit.request.mode);
+  const auto picture = [&](std::size_t v) {
+    return edit.corrector == nullptr ? uncorrected.picture(v) : std::optional(std::move(corrected.pictures[v]));
+  };
   const int before = (round.correction - 1) * edit.params().iterations;
   const auto advance = [&](const OptimiseProgress& at) {
     if (at.set_up < 1) return edit.progress.advance(at.set_up);
     if (at.iteration == 0) return edit.progress.enter(Stage::optimise, round.interval);
     return edit.progress.advance(double(at.iteration) / at.iterations, before + at.iteration, at.loss);
   };
-  return edit::optimise(state.scene, edit.input, state.views, masks, corrected, edit.params(), round, edit.perceptual,
-                        advance);
+  return edit::optimise(state.scene, edit.input, state.views, masks, {picture, corrected.trust}, edit.params(), round,
+                        edit.perceptual, advance);
 }
 
 Result<void> relocate_handles(State& state, Edit& edit, int u) {

@@ -50,6 +50,14 @@ class OpaqueTrail {
   std::vector<float> lowered_;  ///< Opacities as they were; seeds appended since have none.
 };
 
+/// A search tree of all means.
+neighbours::PointIndex index_of(const scene::GaussianCloud& cloud) {
+  std::vector<float> points;
+  for (std::size_t i = 0; i < cloud.size(); ++i)
+    for (int axis = 0; axis < 3; ++axis) points.push_back(cloud.mean.get(i)[axis]);
+  return {points, 3};
+}
+
 }  // namespace
 
 /// What random choices are made for, in each view of each correction.
@@ -75,6 +83,7 @@ Repair::Repair(scene::GaussianCloud original, std::span<const scene::Camera> obs
   for (std::size_t v = 0; v < views_.size(); ++v)
     buffer_.push_back({std::move(unedited_.color[v]), scene::Mask(views_[v].width, views_[v].height), {}});
   unedited_.color.clear();
+  if (mode == Mode::move) originals_.emplace(index_of(original_));
 }
 
 Repair::ViewNow Repair::look(const WorkingScene& working, std::span<const std::uint32_t> hidden, std::size_t v) {
@@ -135,7 +144,7 @@ Result<Repair::Background> Repair::complete_background(WorkingScene& working, co
   auto picture = ask_corrector(std::move(now.color), vacated_[v], std::move(now.trust), v, round, Purpose::background);
   if (!picture) return propagate(picture);
   background.picture = std::move(*picture);
-  if (goes_on) background.seeds = add_seeds(working, view, surface, background.picture, inputs());
+  if (goes_on) background.seeds = add_seeds(working, view, surface, background.picture, *originals_);
   trust_.resize(working.size(), 1.0f);  // what has been decided stays
   return background;
 }
@@ -211,16 +220,6 @@ void Repair::note_vacated(const Rows& rows, std::span<const scene::Mask> masks) 
     buffer_[v].excluded = mask::mask2d(share, trace);
     buffer_[v].box = scene::bounding_box(masks[v]);
   }
-}
-
-const neighbours::PointIndex& Repair::inputs() {
-  if (!inputs_) {
-    std::vector<float> points;
-    for (std::size_t i = 0; i < original_.size(); ++i)
-      for (int axis = 0; axis < 3; ++axis) points.push_back(original_.mean.get(i)[axis]);
-    inputs_.emplace(points, 3);
-  }
-  return *inputs_;
 }
 
 }  // namespace engine::repair

@@ -93,7 +93,6 @@ class Repair {
   /// Lays what goes on behind the dragged part into the working scene as seeds.
   [[nodiscard]] Result<Background> complete_background(WorkingScene& working, const Rows& rows, std::size_t v,
                                                        const Round& round);
-  [[nodiscard]] const neighbours::PointIndex& inputs();
 
   scene::GaussianCloud original_;
   std::vector<scene::Camera> views_;
@@ -105,8 +104,8 @@ class Repair {
   std::vector<correct::Example> buffer_;
   std::vector<scene::Mask> vacated_;  ///< Per view: what the part has left.
   render::Workspace workspace_;
-  std::vector<float> trust_;  ///< Of the rows of the working scene, in the correction at hand.
-  std::optional<neighbours::PointIndex> inputs_;
+  std::vector<float> trust_;                         ///< Of the rows of the working scene, in the correction at hand.
+  std::optional<neighbours::PointIndex> originals_;  ///< Their means, in a move: seeds take after the nearest one.
 };
 
 }  // namespace engine::repair

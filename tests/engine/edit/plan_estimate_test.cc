@@ -1,5 +1,5 @@
 // What a plan expects an edit to take: how it depends on the work. How good it is, only a benchmark can say
-// (bench/estimate).
+// (docs/estimates.md).
 #include <gtest/gtest.h>
 
 #include <algorithm>
