@@ -84,7 +84,7 @@ class Service {
 
   /// A scene, and the same one without its cameras: both ids.
   std::pair<std::string, std::string> add(const std::string& name, engine::scene::GaussianCloud cloud,
-                                          std::vector<engine::scene::Camera> cameras) {
+                                          const std::vector<engine::scene::Camera>& cameras) {
     const path there = folder_ / "root" / name;
     std::filesystem::create_directories(there / "sparse" / "0");
     succeed(server::cli::write_colmap_text(there / "sparse" / "0", cameras, cloud));
@@ -139,12 +139,12 @@ proto::Handle handle(proto::Point from, std::optional<proto::Point> to, double r
 std::vector<Sample> demo_samples(Service& service) {
   auto demo = engine::procedural::make_demo_scene();
   const EditRequest ball = server::cli::to_request(demo.drags[0]), leaf = server::cli::to_request(demo.drags[1]);
-  const auto [id, bare] = service.add("demo", std::move(demo.cloud), std::move(demo.cameras));
+  const auto [id, bare] = service.add("demo", std::move(demo.cloud), demo.cameras);
   EditRequest drawn = ball, large = ball;
   drawn.mode = proto::Mode::extend;
   for (proto::Handle& each : large.handles) each.radius *= 3;
   auto big = engine::procedural::make_demo_scene({.gaussians = 500'000});
-  const auto [big_id, big_bare] = service.add("large", std::move(big.cloud), std::move(big.cameras));
+  const auto [big_id, big_bare] = service.add("large", std::move(big.cloud), big.cameras);
   return {
       {"preview, ball", true, with(ball, id, Preset::preview)},
       {"preview, leaf, no dataset", true, with(leaf, bare, Preset::preview)},
@@ -170,7 +170,7 @@ std::vector<Sample> demo_samples(Service& service) {
 std::vector<Sample> fox_samples(Service& service) {
   auto fox = bench::fox("0097.jpg");
   if (!fox) return {};
-  const auto [id, bare] = service.add("fox", std::move(fox->cloud), std::move(fox->cameras));
+  const auto [id, bare] = service.add("fox", std::move(fox->cloud), fox->cameras);
   EditRequest ear;
   ear.handles = {handle({2.50, -1.46, 1.60}, proto::Point{2.56, -1.96, 1.62}, 0.3),
                  handle({2.36, -1.28, 1.68}, proto::Point{2.39, -1.53, 1.69}, 0.3),

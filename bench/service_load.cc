@@ -267,7 +267,7 @@ std::vector<double> watch_memory(const Options& options, Clock::time_point end) 
 
 /// Of sorted values; 0 of none.
 float quantile(const std::vector<float>& sorted, double q) {
-  return sorted.empty() ? 0 : sorted[std::size_t(q * double(sorted.size() - 1) + 0.5)];
+  return sorted.empty() ? 0 : sorted[std::size_t(std::lround(q * double(sorted.size() - 1)))];
 }
 
 std::string row(const std::vector<std::string>& cells, bool markdown) {

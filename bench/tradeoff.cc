@@ -7,6 +7,7 @@
 // Results are kept in the last folder: what is there is not measured again, so that it may be interrupted. Half an hour
 // on two cores, which it wants to itself.
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -132,10 +133,10 @@ std::string row(const SettingResult& point) {
   return out.str();
 }
 
-constexpr const char* trip_head =
+const std::string trip_head =
     " | arrived, % | inside, dB | SSIM | outside, dB | s there |\n| --- | ---: | ---: | ---: | ---: | ---: |\n";
 
-constexpr const char* head =
+const std::string head =
     "| setting | edited, dB | SSIM | vacated, dB | outside, dB | s |\n| --- | ---: | ---: | ---: | ---: | ---: |\n";
 
 bench::Series series(const std::string& name, const std::vector<SettingResult>& points) {
@@ -155,73 +156,59 @@ std::vector<SettingResult> front(std::vector<SettingResult> points) {
   return best;
 }
 
-void write_docs(const Bench& bench, const path& folder) {
-  std::ostringstream page;
-  page << "# What speed costs in quality\n\n"
-          "Made by `build/release/bench/tradeoff build/release/splatdrag docs out/tradeoff`. Edits whose right result "
-          "is\n"
-          "known, judged at cameras that they have not seen: PSNR and SSIM of the edited region, PSNR of what was "
-          "vacated\n"
-          "where that has a texture, and outside; seconds of an edit; means over the cases.\n\n"
-          "![](tradeoff.svg)\n\n## Presets, all cases\n\n"
-       << head;
-  std::vector<bench::Chart> charts;
+/// Presets and correctors over all cases, and each case. Adds a chart of the presets.
+std::string presets_section(const Bench& bench, std::vector<bench::Chart>& charts) {
+  std::string page = "## Presets, all cases\n\n" + head;
   std::vector<SettingResult> presets;
   for (const std::string preset : {"preview", "draft", "standard"})
     for (const std::string corrector : {"none", "harmonic", "scene"}) {
       if (preset == "preview" && corrector != "none") continue;
       presets.push_back(bench.measure(preset + ", " + corrector, "--preset " + preset + " --corrector " + corrector));
-      page << row(presets.back());
+      page += row(presets.back());
     }
-  page << "\n## Each case at standard\n\n" << bench.cases();
-  page << "\n## The two small cases\n\n" << head;
+  page += "\n## Each case at standard\n\n" + bench.cases() + "\n## The two small cases\n\n" + head;
   for (const std::string preset : {"draft", "standard", "paper"})
-    page << row(bench.measure(preset + ", scene", "--small --preset " + preset + " --corrector scene"));
+    page += row(bench.measure(preset + ", scene", "--small --preset " + preset + " --corrector scene"));
+  charts.push_back({"Presets, all cases",
+                    "seconds",
+                    "edited region, dB",
+                    {series("presets", front(presets))},
+                    bench::Scale::logarithmic,
+                    bench::Scale::linear});
+  return page;
+}
 
-  page << "\n## Each knob alone\n\nThe small cases, preset `draft`, corrector `scene` but where it says otherwise.\n";
+/// One knob turned, all else as in `draft`.
+std::vector<SettingResult> turn(const Bench& bench, const Knob& knob) {
+  std::vector<SettingResult> points;
+  const std::string draft = "--small --preset draft";
+  for (const std::string& value : knob.values) {
+    const std::string corrector = knob.flag == "--corrector" ? " " : " --corrector scene ";
+    points.push_back(bench.measure(knob.name + " " + value, draft + corrector + knob.flag + " " + value));
+  }
+  if (knob.name == "corrector")
+    points.push_back(bench.measure("whole picture for a mask", draft + " --corrector scene --whole-picture"));
+  return points;
+}
+
+/// Each knob, and the settings that no other one beats. Adds a chart of each.
+std::string knobs_section(const Bench& bench, std::vector<bench::Chart>& charts) {
+  std::string page =
+      "\n## Each knob alone\n\nThe small cases, preset `draft`, corrector `scene` but where it says otherwise.\n";
   std::vector<SettingResult> all;
   bench::Chart by_knob{"Each knob alone",         "seconds",           "edited region, dB", {},
                        bench::Scale::logarithmic, bench::Scale::linear};
   for (const Knob& knob : knobs()) {
-    page << "\n### " << knob.name << "\n\n" << head;
-    std::vector<SettingResult> points;
-    for (const std::string& value : knob.values) {
-      const std::string corrector = knob.flag == "--corrector" ? "" : " --corrector scene";
-      points.push_back(
-          bench.measure(knob.name + " " + value, "--small --preset draft" + corrector + " " + knob.flag + " " + value));
-      page << row(points.back());
-    }
-    if (knob.name == "corrector") {
-      points.push_back(
-          bench.measure("whole picture for a mask", "--small --preset draft --corrector scene --whole-picture"));
-      page << row(points.back());
-    } else if (knob.name != "interpolation") {  // which has no scale
-      by_knob.series.push_back(series(knob.name, points));
-    }
+    const std::vector<SettingResult> points = turn(bench, knob);
+    page += "\n### " + knob.name + "\n\n" + head;
+    for (const SettingResult& point : points) page += row(point);
+    const bool has_scale = knob.name != "corrector" && knob.name != "interpolation";
+    if (has_scale) by_knob.series.push_back(series(knob.name, points));
     all.insert(all.end(), points.begin(), points.end());
   }
-  page << "\n## Intervals of a drag that turns\n\nThe case `arm`, preset `draft`, corrector `scene`: both "
-          "interpolations.\n\n"
-       << head;
-  for (const std::string interpolation : {"paper", "rigid"})
-    for (const std::string intervals : {"1", "2", "5", "10", "20"})
-      page << row(
-          bench.measure(intervals + ", " + interpolation, "--case arm --preset draft --corrector scene --intervals " +
-                                                              intervals + " --interpolation " + interpolation));
-  page << "\n## Intervals on a capture\n\nThe fox's ear, preset `draft`, corrector `scene`: there and back, judged at "
-          "cameras between those of the\ncapture; `arrived` is the part of the drag that the half-way scene shows.\n\n"
-          "| intervals"
-       << trip_head;
-  for (const std::string intervals : {"1", "2", "5", "10", "20"})
-    page << bench.trip(intervals, "--preset draft --corrector scene --intervals " + intervals);
-  page << "\n### What each preset does there\n\n"
-          "| preset"
-       << trip_head;
-  for (const std::string preset : {"preview", "draft", "standard"})
-    page << bench.trip(preset, "--preset " + preset + " --corrector scene");
   const std::vector<SettingResult> best = front(all);
-  page << "\n## The front\n\nSettings above that no other one beats in both time and quality.\n\n" << head;
-  for (const SettingResult& point : best) page << row(point);
+  page += "\n## The front\n\nSettings above that no other one beats in both time and quality.\n\n" + head;
+  for (const SettingResult& point : best) page += row(point);
   charts.push_back(by_knob);
   charts.push_back({"The front",
                     "seconds",
@@ -229,13 +216,46 @@ void write_docs(const Bench& bench, const path& folder) {
                     {series("best of all knobs", best)},
                     bench::Scale::logarithmic,
                     bench::Scale::linear});
-  charts.push_back({"Presets, all cases",
-                    "seconds",
-                    "edited region, dB",
-                    {series("presets", front(presets))},
-                    bench::Scale::logarithmic,
-                    bench::Scale::linear});
-  std::ofstream(folder / "tradeoff.md") << page.str();
+  return page;
+}
+
+/// Intervals where a drag turns, and where it is long, on a capture.
+std::string intervals_section(const Bench& bench) {
+  const std::array<std::string, 5> numbers{"1", "2", "5", "10", "20"};
+  std::string page =
+      "\n## Intervals of a drag that turns\n\nThe case `arm`, preset `draft`, corrector `scene`: both "
+      "interpolations.\n\n" +
+      head;
+  for (const std::string interpolation : {"paper", "rigid"})
+    for (const std::string& intervals : numbers)
+      page += row(
+          bench.measure(intervals + ", " + interpolation, "--case arm --preset draft --corrector scene --intervals " +
+                                                              intervals + " --interpolation " + interpolation));
+  page +=
+      "\n## Intervals on a capture\n\nThe fox's ear, preset `draft`, corrector `scene`: there and back, judged at "
+      "cameras between those of the\ncapture; `arrived` is the part of the drag that the half-way scene shows.\n\n"
+      "| intervals" +
+      trip_head;
+  for (const std::string& intervals : numbers)
+    page += bench.trip(intervals, "--preset draft --corrector scene --intervals " + intervals);
+  page += "\n### What each preset does there\n\n| preset" + trip_head;
+  for (const std::string preset : {"preview", "draft", "standard"})
+    page += bench.trip(preset, "--preset " + preset + " --corrector scene");
+  return page;
+}
+
+void write_docs(const Bench& bench, const path& folder) {
+  std::vector<bench::Chart> charts;
+  std::string page =
+      "# What speed costs in quality\n\n"
+      "Made by `build/release/bench/tradeoff build/release/splatdrag docs out/tradeoff`. Edits whose right result is\n"
+      "known, judged at cameras that they have not seen: PSNR and SSIM of the edited region, PSNR of what was vacated\n"
+      "where that has a texture, and outside; seconds of an edit; means over the cases.\n\n"
+      "![](tradeoff.svg)\n\n";
+  page += presets_section(bench, charts);
+  page += knobs_section(bench, charts);
+  page += intervals_section(bench);
+  std::ofstream(folder / "tradeoff.md") << page;
   std::ofstream(folder / "tradeoff.svg") << bench::to_svg(charts);
 }
 

@@ -5,7 +5,7 @@
 #
 #   lint.sh             every tracked source; of the tests only the layout, for they would double the time
 #   lint.sh FILE ...    these files only
-#   lint.sh --layout    clang-format alone, over every tracked source: what continuous integration asks for today
+#   lint.sh --layout    clang-format alone, over every tracked source: seconds in place of ten minutes
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -48,8 +48,8 @@ export -f check_unit
 export work
 if ((${#units[@]} > 0)); then
   printf '%s\0' "${units[@]}" | xargs -0 -n 1 -P "$(nproc)" bash -c 'check_unit "$1"' check_unit
-  # A header's findings come with every file that includes it.
-  cat "$work/reports/"* | grep -E '^/.*: (warning|error): ' | sed -e "s|^$PWD/||" -e 's/,-warnings-as-errors\]$/]/' |
+  # A header's findings come with every file that includes it; those of other projects' headers are not ours.
+  cat "$work/reports/"* | grep -E "^$PWD/.*: (warning|error): " | sed -e "s|^$PWD/||" -e 's/,-warnings-as-errors\]$/]/' |
     sort -u -t : -k 1,1 -k 2,2n -k 3,3n -k 4 >"$work/tidy" || true
 fi
 touch "$work/tidy"

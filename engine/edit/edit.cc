@@ -40,7 +40,7 @@ Result<void> carry_out_interval(State& state, Edit& edit, int u) {
   const auto motion = deform(state, edit, u);
   if (!motion) return propagate(motion);
   const Rows& before = edit.params().optimise_unmoved ? motion->rows : motion->moving;
-  if (edit.optimises() || before != edit.covered)
+  if (edit.optimises() || before != edit.masked_rows)
     if (auto masked = mask(state, edit, u, before); !masked) return masked;
   const auto copies = paste(state, edit, u, *motion);
   if (!copies) return propagate(copies);
@@ -79,7 +79,7 @@ Result<State> begin(Edit& edit, std::span<const scene::Camera> cameras, std::opt
     edit.progress.go_on_after(from->interval);
     if (auto going = edit.progress.enter(Stage::assign, from->interval); !going) return propagate(going);
     if (edit.corrector != nullptr) edit.candidates = candidate_cameras(edit.input, cameras, edit.request);
-    set_out(*from, edit);
+    plan_ahead(*from, edit);
     if (edit.observer.assigned) edit.observer.assigned(from->report);
     return std::move(*from);
   }

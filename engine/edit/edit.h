@@ -22,7 +22,7 @@ namespace engine::edit {
 
 /// What an edit works with; they outlive it.
 struct Tools {
-  correct::Corrector* corrector = nullptr;      ///< Null: `none`, the optimisation keeps what the deformation shows.
+  correct::Corrector* corrector = nullptr;      ///< Null: `none`, a view should show what its deformation left.
   optim::PerceptualLoss* perceptual = nullptr;  ///< The loss inside masks; null: optim::MsSsimLoss.
 };
 

@@ -36,8 +36,8 @@ struct Progress {
 struct Moment {
   int interval = 0;
   int intervals = 0;
-  std::string
-      stage;  ///< "before": as the interval found it; "deformed"; "corrected" and "optimised" where they happen.
+  /// "before": as the interval found it; "deformed"; "corrected" and "optimised" where they happen.
+  std::string name;
   const scene::Overlay& overlay;                ///< Over the input: the scene as it would be published.
   std::span<const scene::Camera> views;         ///< Of the edit, best first.
   std::span<const scene::Image> pictures = {};  ///< "corrected": I_e of each view; else empty: the overlay's are meant.

@@ -13,7 +13,6 @@ namespace engine::edit {
 namespace {
 
 using working::Mode;
-using working::Role;
 
 /// Opacity from which on an original, or a child of one, was asked for by the pictures, and not lifted by noise: Adam
 /// takes no notice of how small a gradient is. What is asked for heads for the opacity it had; noise made of 0.01 at

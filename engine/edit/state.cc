@@ -9,8 +9,9 @@ namespace engine::edit {
 
 bool is_of(const Request& request, const State& state) {
   const std::size_t handles = request.handles.size();
-  const int intervals = resolved_intervals(request);
-  bool fits = state.interval >= 1 && state.interval <= intervals && state.report.resolved.intervals == intervals &&
+  Params resolved = request.params;
+  resolved.intervals = resolved_intervals(request);
+  bool fits = state.interval >= 1 && state.interval <= resolved.intervals && state.report.resolved == resolved &&
               state.positions.size() == handles && state.report.handles.size() == handles &&
               state.masks.size() == state.views.size();
   for (std::size_t v = 0; fits && v < state.views.size(); ++v)

@@ -60,7 +60,7 @@ class Uncorrected {
 
 }  // namespace
 
-void set_out(const State& state, Edit& edit) {
+void plan_ahead(const State& state, Edit& edit) {
   if (!edit.observer.progress) return;  // measuring costs about ten small frames
   edit.progress.set_out(measured(edit.progress.workload(), state, edit.input, edit.candidates, edit.params()));
 }
@@ -82,7 +82,7 @@ Result<State> assign_and_divide(Edit& edit) {
 Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Camera> cameras) {
   if (auto going = edit.progress.enter(Stage::views, 0); !going) return going;
   edit.candidates = candidate_cameras(edit.input, cameras, edit.request);
-  set_out(state, edit);
+  plan_ahead(state, edit);
   auto& warnings = state.report.warnings;
   for (const std::string& name : edit.params().exclude_views)
     if (std::ranges::none_of(edit.candidates, [&](const scene::Camera& c) { return c.name == name; }))
@@ -118,7 +118,7 @@ Result<Rows> paste(State& state, Edit& edit, int u, const PlannedMotion& motion)
 
 Result<void> mask(State& state, Edit& edit, int u, const Rows& rows) {
   if (auto going = edit.progress.enter(Stage::mask, u); !going) return going;
-  edit.covered = rows;
+  edit.masked_rows = rows;
   return unite_masks(state.scene, rows, state.views, state.masks,
                      [&](double part) { return edit.progress.advance(part); });
 }

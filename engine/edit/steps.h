@@ -35,7 +35,7 @@ struct Edit {
   ProgressMeter progress;
   std::vector<scene::Camera> candidates = {};  ///< That views are chosen from; they have seen the scene.
   std::optional<repair::Repair> repair = {};   ///< What the unedited scene looks like to a corrector.
-  Rows covered = {};                           ///< The rows that masks were last united with.
+  Rows masked_rows = {};                       ///< Those that the masks were last united with.
 
   [[nodiscard]] const Params& params() const { return request.params; }
   /// Step 8 takes place, and so step 7 where there is a corrector.
@@ -83,10 +83,10 @@ struct Edit {
 [[nodiscard]] Result<void> relocate_handles(State& state, Edit& edit, int u);
 
 /// The plan is made anew once the dragged part is known, and cameras that may look at it: for who watches progress.
-void set_out(const State& state, Edit& edit);
+void plan_ahead(const State& state, Edit& edit);
 
 /// Shows the scene as it would be published now to an observer that wants to see it.
-///   moment  as Moment::stage
+///   moment  as Moment::name
 [[nodiscard]] Result<void> show(const State& state, Edit& edit, int u, const char* moment,
                                 std::span<const scene::Image> pictures = {});
 

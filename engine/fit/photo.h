@@ -13,8 +13,6 @@ namespace engine::fit {
 struct Photo {
   scene::Camera camera;
   std::vector<std::uint8_t> rgb;  ///< [3][camera.height][camera.width], display-referred.
-
-  bool operator==(const Photo&) const = default;
 };
 
 /// The photo of a picture, rounded to bytes.

@@ -114,7 +114,7 @@ class Database {
   [[nodiscard]] int last_errno() const {
     int number = 0;
     sqlite3_file* log = nullptr;
-    sqlite3_file_control(handle_, "main", SQLITE_FCNTL_JOURNAL_POINTER, &log);
+    sqlite3_file_control(handle_, "main", SQLITE_FCNTL_JOURNAL_POINTER, static_cast<void*>(&log));
     if (log && log->pMethods) log->pMethods->xFileControl(log, SQLITE_FCNTL_LAST_ERRNO, &number);
     return number;
   }

@@ -28,6 +28,12 @@ std::string complaint(const Parameter<double>& parameter, double value) {
          std::to_string(int(parameter.range.high));
 }
 
+std::string complaint(const Parameter<std::vector<std::string>>& parameter, const std::vector<std::string>& value) {
+  if (value.size() <= parameter.range.most) return {};
+  return std::string(parameter.name) + " has " + std::to_string(value.size()) + " elements; at most " +
+         std::to_string(parameter.range.most) + " are allowed";
+}
+
 template <class T>
 std::string complaint(const Parameter<T>&, const T&) {
   return {};  // what the type holds is right

@@ -43,62 +43,74 @@ struct Box {
 
 }  // namespace
 
-void Occluders::split(std::uint32_t node, std::uint32_t begin, std::uint32_t end) {
-  auto middle = [](const Triangle& t) { return t.corner + (t.edge1 + t.edge2) / 3.0f; };
-  auto box_of = [](const Triangle& t) {
+/// Triangles are cut in two by one of 16 planes across an axis.
+struct Occluders::Cut {
+  static constexpr std::size_t bins = 16;
+
+  int axis = -1;        ///< -1: no cut.
+  std::size_t bin = 0;  ///< The first one of the second half.
+  Vec3 low{}, size{};   ///< Box of the triangles' middles.
+
+  [[nodiscard]] static Vec3 middle(const Triangle& t) { return t.corner + (t.edge1 + t.edge2) / 3.0f; }
+  [[nodiscard]] static Box box_of(const Triangle& t) {
     Box box;
     box.add(t.corner), box.add(t.corner + t.edge1), box.add(t.corner + t.edge2);
     return box;
-  };
-  Box box, middles;
-  for (std::uint32_t i = begin; i < end; ++i) box.add(box_of(triangles_[i])), middles.add(middle(triangles_[i]));
-  constexpr float skin = 1e-5f;  // so that rounding never makes a ray miss the box of a flat, axis-aligned triangle
-  nodes_[node].low = box.low - skin;
-  nodes_[node].high = box.high + skin;
-  nodes_[node].first = begin;
-  nodes_[node].count = end - begin;
-  if (end - begin <= 4) return;
+  }
+  [[nodiscard]] std::size_t bin_of(const Triangle& t, int across) const {
+    return std::min(bins - 1, std::size_t((middle(t)[across] - low[across]) / size[across] * float(bins)));
+  }
+  [[nodiscard]] bool is_before(const Triangle& t) const { return bin_of(t, axis) < bin; }
+};
 
-  // The cut with the least expected work: sum over both sides of surface area times triangles, on 16 planes per axis.
-  constexpr std::size_t bins = 16;
-  const Vec3 size = middles.high - middles.low;
-  auto bin_of = [&](const Triangle& t, int axis) {
-    return std::min(bins - 1, std::size_t((middle(t)[axis] - middles.low[axis]) / size[axis] * float(bins)));
-  };
-  float best_cost = box.half_area() * float(end - begin);
-  int best_axis = -1;
-  std::size_t best_bin = 0;
+Occluders::Cut Occluders::best_cut(std::span<const Triangle> triangles, Vec3 low, Vec3 high, float unsplit) {
+  Cut best{.low = low, .size = high - low};
+  float best_cost = unsplit;  // of a half: its box's surface area times its triangles
   for (int axis = 0; axis < 3; ++axis) {
-    if (!(size[axis] > 0)) continue;
-    std::array<Box, bins> boxes;
-    std::array<std::uint32_t, bins> counts{};
-    for (std::uint32_t i = begin; i < end; ++i) {
-      const std::size_t bin = bin_of(triangles_[i], axis);
-      boxes[bin].add(box_of(triangles_[i]));
+    if (!(best.size[axis] > 0)) continue;
+    std::array<Box, Cut::bins> boxes;
+    std::array<std::uint32_t, Cut::bins> counts{};
+    for (const Triangle& triangle : triangles) {
+      const std::size_t bin = best.bin_of(triangle, axis);
+      boxes[bin].add(Cut::box_of(triangle));
       ++counts[bin];
     }
-    std::array<float, bins> cost_right{};  // of everything from a bin on
+    std::array<float, Cut::bins> cost_right{};  // of everything from a bin on
     Box right;
     std::uint32_t count = 0;
-    for (std::size_t bin = bins; bin-- > 1;) {
+    for (std::size_t bin = Cut::bins; bin-- > 1;) {
       right.add(boxes[bin]);
       count += counts[bin];
       cost_right[bin] = count > 0 ? right.half_area() * float(count) : 0.0f;
     }
     Box left;
     count = 0;
-    for (std::size_t bin = 1; bin < bins; ++bin) {
+    for (std::size_t bin = 1; bin < Cut::bins; ++bin) {
       left.add(boxes[bin - 1]);
       count += counts[bin - 1];
-      if (count == 0 || count == end - begin) continue;
+      if (count == 0 || count == triangles.size()) continue;
       const float cost = left.half_area() * float(count) + cost_right[bin];
-      if (cost < best_cost) best_cost = cost, best_axis = axis, best_bin = bin;
+      if (cost < best_cost) best_cost = cost, best.axis = axis, best.bin = bin;
     }
   }
-  if (best_axis < 0) return;
-  const auto cut = std::partition(triangles_.begin() + begin, triangles_.begin() + end,
-                                  [&](const Triangle& t) { return bin_of(t, best_axis) < best_bin; });
-  const auto half = std::uint32_t(cut - triangles_.begin());
+  return best;
+}
+
+void Occluders::split(std::uint32_t node, std::uint32_t begin, std::uint32_t end) {
+  const std::span triangles(triangles_.data() + begin, end - begin);
+  Box box, middles;
+  for (const Triangle& triangle : triangles) box.add(Cut::box_of(triangle)), middles.add(Cut::middle(triangle));
+  constexpr float skin = 1e-5f;  // so that rounding never makes a ray miss the box of a flat, axis-aligned triangle
+  nodes_[node].low = box.low - skin;
+  nodes_[node].high = box.high + skin;
+  nodes_[node].first = begin;
+  nodes_[node].count = end - begin;
+  if (end - begin <= 4) return;
+  const Cut cut = best_cut(triangles, middles.low, middles.high, box.half_area() * float(end - begin));
+  if (cut.axis < 0) return;
+  const auto second = std::partition(triangles.begin(), triangles.end(),
+                                     [&](const Triangle& triangle) { return cut.is_before(triangle); });
+  const std::uint32_t half = begin + std::uint32_t(second - triangles.begin());
   const auto children = std::uint32_t(nodes_.size());
   nodes_[node].first = children;
   nodes_[node].count = 0;

@@ -37,6 +37,11 @@ class Occluders {
     std::uint32_t first = 0;  ///< Of its triangles; in an inner node, of its two children.
     std::uint32_t count = 0;  ///< 0 for an inner node.
   };
+  struct Cut;
+  /// The cut with the least expected work.
+  ///   low, high  box of the triangles' middles
+  ///   unsplit    the work without a cut: which is kept where none is better
+  [[nodiscard]] static Cut best_cut(std::span<const Triangle> triangles, Vec3 low, Vec3 high, float unsplit);
   void split(std::uint32_t node, std::uint32_t begin, std::uint32_t end);
   template <bool any_hit>
   [[nodiscard]] std::optional<Hit> cast(Vec3 origin, Vec3 direction, float limit) const;

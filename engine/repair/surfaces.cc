@@ -101,8 +101,8 @@ std::vector<Point> points_of(const SurfaceView& view) {
   std::vector<Point> points;
   const std::size_t count = std::min(shown.size(), most_points);
   for (std::size_t k = 0; k < count; ++k) {
-    const std::size_t i = shown[k * shown.size() / count];
-    points.push_back({double(i % width) + 0.5, double(i / width) + 0.5, double(view.inverse_depth.data[i])});
+    const std::size_t i = shown[k * shown.size() / count], x = i % width, y = i / width;
+    points.push_back({double(x) + 0.5, double(y) + 0.5, double(view.inverse_depth.data[i])});
   }
   return points;
 }

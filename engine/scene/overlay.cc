@@ -130,6 +130,24 @@ GaussianCloud flatten(const LayeredCloud& cloud) {
   return cloud.overlay ? flatten(*cloud.base, *cloud.overlay) : *cloud.base;
 }
 
+namespace {
+
+/// Numbers of rows of two clouds, one after the other, as ranges to assemble: the first `from_first` are the first's.
+std::vector<RowRange> ranges_of_rows(std::span<const std::uint32_t> numbers, std::size_t from_first) {
+  std::vector<RowRange> ranges;
+  for (const std::uint32_t number : numbers) {
+    const bool is_first = number < from_first;
+    const std::size_t source = is_first ? number : number - from_first;
+    if (!ranges.empty() && ranges.back().from_base == is_first && ranges.back().source + ranges.back().count == source)
+      ++ranges.back().count;
+    else
+      ranges.push_back({ranges.empty() ? 0 : ranges.back().first + ranges.back().count, is_first, source, 1});
+  }
+  return ranges;
+}
+
+}  // namespace
+
 Overlay compose(std::size_t base_rows, const Overlay& lower, const Overlay& upper) {
   // Every row that lower's result takes from the base or from lower.rows either stays, goes, or takes a value of
   // upper.rows. Values of the composed rows are first noted as numbers into `pool`: lower.rows, then upper.rows.
@@ -177,21 +195,9 @@ Overlay compose(std::size_t base_rows, const Overlay& lower, const Overlay& uppe
              std::back_inserter(all_removed));
   out.removed = std::move(all_removed);
 
-  std::vector<RowRange> ranges;
-  const auto take = [&](std::span<const std::uint32_t> values) {
-    for (const std::uint32_t value : values) {
-      const bool from_lower = value < lower_rows;
-      const std::size_t source = from_lower ? value : value - lower_rows;
-      if (!ranges.empty() && ranges.back().from_base == from_lower &&
-          ranges.back().source + ranges.back().count == source)
-        ++ranges.back().count;
-      else
-        ranges.push_back({ranges.empty() ? 0 : ranges.back().first + ranges.back().count, from_lower, source, 1});
-    }
-  };
-  take(changed_values);
-  take(added_values);
-  out.rows = assemble(lower.rows, upper.rows, ranges);
+  std::vector<std::uint32_t> values = std::move(changed_values);
+  values.insert(values.end(), added_values.begin(), added_values.end());
+  out.rows = assemble(lower.rows, upper.rows, ranges_of_rows(values, lower_rows));
   return out;
 }
 

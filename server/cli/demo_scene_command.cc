@@ -20,7 +20,6 @@ namespace {
 
 namespace io = engine::io;
 namespace procedural = engine::procedural;
-using engine::propagate;
 using std::filesystem::path;
 
 struct DemoSceneOptions {

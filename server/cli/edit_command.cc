@@ -33,8 +33,6 @@ namespace {
 namespace edit = engine::edit;
 namespace io = engine::io;
 namespace scene = engine::scene;
-using engine::ErrorCode;
-using engine::fail;
 using engine::propagate;
 using std::filesystem::path;
 

@@ -24,7 +24,6 @@ namespace {
 
 namespace edit = engine::edit;
 namespace jobs = engine::jobs;
-namespace scene = engine::scene;
 using engine::ErrorCode;
 using engine::fail;
 using engine::propagate;
@@ -193,8 +192,9 @@ Result<proto::EditEstimate> EditService::estimate(const proto::EditRequest& requ
   if (!info) return propagate(info);
   edit::Request request_there = checked->request;
   if (info->up) request_there.up = *info->up;
-  const Workload work = workload_of(checked->version.cloud, request_there, checked->preview, cameras_of(dataset->get()),
-                                    uses_corrector(request_there.params), impl_->options.pictured_views);
+  const JobWorkload work =
+      workload_of(checked->version.cloud, request_there, checked->preview, cameras_of(dataset->get()),
+                  uses_corrector(request_there.params), impl_->options.pictured_views);
 
   proto::EditEstimate estimate;
   estimate.handles = checked->handles();

@@ -34,9 +34,9 @@ std::vector<scene::Camera> cameras_of(const engine::io::Dataset* dataset) {
   return engine::io::cameras_of(*dataset);
 }
 
-Workload workload_of(const scene::LayeredCloud& version, const edit::Request& request,
-                     const edit::PreviewOutcome& preview, std::span<const scene::Camera> dataset, bool corrected,
-                     int pictured) {
+JobWorkload workload_of(const scene::LayeredCloud& version, const edit::Request& request,
+                        const edit::PreviewOutcome& preview, std::span<const scene::Camera> dataset, bool corrected,
+                        int pictured) {
   const scene::GaussianCloud& cloud = *version.base;
   const edit::Params& params = request.params;
   std::vector<scene::Camera> cameras(dataset.begin(), dataset.end());
@@ -45,7 +45,7 @@ Workload workload_of(const scene::LayeredCloud& version, const edit::Request& re
   std::vector<std::uint32_t> rows(copies.size());
   std::iota(rows.begin(), rows.end(), 0u);
 
-  Workload work;
+  JobWorkload work;
   work.row_bytes = cloud.size() == 0 ? 0 : scene::memory_bytes(cloud) / cloud.size();
   work.layered = version.overlay != nullptr;
   work.copies = preview.overlay.added();
@@ -55,7 +55,9 @@ Workload workload_of(const scene::LayeredCloud& version, const edit::Request& re
   work.edit.candidates = dataset.empty() ? std::size_t(params.views) : dataset.size();
   work.edit.virtual_views = dataset.empty();
   work.edit.views = dataset.empty() ? std::size_t(params.views) : edit::views_at_most(dataset, params);
-  work.edit.view_pixels = edit::view_pixels(cameras, params.max_image_side);
+  // Where not even a virtual camera was found, no view of the edit will be larger than this.
+  const std::size_t side = std::size_t(params.max_image_side);
+  work.edit.view_pixels = cameras.empty() ? side * side : edit::view_pixels(cameras, params.max_image_side);
   work.edit.shown = work.edit.kept = true;
   work.edit.pictured = std::min(std::size_t(std::max(0, pictured)), work.edit.views);
   work.edit.frame = edit::measured_frames(cloud, cameras, params.max_image_side);
@@ -69,12 +71,12 @@ double seconds_to_load(std::size_t gaussians, bool layered) {
 
 double seconds_to_publish(std::size_t gaussians) { return publish_seconds + flatten_row_seconds * double(gaussians); }
 
-double estimated_seconds(const Workload& work) {
+double estimated_seconds(const JobWorkload& work) {
   return seconds_to_load(work.edit.gaussians, work.layered) + seconds_of(edit::plan_of(work.edit)) +
          seconds_to_publish(work.edit.gaussians);
 }
 
-std::uint64_t estimated_bytes(const Workload& work) {
+std::uint64_t estimated_bytes(const JobWorkload& work) {
   const std::uint64_t n = work.edit.gaussians, views = work.edit.views, pixels = work.edit.view_pixels;
   const std::uint64_t rows =
       (work.layered ? n : 0) + n + std::uint64_t(work.edit.intervals) * work.copies + n + work.copies;

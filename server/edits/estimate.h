@@ -16,7 +16,7 @@
 namespace server::edits {
 
 /// What the cost of an edit as a job depends on.
-struct Workload {
+struct JobWorkload {
   engine::edit::Workload edit = {};
   std::size_t row_bytes = 0;  ///< Of one Gaussian in memory.
   bool layered = false;       ///< The version is an overlay: it is flattened first.
@@ -32,9 +32,9 @@ struct Workload {
 ///   dataset    its cameras; none: a few of the virtual ones are found, of which the edit will find all
 ///   corrected  by a corrector
 ///   pictured   views with intermediate pictures, at most
-[[nodiscard]] Workload workload_of(const engine::scene::LayeredCloud& version, const engine::edit::Request& request,
-                                   const engine::edit::PreviewOutcome& preview,
-                                   std::span<const engine::scene::Camera> dataset, bool corrected, int pictured);
+[[nodiscard]] JobWorkload workload_of(const engine::scene::LayeredCloud& version, const engine::edit::Request& request,
+                                      const engine::edit::PreviewOutcome& preview,
+                                      std::span<const engine::scene::Camera> dataset, bool corrected, int pictured);
 
 /// Seconds of what a job does beside the edit: before it, to read the request and put the version together, and after
 /// it, until the result is on disk as a version.
@@ -44,7 +44,7 @@ struct Workload {
 
 /// Seconds, about, with the machine to itself: the engine's plan, and what the job does before and after it. It says
 /// nothing of the time an edit waits for others.
-[[nodiscard]] double estimated_seconds(const Workload& work);
+[[nodiscard]] double estimated_seconds(const JobWorkload& work);
 
 /// Bytes beside the scene as the service holds it, all of them given back at the end:
 ///     row_bytes ([layered] N                    the version as one cloud
@@ -58,6 +58,6 @@ struct Workload {
 ///   + V 30 pixels [corrected]                   of each view: the unedited scene and its depth, what was vacated and
 ///                                               must not be learned from, and what it was corrected to
 ///   + (row_bytes + 100) N [corrected]           the unedited scene, its trust, and a search tree of it
-[[nodiscard]] std::uint64_t estimated_bytes(const Workload& work);
+[[nodiscard]] std::uint64_t estimated_bytes(const JobWorkload& work);
 
 }  // namespace server::edits

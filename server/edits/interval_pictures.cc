@@ -45,14 +45,14 @@ Result<void> IntervalPictures::add(const engine::edit::Moment& moment) {
   const std::vector<std::string>& jpegs = corrected.empty() ? cached_jpegs_ : corrected;
   Result<void> written = engine::jobs::create_folder(folder_);
   for (std::size_t v = 0; written && v < count; ++v)
-    written = engine::jobs::write_durably(folder_ / picture_name(moment.interval, v, moment.stage), jpegs[v]);
+    written = engine::jobs::write_durably(folder_ / picture_name(moment.interval, v, moment.name), jpegs[v]);
   if (!written)
     return engine::fail(written.error().code, "the pictures of interval " + std::to_string(moment.interval) +
                                                   " cannot be kept: " + written.error().message);
   renders_.resize(count);
   for (std::size_t v = 0; v < count; ++v) {
     renders_[v].view = moment.views[v].name;
-    renders_[v].stages.push_back(moment.stage);
+    renders_[v].stages.push_back(moment.name);
   }
   return {};
 }

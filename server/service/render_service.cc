@@ -10,7 +10,6 @@
 namespace server::service {
 namespace {
 
-namespace io = engine::io;
 namespace render = engine::render;
 using engine::ErrorCode;
 using engine::fail;

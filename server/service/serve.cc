@@ -131,7 +131,7 @@ Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& lo
       {**scenes, **edits, options.edit_limits, renders, views, guard, metrics, service_info(options)});
   auto server = http::HttpServer::start(options.http, std::move(router), guard, metrics, logger);
   if (!server) return propagate(server);
-  out << "splatdrag " << SPLATDRAG_VERSION << " is listening on " << (*server)->url() << std::endl;
+  out << "splatdrag " << SPLATDRAG_VERSION << " is listening on " << (*server)->url() << '\n' << std::flush;
   http::log(logger, spdlog::level::info, "listening",
             {{"url", (*server)->url()},
              {"version", std::string(SPLATDRAG_VERSION)},

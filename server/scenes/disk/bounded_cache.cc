@@ -9,7 +9,6 @@
 namespace server::scenes {
 namespace {
 
-using engine::Error;
 using engine::ErrorCode;
 using engine::fail;
 using engine::propagate;

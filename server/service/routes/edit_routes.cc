@@ -155,7 +155,7 @@ void stream(const std::string& id, EditService& service, const EditRouteOptions&
 }
 
 Result<Reply> get_events(const Call& call, EditService& service, const EditRouteOptions& options) {
-  const std::string id = call.path("id");
+  const std::string& id = call.path("id");
   if (const auto status = service.find(id); !status) return propagate(status);
   Reply reply;
   reply.media_type = "text/event-stream";
@@ -191,12 +191,12 @@ Result<Reply> delete_edit(const Call& call, EditService& service) {
 void add_edit_routes(http::Router& router, EditService& service, const EditRouteOptions& options) {
   using http::Body;
   const auto add = [&](const char* method, const char* path, auto answer, Body body = Body::none,
-                       std::vector<std::string> queries = {}) {
+                       const std::vector<std::string>& queries = {}) {
     router.add({.method = method,
                 .path = path,
                 .handler = [&service, answer](const Call& call) -> Result<Reply> { return answer(call, service); },
                 .body = body,
-                .queries = std::move(queries)});
+                .queries = queries});
   };
   const EditLimits limits = options.limits;
   add(

@@ -112,7 +112,7 @@ TEST(Optimise, ReportsTheLossOfEveryIterationAndInterval) {
   };
   std::vector<std::string> stages;
   observer.moment = [&](const Moment& moment) {
-    stages.push_back(moment.stage);
+    stages.push_back(moment.name);
     return Result<void>{};
   };
   observer.interval_done = [&](const IntervalDone& done) {

@@ -83,7 +83,7 @@ Undisturbed run_undisturbed(const Case& c) {
     return Result<void>{};
   };
   observer.moment = [&](const Moment& moment) {
-    told.moments[moment.stage + " " + std::to_string(moment.interval)] = moment.overlay;
+    told.moments[moment.name + " " + std::to_string(moment.interval)] = moment.overlay;
     EXPECT_EQ(moment.intervals, intervals);
     EXPECT_EQ(moment.views.size(), 3u);
     return Result<void>{};
@@ -205,7 +205,7 @@ TEST(Moments, AnErrorOfTheWatcherEndsTheEdit) {
   const Case c(Mode::move, DVec3(0));
   Observer observer;
   observer.moment = [](const Moment& moment) -> Result<void> {
-    if (moment.stage == "deformed") return fail(ErrorCode::no_space, "no room for the picture");
+    if (moment.name == "deformed") return fail(ErrorCode::no_space, "no room for the picture");
     return {};
   };
   const auto outcome = run(c.scene, c.cameras, c.request, {}, observer);

@@ -83,6 +83,11 @@ struct HoldsItsRange {
     EXPECT_NE(refusal(parameter, std::nextafter(parameter.range.high, 2 * parameter.range.high)), "");
     EXPECT_NE(refusal(parameter, std::numeric_limits<double>::quiet_NaN()), "") << parameter.name;
   }
+  void operator()(const Parameter<std::vector<std::string>>& parameter) const {
+    const auto names_of_length = [](std::size_t n) { return std::vector<std::string>(n, "0001.jpg"); };
+    EXPECT_EQ(refusal(parameter, names_of_length(parameter.range.most)), "");
+    EXPECT_NE(refusal(parameter, names_of_length(parameter.range.most + 1)), "") << parameter.name;
+  }
   template <class T>
   void operator()(const Parameter<T>&) const {}  // of other types every value is right
 };

@@ -9,8 +9,8 @@
 namespace server::edits {
 namespace {
 
-Workload typical() {
-  Workload work;
+JobWorkload typical() {
+  JobWorkload work;
   work.row_bytes = 152, work.copies = 6000;
   work.edit.gaussians = 150'000, work.edit.dragged = 6000;
   work.edit.intervals = 4, work.edit.iterations = 100, work.edit.corrected = true;
@@ -23,25 +23,26 @@ Workload typical() {
 TEST(Estimate, GrowsWithEverythingThatTakesMemory) {
   struct Growth {
     std::string what;
-    std::function<void(Workload&)> grow;
+    std::function<void(JobWorkload&)> grow;
     bool takes_memory;
   };
-  const std::vector<Growth> growths = {{"gaussians", [](Workload& w) { w.edit.gaussians *= 2; }, true},
-                                       {"row bytes", [](Workload& w) { w.row_bytes *= 2; }, true},
-                                       {"layered", [](Workload& w) { w.layered = true; }, true},
-                                       {"dragged", [](Workload& w) { w.edit.dragged *= 2; }, false},
-                                       {"copies", [](Workload& w) { w.copies *= 2; }, true},
-                                       {"intervals", [](Workload& w) { ++w.edit.intervals; }, true},
-                                       {"candidates", [](Workload& w) { ++w.edit.candidates; }, false},
-                                       {"views", [](Workload& w) { ++w.edit.views; }, true},
-                                       {"pictures", [](Workload& w) { ++w.edit.pictured; }, false},
-                                       {"iterations", [](Workload& w) { w.edit.iterations *= 2; }, false},
-                                       {"corrections", [](Workload& w) { ++w.edit.corrections; }, false},
-                                       {"picture size", [](Workload& w) { w.edit.view_pixels *= 2; }, true},
-                                       {"a slower machine", [](Workload& w) { w.edit.frame.gaussians *= 2; }, false}};
+  const std::vector<Growth> growths = {
+      {"gaussians", [](JobWorkload& w) { w.edit.gaussians *= 2; }, true},
+      {"row bytes", [](JobWorkload& w) { w.row_bytes *= 2; }, true},
+      {"layered", [](JobWorkload& w) { w.layered = true; }, true},
+      {"dragged", [](JobWorkload& w) { w.edit.dragged *= 2; }, false},
+      {"copies", [](JobWorkload& w) { w.copies *= 2; }, true},
+      {"intervals", [](JobWorkload& w) { ++w.edit.intervals; }, true},
+      {"candidates", [](JobWorkload& w) { ++w.edit.candidates; }, false},
+      {"views", [](JobWorkload& w) { ++w.edit.views; }, true},
+      {"pictures", [](JobWorkload& w) { ++w.edit.pictured; }, false},
+      {"iterations", [](JobWorkload& w) { w.edit.iterations *= 2; }, false},
+      {"corrections", [](JobWorkload& w) { ++w.edit.corrections; }, false},
+      {"picture size", [](JobWorkload& w) { w.edit.view_pixels *= 2; }, true},
+      {"a slower machine", [](JobWorkload& w) { w.edit.frame.gaussians *= 2; }, false}};
   for (const Growth& growth : growths) {
     SCOPED_TRACE(growth.what);
-    Workload more = typical();
+    JobWorkload more = typical();
     growth.grow(more);
     EXPECT_EQ(estimated_bytes(more) > estimated_bytes(typical()), growth.takes_memory);
     EXPECT_GE(estimated_bytes(more), estimated_bytes(typical()));
@@ -50,7 +51,7 @@ TEST(Estimate, GrowsWithEverythingThatTakesMemory) {
 }
 
 TEST(Estimate, TheTimeOfAJobIsThatOfTheEditAndWhatComesBeforeAndAfter) {
-  Workload work = typical();
+  JobWorkload work = typical();
   const double of_edit = seconds_of(engine::edit::plan_of(work.edit));
   EXPECT_DOUBLE_EQ(estimated_seconds(work), seconds_to_load(150'000, false) + of_edit + seconds_to_publish(150'000));
   work.layered = true;
@@ -58,7 +59,7 @@ TEST(Estimate, TheTimeOfAJobIsThatOfTheEditAndWhatComesBeforeAndAfter) {
 }
 
 TEST(Estimate, MemoryHoldsTheWorkingCopyAndAPicturesScene) {
-  Workload work = typical();
+  JobWorkload work = typical();
   EXPECT_GE(estimated_bytes(work), 2 * work.edit.gaussians * work.row_bytes);
   const auto flat = estimated_bytes(work);
   work.layered = true;
@@ -66,7 +67,7 @@ TEST(Estimate, MemoryHoldsTheWorkingCopyAndAPicturesScene) {
 }
 
 TEST(Estimate, AnOptimisationHoldsEveryViewItSetsUp) {
-  Workload work = typical();
+  JobWorkload work = typical();
   work.edit.iterations = 0;
   work.edit.corrected = false;
   const auto plain = estimated_bytes(work);
@@ -75,7 +76,7 @@ TEST(Estimate, AnOptimisationHoldsEveryViewItSetsUp) {
 }
 
 TEST(Estimate, ACorrectionHoldsTheUneditedScene) {
-  Workload work = typical();
+  JobWorkload work = typical();
   work.edit.corrected = false;
   const auto plain = estimated_bytes(work);
   work.edit.corrected = true;

@@ -28,7 +28,7 @@ class IntervalPicturesTest : public testing::Test {
     return overlay;
   }
   Moment moment(int interval, const std::string& stage, const engine::scene::Overlay& overlay) const {
-    return {.interval = interval, .intervals = 9, .stage = stage, .overlay = overlay, .views = views};
+    return {.interval = interval, .intervals = 9, .name = stage, .overlay = overlay, .views = views};
   }
   /// One for each view, each of another grey.
   [[nodiscard]] std::vector<engine::scene::Image> plain_pictures() const {
