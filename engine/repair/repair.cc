@@ -116,7 +116,8 @@ Result<scene::Image> Repair::ask_corrector(scene::Image picture, const scene::Ma
                                      nearest_views(views_, v, most_examples)};
   auto pictures = corrector_.correct(std::span(&task, 1), round.strength, seed_for(purpose, v, round));
   if (!pictures) return propagate(pictures);
-  if (pictures->size() != 1 || pictures->front().width != mask.width || pictures->front().height != mask.height)
+  if (pictures->size() != 1 || pictures->front().width != mask.width || pictures->front().height != mask.height ||
+      pictures->front().channels != 3)
     return fail(ErrorCode::internal, "the corrector answered with other pictures than it was asked for", "corrector");
   return std::move(pictures->front());
 }

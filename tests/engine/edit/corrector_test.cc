@@ -267,6 +267,30 @@ TEST(EditWithACorrector, AnErrorOfTheCorrectorEndsTheEdit) {
   }
 }
 
+/// Gives back so many pictures, of so many pixels a side.
+class Careless final : public correct::Corrector {
+ public:
+  Careless(std::size_t pictures, int side) : pictures_(pictures), side_(side) {}
+  Result<void> fine_tune(std::span<const correct::Example>, int) override { return {}; }
+  Result<std::vector<scene::Image>> correct(std::span<const correct::CorrectionTask>, double, std::uint64_t) override {
+    return std::vector<scene::Image>(pictures_, scene::Image(side_, side_, 3));
+  }
+
+ private:
+  std::size_t pictures_;
+  int side_;
+};
+
+TEST(EditWithACorrector, ACorrectorThatAnswersSomethingElseEndsTheEdit) {
+  const BlockScene block;
+  for (Careless careless : {Careless(0, 8), Careless(1, 8), Careless(2, block.cameras[0].width)}) {
+    const auto outcome = run(block.cloud, block.cameras, block.request, {&careless});
+    ASSERT_FALSE(outcome);
+    EXPECT_EQ(outcome.error().code, ErrorCode::internal);
+    EXPECT_EQ(outcome.error().where, "corrector");
+  }
+}
+
 /// Leaves pictures as they are, and notes how strongly it was to correct them.
 class Noting final : public correct::Corrector {
  public:
