@@ -52,7 +52,8 @@ std::string why_empty(std::size_t handle, const Sphere& sphere, const Sighting& 
   if (seen.excluded > 0)
     return gaussians(seen.excluded) + within + ", but all outside the region: enlarge the region or leave it out";
   if (seen.nearest == infinity) return "0 Gaussians" + within + ": the region holds none; move or enlarge it";
-  return "0 Gaussians" + within + "; the nearest is at " + text(std::sqrt(seen.nearest)) + ": raise the radius";
+  return "0 Gaussians" + within + "; the nearest is " + text(std::sqrt(seen.nearest)) +
+         " away: move the handle's source there, or raise the radius";
 }
 
 }  // namespace
@@ -96,6 +97,38 @@ Result<Assignment> assign(const Array3& mean, std::span<const Sphere> spheres, c
                   "handles[" + std::to_string(h) + "].radius");
     result.count[h] = seen.owned;
   }
+  return result;
+}
+
+Result<Assignment> assign_selected(const Array3& mean, std::span<const std::uint32_t> rows,
+                                   std::span<const DVec3> centers, const std::optional<Box>& region) {
+  assert(centers.size() < std::numeric_limits<std::uint16_t>::max());
+  assert(rows.empty() || rows.back() < mean.size());
+  Assignment result{HandleColumn(mean.size(), 0), std::vector<std::size_t>(centers.size(), 0)};
+  parallel_for(rows.size(), grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) {
+      const DVec3 point(mean.get(rows[k]));
+      if (region && !inside(*region, point)) continue;
+      double best = infinity;
+      for (std::size_t h = 0; h < centers.size(); ++h) {
+        const DVec3 offset = point - centers[h];
+        const double squared = glm::dot(offset, offset);
+        if (squared < best) best = squared, result.handle[rows[k]] = std::uint16_t(h + 1);
+      }
+    }
+  });
+  for (const std::uint32_t row : rows)
+    if (result.handle[row] != 0) ++result.count[result.handle[row] - 1u];
+  if (std::ranges::all_of(result.count, [](std::size_t count) { return count == 0; }))
+    return fail(ErrorCode::unprocessable,
+                gaussians(rows.size()) + " selected, but all outside the region: enlarge the region or leave it out",
+                "selection");
+  for (std::size_t h = 0; h < centers.size(); ++h)
+    if (result.count[h] == 0)
+      return fail(ErrorCode::unprocessable,
+                  "every selected Gaussian is nearer to another handle than to handle " + std::to_string(h + 1) +
+                      ": move this handle or leave it out",
+                  "handles[" + std::to_string(h) + "].source");
   return result;
 }
 

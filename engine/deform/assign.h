@@ -41,4 +41,14 @@ struct Assignment {
 [[nodiscard]] Result<Assignment> assign(const Array3& mean, std::span<const Sphere> spheres,
                                         const std::optional<Box>& region = std::nullopt);
 
+/// Where a selection says what moves: each of its rows that lies inside `region` (if there is one) belongs to the
+/// nearest handle, however far that is; the lower index if the distances tie.
+///   rows     ascending, of the scene (asserted)
+///   centers  [H], H < 65536
+///   errors   unprocessable: `where` is "selection" if the region leaves no row, else "handles[2].source", the first
+///            handle that no row belongs to
+[[nodiscard]] Result<Assignment> assign_selected(const Array3& mean, std::span<const std::uint32_t> rows,
+                                                 std::span<const DVec3> centers,
+                                                 const std::optional<Box>& region = std::nullopt);
+
 }  // namespace engine::deform

@@ -1,6 +1,7 @@
 #include "engine/edit/drag.h"
 
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "engine/deform/rigid.h"
@@ -15,7 +16,15 @@ Result<deform::Assignment> assign(const Array3& mean, const Request& request) {
   for (const Handle& handle : request.handles) spheres.push_back({handle.source, handle.radius});
   std::optional<deform::Box> region;
   if (request.region) region = deform::Box{request.region->center, request.region->size};
-  return deform::assign(mean, spheres, region);
+  if (!request.selected) return deform::assign(mean, spheres, region);
+  if (request.selected->back() >= mean.size())
+    return fail(ErrorCode::unprocessable,
+                "row " + std::to_string(request.selected->back()) + " is selected; the scene has " +
+                    std::to_string(mean.size()),
+                "selection");
+  std::vector<DVec3> centers;
+  for (const Handle& handle : request.handles) centers.push_back(handle.source);
+  return deform::assign_selected(mean, *request.selected, centers, region);
 }
 
 PlannedMotion plan_motion(const WorkingScene& working, const Request& request, std::span<const DVec3> positions, int u,

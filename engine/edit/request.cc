@@ -1,6 +1,9 @@
 #include "engine/edit/request.h"
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
+#include <span>
 
 namespace engine::edit {
 namespace {
@@ -32,6 +35,14 @@ Result<void> validate(const Region& region) {
   return {};
 }
 
+Result<void> validate_selected(std::span<const std::uint32_t> rows) {
+  if (rows.empty())
+    return fail(ErrorCode::unprocessable, "the selection holds no Gaussian: nothing could be dragged", "selection");
+  if (std::ranges::adjacent_find(rows, std::greater_equal<>()) != rows.end())
+    return invalid("selected rows are given once each, in ascending order", "selection");
+  return {};
+}
+
 }  // namespace
 
 Result<void> validate(const Request& request) {
@@ -44,6 +55,8 @@ Result<void> validate(const Request& request) {
                    "handles");
   for (std::size_t i = 0; i < request.handles.size(); ++i)
     if (auto valid = validate(request.handles[i], "handles[" + std::to_string(i) + "]"); !valid) return valid;
+  if (request.selected)
+    if (auto valid = validate_selected(*request.selected); !valid) return valid;
   if (request.region)
     if (auto valid = validate(*request.region); !valid) return valid;
   return params::validate(request.params);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -37,6 +38,9 @@ struct Region {
 struct Request {
   Mode mode = Mode::move;
   std::vector<Handle> handles;
+  /// Rows of the scene that are meant, strictly ascending: each goes with the handle nearest to it, and the radius of a
+  /// handle says nothing of what moves. None: the spheres of the handles say it.
+  std::optional<std::vector<std::uint32_t>> selected;
   std::optional<Region> region;
   Params params;
   DVec3 up{0.0, -1.0, 0.0};  ///< World direction that virtual cameras take for up, any length but 0. Default: COLMAP's

@@ -65,6 +65,9 @@ std::string result_key(const ResultOf& of, const edit::Request& request) {
     fields.add(handle.source);
     fields.add(handle.target.value_or(handle.source));
   }
+  fields.add(request.selected.has_value());
+  if (request.selected)
+    for (const std::uint32_t row : *request.selected) fields.add(row);
   if (request.region) {
     fields.add(request.region->center);
     fields.add(request.region->size);

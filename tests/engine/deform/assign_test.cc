@@ -53,7 +53,9 @@ TEST(Assign, SaysHowFarTheNearestGaussianIs) {
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().code, ErrorCode::unprocessable);
   EXPECT_EQ(result.error().where, "handles[1].radius");
-  EXPECT_EQ(result.error().message, "0 Gaussians within 0.02 of handle 2; the nearest is at 0.061: raise the radius");
+  EXPECT_EQ(result.error().message,
+            "0 Gaussians within 0.02 of handle 2; the nearest is 0.061 away: move the handle's source there, or raise "
+            "the radius");
 }
 
 TEST(Assign, SaysSoWhenTheRegionOrOtherHandlesTakeThemAll) {
@@ -89,6 +91,55 @@ TEST(Assign, GivesTheSameForAnyNumberOfThreads) {
       EXPECT_EQ(result->handle, alone->handle) << threads;
       EXPECT_EQ(result->count, alone->count) << threads;
     });
+  }
+}
+
+using Rows = std::vector<std::uint32_t>;
+
+TEST(AssignSelected, EachSelectedRowGoesWithTheNearestHandleHoweverFar) {
+  const Array3 mean = points({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}, {1000, 0, 0}});
+  const auto result = assign_selected(mean, Rows{0, 2, 3, 4}, std::vector<DVec3>{DVec3(0), DVec3(4, 0, 0)});
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(result->handle, (HandleColumn{1, 0, 1, 2, 2})) << "a tie goes to the lower index";
+  EXPECT_EQ(result->count, (std::vector<std::size_t>{2, 2}));
+}
+
+TEST(AssignSelected, TheRegionLimitsTheSelection) {
+  const Array3 mean = points({{0, 0, 0}, {0.5f, 0, 0}, {0.6f, 0, 0}});
+  const std::vector<DVec3> centers{DVec3(0)};
+  const auto result = assign_selected(mean, Rows{0, 1, 2}, centers, Box{DVec3(0), DVec3(1)});
+  ASSERT_TRUE(result);
+  EXPECT_EQ(result->handle, (HandleColumn{1, 1, 0}));
+  const auto nothing = assign_selected(mean, Rows{0, 1}, centers, Box{DVec3(9), DVec3(1)});
+  ASSERT_FALSE(nothing);
+  EXPECT_EQ(nothing.error().code, ErrorCode::unprocessable);
+  EXPECT_EQ(nothing.error().where, "selection");
+  EXPECT_EQ(nothing.error().message,
+            "2 Gaussians selected, but all outside the region: enlarge the region or leave it out");
+}
+
+TEST(AssignSelected, AHandleThatNoRowBelongsToIsNamed) {
+  const auto result = assign_selected(points({{0, 0, 0}, {1, 0, 0}}), Rows{0, 1},
+                                      std::vector<DVec3>{DVec3(0), DVec3(1, 0, 0), DVec3(9, 0, 0)});
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, ErrorCode::unprocessable);
+  EXPECT_EQ(result.error().where, "handles[2].source");
+}
+
+TEST(AssignSelected, GivesTheSameForAnyNumberOfThreads) {
+  Array3 mean;
+  Rng rng(3);
+  Rows rows;
+  for (std::uint32_t i = 0; i < 100000; ++i) {
+    mean.push_back({rng.normal(), rng.normal(), rng.normal()});
+    if (i % 3 != 0) rows.push_back(i);
+  }
+  const std::vector<DVec3> centers{DVec3(0), DVec3(0.5, 0, 0), DVec3(0, 1, 1)};
+  const auto alone = assign_selected(mean, rows, centers);
+  ASSERT_TRUE(alone);
+  for (int threads : {1, 2, 4}) {
+    WorkArena arena(threads);
+    arena.run([&] { EXPECT_EQ(assign_selected(mean, rows, centers)->handle, alone->handle) << threads; });
   }
 }
 

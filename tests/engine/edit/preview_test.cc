@@ -46,6 +46,50 @@ void expect_as_run(const scene::LayeredCloud& scene, const Request& request) {
   }
 }
 
+/// The Gaussians that the handles' spheres hold, as a selection.
+std::vector<std::uint32_t> in_spheres(const scene::GaussianCloud& cloud, const Request& request) {
+  std::vector<std::uint32_t> rows;
+  for (std::uint32_t i = 0; i < cloud.size(); ++i)
+    for (const Handle& handle : request.handles)
+      if (glm::distance(DVec3(cloud.mean.get(i)), handle.source) < handle.radius) {
+        rows.push_back(i);
+        break;
+      }
+  return rows;
+}
+
+TEST(Preview, WithASelectionIsWhatTheEditWillBe) {
+  const scene::GaussianCloud cloud = ball_before_wall(200, Vec3(0), 3);
+  Request request = four_handles(Mode::move);
+  request.selected = in_spheres(cloud, request);
+  for (Handle& handle : request.handles) handle.radius *= 0.1;  // which says nothing of what moves any more
+  request.params.intervals = 2;
+  expect_as_run(plain(cloud), request);
+}
+
+TEST(Preview, ASelectionOfWhatASphereHoldsIsTheSphere) {
+  const scene::GaussianCloud cloud = ball_before_wall(200, Vec3(0), 3);
+  Request request = four_handles(Mode::move);
+  request.handles.resize(1);
+  const auto by_sphere = preview(plain(cloud), request);
+  request.selected = in_spheres(cloud, request);
+  const auto by_rows = preview(plain(cloud), request);
+  ASSERT_TRUE(by_sphere && by_rows);
+  EXPECT_EQ(by_sphere->overlay, by_rows->overlay);
+  EXPECT_EQ(by_sphere->counts, by_rows->counts);
+}
+
+TEST(Preview, ASelectedRowThatTheSceneDoesNotHaveIsRefused) {
+  const scene::GaussianCloud cloud = ball_before_wall(200, Vec3(0), 3);
+  Request request = four_handles(Mode::move);
+  request.selected = {0, std::uint32_t(cloud.size())};
+  const auto refused = preview(plain(cloud), request);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::unprocessable);
+  EXPECT_EQ(refused.error().where, "selection");
+  EXPECT_FALSE(run(cloud, {}, request));
+}
+
 TEST(Preview, IsWhatTheEditWillBe) {
   const auto scene = plain(ball_before_wall(200, Vec3(0), 3));
   for (const Mode mode : {Mode::move, Mode::extend})

@@ -40,6 +40,14 @@ TEST(ValidateRequest, NamesTheFieldThatIsWrong) {
       {"params.views", [](Request& r) { r.params.views = 1001; }},
       {"params.max_image_side", [](Request& r) { r.params.max_image_side = 15; }},
       {"params.max_image_side", [](Request& r) { r.params.max_image_side = 16385; }},
+      {"selection",
+       [](Request& r) {
+         r.selected = {3, 3};
+       }},
+      {"selection",
+       [](Request& r) {
+         r.selected = {4, 3};
+       }},
       {"up", [](Request& r) { r.up = DVec3(0.0); }},
       {"up", [](Request& r) { r.up.x = nan; }},
   };
@@ -52,6 +60,15 @@ TEST(ValidateRequest, NamesTheFieldThatIsWrong) {
     EXPECT_EQ(result.error().where, where);
     EXPECT_FALSE(result.error().message.empty());
   }
+}
+
+TEST(ValidateRequest, ASelectionOfNothingCannotBeCarriedOut) {
+  Request request = good();
+  request.selected.emplace();
+  const auto result = validate(request);
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, ErrorCode::unprocessable);
+  EXPECT_EQ(result.error().where, "selection");
 }
 
 TEST(ValidateRequest, SaysWhatIsAllowed) {

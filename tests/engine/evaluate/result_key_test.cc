@@ -62,6 +62,11 @@ TEST(ResultKey, IsAnotherWhereAnythingIs) {
                                     [](auto& r) { r.handles[0].target->x = 1.5; },
                                     [](auto& r) { r.handles[0].target.reset(); },
                                     [](auto& r) { r.handles.push_back(r.handles[0]); },
+                                    [](auto& r) { r.selected = {0}; },
+                                    [](auto& r) { r.selected = {1}; },
+                                    [](auto& r) {
+                                      r.selected = {0, 1};
+                                    },
                                     [](auto& r) { r.region->size.y = 2; },
                                     [](auto& r) { r.region.reset(); }};
   for (const Asked& change : requests) {
