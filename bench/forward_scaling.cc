@@ -58,6 +58,7 @@ std::string row(const std::string& what, const Measured& m) {
 
 }  // namespace
 
+// NOLINTNEXTLINE(bugprone-exception-escape): it ends a benchmark, with its message
 int main(int argc, char** argv) {
   if (argc != 2) {
     std::fprintf(stderr, "usage: forward_scaling FOLDER\n");

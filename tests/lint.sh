@@ -8,6 +8,7 @@
 #   lint.sh --layout    clang-format alone, over every tracked source: seconds in place of ten minutes
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
+root=$(pwd -P)  # as clang-tidy writes it, where a checkout is reached by a link
 
 if [[ "${1:-}" == --layout ]]; then
   mapfile -t sources < <(git ls-files '*.cc' '*.h' '*.inc')
@@ -39,17 +40,17 @@ check_unit() {
   local report="$work/reports/${1//\//_}"
   clang-tidy-19 --quiet -p build/release --extra-arg=-DHWY_COMPILE_ONLY_STATIC \
     --extra-arg=-Wno-unknown-warning-option --extra-arg=-Wno-error "$1" >"$report" 2>&1 && return
-  # A failure always has a line, even where clang-tidy itself broke.
-  if ! grep -qE '^/.*: (warning|error): ' "$report"; then
-    echo "$PWD/$1:1:1: error: clang-tidy failed: $(tail -n 1 "$report")" >>"$report"
+  # A failure always has a line that counts, even where clang-tidy itself broke, or stopped in a header of others.
+  if ! grep -F "$root/" "$report" | grep -qE ': (warning|error): '; then
+    echo "$root/$1:1:1: error: clang-tidy failed: $(grep -m 1 'error:' "$report" || tail -n 1 "$report")" >>"$report"
   fi
 }
 export -f check_unit
-export work
+export work root
 if ((${#units[@]} > 0)); then
   printf '%s\0' "${units[@]}" | xargs -0 -n 1 -P "$(nproc)" bash -c 'check_unit "$1"' check_unit
   # A header's findings come with every file that includes it; those of other projects' headers are not ours.
-  cat "$work/reports/"* | grep -E "^$PWD/.*: (warning|error): " | sed -e "s|^$PWD/||" -e 's/,-warnings-as-errors\]$/]/' |
+  cat "$work/reports/"* | grep -F "$root/" | grep -E ': (warning|error): ' | sed -e "s|^$root/||" -e 's/,-warnings-as-errors\]$/]/' |
     sort -u -t : -k 1,1 -k 2,2n -k 3,3n -k 4 >"$work/tidy" || true
 fi
 touch "$work/tidy"

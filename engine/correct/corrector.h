@@ -53,7 +53,8 @@ class Corrector {
   ///   errors  those of the implementation; SceneCorrector has none
   [[nodiscard]] virtual Result<void> fine_tune(std::span<const Example> buffer, int steps) = 0;
 
-  /// Returns a corrected picture for each task. Pixels outside the mask, and trusted ones, stay as given.
+  /// Returns a corrected picture for each task, in their order and of the task's size, [3]. Pixels outside the mask,
+  /// and trusted ones, stay as given.
   ///   strength  S, 0 to 1: how much of what is doubtful is made anew; 1 all of it, 0 nothing
   ///   seed      same seed, same bytes, for any number of threads; the next million are this call's too
   ///   errors    those of the implementation; SceneCorrector has none

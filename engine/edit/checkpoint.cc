@@ -180,7 +180,9 @@ void write(ByteWriter& out, const ViewReport& view) { write(out, view.name), out
 void read(ByteReader& in, ViewReport& view) { read(in, view.name), view.mask_area = in.read<double>(); }
 
 void write(ByteWriter& out, const StageTime& time) { out.write(std::uint8_t(time.stage)), out.write(time.seconds); }
-void read(ByteReader& in, StageTime& time) { read(in, time.stage, Stage::finish), time.seconds = in.read<double>(); }
+void read(ByteReader& in, StageTime& time) {
+  read(in, time.stage, names<Stage>.back().value), time.seconds = in.read<double>();
+}
 
 void write(ByteWriter& out, const Report& report) {
   write(out, report.resolved);
@@ -270,13 +272,11 @@ Result<State> decode(std::string_view text, const scene::GaussianCloud& input, c
   if (!bytes) return propagate(bytes);
   auto contents = read_contents(*bytes);
   if (!contents) return propagate(contents);
-  const auto& handle = contents->members.handle;
-  if (!is_of(request, contents->state) ||
-      std::ranges::any_of(handle, [&](std::uint16_t owner) { return owner > request.handles.size(); }))
-    return fail(ErrorCode::invalid_argument, "the checkpoint is of another edit", "checkpoint");
   auto scene = working::restore(contents->members, input, frame_of(request));
   if (!scene) return fail(ErrorCode::invalid_argument, "the checkpoint is of an edit of another scene", "checkpoint");
   contents->state.scene = std::move(*scene);
+  if (!is_of(input, request, contents->state))
+    return fail(ErrorCode::invalid_argument, "the checkpoint is of another edit", "checkpoint");
   return std::move(contents->state);
 }
 

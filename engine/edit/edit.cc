@@ -136,7 +136,7 @@ Result<Outcome> run(const scene::GaussianCloud& scene, std::span<const scene::Ca
                     const Tools& tools, const Observer& observer, std::optional<State> from) {
   if (const auto valid = validate(request); !valid) return propagate(valid);
   if (const auto valid = validate_cameras(cameras); !valid) return propagate(valid);
-  if (from && (!is_of(request, *from) || from->scene.input_rows() != scene.size() || !from->scene.check()))
+  if (from && !is_of(scene, request, *from))
     return fail(ErrorCode::invalid_argument, "the state is of another edit", "checkpoint");
   optim::MsSsimLoss ms_ssim;
   Edit edit{scene,

@@ -22,7 +22,8 @@ namespace engine::edit {
 
 /// What an edit works with; they outlive it.
 struct Tools {
-  correct::Corrector* corrector = nullptr;      ///< Null: `none`, a view should show what its deformation left.
+  correct::Corrector* corrector =
+      nullptr;  ///< Null: `none`, views should show what they show once the part is deformed.
   optim::PerceptualLoss* perceptual = nullptr;  ///< The loss inside masks; null: optim::MsSsimLoss.
 };
 

@@ -31,7 +31,7 @@ struct OptimiseProgress {
   std::optional<double> loss = {};  ///< Of the last iteration.
 };
 
-/// What the views should show.
+/// What the optimisation is to reach, and what it is to keep.
 struct Goal {
   /// I_e of view v, in its size, rounded to 8 bits when it is taken; without a value, what the view shows now.
   std::function<std::optional<scene::Image>(std::size_t v)> picture;

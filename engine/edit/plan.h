@@ -36,6 +36,11 @@ constexpr auto names_of(Stage) {
 }
 using engine::name_of;
 constexpr std::size_t stage_count = names<Stage>.size();
+static_assert([] {  // a list of stage_count is indexed by the enumerators
+  for (std::size_t k = 0; k < stage_count; ++k)
+    if (names<Stage>[k].value != Stage(k)) return false;
+  return names<Stage>.back().value == Stage::finish;
+}());
 
 /// Time that a whole frame of a scene takes on a machine: a part that goes with the Gaussians, and one that goes with
 /// the pixels.

@@ -7,9 +7,10 @@
 namespace engine::edit {
 namespace {
 
-// How much of a plan must have been carried out until what was seen of it counts as much as the plan itself; and of the
-// stages of one kind. Stages of a kind are not all alike: the first view of a correction takes three times as long as
-// the last one, and with 0.05 of a kind the time left of some edits was told at 1.8 of the truth (docs/estimates.md).
+// How much of a plan must have been carried out until what was seen of it counts as much as the plan itself. The second
+// number says the same of the stages of one kind, which are not all alike: the first view of a correction takes longer
+// than the last one. Both were chosen on the edits of docs/estimates.md that are marked `fitted` and on those of the
+// fox: docs/experiments/0016-time-left.md.
 constexpr double plan_trust = 0.1, kind_trust = 0.4;
 
 bool is_measured(const Workload& work) { return work.frame.gaussians > 0 || work.frame.pixel > 0; }
@@ -38,7 +39,7 @@ void ProgressMeter::refine(const Workload& work) {
   for (std::size_t k = 0; k < plan_.size(); ++k) before_[k + 1] = before_[k] + plan_[k].seconds;
 }
 
-void ProgressMeter::set_out(const Workload& work) {
+void ProgressMeter::replan(const Workload& work) {
   refine(work);
   done_ = {};
   if (!entered_) return;

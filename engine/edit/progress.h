@@ -33,7 +33,7 @@ class ProgressMeter {
   /// More is known of the same edit: another plan of the same stages.
   void refine(const Workload& work);
   /// As refine(), and only what comes from now on is compared with the plan: so far, the edit was looked at.
-  void set_out(const Workload& work);
+  void replan(const Workload& work);
   [[nodiscard]] const Workload& workload() const { return work_; }
   /// What the plan has up to the end of this interval was done before.
   void go_on_after(int interval);

@@ -24,7 +24,7 @@ struct State {
   Report report;                     ///< So far.
 };
 
-/// Could an edit by this request be in this state? Its scene is not looked at.
-[[nodiscard]] bool is_of(const Request& request, const State& state);
+/// Could an edit of this scene by this request be in this state? Precondition: validate(request).
+[[nodiscard]] bool is_of(const scene::GaussianCloud& input, const Request& request, const State& state);
 
 }  // namespace engine::edit

@@ -36,7 +36,7 @@ repair::Repair make_repair(const State& state, const Edit& edit) {
           *edit.corrector};
 }
 
-/// Without a corrector I_e is what the deformation shows. In a move that is the scene without what has left: a
+/// Without a corrector I_e is what the scene shows before the optimisation. In a move that is without what has left: a
 /// picture with the originals in it, however faint, would ask for them, and where there are many they came back.
 class Uncorrected {
  public:
@@ -44,6 +44,8 @@ class Uncorrected {
     if (mode == Mode::move) gone_ = state.scene.rows_that_left();
     layers_.hidden = gone_;
   }
+  Uncorrected(const Uncorrected&) = delete;
+  Uncorrected& operator=(const Uncorrected&) = delete;
   [[nodiscard]] std::optional<scene::Image> picture(std::size_t v) {
     if (gone_.empty()) return std::nullopt;
     render::Rendering rendering;
@@ -62,7 +64,7 @@ class Uncorrected {
 
 void plan_ahead(const State& state, Edit& edit) {
   if (!edit.observer.progress) return;  // measuring costs about ten small frames
-  edit.progress.set_out(measured(edit.progress.workload(), state, edit.input, edit.candidates, edit.params()));
+  edit.progress.replan(measured(edit.progress.workload(), state, edit.input, edit.candidates, edit.params()));
 }
 
 Result<State> assign_and_divide(Edit& edit) {
@@ -147,9 +149,10 @@ Result<repair::Corrected> correct(State& state, Edit& edit, std::span<const scen
 Result<double> optimise(State& state, Edit& edit, std::span<const scene::Mask> masks, repair::Corrected corrected,
                         const repair::Round& round) {
   if (auto going = edit.progress.enter(Stage::set_up, round.interval); !going) return propagate(going);
-  Uncorrected uncorrected(state, edit.request.mode);
+  std::optional<Uncorrected> uncorrected;
+  if (edit.corrector == nullptr) uncorrected.emplace(state, edit.request.mode);
   const auto picture = [&](std::size_t v) {
-    return edit.corrector == nullptr ? uncorrected.picture(v) : std::optional(std::move(corrected.pictures[v]));
+    return uncorrected ? uncorrected->picture(v) : std::optional(std::move(corrected.pictures[v]));
   };
   const int before = (round.correction - 1) * edit.params().iterations;
   const auto advance = [&](const OptimiseProgress& at) {

@@ -1,5 +1,4 @@
-// The steps of an edit, each a function from the state and what stays the same to the next state, in their order.
-// edit.cc puts them together.
+// The steps of an edit in their order: each takes the state on, by what stays the same. edit.cc puts them together.
 // Source: 3DGS-Drag (ICLR 2025), section 3; docs/method.md tells them one by one.
 #pragma once
 
@@ -25,7 +24,7 @@ namespace engine::edit {
 
 using Rows = std::vector<std::uint32_t>;  ///< Of a working scene, ascending.
 
-/// What stays the same while an edit runs, and what can be made again from that at any time.
+/// What stays the same while an edit runs; below it, what steps have made of that, and could make again.
 struct Edit {
   const scene::GaussianCloud& input;
   const Request& request;

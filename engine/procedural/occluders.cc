@@ -43,7 +43,7 @@ struct Box {
 
 }  // namespace
 
-/// Triangles are cut in two by one of 16 planes across an axis.
+/// Triangles are cut in two between two of 16 bins along an axis.
 struct Occluders::Cut {
   static constexpr std::size_t bins = 16;
 

@@ -1,6 +1,7 @@
 #include "engine/repair/repair.h"
 
 #include <algorithm>
+#include <string>
 #include <utility>
 
 #include "engine/core/rng.h"
@@ -49,6 +50,14 @@ class OpaqueTrail {
   WorkingScene& working_;
   std::vector<float> lowered_;  ///< Opacities as they were; seeds appended since have none.
 };
+
+/// "512 x 384 x 3": pixels and channels.
+std::string size_text(int width, int height, int channels) {
+  return std::to_string(width) + " x " + std::to_string(height) + " x " + std::to_string(channels);
+}
+std::string size_text(const scene::Image& picture) {
+  return size_text(picture.width, picture.height, picture.channels);
+}
 
 /// A search tree of all means.
 neighbours::PointIndex index_of(const scene::GaussianCloud& cloud) {
@@ -116,9 +125,13 @@ Result<scene::Image> Repair::ask_corrector(scene::Image picture, const scene::Ma
                                      nearest_views(views_, v, most_examples)};
   auto pictures = corrector_.correct(std::span(&task, 1), round.strength, seed_for(purpose, v, round));
   if (!pictures) return propagate(pictures);
-  if (pictures->size() != 1 || pictures->front().width != mask.width || pictures->front().height != mask.height ||
-      pictures->front().channels != 3)
-    return fail(ErrorCode::internal, "the corrector answered with other pictures than it was asked for", "corrector");
+  const std::string due = size_text(mask.width, mask.height, 3);
+  const std::string came = pictures->empty() ? "none" : size_text(pictures->front());
+  if (pictures->size() != 1 || came != due)
+    return fail(ErrorCode::internal,
+                "view " + std::to_string(v) + ": the corrector was to give back one picture of " + due + ", and gave " +
+                    std::to_string(pictures->size()) + ", the first of " + came,
+                "corrector");
   return std::move(pictures->front());
 }
 

@@ -29,7 +29,7 @@ using working::WorkingScene;
 
 /// What the optimisation should reach.
 struct Corrected {
-  std::vector<scene::Image> pictures;  ///< I_e of each view, in its size. Empty: what a view shows now.
+  std::vector<scene::Image> pictures;  ///< I_e of each view, in its size. Empty: there was no corrector.
   std::vector<float> trust;            ///< [rows of the working scene] 0 to 1: the more, the slower a row may change.
   std::size_t seeds = 0;               ///< Rows that the correction appended.
 };
@@ -56,7 +56,8 @@ class Repair {
   /// One correction of all views. Appends seeds to the working scene.
   ///   masks    per view, dilated; views without a set pixel stay as they are
   ///   advance  called with the part that is done after each view; its error ends the correction
-  ///   errors   those of the corrector and of `advance`
+  ///   errors   those of the corrector and of `advance`; internal: the corrector gave back something else than a
+  ///            picture of the view's size
   [[nodiscard]] Result<Corrected> correct(WorkingScene& working, std::span<const scene::Mask> masks, const Round& round,
                                           const std::function<Result<void>(double)>& advance);
 

@@ -132,12 +132,13 @@ GaussianCloud flatten(const LayeredCloud& cloud) {
 
 namespace {
 
-/// Numbers of rows of two clouds, one after the other, as ranges to assemble: the first `from_first` are the first's.
-std::vector<RowRange> ranges_of_rows(std::span<const std::uint32_t> numbers, std::size_t from_first) {
+/// Rows of two clouds, counted through both, as ranges to assemble.
+///   first_rows  of the first cloud, which is counted first
+std::vector<RowRange> ranges_of_rows(std::span<const std::uint32_t> numbers, std::size_t first_rows) {
   std::vector<RowRange> ranges;
   for (const std::uint32_t number : numbers) {
-    const bool is_first = number < from_first;
-    const std::size_t source = is_first ? number : number - from_first;
+    const bool is_first = number < first_rows;
+    const std::size_t source = is_first ? number : number - first_rows;
     if (!ranges.empty() && ranges.back().from_base == is_first && ranges.back().source + ranges.back().count == source)
       ++ranges.back().count;
     else

@@ -36,7 +36,7 @@ DMat3 unit_from_world(const scene::GaussianCloud& cloud, std::size_t row) {
 double sigmoid(double x) { return 1.0 / (1.0 + std::exp(-x)); }
 
 /// What the dome is built around; lengths in world units.
-struct Stage {
+struct Subject {
   DVec3 centre;
   std::vector<DVec3> points;  ///< From the centre; at most 16 of them, which is plenty to judge visibility.
   double points_radius = 0;   ///< Largest distance of a point from the centre.
@@ -63,39 +63,41 @@ double cloud_scale(const scene::GaussianCloud& cloud, DVec3 centre) {
   return *middle > 0 ? *middle : 3 * widest;
 }
 
-Stage set_stage(const scene::GaussianCloud& cloud, std::span<const DVec3> points, const VirtualCameraOptions& options) {
-  Stage stage;
+Subject subject_of(const scene::GaussianCloud& cloud, std::span<const DVec3> points,
+                   const VirtualCameraOptions& options) {
+  Subject subject;
   DVec3 low = points[0], high = points[0];
   for (const DVec3& p : points) low = glm::min(low, p), high = glm::max(high, p);
-  stage.centre = 0.5 * (low + high);
-  for (const DVec3& p : points) stage.points_radius = std::max(stage.points_radius, glm::length(p - stage.centre));
+  subject.centre = 0.5 * (low + high);
+  for (const DVec3& p : points)
+    subject.points_radius = std::max(subject.points_radius, glm::length(p - subject.centre));
   const std::size_t kept = std::min<std::size_t>(points.size(), 16);
-  for (std::size_t k = 0; k < kept; ++k) stage.points.push_back(points[k * points.size() / kept] - stage.centre);
+  for (std::size_t k = 0; k < kept; ++k) subject.points.push_back(points[k * points.size() / kept] - subject.centre);
 
-  const double dragged = stage.points_radius + options.radius;
-  double framed = std::max(1.5 * dragged, 0.5 * cloud_scale(cloud, stage.centre));
+  const double dragged = subject.points_radius + options.radius;
+  double framed = std::max(1.5 * dragged, 0.5 * cloud_scale(cloud, subject.centre));
   // Nothing has a size. A millionth of the coordinates is about what float means can still tell apart.
-  if (!(framed > 0)) framed = std::max(1.0, 1e-6 * glm::length(stage.centre));
+  if (!(framed > 0)) framed = std::max(1.0, 1e-6 * glm::length(subject.centre));
   const double smaller_side = std::min(options.width, options.height);
   double half_fov = std::atan(std::tan(0.5 * options.fov_y_rad) * smaller_side / options.height);
   // A sphere of radius r around the point looked at fits the picture from r / sin(half the field of view) on.
   const double not_cut = 2 * options.near_plane + dragged;
-  stage.far = std::max(framed / std::sin(half_fov), not_cut);
-  half_fov = std::min(half_fov, std::asin(framed / stage.far));
-  stage.near = std::max({1.2 * dragged / std::sin(half_fov), 0.2 * stage.far, not_cut});
-  stage.far = std::max(stage.far, stage.near);
-  stage.fov_y_rad = 2 * std::atan(std::tan(half_fov) * options.height / smaller_side);
-  stage.clear = options.radius > 0 ? options.radius : framed / 8;
+  subject.far = std::max(framed / std::sin(half_fov), not_cut);
+  half_fov = std::min(half_fov, std::asin(framed / subject.far));
+  subject.near = std::max({1.2 * dragged / std::sin(half_fov), 0.2 * subject.far, not_cut});
+  subject.far = std::max(subject.far, subject.near);
+  subject.fov_y_rad = 2 * std::atan(std::tan(half_fov) * options.height / smaller_side);
+  subject.clear = options.radius > 0 ? options.radius : framed / 8;
 
-  const double reach_of_dome = 1.1 * stage.far;
+  const double reach_of_dome = 1.1 * subject.far;
   for (std::size_t i = 0; i < cloud.size(); ++i) {
-    Obstacle o{DVec3(cloud.mean.get(i)) - stage.centre, 0, sigmoid(cloud.opacity_logit[i]), std::uint32_t(i)};
+    Obstacle o{DVec3(cloud.mean.get(i)) - subject.centre, 0, sigmoid(cloud.opacity_logit[i]), std::uint32_t(i)};
     if (o.opacity < 0.05) continue;  // fog: it dims, but it hides nothing
     const Vec3 s = cloud.log_scale.get(i);
     o.reach = 3 * std::exp(std::clamp(double(std::max({s.x, s.y, s.z})), -20.0, 20.0));
-    if (glm::length(o.mean) <= reach_of_dome + o.reach) stage.obstacles.push_back(o);
+    if (glm::length(o.mean) <= reach_of_dome + o.reach) subject.obstacles.push_back(o);
   }
-  return stage;
+  return subject;
 }
 
 /// How well a camera sees the points.
@@ -143,11 +145,11 @@ bool can_see(std::span<const Shape> shapes, DVec3 eye, DVec3 point, double clear
   return true;
 }
 
-Sight look(const Stage& stage, std::span<const Shape> shapes, DVec3 eye) {
+Sight look(const Subject& subject, std::span<const Shape> shapes, DVec3 eye) {
   if (within(shapes, eye)) return {.inside = true};
-  const auto seen = std::count_if(stage.points.begin(), stage.points.end(),
-                                  [&](DVec3 point) { return can_see(shapes, eye, point, stage.clear); });
-  return {.inside = false, .seen = double(seen) / double(stage.points.size())};
+  const auto seen = std::count_if(subject.points.begin(), subject.points.end(),
+                                  [&](DVec3 point) { return can_see(shapes, eye, point, subject.clear); });
+  return {.inside = false, .seen = double(seen) / double(subject.points.size())};
 }
 
 struct Placement {
@@ -156,12 +158,12 @@ struct Placement {
 };
 
 /// The farthest free distance in a direction, or the nearest distance there is.
-Placement place(const scene::GaussianCloud& cloud, const Stage& stage, DVec3 direction) {
+Placement place(const scene::GaussianCloud& cloud, const Subject& subject, DVec3 direction) {
   // Everything that can matter lies in the capsule around the axis that holds all rays and the camera's surroundings.
-  const double capsule = std::max(stage.points_radius, 0.05 * stage.far);
+  const double capsule = std::max(subject.points_radius, 0.05 * subject.far);
   std::vector<Shape> shapes;
-  for (const Obstacle& o : stage.obstacles) {
-    const double along = std::clamp(glm::dot(o.mean, direction), 0.0, stage.far);
+  for (const Obstacle& o : subject.obstacles) {
+    const double along = std::clamp(glm::dot(o.mean, direction), 0.0, subject.far);
     const DVec3 off = o.mean - along * direction;
     const double limit = capsule + o.reach;
     if (glm::dot(off, off) <= limit * limit)
@@ -170,9 +172,9 @@ Placement place(const scene::GaussianCloud& cloud, const Stage& stage, DVec3 dir
   constexpr int distances = 6;
   Placement placed;
   for (int k = 0; k < distances; ++k) {
-    const double distance = stage.far * std::pow(stage.near / stage.far, double(k) / (distances - 1));
+    const double distance = subject.far * std::pow(subject.near / subject.far, double(k) / (distances - 1));
     placed.eye = distance * direction;
-    placed.sight = look(stage, shapes, placed.eye);
+    placed.sight = look(subject, shapes, placed.eye);
     if (placed.sight.free()) break;
   }
   return placed;
@@ -199,11 +201,11 @@ std::vector<DVec3> dome(int n, DVec3 pole) {
   return directions;
 }
 
-std::vector<Placement> place_all(const scene::GaussianCloud& cloud, const Stage& stage,
+std::vector<Placement> place_all(const scene::GaussianCloud& cloud, const Subject& subject,
                                  const std::vector<DVec3>& directions) {
   std::vector<Placement> placements(directions.size());
   parallel_for(directions.size(), 4, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) placements[i] = place(cloud, stage, directions[i]);
+    for (std::size_t i = begin; i < end; ++i) placements[i] = place(cloud, subject, directions[i]);
   });
   return placements;
 }
@@ -213,14 +215,14 @@ std::vector<Placement> place_all(const scene::GaussianCloud& cloud, const Stage&
 std::vector<scene::Camera> virtual_cameras(const scene::GaussianCloud& cloud, std::span<const DVec3> points,
                                            const VirtualCameraOptions& options) {
   if (points.empty() || options.count < 1) return {};
-  const Stage stage = set_stage(cloud, points, options);
+  const Subject subject = subject_of(cloud, points, options);
   const DVec3 up = unit_up(options.up);
   const std::size_t wanted = std::size_t(options.count);
 
   std::vector<Placement> tried;
   std::vector<std::size_t> free;
   for (int density = 1; density <= 8 && free.size() < wanted; density *= 2) {
-    tried = place_all(cloud, stage, dome(density * options.count, up));
+    tried = place_all(cloud, subject, dome(density * options.count, up));
     free.clear();
     for (std::size_t i = 0; i < tried.size(); ++i)
       if (tried[i].sight.free()) free.push_back(i);
@@ -239,8 +241,8 @@ std::vector<scene::Camera> virtual_cameras(const scene::GaussianCloud& cloud, st
   const std::size_t count = std::min(wanted, free.size());
   std::vector<scene::Camera> cameras;
   for (std::size_t k = 0; k < count; ++k) {
-    const DVec3 eye = stage.centre + tried[free[k * free.size() / count]].eye;  // evenly through the lattice
-    cameras.push_back(scene::look_at(eye, stage.centre, up, stage.fov_y_rad, options.width, options.height));
+    const DVec3 eye = subject.centre + tried[free[k * free.size() / count]].eye;  // evenly through the lattice
+    cameras.push_back(scene::look_at(eye, subject.centre, up, subject.fov_y_rad, options.width, options.height));
     std::array<char, 32> name{};
     std::snprintf(name.data(), name.size(), "virtual_%02zu", k);
     cameras.back().name = name.data();

@@ -55,9 +55,7 @@ JobWorkload workload_of(const scene::LayeredCloud& version, const edit::Request&
   work.edit.candidates = dataset.empty() ? std::size_t(params.views) : dataset.size();
   work.edit.virtual_views = dataset.empty();
   work.edit.views = dataset.empty() ? std::size_t(params.views) : edit::views_at_most(dataset, params);
-  // Where not even a virtual camera was found, no view of the edit will be larger than this.
-  const std::size_t side = std::size_t(params.max_image_side);
-  work.edit.view_pixels = cameras.empty() ? side * side : edit::view_pixels(cameras, params.max_image_side);
+  work.edit.view_pixels = edit::view_pixels(cameras, params.max_image_side);
   work.edit.shown = work.edit.kept = true;
   work.edit.pictured = std::min(std::size_t(std::max(0, pictured)), work.edit.views);
   work.edit.frame = edit::measured_frames(cloud, cameras, params.max_image_side);

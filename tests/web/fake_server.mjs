@@ -295,7 +295,7 @@ export function start({ port = 0, token = null, slow = 0, empty = false, tick = 
       fail(
         422,
         "unprocessable",
-        `0 Gaussians within ${request.handles[i].radius} of handle ${i + 1}; the nearest is at ${least.toPrecision(3)}: raise the radius`,
+        `0 Gaussians within ${request.handles[i].radius} of handle ${i + 1}; the nearest is ${least.toPrecision(3)} away: move the handle's source there, or raise the radius`,
         `handles[${i}].radius`,
       );
     });

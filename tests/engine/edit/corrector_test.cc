@@ -267,23 +267,27 @@ TEST(EditWithACorrector, AnErrorOfTheCorrectorEndsTheEdit) {
   }
 }
 
-/// Gives back so many pictures, of so many pixels a side.
+/// Gives back so many times this picture, whatever it is asked for.
 class Careless final : public correct::Corrector {
  public:
-  Careless(std::size_t pictures, int side) : pictures_(pictures), side_(side) {}
+  Careless(std::size_t pictures, scene::Image picture) : pictures_(pictures, std::move(picture)) {}
   Result<void> fine_tune(std::span<const correct::Example>, int) override { return {}; }
   Result<std::vector<scene::Image>> correct(std::span<const correct::CorrectionTask>, double, std::uint64_t) override {
-    return std::vector<scene::Image>(pictures_, scene::Image(side_, side_, 3));
+    return pictures_;
   }
 
  private:
-  std::size_t pictures_;
-  int side_;
+  std::vector<scene::Image> pictures_;
 };
 
 TEST(EditWithACorrector, ACorrectorThatAnswersSomethingElseEndsTheEdit) {
-  const BlockScene block;
-  for (Careless careless : {Careless(0, 8), Careless(1, 8), Careless(2, block.cameras[0].width)}) {
+  BlockScene block;
+  block.request.params.max_image_side = 48;
+  const scene::Camera view = scene::fit_within(block.cameras[0], 48);
+  const int width = view.width, height = view.height;
+  for (Careless careless :
+       {Careless(0, {}), Careless(2, scene::Image(width, height, 3)), Careless(1, scene::Image(width + 1, height, 3)),
+        Careless(1, scene::Image(width, height - 1, 3)), Careless(1, scene::Image(width, height, 1))}) {
     const auto outcome = run(block.cloud, block.cameras, block.request, {&careless});
     ASSERT_FALSE(outcome);
     EXPECT_EQ(outcome.error().code, ErrorCode::internal);

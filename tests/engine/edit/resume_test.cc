@@ -223,6 +223,9 @@ TEST(Resume, RefusesACheckpointOfAnotherEditOrScene) {
     ASSERT_FALSE(read) << what;
     EXPECT_EQ(read.error().code, ErrorCode::invalid_argument) << what;
     EXPECT_EQ(read.error().where, "checkpoint") << what;
+    const auto went_on = run(scene, c.cameras, request, {}, {}, from);
+    ASSERT_FALSE(went_on) << what;
+    EXPECT_EQ(went_on.error().where, "checkpoint") << what;
   };
   Request other = c.request;
   other.handles.pop_back();
