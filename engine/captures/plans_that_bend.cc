@@ -82,7 +82,7 @@ procedural::Patch mouth_inside() {
           .material =
               [=](const procedural::SurfacePoint& p) {
                 const float up = std::lerp(low, high, p.v), tooth = 14 * p.u - std::floor(14 * p.u);
-                const bool teeth = up > mouth_line - 0.10f;
+                const bool teeth = up > mouth_line - 0.24f;
                 const Vec3 color = teeth ? srgb(238, 232, 214) * (tooth < 0.12f ? 0.5f : 1.0f) : srgb(70, 18, 22);
                 return procedural::Finish{color, 0};
               },
@@ -127,12 +127,13 @@ Plan opened_mouth() {
   };
   Plan plan{.what = "The mouth of a face opened: the lower lip and the chin sink, the rest stays."};
   plan.surroundings = evaluate::furnished_room();
-  plan.surroundings.push_back({"face", {Vec3(middle), 0}, {face(mouth_line, highest), mouth_inside()}});
   plan.surroundings.push_back({"neck",
                                {at(0, 0, 0.02f), 0},
                                {procedural::lathe({{0.30f, 0}, {0.24f, 0.06f}, {0.16f, 0.12f}, {0.15f, 0.5f}},
                                                   procedural::plain(srgb(96, 92, 88)), on_things, 40)}});
-  plan.things = {{{"jaw", {Vec3(middle), 0}, {face(lowest, mouth_line)}}, sink}};
+  // What stays of the face is a thing, too, that goes nowhere: one light for all of it.
+  plan.things = {{{"jaw", {Vec3(middle), 0}, {face(lowest, mouth_line)}}, sink},
+                 {{"face", {Vec3(middle), 0}, {face(mouth_line, highest), mouth_inside()}}, shifted(DVec3(0.0))}};
   plan.orbit = {.target = dat(0, 0.65, -0.2), .distance = 2.5, .reach = 36, .lowest = 4, .highest = 26};
   const auto on_face = [&](float across, float up) { return middle + DVec3(face_point(across, up, 1)); };
   plan.grips = {{on_face(0, mouth_line - 0.06f), 0.2},
