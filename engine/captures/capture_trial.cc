@@ -1,26 +1,47 @@
 #include "engine/captures/capture_trial.h"
 
+#include <algorithm>
 #include <iomanip>
+#include <iterator>
 #include <memory>
+#include <optional>
 #include <span>
 #include <sstream>
 #include <utility>
 
 #include "engine/captures/photographs.h"
 #include "engine/edit/preview.h"
+#include "engine/mask/mask.h"
+#include "engine/render/forward.h"
 #include "engine/scene/overlay.h"
+#include "engine/working/footprint.h"
 
 namespace engine::captures {
 namespace {
 
-/// What the held-out cameras should show, without noise.
+/// What the held-out cameras should show, without noise. What no photo before the edit shows is nobody's fault: it does
+/// not count as outside.
 std::vector<evaluate::JudgedView> true_views(const CapturedCase& the_case) {
   std::vector<evaluate::JudgedView> views;
-  for (const scene::Camera& camera : the_case.held_out)
-    views.push_back({camera, photograph(the_case.after, camera),
-                     evaluate::judged_regions({the_case.before, the_case.part_before},
-                                              {the_case.after, the_case.part_after}, camera)});
+  render::Workspace workspace;
+  for (const scene::Camera& camera : the_case.held_out) {
+    evaluate::JudgedView view{camera, photograph(the_case.after, camera),
+                              evaluate::judged_regions({the_case.before, the_case.part_before},
+                                                       {the_case.after, the_case.part_after}, camera)};
+    const scene::Mask shown = mask::mask2d(working::footprint(the_case.before, the_case.shown, camera, workspace));
+    for (std::size_t i = 0; i < shown.data.size(); ++i)
+      if (shown.data[i] == 0) view.regions.outside.data[i] = 0;
+    views.push_back(std::move(view));
+  }
   return views;
+}
+
+/// Rows of the part after the edit that photos before it show.
+std::vector<std::uint32_t> shown_part(const CapturedCase& the_case) {
+  std::vector<std::uint32_t> rows;
+  std::set_intersection(the_case.part_before.begin(), the_case.part_before.end(), the_case.shown.begin(),
+                        the_case.shown.end(), std::back_inserter(rows));
+  return rows;
 }
 
 std::vector<std::uint32_t> rows_that_move(const CapturedCase& the_case, const scene::GaussianCloud& trained) {
@@ -57,7 +78,7 @@ Result<ReadyCase> make_ready(const CapturedCase& the_case, const fit::FitOptions
   judged.before = std::move(before->cloud);
   judged.truth = the_case.after;
   judged.part = the_case.part_after;
-  judged.part_after = the_case.shown_after;
+  judged.part_after = shown_part(the_case);
   judged.cameras = the_case.cameras, judged.held_out = the_case.held_out;
   judged.judged = true_views(the_case);
   judged.request = out.grasp.request;
@@ -112,23 +133,28 @@ std::string capture_table_head() {
 std::string capture_table_row(const CaptureTrial& trial) {
   const evaluate::Quality& result = trial.trial.result;
   std::ostringstream out;
-  out << "| " << trial.trial.name << " | " << (trial.is_test ? "test" : "choose") << " | " << trial.trial.corrector
-      << std::fixed << std::setprecision(2);
+  out << std::fixed;
+  const auto number = [&](bool is_known, double value, int digits) {
+    out << " | ";
+    if (is_known)
+      out << std::setprecision(digits) << value;
+    else
+      out << '-';
+  };
+  out << "| " << trial.trial.name << " | " << (trial.is_test ? "test" : "choose") << " | " << trial.trial.corrector;
   for (const double db : {trial.trial.untouched.edited.psnr_db, trial.deformed.edited.psnr_db, result.edited.psnr_db,
                           trial.gain_db(), trial.ceiling.edited.psnr_db})
-    out << " | " << db;
-  out << " | " << std::setprecision(0);
-  if (const auto share = trial.share_of_ceiling())
-    out << 100 * *share;
-  else
-    out << "-";
-  out << std::setprecision(2);
-  for (const double db :
-       {trial.result_beyond_db, result.outside.psnr_db, result.vacated.psnr_db, result.arrived.psnr_db})
-    out << " | " << db;
-  out << " | " << std::setprecision(4) << result.edited.ssim << std::setprecision(0) << " | "
-      << 100 * trial.match.recall << " | " << 100 * trial.match.precision << " | " << std::setprecision(1)
-      << trial.trial.seconds << " |\n";
+    number(true, db, 2);
+  const std::optional<double> share = trial.share_of_ceiling();
+  number(share.has_value(), 100 * share.value_or(0), 0);
+  number(true, trial.result_beyond_db, 2);
+  for (const evaluate::RegionQuality* region : {&result.outside, &result.vacated, &result.arrived})
+    number(region->pixels > 0, region->psnr_db, 2);
+  number(true, result.edited.ssim, 4);
+  number(true, 100 * trial.match.recall, 0);
+  number(true, 100 * trial.match.precision, 0);
+  number(true, trial.trial.seconds, 1);
+  out << " |\n";
   return out.str();
 }
 

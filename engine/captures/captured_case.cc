@@ -1,7 +1,9 @@
 #include "engine/captures/captured_case.h"
 
 #include <algorithm>
+#include <numbers>
 #include <numeric>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -21,10 +23,12 @@ constexpr std::uint64_t seed = 11;  // of all that is random in a case
 constexpr float spacing = 0.018f;   // between Gaussians of a true surface, world units: a pixel or so of a photo
 // What moves less than this counts as standing still: less than a pixel of a photo. World units.
 constexpr double least_motion = 0.01;
-constexpr double handle_noise = 0.02;  // standard deviation of each coordinate of a handle's ends, of its length
-constexpr double click_noise_px = 2;   // standard deviation of each coordinate of a click, pixels of a photo
-constexpr float gleam = 0.30f;         // of glossy things, see add_gloss()
-// A row of the part that photos blend with this weight or more is shown by them.
+// What a person points at is the source; the target is where it should go but for an error, whose length has this root
+// mean square as a share of the way.
+constexpr double handle_noise = 0.02;
+constexpr double click_noise_px = 2;  // standard deviation of each coordinate of a click, pixels of a photo
+constexpr float gleam = 0.30f;        // of glossy things, see add_gloss()
+// A row that photos blend with this weight or more is shown by them.
 constexpr float shown_weight = 0.02f;
 
 // Purposes of derived_seed().
@@ -117,8 +121,8 @@ void put_scenes(const Plan& plan, CapturedCase& out) {
   render::Workspace workspace;
   for (const scene::Camera& camera : out.cameras)
     render::raise_to_largest_weights(out.before, camera, workspace, weight);
-  for (const std::uint32_t row : out.part_before)
-    if (weight[row] >= shown_weight) out.shown_after.push_back(row);
+  for (std::uint32_t row = 0; row < weight.size(); ++row)
+    if (weight[row] >= shown_weight) out.shown.push_back(row);
 }
 
 /// The surface that a person sees near a place and points at, from where the first photo was taken.
@@ -140,33 +144,24 @@ class Pointing {
   render::Workspace workspace_;
 };
 
-DVec3 noise(double deviation, Rng& rng) {
+/// A vector of that length, root mean square.
+DVec3 noise(double length, Rng& rng) {
   DVec3 out(0.0);
-  for (int axis = 0; axis < 3; ++axis) out[axis] = deviation * double(rng.normal());
+  for (int axis = 0; axis < 3; ++axis) out[axis] = length / std::numbers::sqrt3 * double(rng.normal());
   return out;
 }
 
 void place_handles(const Plan& plan, CapturedCase& out) {
   Pointing point_at(out);
-  std::vector<DVec3> sources, targets;
-  double longest = 0;
   for (std::size_t h = 0; h < plan.grips.size(); ++h) {
     const Grip& grip = plan.grips[h];
-    Rng rng(seed_for(for_handles), 2 * h);
-    sources.push_back(point_at(grip.near, 0, rng));
-    targets.push_back(grip.anchor ? sources.back() : plan.things[grip.thing].motion(sources.back()));
-    longest = std::max(longest, glm::distance(sources.back(), targets.back()));
-  }
-  for (std::size_t h = 0; h < plan.grips.size(); ++h) {
-    const Grip& grip = plan.grips[h];
-    Rng rng(seed_for(for_handles), 2 * h + 1);
-    // An anchor has no length; its place is as uncertain as that of the others.
-    const double length = grip.anchor ? longest : glm::distance(sources[h], targets[h]);
-    edit::Handle handle{.source = sources[h] + noise(handle_noise * length, rng),
-                        .target = std::nullopt,
-                        .radius = grip.radius,
-                        .group = 0};
-    if (!grip.anchor) handle.target = targets[h] + noise(handle_noise * length, rng);
+    Rng rng(seed_for(for_handles), h);
+    edit::Handle handle{
+        .source = point_at(grip.near, 0, rng), .target = std::nullopt, .radius = grip.radius, .group = 0};
+    if (!grip.anchor) {
+      const DVec3 target = plan.things[grip.thing].motion(handle.source);
+      handle.target = target + noise(handle_noise * glm::distance(handle.source, target), rng);
+    }
     out.handles.push_back(handle);
   }
 }

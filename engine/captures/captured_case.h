@@ -42,9 +42,9 @@ struct CapturedCase {
   bool textured = true;
 
   scene::GaussianCloud before, after;      ///< What is photographed.
-  std::vector<std::uint32_t> part_before;  ///< Rows of `before` that move.
-  std::vector<std::uint32_t> part_after;   ///< Rows of `after` that have moved or are new.
-  std::vector<std::uint32_t> shown_after;  ///< Those of part_after that photos before the edit show.
+  std::vector<std::uint32_t> part_before;  ///< Rows of `before` that move; they are the same rows of `after`.
+  std::vector<std::uint32_t> part_after;   ///< Those, and rows of `after` that are new.
+  std::vector<std::uint32_t> shown;        ///< Rows of `before` that photos before the edit show; ascending.
   MovingPart moving;                       ///< What part_before is, of positions.
 
   std::vector<scene::Camera> cameras;   ///< Of the photos.

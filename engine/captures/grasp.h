@@ -23,8 +23,8 @@ struct Grasp {
 /// photos.
 using GraspBy = std::function<Result<Grasp>(const CapturedCase& the_case, const scene::GaussianCloud& scene)>;
 
-/// By a ball around each handle, and a box where the case has one. Carelessly: balls too large by half, off to one side
-/// by a third of their radius, which reaches beyond the outline on that side and misses the other.
+/// By a ball around each handle, and a box where the case has one. Carelessly: balls too large by a quarter
+/// and so far off to one side that about half of the thing is missing.
 ///   errors  those of deform::assign()
 [[nodiscard]] Result<Grasp> grasp_by_balls(const CapturedCase& the_case, const scene::GaussianCloud& scene);
 

@@ -98,7 +98,7 @@ Plan apple_on_barrel() {
   plan.orbit = {.target = dat(0, 0, -0.2), .distance = 3.2, .lowest = 14, .highest = 38};
   const auto on_apple = [&](double x, double height, double z) { return pose(dat(x, height, z - 0.35)); };
   plan.grips = {
-      {on_apple(-0.13, 0.2, -0.12), 0.26}, {on_apple(0.13, 0.2, -0.12), 0.26}, {on_apple(0.02, 0.32, -0.12), 0.26}};
+      {on_apple(-0.13, 0.2, -0.12), 0.33}, {on_apple(0.13, 0.2, -0.12), 0.33}, {on_apple(0.02, 0.32, -0.12), 0.33}};
   plan.clicks = {{on_apple(0, 0.2, -0.19), on_apple(0.1, 0.3, -0.1)},
                  {pose(dat(0.35, 0, -0.4)), pose(dat(-0.35, 0, -0.4)), dat(0.5, 0.75, 1.4)}};
   return plan;

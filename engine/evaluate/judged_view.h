@@ -8,7 +8,7 @@ namespace engine::evaluate {
 
 /// The judged regions in one held-out view; pixels may lie in several.
 struct JudgedRegions {
-  scene::Mask edited, vacated, arrived;
+  scene::Mask edited, vacated, arrived, outside;
 };
 
 /// A held-out view. All have the camera's size.

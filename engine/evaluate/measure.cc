@@ -130,6 +130,7 @@ JudgedRegions judged_regions(RowsOf before, RowsOf after, const scene::Camera& c
   kinds.edited = mask::dilate(both, std::max(1, rim_px_at_360 * camera.height / 360));
   for (std::size_t i = 0; i < kinds.vacated.data.size(); ++i)
     if (kinds.arrived.data[i] != 0) kinds.vacated.data[i] = 0;
+  kinds.outside = complement(kinds.edited);
   return kinds;
 }
 
@@ -144,7 +145,7 @@ Quality judge(std::span<const JudgedView> views, const scene::GaussianCloud& res
     edited.add(is, view.truth, view.regions.edited);
     vacated.add(is, view.truth, view.regions.vacated);
     arrived.add(is, view.truth, view.regions.arrived);
-    outside.add(is, view.truth, complement(view.regions.edited));
+    outside.add(is, view.truth, view.regions.outside);
   }
   return {edited.quality(), vacated.quality(), arrived.quality(), outside.quality(), 0};
 }
