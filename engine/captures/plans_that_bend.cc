@@ -109,6 +109,7 @@ Plan bent_plant() {
   plan.things = {{procedural::make_plant({Vec3(foot), 0.3f}, 22, plant_seed).object, bend}};
   plan.orbit = {.target = dat(0.05, 0.65, -0.1), .distance = 3.8};
   plan.grips = {{soil + dat(0, 0.3, -0.1), 0.6}, {soil + dat(0, 0.75, 0), 0.65}};
+  plan.region = standing_on(double(procedural::soil_height) + 0.04, foot, {2.0, 1.5, 2.0});
   plan.clicks = {{soil + dat(0.05, 0.35, -0.2), soil + dat(-0.2, 0.4, -0.1), soil + dat(0.1, 0.75, 0)},
                  {foot + dat(0, 0.3, -0.4), foot + dat(0.6, 0, -0.3), dat(-1.0, 1.2, 1.4)}};
   return plan;

