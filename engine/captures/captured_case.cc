@@ -78,6 +78,7 @@ void gloss_over(const std::vector<std::string>& glossy, const std::vector<proced
 /// Appends the things as they are before the edit, and after it, with all gloss.
 void put_things(const Plan& plan, CapturedCase& out) {
   std::vector<procedural::Object> objects;
+  objects.reserve(plan.things.size());
   for (const Thing& thing : plan.things) objects.push_back(thing.object);
   Covered things = cover(objects, out.cameras, seed + 1);
   for (std::size_t i = 0; i < things.cloud.size(); ++i)

@@ -72,6 +72,7 @@ std::vector<Vec3> exposures(std::size_t photos, const Sensor& sensor, std::uint6
     mean += logarithm[p] / double(photos);
   }
   std::vector<Vec3> out;
+  out.reserve(photos);
   for (const DVec3& value : logarithm) out.emplace_back(glm::exp(value - mean));
   return out;
 }
@@ -100,6 +101,7 @@ std::vector<fit::Photo> take_photos(const scene::GaussianCloud& cloud, std::span
                                     const Sensor& sensor, std::uint64_t seed) {
   const std::vector<Vec3> exposure = exposures(cameras.size(), sensor, seed);
   std::vector<fit::Photo> photos;
+  photos.reserve(cameras.size());
   for (std::size_t p = 0; p < cameras.size(); ++p)
     photos.push_back(expose(cameras[p], photograph(cloud, cameras[p]), exposure[p], sensor,
                             derived_seed(seed, {for_noise, std::uint32_t(p), 0, 0})));

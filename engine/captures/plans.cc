@@ -12,7 +12,6 @@ namespace engine::captures {
 namespace {
 
 using procedural::box;
-using procedural::cloth_cover;
 using procedural::lathe;
 using procedural::Object;
 using procedural::plain;

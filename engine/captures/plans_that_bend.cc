@@ -13,7 +13,6 @@
 namespace engine::captures {
 namespace {
 
-using procedural::Object;
 using procedural::srgb;
 
 constexpr float on_things = 2.2f;         // Gaussians per area, relative to the table top
