@@ -12,6 +12,7 @@
 #include "engine/core/half_axes.h"
 #include "engine/core/rng.h"
 #include "engine/deform/rotate_sh.h"
+#include "engine/evaluate/studio.h"
 #include "engine/procedural/demo_scene.h"
 #include "engine/procedural/light.h"
 #include "engine/procedural/materials.h"
@@ -70,25 +71,6 @@ struct Plan {
 
 Vec3 at(float x, float height, float z) { return {x, -height, z}; }
 DVec3 dat(double x, double height, double z) { return {x, -height, z}; }
-
-/// Even light: what is moved looks the same elsewhere.
-procedural::Light studio() {
-  procedural::Light light;
-  light.to_sun = glm::normalize(Vec3(-0.5f, -0.8f, -0.6f));
-  light.sun = 1.6f * Vec3(1.0f, 0.95f, 0.88f);
-  light.sky_up = 0.9f * Vec3(0.95f, 0.98f, 1.0f);
-  light.sky_level = 0.75f * Vec3(1.0f, 1.0f, 1.0f);
-  light.sky_down = 0.45f * Vec3(1.0f, 0.95f, 0.9f);
-  light.window = {
-      .middle = {0, 0, 0}, .columns = 1, .rows = 1, .pane_width = 200, .pane_height = 200, .bar = 0, .softness = 0.1f};
-  return light;
-}
-
-std::vector<procedural::Object> furnished_room() {
-  return {procedural::make_room(-1.5f), procedural::make_table({}, {3.7f, 1.5f, 2.1f}),
-          procedural::make_framed_print({at(-0.95f, 0.85f, 1.40f), 0}, 1.5f, 1.1f),
-          procedural::make_framed_print({at(0.95f, 0.85f, 1.40f), 0}, 1.5f, 1.1f)};
-}
 
 procedural::Object crate(procedural::Placement placement, float side, float height) {
   return {"crate", placement,
@@ -326,7 +308,7 @@ Case carry_out(const std::string& name, const Plan& plan) {
   out.request = plan.request;
   place_cameras(plan, out);
 
-  const procedural::Light light = studio();
+  const procedural::Light light = studio_light();
   const procedural::Surfels around = procedural::cover_all(plan.surroundings, light, out.cameras, plan.spacing, seed);
   std::vector<procedural::Object> things;
   for (const Part& part : plan.parts) things.push_back(part.object);

@@ -13,6 +13,7 @@
 
 #include "engine/core/result.h"
 #include "engine/edit/request.h"
+#include "engine/evaluate/judged_view.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/gaussian_cloud.h"
 
@@ -31,7 +32,9 @@ struct Case {
   std::vector<std::uint32_t> part_after;   ///< For each of those, the row of `truth` that it should become.
   std::vector<scene::Camera> cameras;      ///< Cameras of the capture.
   std::vector<scene::Camera> held_out;     ///< Cameras between those; the edit never sees their pictures.
-  edit::Request request;                   ///< Handles and mode; parameters are those of a preset or a sweep.
+  /// What held-out cameras should show, one for each, where that is known better than by rendering `truth`.
+  std::vector<JudgedView> judged;
+  edit::Request request;  ///< Handles and mode; parameters are those of a preset or a sweep.
 };
 
 /// Names of all cases, in order.

@@ -46,6 +46,13 @@ double psnr_db(double mean_square) {
   return mean_square > 0 ? std::min(-10 * std::log10(mean_square), identical_db) : identical_db;
 }
 
+/// What the camera should show.
+scene::Image true_picture(const Case& the_case, const scene::Camera& camera) {
+  for (const JudgedView& view : the_case.judged)
+    if (view.camera.name == camera.name) return view.truth;
+  return picture(the_case.truth, camera);
+}
+
 /// Depth along the optical axis of what a view shows most of. World units; 0: nothing.
 scene::Image true_depth(const scene::GaussianCloud& truth, const scene::Camera& camera) {
   render::ForwardOptions options;
@@ -114,29 +121,43 @@ scene::Mask complement(scene::Mask mask) {
   return mask;
 }
 
-JudgedRegions judged_regions(const Case& the_case, const scene::Camera& camera) {
+JudgedRegions judged_regions(RowsOf before, RowsOf after, const scene::Camera& camera) {
   JudgedRegions kinds;
-  kinds.arrived = shown(the_case.truth, the_case.part, camera);
-  kinds.vacated = shown(the_case.before, the_case.part_before, camera);
+  kinds.arrived = shown(after.cloud, after.rows, camera);
+  kinds.vacated = shown(before.cloud, before.rows, camera);
   scene::Mask both = kinds.arrived;
   mask::unite(both, kinds.vacated);
   kinds.edited = mask::dilate(both, std::max(1, rim_px_at_360 * camera.height / 360));
   for (std::size_t i = 0; i < kinds.vacated.data.size(); ++i)
     if (kinds.arrived.data[i] != 0) kinds.vacated.data[i] = 0;
+  kinds.outside = complement(kinds.edited);
   return kinds;
 }
 
-Quality judge(const Case& the_case, const scene::GaussianCloud& result) {
+JudgedRegions judged_regions(const Case& the_case, const scene::Camera& camera) {
+  return judged_regions({the_case.before, the_case.part_before}, {the_case.truth, the_case.part}, camera);
+}
+
+Quality judge(std::span<const JudgedView> views, const scene::GaussianCloud& result) {
   RegionQualitySum edited, vacated, arrived, outside;
-  for (const scene::Camera& camera : the_case.held_out) {
-    const JudgedRegions kinds = judged_regions(the_case, camera);
-    const scene::Image is = picture(result, camera), should_be = picture(the_case.truth, camera);
-    edited.add(is, should_be, kinds.edited);
-    vacated.add(is, should_be, kinds.vacated);
-    arrived.add(is, should_be, kinds.arrived);
-    outside.add(is, should_be, complement(kinds.edited));
+  for (const JudgedView& view : views) {
+    const scene::Image is = picture(result, view.camera);
+    edited.add(is, view.truth, view.regions.edited);
+    vacated.add(is, view.truth, view.regions.vacated);
+    arrived.add(is, view.truth, view.regions.arrived);
+    outside.add(is, view.truth, view.regions.outside);
   }
-  return {edited.quality(), vacated.quality(), arrived.quality(), outside.quality(), miss(the_case, result)};
+  return {edited.quality(), vacated.quality(), arrived.quality(), outside.quality(), 0};
+}
+
+Quality judge(const Case& the_case, const scene::GaussianCloud& result) {
+  std::vector<JudgedView> rendered;
+  if (the_case.judged.empty())
+    for (const scene::Camera& camera : the_case.held_out)
+      rendered.push_back({camera, picture(the_case.truth, camera), judged_regions(the_case, camera)});
+  Quality quality = judge(the_case.judged.empty() ? rendered : the_case.judged, result);
+  quality.miss = miss(the_case, result);
+  return quality;
 }
 
 Agreement agreement(const Case& the_case, std::span<const scene::Camera> views,
@@ -172,7 +193,7 @@ Agreement agreement(const Case& the_case, std::span<const scene::Camera> views,
 
 scene::Image comparison(const Case& the_case, const scene::GaussianCloud& deformed, const scene::GaussianCloud& result,
                         const scene::Camera& camera) {
-  const scene::Image truth = picture(the_case.truth, camera), is = picture(result, camera);
+  const scene::Image truth = true_picture(the_case, camera), is = picture(result, camera);
   scene::Image difference(camera.width, camera.height, 3);
   for (std::size_t i = 0; i < difference.data.size(); ++i)
     difference.data[i] = std::min(1.0f, 4 * std::abs(is.data[i] - truth.data[i]));

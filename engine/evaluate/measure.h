@@ -2,10 +2,12 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
 #include "engine/evaluate/cases.h"
+#include "engine/evaluate/judged_view.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/gaussian_cloud.h"
 #include "engine/scene/image.h"
@@ -50,12 +52,17 @@ struct Quality {
   double miss = 0;
 };
 
-/// The judged regions in one held-out view; pixels may lie in several.
-struct JudgedRegions {
-  scene::Mask edited, vacated, arrived;
+/// Rows of a cloud.
+struct RowsOf {
+  const scene::GaussianCloud& cloud;
+  std::span<const std::uint32_t> rows;
 };
+/// The regions of a part that is `before` in one scene and `after` in another.
+[[nodiscard]] JudgedRegions judged_regions(RowsOf before, RowsOf after, const scene::Camera& camera);
 [[nodiscard]] JudgedRegions judged_regions(const Case& the_case, const scene::Camera& camera);
 
+/// Judges `result` at these views; `miss` is not known.
+[[nodiscard]] Quality judge(std::span<const JudgedView> views, const scene::GaussianCloud& result);
 /// Judges `result`, which came of the_case.before.
 [[nodiscard]] Quality judge(const Case& the_case, const scene::GaussianCloud& result);
 

@@ -14,14 +14,13 @@
 #include "engine/core/names.h"
 #include "engine/edit/request.h"
 #include "engine/evaluate/cases.h"
-#include "engine/evaluate/result_key.h"
 #include "engine/evaluate/trial.h"
 #include "engine/evaluate/trip_trial.h"
 #include "engine/io/dataset.h"
-#include "engine/io/image_file.h"
 #include "engine/io/scene_file.h"
 #include "engine/params/params.h"
-#include "proto/params_fields.h"
+#include "server/cli/bench_captures.h"
+#include "server/cli/bench_edit.h"
 #include "server/cli/bench_report.h"
 #include "server/cli/commands.h"
 #include "server/cli/compute.h"
@@ -40,58 +39,11 @@ using engine::propagate;
 using nlohmann::ordered_json;
 using std::filesystem::path;
 
-struct BenchOptions {
-  std::vector<std::string> cases, correctors{"scene"};
-  std::string out;
-  proto::Preset preset = proto::Preset::draft;
-  proto::Params given;                        // over the preset
-  std::string scene, dataset, request, name;  // a real capture, there and back
-  bool small = false, whole_picture = false;
-  int pictures = 1;
-  ComputeOptions compute;
-};
-
-/// What is given on the command line, over the preset.
-void apply(const BenchOptions& options, edit::Request& request) {
-  request.params = edits::filled_in(options.given, options.preset, request);
-  request.params.local_mask = !options.whole_picture;
-}
-
-/// Those parameters that a request could give; which corrector is not one of them here.
-ordered_json encode_params(const edit::Params& params) {
-  ordered_json out = proto::encode(engine::params::as_given(params));
-  out.erase("corrector");
-  return out;
-}
-
-/// Where a result is kept.
-path cache_file(const BenchOptions& options, const Machine& machine, const std::string& subject,
-                const std::string& corrector, const edit::Request& request) {
-  static const std::uint64_t program = evaluate::checksum_of_program();
-  const std::string key = evaluate::result_key({.subject = subject,
-                                                .corrector = corrector,
-                                                .scene = options.scene,
-                                                .dataset = options.dataset,
-                                                .pictures = options.pictures,
-                                                .threads = machine.threads,
-                                                .simd = machine.simd,
-                                                .program = program},
-                                               request);
-  return path(options.out) / "results" / (key + ".json");
-}
-
-/// Writes pictures below the output folder.
-evaluate::Show picture_writer(const BenchOptions& options) {
-  return [&options](const std::string& name, const scene::Image& picture) {
-    return io::write_image(path(options.out) / (name + ".png"), picture);
-  };
-}
-
 Result<evaluate::Trial> trial_of(const evaluate::Case& the_case, const std::string& corrector,
                                  const BenchOptions& options, const Machine& machine) {
   edit::Request request = the_case.request;
   apply(options, request);
-  const path file = cache_file(options, machine, the_case.name, corrector, request);
+  const path file = cache_file(options, machine, the_case.name, corrector, {}, {}, request);
   return cached_or_new<evaluate::Trial>(file, [&]() -> Result<evaluate::Trial> {
     auto done = evaluate::carry_out(the_case, request, corrector);
     if (!done) return propagate(done);
@@ -100,20 +52,6 @@ Result<evaluate::Trial> trial_of(const evaluate::Case& the_case, const std::stri
     if (!pictures) return propagate(pictures);
     return std::move(done->trial);
   });
-}
-
-/// What stands at the head of every report.
-ordered_json settings(const BenchOptions& options, const Machine& machine) {
-  edit::Request any;
-  apply(options, any);
-  ordered_json params{{"preset", proto::name_of(options.preset)}};
-  params.update(encode_params(any.params));
-  if (!options.given.intervals) params["intervals"] = nullptr;  // they depend on the drag
-  params["local_mask"] = any.params.local_mask;
-  return {{"splatdrag", SPLATDRAG_VERSION},
-          {"threads", machine.threads},
-          {"simd", machine.simd},
-          {"params", std::move(params)}};
 }
 
 Result<void> run_cases(const BenchOptions& options, const Machine& machine, Terminal& terminal) {
@@ -169,7 +107,7 @@ Result<void> run_trips(const BenchOptions& options, const Machine& machine, Term
   if (!capture) return propagate(capture);
   ordered_json all = ordered_json::array();
   for (const std::string& corrector : options.correctors) {
-    const path file = cache_file(options, machine, "trip", corrector, capture->request);
+    const path file = cache_file(options, machine, "trip", corrector, options.scene, options.dataset, capture->request);
     const auto trial = cached_or_new<evaluate::TripTrial>(file, [&] {
       auto done = evaluate::carry_out_trip(capture->cloud, capture->cameras, capture->request, corrector,
                                            std::size_t(options.pictures), picture_writer(options));
@@ -191,6 +129,7 @@ Result<void> run(const BenchOptions& options, Terminal& terminal) {
   if (auto all = edits::available(any.params); !all) return all;
   if (auto made = make_folder(path(options.out) / "results"); !made) return made;
   return compute(options.compute, [&](const Machine& machine) -> Result<void> {
+    if (options.captures.on) return run_captures(options, machine, terminal);
     return options.scene.empty() ? run_cases(options, machine, terminal) : run_trips(options, machine, terminal);
   });
 }
@@ -241,10 +180,13 @@ void add_bench_edit_command(CLI::App& program, Action& action) {
   const auto options = std::make_shared<BenchOptions>();
   std::string known;
   for (const std::string& name : evaluate::case_names()) known += (known.empty() ? "" : ", ") + name;
-  command->add_option("--case", options->cases, "Which; may be repeated; all if none is named. There are " + known)
+  command
+      ->add_option(
+          "--case", options->cases,
+          "Which; may be repeated; all if none is named. There are " + known + "; with --captures " + captured_cases())
       ->default_str("")
       ->type_name("NAME");
-  command->add_flag("--small", options->small, "Only those that are quick");
+  CLI::Option* const small = command->add_flag("--small", options->small, "Only those that are quick");
   command
       ->add_option("--out", options->out,
                    "Folder for bench.json, bench.md, pictures, and results by request: those that are there are not "
@@ -268,6 +210,7 @@ void add_bench_edit_command(CLI::App& program, Action& action) {
                    "Held-out views to show per case: before, deformed, result, truth, four times the difference")
       ->check(CLI::Range(0, 1000))
       ->type_name("N");
+  CLI::Option* const captures = add_capture_options(*command, options->captures);
   const auto capture = command->add_option("--scene", options->scene,
                                            "In place of the cases a real capture, without truth: the drag and the one "
                                            "that undoes it, judged at cameras between those of the capture");
@@ -275,7 +218,8 @@ void add_bench_edit_command(CLI::App& program, Action& action) {
   CLI::Option* const dataset = command->add_option("--dataset", options->dataset, "Its cameras")->type_name("DIR");
   CLI::Option* const request = command->add_option("--request", options->request, "The drag")->type_name("FILE");
   command->add_option("--name", options->name, "Which request of a file of several")->type_name("NAME");
-  capture->needs(dataset)->needs(request);
+  capture->needs(dataset)->needs(request)->excludes(captures);
+  small->excludes(captures);
   add_compute_options(*command, options->compute);
   command->callback([options, &action] { action = [options](Terminal& terminal) { return run(*options, terminal); }; });
 }

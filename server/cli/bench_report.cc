@@ -10,6 +10,7 @@
 namespace server::cli {
 namespace {
 
+namespace captures = engine::captures;
 namespace evaluate = engine::evaluate;
 using nlohmann::ordered_json;
 
@@ -104,6 +105,43 @@ void decode(const ordered_json& from, evaluate::TripTrial& trial) {
   from.at("seconds").get_to(trial.seconds);
 }
 
+/// The columns of every trial, then those of captured cases. Derived figures are for readers; decode() has no need of
+/// them.
+ordered_json encode(const captures::CaptureTrial& trial) {
+  ordered_json out = encode(trial.trial);
+  out["test"] = trial.is_test;
+  out["said"] = trial.said;
+  out["deformed"] = encode(trial.deformed);
+  out["ceiling"] = encode(trial.ceiling);
+  out["gain_db"] = trial.gain_db();
+  const auto share = trial.share_of_ceiling();
+  out["share_of_ceiling"] = share ? ordered_json(*share) : ordered_json(nullptr);
+  out["beyond_db"] = {{"untouched", trial.untouched_beyond_db},
+                      {"deformed", trial.deformed_beyond_db},
+                      {"result", trial.result_beyond_db},
+                      {"ceiling", trial.ceiling_beyond_db}};
+  out["recall"] = trial.match.recall;
+  out["precision"] = trial.match.precision;
+  out["fit_seconds"] = trial.fit_seconds;
+  return out;
+}
+
+void decode(const ordered_json& from, captures::CaptureTrial& trial) {
+  decode(from, trial.trial);
+  from.at("test").get_to(trial.is_test);
+  from.at("said").get_to(trial.said);
+  decode(from.at("deformed"), trial.deformed);
+  decode(from.at("ceiling"), trial.ceiling);
+  const ordered_json& beyond = from.at("beyond_db");
+  beyond.at("untouched").get_to(trial.untouched_beyond_db);
+  beyond.at("deformed").get_to(trial.deformed_beyond_db);
+  beyond.at("result").get_to(trial.result_beyond_db);
+  beyond.at("ceiling").get_to(trial.ceiling_beyond_db);
+  from.at("recall").get_to(trial.match.recall);
+  from.at("precision").get_to(trial.match.precision);
+  from.at("fit_seconds").get_to(trial.fit_seconds);
+}
+
 template <class ResultType>
 std::optional<ResultType> cached_result(const std::filesystem::path& file) {
   std::ifstream in(file);
@@ -119,6 +157,7 @@ std::optional<ResultType> cached_result(const std::filesystem::path& file) {
 }
 template std::optional<evaluate::Trial> cached_result(const std::filesystem::path& file);
 template std::optional<evaluate::TripTrial> cached_result(const std::filesystem::path& file);
+template std::optional<captures::CaptureTrial> cached_result(const std::filesystem::path& file);
 
 engine::Result<void> write_json(const std::filesystem::path& file, const ordered_json& what) {
   const std::string text = proto::pretty(what) + "\n";

@@ -1,4 +1,5 @@
-// Results of `splatdrag bench-edit` as JSON: in bench.json and trips.json, and in a cache from one run to the next.
+// Results of `splatdrag bench-edit` as JSON: in bench.json, captures.json and trips.json, and in a cache from one run
+// to the next.
 #pragma once
 
 #include <filesystem>
@@ -6,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "engine/captures/capture_trial.h"
 #include "engine/core/result.h"
 #include "engine/evaluate/trial.h"
 #include "engine/evaluate/trip_trial.h"
@@ -15,16 +17,19 @@ namespace server::cli {
 /// The JSON of a result.
 [[nodiscard]] nlohmann::ordered_json encode(const engine::evaluate::Trial& trial);
 [[nodiscard]] nlohmann::ordered_json encode(const engine::evaluate::TripTrial& trial);
+[[nodiscard]] nlohmann::ordered_json encode(const engine::captures::CaptureTrial& trial);
 
 /// The reverse of encode(). Throw what nlohmann::json does where a field is missing or of another type.
 void decode(const nlohmann::ordered_json& from, engine::evaluate::Trial& trial);
 void decode(const nlohmann::ordered_json& from, engine::evaluate::TripTrial& trial);
+void decode(const nlohmann::ordered_json& from, engine::captures::CaptureTrial& trial);
 
 /// The result that the file holds; nothing if it is not there, damaged or of another form.
 template <class ResultType>
 [[nodiscard]] std::optional<ResultType> cached_result(const std::filesystem::path& file);
 extern template std::optional<engine::evaluate::Trial> cached_result(const std::filesystem::path& file);
 extern template std::optional<engine::evaluate::TripTrial> cached_result(const std::filesystem::path& file);
+extern template std::optional<engine::captures::CaptureTrial> cached_result(const std::filesystem::path& file);
 
 /// Writes indented JSON with a line's end.
 ///   errors  those of engine::write_file()

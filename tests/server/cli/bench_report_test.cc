@@ -7,6 +7,7 @@
 namespace server::cli {
 namespace {
 
+namespace captures = engine::captures;
 namespace evaluate = engine::evaluate;
 
 evaluate::Trial sample_trial() {
@@ -50,6 +51,38 @@ TEST(BenchReport, ATripComesBackAsItWas) {
   decode(nlohmann::ordered_json::parse(written.dump()), read);
   EXPECT_EQ(encode(read).dump(), written.dump());
   EXPECT_EQ(read.request, "ear_up");
+}
+
+captures::CaptureTrial sample_capture() {
+  captures::CaptureTrial capture;
+  capture.trial = sample_trial();
+  capture.is_test = true, capture.said = "Nearly.";
+  capture.deformed.edited = {25.5, 0.5, 7}, capture.ceiling.edited = {40.1, 0.5, 7};
+  capture.untouched_beyond_db = 19, capture.deformed_beyond_db = 20;
+  capture.result_beyond_db = 21, capture.ceiling_beyond_db = 22;
+  capture.match = {.recall = 0.75, .precision = 0.5};
+  capture.fit_seconds = 61.5;
+  return capture;
+}
+
+TEST(BenchReport, ACaptureComesBackAsItWas) {
+  const auto written = encode(sample_capture());
+  captures::CaptureTrial read;
+  decode(nlohmann::ordered_json::parse(written.dump()), read);
+  EXPECT_EQ(encode(read).dump(), written.dump());
+  EXPECT_TRUE(read.is_test);
+  EXPECT_EQ(read.trial.name, "slide");
+  EXPECT_DOUBLE_EQ(written.at("gain_db"), 30.1 - 25.5);
+  EXPECT_DOUBLE_EQ(written.at("share_of_ceiling"), (30.1 - 20.1) / (40.1 - 20.1));
+}
+
+TEST(BenchReport, ACaptureWithoutAWayToItsCeilingHasNoShareOfIt) {
+  captures::CaptureTrial capture = sample_capture();
+  capture.ceiling.edited.psnr_db = 10;
+  EXPECT_TRUE(encode(capture).at("share_of_ceiling").is_null());
+  captures::CaptureTrial read;
+  decode(encode(capture), read);
+  EXPECT_EQ(encode(read).dump(), encode(capture).dump());
 }
 
 TEST(BenchReport, HasTheFieldsThatOthersRead) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -214,6 +215,33 @@ TEST_F(Cli, BenchEditJudgesEditsWhoseRightResultIsKnown) {
   support::write_file(kept, bytes.substr(0, bytes.size() / 2));
   ASSERT_EQ(splatdrag(bench).status, 0);
   EXPECT_LT(json::parse(support::read_file(at("bench/bench.json")))["cases"][0]["seconds"], 70);
+}
+
+TEST_F(Cli, BenchEditJudgesEditsOfScenesThatItTrains) {
+  const std::string bench =
+      "bench-edit --captures --case mug --fit-iterations 60 --preset preview --corrector none "
+      "--cache " +
+      at("trained") + " --out " + at("bench") + " --page " + at("page.md");
+  const Finished run = splatdrag(bench);
+  ASSERT_EQ(run.status, 0) << run.err;
+  const json said = json::parse(support::read_file(at("bench/captures.json")));
+  EXPECT_EQ(said["fit_iterations"], 60);
+  ASSERT_EQ(said["captures"].size(), 1u);
+  const json& found = said["captures"][0];
+  EXPECT_EQ(found["case"], "mug");
+  EXPECT_GT(found["deformed"]["edited"]["psnr_db"], found["untouched"]["edited"]["psnr_db"]) << found;
+  EXPECT_GT(found["ceiling"]["edited"]["psnr_db"], found["deformed"]["edited"]["psnr_db"]) << found;
+  EXPECT_EQ(found["gain_db"], 0) << "a preview is the deformation alone";
+  EXPECT_GT(found["recall"], 0.5);
+  EXPECT_GT(found["precision"], 0.5);
+  EXPECT_NE(support::read_file(at("page.md")).find("| mug | choose | none |"), std::string::npos);
+  EXPECT_TRUE(io::read_image(at("bench/mug_none_within_0.png")));
+  EXPECT_EQ(std::distance(fs::directory_iterator(at("trained")), fs::directory_iterator()), 2) << "before and after";
+
+  // Other parameters are tried on the scenes that are there.
+  const double seconds = found["fit_seconds"];
+  ASSERT_EQ(splatdrag(bench + " --interpolation smooth").status, 0);
+  EXPECT_EQ(json::parse(support::read_file(at("bench/captures.json")))["captures"][0]["fit_seconds"], seconds);
 }
 
 TEST_F(Cli, EditWritesSceneReportAndPictures) {

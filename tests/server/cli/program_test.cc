@@ -119,5 +119,28 @@ TEST(Program, EachKindOfFailureHasItsStatus) {
   expect_error({"demo-scene", "--out", folder.path().string(), "--gaussians", "7"}, 2, "gaussians");
 }
 
+TEST(Program, RefusesWrongOptionsOfCaptures) {
+  const support::TempDir folder;
+  const std::string out = (folder.path() / "out").string(), file = (folder.path() / "file").string();
+  support::write_file(file, "not a folder");
+  const auto refused = [&](std::vector<std::string> more, int status, const std::string& part) {
+    const std::vector<std::string> base{"bench-edit", "--out", out};
+    more.insert(more.begin(), base.begin(), base.end());
+    expect_error(more, status, part);
+  };
+  refused({"--page", "page.md"}, 2, "--captures");
+  refused({"--cache", out}, 2, "--captures");
+  refused({"--fit-iterations", "9"}, 2, "--captures");
+  refused({"--captures", "--small"}, 2, "--small");
+  refused({"--captures", "--scene", "a.ply", "--dataset", "d", "--request", "r.json"}, 2, "--captures");
+  refused({"--captures", "--fit-iterations", "0"}, 2, "--fit-iterations");
+  refused({"--captures", "--fit-iterations", "nan"}, 2, "--fit-iterations");
+  refused({"--captures", "--cache", out, "--case", "slide"}, 3, "no captured case \"slide\"");
+  refused({"--case", "mug"}, 3, "no case \"mug\"");
+  refused({"--captures", "--cache", file}, 2, "file");
+  refused({"--captures", "--cache", file + "/below"}, 2, "file");
+  refused({"--captures", "--cache", out, "--page", (folder.path() / "none" / "page.md").string()}, 3, "none");
+}
+
 }  // namespace
 }  // namespace server::cli

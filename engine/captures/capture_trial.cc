@@ -1,0 +1,161 @@
+#include "engine/captures/capture_trial.h"
+
+#include <algorithm>
+#include <iomanip>
+#include <iterator>
+#include <memory>
+#include <optional>
+#include <span>
+#include <sstream>
+#include <utility>
+
+#include "engine/captures/photographs.h"
+#include "engine/edit/preview.h"
+#include "engine/mask/mask.h"
+#include "engine/render/forward.h"
+#include "engine/scene/overlay.h"
+#include "engine/working/footprint.h"
+
+namespace engine::captures {
+namespace {
+
+/// What the held-out cameras should show, without noise. What no photo before the edit shows is nobody's fault: it does
+/// not count as outside.
+std::vector<evaluate::JudgedView> true_views(const CapturedCase& the_case) {
+  std::vector<evaluate::JudgedView> views;
+  render::Workspace workspace;
+  for (const scene::Camera& camera : the_case.held_out) {
+    evaluate::JudgedView view{camera, photograph(the_case.after, camera),
+                              evaluate::judged_regions({the_case.before, the_case.part_before},
+                                                       {the_case.after, the_case.part_after}, camera)};
+    const scene::Mask shown = mask::mask2d(working::footprint(the_case.before, the_case.shown, camera, workspace));
+    for (std::size_t i = 0; i < shown.data.size(); ++i)
+      if (shown.data[i] == 0) view.regions.outside.data[i] = 0;
+    views.push_back(std::move(view));
+  }
+  return views;
+}
+
+/// Rows of the part after the edit that photos before it show.
+std::vector<std::uint32_t> shown_part(const CapturedCase& the_case) {
+  std::vector<std::uint32_t> rows;
+  std::set_intersection(the_case.part_before.begin(), the_case.part_before.end(), the_case.shown.begin(),
+                        the_case.shown.end(), std::back_inserter(rows));
+  return rows;
+}
+
+std::vector<std::uint32_t> rows_that_move(const CapturedCase& the_case, const scene::GaussianCloud& trained) {
+  const std::vector<std::uint8_t> moves = the_case.moving.holds(trained.mean);
+  std::vector<std::uint32_t> rows;
+  for (std::uint32_t row = 0; row < moves.size(); ++row)
+    if (moves[row] != 0) rows.push_back(row);
+  return rows;
+}
+
+/// PSNR of the edited region at the views outside the orbit.
+double beyond_db(const ReadyCase& ready, const scene::GaussianCloud& result) {
+  const std::span<const evaluate::JudgedView> views = ready.judged.judged;
+  return evaluate::judge(views.last(ready.beyond), result).edited.psnr_db;
+}
+
+}  // namespace
+
+Result<ReadyCase> make_ready(const CapturedCase& the_case, const fit::FitOptions& options,
+                             const std::filesystem::path& folder, const GraspBy& grasp_by) {
+  auto before = trained(capture(the_case, Side::before), options, folder);
+  if (!before) return propagate(before);
+  auto after = trained(capture(the_case, Side::after), options, folder);
+  if (!after) return propagate(after);
+  auto grasp = grasp_by(the_case, before->cloud);
+  if (!grasp) return propagate(grasp);
+
+  ReadyCase out;
+  out.match = match(before->cloud, grasp->rows, the_case.moving);
+  out.grasp = std::move(*grasp);
+  evaluate::Case& judged = out.judged;
+  judged.name = the_case.name, judged.what = the_case.what, judged.textured = the_case.textured;
+  judged.part_before = rows_that_move(the_case, before->cloud);
+  judged.before = std::move(before->cloud);
+  judged.truth = the_case.after;
+  judged.part = the_case.part_after;
+  judged.part_after = shown_part(the_case);
+  judged.cameras = the_case.cameras, judged.held_out = the_case.held_out;
+  judged.judged = true_views(the_case);
+  judged.request = out.grasp.request;
+  out.beyond = the_case.beyond;
+  out.ceiling = std::move(after->cloud);
+  out.ceiling_gaussians = out.ceiling.size();
+  out.is_test = the_case.is_test, out.said = the_case.said;
+  out.fit_seconds = before->seconds + after->seconds;
+  out.key_before = before->key, out.key_after = after->key;
+  return out;
+}
+
+double CaptureTrial::gain_db() const { return trial.result.edited.psnr_db - deformed.edited.psnr_db; }
+
+std::optional<double> CaptureTrial::share_of_ceiling() const {
+  const double way = ceiling.edited.psnr_db - trial.untouched.edited.psnr_db;
+  if (!(way > 0)) return std::nullopt;
+  return (trial.result.edited.psnr_db - trial.untouched.edited.psnr_db) / way;
+}
+
+Result<CaptureOutcome> carry_out(const ReadyCase& ready, const edit::Request& request, const edit::Request& preview,
+                                 const std::string& corrector) {
+  auto done = evaluate::carry_out(ready.judged, request, corrector);
+  if (!done) return propagate(done);
+  const auto base = std::make_shared<const scene::GaussianCloud>(ready.judged.before);
+  const auto shown = edit::preview({.base = base, .overlay = nullptr}, preview);
+  if (!shown) return propagate(shown);
+  const scene::GaussianCloud deformed = scene::flatten(*base, shown->overlay);
+
+  CaptureOutcome out{.trial = {}, .edited = std::move(done->edited)};
+  CaptureTrial& trial = out.trial;
+  trial.trial = std::move(done->trial);
+  trial.is_test = ready.is_test, trial.said = ready.said;
+  trial.deformed = evaluate::judge(ready.judged, deformed);
+  trial.ceiling = evaluate::judge(ready.judged, ready.ceiling);
+  trial.untouched_beyond_db = beyond_db(ready, ready.judged.before);
+  trial.deformed_beyond_db = beyond_db(ready, deformed);
+  trial.result_beyond_db = beyond_db(ready, out.edited);
+  trial.ceiling_beyond_db = beyond_db(ready, ready.ceiling);
+  trial.match = ready.match;
+  trial.fit_seconds = ready.fit_seconds;
+  return out;
+}
+
+std::string capture_table_head() {
+  return "| case | set | corrector | before, dB | deformed, dB | edited, dB | gain, dB | ceiling, dB | share, % "
+         "| beyond, dB | outside, dB | vacated, dB | arrived, dB | SSIM | recall, % | precision, % | s |\n"
+         "| --- | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: "
+         "| ---: |\n";
+}
+
+std::string capture_table_row(const CaptureTrial& trial) {
+  const evaluate::Quality& result = trial.trial.result;
+  std::ostringstream out;
+  out << std::fixed;
+  const auto number = [&](bool is_known, double value, int digits) {
+    out << " | ";
+    if (is_known)
+      out << std::setprecision(digits) << value;
+    else
+      out << '-';
+  };
+  out << "| " << trial.trial.name << " | " << (trial.is_test ? "test" : "choose") << " | " << trial.trial.corrector;
+  for (const double db : {trial.trial.untouched.edited.psnr_db, trial.deformed.edited.psnr_db, result.edited.psnr_db,
+                          trial.gain_db(), trial.ceiling.edited.psnr_db})
+    number(true, db, 2);
+  const std::optional<double> share = trial.share_of_ceiling();
+  number(share.has_value(), 100 * share.value_or(0), 0);
+  number(true, trial.result_beyond_db, 2);
+  for (const evaluate::RegionQuality* region : {&result.outside, &result.vacated, &result.arrived})
+    number(region->pixels > 0, region->psnr_db, 2);
+  number(true, result.edited.ssim, 4);
+  number(true, 100 * trial.match.recall, 0);
+  number(true, 100 * trial.match.precision, 0);
+  number(true, trial.trial.seconds, 1);
+  out << " |\n";
+  return out.str();
+}
+
+}  // namespace engine::captures

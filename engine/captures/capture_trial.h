@@ -1,0 +1,73 @@
+// A captured case carried out and judged.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+
+#include "engine/captures/captured_case.h"
+#include "engine/captures/grasp.h"
+#include "engine/captures/moving_part.h"
+#include "engine/captures/training.h"
+#include "engine/core/result.h"
+#include "engine/edit/request.h"
+#include "engine/evaluate/cases.h"
+#include "engine/evaluate/measure.h"
+#include "engine/evaluate/trial.h"
+
+namespace engine::captures {
+
+/// A case with its trained scenes.
+struct ReadyCase {
+  evaluate::Case judged;   ///< `before` is the trained scene, `truth` the true one after; views show true photographs.
+  std::size_t beyond = 0;  ///< So many of the held-out views, the last ones, are outside the orbit.
+  scene::GaussianCloud ceiling;  ///< Trained from photos after the edit.
+  Grasp grasp;                   ///< What is asked for; its request is that of `judged`.
+  Match match;                   ///< Of the grasp with what moves.
+  bool is_test = false;          ///< See CapturedCase.
+  std::string said;              ///< See Plan.
+  double fit_seconds = 0;        ///< Of both fits, when they were done.
+  std::size_t ceiling_gaussians = 0;
+  std::uint64_t key_before = 0, key_after = 0;  ///< Of the fits.
+};
+
+/// Photographs a case, trains both scenes and asks for the edit.
+///   folder  of trained(); exists
+///   errors  those of trained() and of `grasp_by`
+[[nodiscard]] Result<ReadyCase> make_ready(const CapturedCase& the_case, const fit::FitOptions& options,
+                                           const std::filesystem::path& folder, const GraspBy& grasp_by);
+
+/// What an edit of a captured case came to. Qualities are over all held-out views but where it says otherwise.
+struct CaptureTrial {
+  evaluate::Trial trial;       ///< Of the edit, with the columns of every trial; `untouched` is of the trained scene.
+  bool is_test = false;        ///< See CapturedCase.
+  std::string said;            ///< See Plan.
+  evaluate::Quality deformed;  ///< Of the deformation alone.
+  evaluate::Quality ceiling;   ///< Of the scene that was trained from photos after the edit.
+  /// PSNR of the edited region at the views outside the orbit, dB.
+  double untouched_beyond_db = 0, deformed_beyond_db = 0, result_beyond_db = 0, ceiling_beyond_db = 0;
+  Match match;             ///< Of what was asked for with what moves.
+  double fit_seconds = 0;  ///< Of both fits.
+
+  [[nodiscard]] double gain_db() const;  ///< Of the edit over deformation alone, in the edited region.
+  /// Of the way from the scene before the edit to the ceiling, in dB of the edited region, the part that the edit goes:
+  /// 0 as good as doing nothing, 1 as good as photographing anew. Nothing where the ceiling is no better than that.
+  [[nodiscard]] std::optional<double> share_of_ceiling() const;
+};
+
+/// Edits a case and judges what comes of it.
+///   request  that of the case, with the parameters to try
+///   preview  the same with those of a deformation alone
+///   errors   those of edit::run()
+struct CaptureOutcome {
+  CaptureTrial trial;
+  scene::GaussianCloud edited;
+};
+[[nodiscard]] Result<CaptureOutcome> carry_out(const ReadyCase& ready, const edit::Request& request,
+                                               const edit::Request& preview, const std::string& corrector);
+
+/// The head of a table of trials in Markdown, and a trial's row of it, each with its line's end.
+[[nodiscard]] std::string capture_table_head();
+[[nodiscard]] std::string capture_table_row(const CaptureTrial& trial);
+
+}  // namespace engine::captures

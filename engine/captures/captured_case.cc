@@ -1,0 +1,231 @@
+#include "engine/captures/captured_case.h"
+
+#include <algorithm>
+#include <numbers>
+#include <numeric>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "engine/core/rng.h"
+#include "engine/evaluate/studio.h"
+#include "engine/fit/start.h"
+#include "engine/procedural/surfels.h"
+#include "engine/render/largest_weight.h"
+#include "engine/render/pick.h"
+
+namespace engine::captures {
+namespace {
+
+// These figures are choices, and part of the definition of the cases: whoever changes one cannot compare results with
+// docs/captures.md any more.
+constexpr std::uint64_t seed = 11;  // of all that is random in a case
+constexpr float spacing = 0.018f;   // between Gaussians of a true surface, world units: a pixel or so of a photo
+// What moves less than this counts as standing still: less than a pixel of a photo. World units.
+constexpr double least_motion = 0.01;
+// What a person points at is the source; the target is where it should go but for an error, whose length has this root
+// mean square as a share of the way.
+constexpr double handle_noise = 0.02;
+constexpr double click_noise_px = 2;  // standard deviation of each coordinate of a click, pixels of a photo
+constexpr float gleam = 0.30f;        // of glossy things, see add_gloss()
+// A row that photos blend with this weight or more is shown by them.
+constexpr float shown_weight = 0.02f;
+
+// Purposes of derived_seed().
+constexpr std::uint32_t for_cameras = 21, for_photos = 22, for_points = 23, for_handles = 24, for_clicks = 25;
+
+std::uint64_t seed_for(std::uint32_t purpose, std::uint32_t number = 0) {
+  return derived_seed(seed, {purpose, number, 0, 0});
+}
+
+std::vector<std::uint32_t> range(std::size_t first, std::size_t last) {
+  std::vector<std::uint32_t> rows(last - first);
+  std::iota(rows.begin(), rows.end(), std::uint32_t(first));
+  return rows;
+}
+
+/// Objects without the gloss of their materials, which is made for cameras; gloss comes with add_gloss().
+std::vector<procedural::Object> matt(std::vector<procedural::Object> objects) {
+  for (procedural::Object& object : objects)
+    for (procedural::Patch& patch : object.patches)
+      patch.material = [material = std::move(patch.material)](const procedural::SurfacePoint& point) {
+        return procedural::Finish{material(point).albedo, 0};
+      };
+  return objects;
+}
+
+/// Objects covered with Gaussians, with room for SH of degree 3.
+struct Covered {
+  scene::GaussianCloud cloud;
+  std::vector<std::uint16_t> object;  ///< [N]
+};
+
+Covered cover(const std::vector<procedural::Object>& objects, std::span<const scene::Camera> cameras,
+              std::uint64_t own_seed) {
+  procedural::Surfels surfels =
+      procedural::cover_all(matt(objects), evaluate::studio_light(), cameras, spacing, own_seed);
+  return {fit::with_sh_degree(surfels.cloud, scene::max_sh_degree), std::move(surfels.object)};
+}
+
+void gloss_over(const std::vector<std::string>& glossy, const std::vector<procedural::Object>& objects,
+                std::span<const std::uint16_t> object_of_row, std::size_t first_row, scene::GaussianCloud& cloud) {
+  const Vec3 to_light = evaluate::studio_light().to_sun;
+  for (std::size_t i = 0; i < object_of_row.size(); ++i)
+    if (std::find(glossy.begin(), glossy.end(), objects[object_of_row[i]].name) != glossy.end())
+      add_gloss(to_light, gleam, first_row + i, cloud);
+}
+
+/// Appends the things as they are before the edit, and after it, with all gloss.
+void put_things(const Plan& plan, CapturedCase& out) {
+  std::vector<procedural::Object> objects;
+  objects.reserve(plan.things.size());
+  for (const Thing& thing : plan.things) objects.push_back(thing.object);
+  Covered things = cover(objects, out.cameras, seed + 1);
+  for (std::size_t i = 0; i < things.cloud.size(); ++i)
+    if (const Motion& pose = plan.things[things.object[i]].pose) carry_along(pose, i, things.cloud);
+  const std::size_t first = out.before.size(), count = things.cloud.size();
+  scene::append_rows(out.before, things.cloud, range(0, count));
+  scene::append_rows(out.after, things.cloud, range(0, count));
+  for (std::size_t i = 0; i < count; ++i) {
+    carry_along(plan.things[things.object[i]].motion, first + i, out.after);
+    const auto row = std::uint32_t(first + i);
+    if (glm::distance(DVec3(out.before.mean.get(row)), DVec3(out.after.mean.get(row))) < least_motion) continue;
+    out.part_before.push_back(row);
+    out.part_after.push_back(row);
+  }
+  gloss_over(plan.glossy, objects, things.object, first, out.before);
+  gloss_over(plan.glossy, objects, things.object, first, out.after);
+}
+
+/// Both scenes and what moves in them.
+void put_scenes(const Plan& plan, CapturedCase& out) {
+  Covered around = cover(plan.surroundings, out.cameras, seed);
+  gloss_over(plan.glossy, plan.surroundings, around.object, 0, around.cloud);
+  std::vector<std::uint32_t> meant;
+  for (std::uint32_t i = 0; plan.drawn_from && i < around.cloud.size(); ++i)
+    if (plan.drawn_from(DVec3(around.cloud.mean.get(i)))) meant.push_back(i);
+  out.before = around.cloud;
+  out.after = std::move(around.cloud);
+  put_things(plan, out);
+  if (!plan.only_after.empty()) {
+    const Covered grown = cover(plan.only_after, out.cameras, seed + 2);
+    const std::size_t first = out.after.size();
+    scene::append_rows(out.after, grown.cloud, range(0, grown.cloud.size()));
+    gloss_over(plan.glossy, plan.only_after, grown.object, first, out.after);
+    for (std::size_t i = 0; i < grown.cloud.size(); ++i) out.part_after.push_back(std::uint32_t(first + i));
+  }
+  std::vector<std::uint32_t> moving = meant;  // all of them come before those of things
+  moving.insert(moving.end(), out.part_before.begin(), out.part_before.end());
+  out.moving = MovingPart(out.before, moving);
+
+  std::vector<float> weight(out.before.size(), 0.0f);
+  render::Workspace workspace;
+  for (const scene::Camera& camera : out.cameras)
+    render::raise_to_largest_weights(out.before, camera, workspace, weight);
+  for (std::uint32_t row = 0; row < weight.size(); ++row)
+    if (weight[row] >= shown_weight) out.shown.push_back(row);
+}
+
+/// The surface that a person sees near a place and points at, from where the first photo was taken.
+class Pointing {
+ public:
+  explicit Pointing(const CapturedCase& the_case) : case_(the_case) {}
+  /// Where nothing is to be seen, the place itself.
+  ///   noise_px  standard deviation of each coordinate
+  DVec3 operator()(DVec3 place, double noise_px, Rng& rng) {
+    const scene::Camera& camera = case_.cameras.front();
+    DVec2 pixel = camera.pixel_from_cam(camera.cam_from_world(place));
+    for (int axis = 0; axis < 2; ++axis) pixel[axis] += noise_px * double(rng.normal());
+    const auto hit = render::pick(case_.before, camera, pixel, workspace_);
+    return hit ? hit->point : place;
+  }
+
+ private:
+  const CapturedCase& case_;
+  render::Workspace workspace_;
+};
+
+/// A vector of that length, root mean square.
+DVec3 noise(double length, Rng& rng) {
+  DVec3 out(0.0);
+  for (int axis = 0; axis < 3; ++axis) out[axis] = length / std::numbers::sqrt3 * double(rng.normal());
+  return out;
+}
+
+void place_handles(const Plan& plan, CapturedCase& out) {
+  Pointing point_at(out);
+  for (std::size_t h = 0; h < plan.grips.size(); ++h) {
+    const Grip& grip = plan.grips[h];
+    Rng rng(seed_for(for_handles), h);
+    edit::Handle handle{
+        .source = point_at(grip.near, 0, rng), .target = std::nullopt, .radius = grip.radius, .group = 0};
+    if (!grip.anchor) {
+      const DVec3 target = plan.things[grip.thing].motion(handle.source);
+      handle.target = target + noise(handle_noise * glm::distance(handle.source, target), rng);
+    }
+    out.handles.push_back(handle);
+  }
+}
+
+void place_clicks(const ClickPlan& plan, CapturedCase& out) {
+  Pointing point_at(out);
+  std::uint64_t number = 0;
+  const auto click = [&](DVec3 near) {
+    Rng rng(seed_for(for_clicks), number++);
+    return point_at(near, click_noise_px, rng);
+  };
+  for (const DVec3& near : plan.inside) out.clicks.inside.push_back(click(near));
+  for (const DVec3& near : plan.outside) out.clicks.outside.push_back(click(near));
+}
+
+CapturedCase carry_out(const std::string& name, const Plan& plan) {
+  CapturedCase out;
+  out.name = name, out.what = plan.what, out.said = plan.said;
+  out.is_test = plan.is_test, out.textured = plan.textured;
+  out.cameras = photo_cameras(plan.orbit, seed_for(for_cameras));
+  HeldOut held_out = held_out_cameras(plan.orbit, seed_for(for_cameras));
+  out.held_out = std::move(held_out.within);
+  out.beyond = held_out.beyond.size();
+  for (scene::Camera& camera : held_out.beyond) out.held_out.push_back(std::move(camera));
+  put_scenes(plan, out);
+  out.mode = plan.mode, out.region = plan.region, out.careless = plan.careless;
+  place_handles(plan, out);
+  place_clicks(plan.clicks, out);
+  return out;
+}
+
+}  // namespace
+
+const std::vector<std::string>& captured_case_names() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> out;
+    for (const NamedPlan& known : known_plans()) out.push_back(known.name);
+    return out;
+  }();
+  return names;
+}
+
+Result<std::vector<std::string>> choose_captured_cases(const std::vector<std::string>& names) {
+  const std::vector<std::string>& all = captured_case_names();
+  for (const std::string& name : names)
+    if (std::find(all.begin(), all.end(), name) == all.end()) return propagate(make_captured_case(name));
+  return names.empty() ? all : names;
+}
+
+Result<CapturedCase> make_captured_case(const std::string& name) {
+  std::string names;
+  for (const NamedPlan& known : known_plans()) {
+    if (known.name == name) return carry_out(name, known.make());
+    names += (names.empty() ? "" : ", ") + known.name;
+  }
+  return fail(ErrorCode::not_found, "there is no captured case \"" + name + "\"; there are " + names, "case");
+}
+
+Capture capture(const CapturedCase& the_case, Side side) {
+  const scene::GaussianCloud& cloud = side == Side::before ? the_case.before : the_case.after;
+  const auto number = std::uint32_t(side);
+  return {take_photos(cloud, the_case.cameras, the_case.sensor, seed_for(for_photos, number)),
+          sparse_points(cloud, the_case.cameras, the_case.points, seed_for(for_points, number))};
+}
+
+}  // namespace engine::captures

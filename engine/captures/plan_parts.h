@@ -1,0 +1,38 @@
+// What plans share.
+#pragma once
+
+#include <numbers>
+
+#include "engine/captures/plan.h"
+#include "engine/core/vec.h"
+
+namespace engine::captures {
+
+constexpr double degree = std::numbers::pi / 180;
+
+/// A place at a height; the world's y points down.
+[[nodiscard]] constexpr Vec3 at(float x, float height, float z) { return {x, -height, z}; }
+[[nodiscard]] constexpr DVec3 dat(double x, double height, double z) { return {x, -height, z}; }
+
+[[nodiscard]] inline Motion shifted(DVec3 shift) {
+  return [=](DVec3 point) { return point + shift; };
+}
+/// About an axis through the pivot.
+[[nodiscard]] inline Motion turned(DVec3 pivot, DVec3 axis, double angle) {
+  const DQuat turn = glm::angleAxis(angle, axis);
+  return [=](DVec3 point) { return pivot + turn * (point - pivot); };
+}
+
+/// A box as a person draws one around a thing that stands on something: its floor is 0.02 above the support, so that
+/// it holds nothing of the support.
+[[nodiscard]] inline edit::Region standing_on(double support_height, DVec3 middle, DVec3 size) {
+  constexpr double clear = 0.02;
+  return {{middle.x, -(support_height + clear + 0.5 * size.y), middle.z}, size};
+}
+
+// Plans of things that bend, in plans_that_bend.cc.
+[[nodiscard]] Plan bent_plant();
+[[nodiscard]] Plan opened_mouth();
+[[nodiscard]] Plan opened_mouth_carelessly();
+
+}  // namespace engine::captures

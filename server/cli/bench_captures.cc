@@ -1,0 +1,158 @@
+#include "server/cli/bench_captures.h"
+
+#include <cstdlib>
+#include <iomanip>
+#include <memory>
+#include <ostream>
+#include <span>
+#include <sstream>
+#include <utility>
+#include <vector>
+
+#include "engine/captures/capture_trial.h"
+#include "engine/captures/captured_case.h"
+#include "engine/captures/grasp.h"
+#include "engine/captures/training.h"
+#include "engine/core/atomic_file.h"
+#include "server/cli/bench_edit.h"
+#include "server/cli/bench_report.h"
+#include "server/cli/captures_page.h"
+#include "server/cli/folders.h"
+#include "server/edits/convert.h"
+
+namespace server::cli {
+namespace {
+
+namespace captures = engine::captures;
+namespace edit = engine::edit;
+namespace evaluate = engine::evaluate;
+using engine::propagate;
+using nlohmann::ordered_json;
+using std::filesystem::path;
+
+std::string hexadecimal(std::uint64_t key) {
+  std::ostringstream out;
+  out << std::hex << std::setfill('0') << std::setw(16) << key;
+  return out.str();
+}
+
+Result<path> cache_folder(const CaptureOptions& options) {
+  auto folder = options.cache.empty() ? default_capture_cache() : Result<path>(path(options.cache));
+  if (!folder) return folder;
+  if (auto made = make_folder(*folder); !made) return propagate(made);
+  return folder;
+}
+
+Result<captures::CaptureTrial> trial_of(const captures::ReadyCase& ready, const std::string& corrector,
+                                        const BenchOptions& options, const Machine& machine) {
+  edit::Request request = ready.judged.request;
+  apply(options, request);
+  edit::Request preview = ready.judged.request;
+  preview.params = edits::preset_params(proto::Preset::preview, preview);
+  const path file = cache_file(options, machine, ready.judged.name, corrector, hexadecimal(ready.key_before),
+                               hexadecimal(ready.key_after), request);
+  return cached_or_new<captures::CaptureTrial>(file, [&]() -> Result<captures::CaptureTrial> {
+    auto done = captures::carry_out(ready, request, preview, corrector);
+    if (!done) return propagate(done);
+    const auto pictures = evaluate::show_pictures(ready.judged, request, corrector, done->edited,
+                                                  std::size_t(options.pictures), picture_writer(options));
+    if (!pictures) return propagate(pictures);
+    return std::move(done->trial);
+  });
+}
+
+/// Every case with every corrector. Rows are shown as they come.
+Result<std::vector<captures::CaptureTrial>> trials_of(const std::vector<std::string>& names, const path& cache,
+                                                      const BenchOptions& options, const Machine& machine,
+                                                      Terminal& terminal) {
+  terminal.out << captures::capture_table_head() << std::flush;
+  std::vector<captures::CaptureTrial> trials;
+  for (const std::string& name : names) {
+    const auto made = captures::make_captured_case(name);
+    if (!made) return propagate(made);
+    const auto ready = captures::make_ready(*made, captures::training_options(options.captures.fit_iterations), cache,
+                                            captures::grasp_by_balls);
+    if (!ready) return propagate(ready);
+    for (const std::string& corrector : options.correctors) {
+      auto trial = trial_of(*ready, corrector, options, machine);
+      if (!trial) return propagate(trial);
+      terminal.out << captures::capture_table_row(*trial) << std::flush;
+      trials.push_back(std::move(*trial));
+    }
+  }
+  return trials;
+}
+
+Result<void> write_text(const path& file, const std::string& text) {
+  return engine::write_file(file, std::as_bytes(std::span(text)));
+}
+
+}  // namespace
+
+CLI::Option* add_capture_options(CLI::App& command, CaptureOptions& options) {
+  CLI::Option* const on =
+      command.add_flag("--captures", options.on,
+                       "Scenes that are trained from photographs: made-up ones are photographed before and after the "
+                       "edit, with noise, in changing exposures, from a part of an orbit");
+  command
+      .add_option("--cache", options.cache,
+                  "Folder for the trained scenes of --captures, by what they were trained from; by default "
+                  "splatdrag/captures below $XDG_CACHE_HOME or ~/.cache")
+      ->needs(on)
+      ->type_name("DIR");
+  command.add_option("--page", options.page, "Also write what --captures finds as a page for people")
+      ->needs(on)
+      ->type_name("FILE");
+  command.add_option("--fit-iterations", options.fit_iterations, "Photos that each fit of --captures learns from")
+      ->needs(on)
+      ->check(CLI::Range(1, 1'000'000))
+      ->type_name("N");
+  return on;
+}
+
+std::string captured_cases() {
+  std::string known;
+  for (const std::string& name : captures::captured_case_names()) known += (known.empty() ? "" : ", ") + name;
+  return known;
+}
+
+Result<path> default_capture_cache() {
+  const auto folder = [](const char* variable) {
+    const char* const value = std::getenv(variable);
+    return value == nullptr ? path() : path(value);
+  };
+  const path below = "splatdrag/captures";
+  // The XDG Base Directory Specification: a path that is not absolute is to be ignored.
+  if (const path cache = folder("XDG_CACHE_HOME"); cache.is_absolute()) return cache / below;
+  if (const path home = folder("HOME"); home.is_absolute()) return home / ".cache" / below;
+  return engine::fail(engine::ErrorCode::invalid_argument,
+                      "neither XDG_CACHE_HOME nor HOME says where to keep trained scenes: name a folder", "--cache");
+}
+
+Result<void> run_captures(const BenchOptions& options, const Machine& machine, Terminal& terminal) {
+  const auto names = captures::choose_captured_cases(options.cases);
+  if (!names) return propagate(names);
+  const auto cache = cache_folder(options.captures);
+  if (!cache) return propagate(cache);
+  const path page = options.captures.page;
+  if (!page.empty())  // better now than after minutes of work
+    if (const auto writable = engine::AtomicFile::create(page); !writable) return propagate(writable);
+
+  const auto trials = trials_of(*names, *cache, options, machine, terminal);
+  if (!trials) return propagate(trials);
+  std::string table = captures::capture_table_head();
+  ordered_json all = ordered_json::array();
+  for (const captures::CaptureTrial& trial : *trials) {
+    table += captures::capture_table_row(trial);
+    all.push_back(encode(trial));
+  }
+  ordered_json report = settings(options, machine);
+  report["fit_iterations"] = options.captures.fit_iterations;
+  report["captures"] = std::move(all);
+  if (auto saved = write_json(path(options.out) / "captures.json", report); !saved) return saved;
+  if (auto saved = write_text(path(options.out) / "captures.md", table); !saved) return saved;
+  if (page.empty()) return {};
+  return write_text(page, captures_page(*trials, options, machine));
+}
+
+}  // namespace server::cli

@@ -1,0 +1,37 @@
+// splatdrag bench-edit --captures: edits whose right result is known, of scenes that are trained from photographs.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "server/cli/compute.h"
+#include "server/cli/options.h"
+
+namespace server::cli {
+
+struct BenchOptions;
+
+/// Options of captured cases.
+struct CaptureOptions {
+  bool on = false;
+  std::string cache;  ///< Folder of trained scenes; empty: default_capture_cache().
+  std::string page;   ///< File; empty: none is written.
+  int fit_iterations = 1500;
+};
+
+/// Adds them.
+///   returns  the one that switches captured cases on
+CLI::Option* add_capture_options(CLI::App& command, CaptureOptions& options);
+
+/// "mug, barrel, ...": names of captured cases, for people.
+[[nodiscard]] std::string captured_cases();
+
+/// splatdrag/captures below $XDG_CACHE_HOME, or below $HOME/.cache.
+///   errors  invalid_argument: the environment names neither
+[[nodiscard]] Result<std::filesystem::path> default_capture_cache();
+
+/// Carries captured cases out; writes captures.json, captures.md and pictures into options.out, which exists.
+///   errors  those of captures::choose_captured_cases(), make_ready() and carry_out(), and of writing
+[[nodiscard]] Result<void> run_captures(const BenchOptions& options, const Machine& machine, Terminal& terminal);
+
+}  // namespace server::cli

@@ -1,0 +1,115 @@
+#include "server/cli/captures_page.h"
+
+#include <algorithm>
+#include <iomanip>
+#include <set>
+#include <sstream>
+#include <vector>
+
+#include "engine/captures/captured_case.h"
+#include "engine/core/names.h"
+#include "server/cli/bench_edit.h"
+
+namespace server::cli {
+namespace {
+
+using engine::captures::CaptureTrial;
+
+constexpr const char* how =
+    "A made-up scene is photographed before an edit and after it: 30 photos of 320x240 from a part of an orbit, with\n"
+    "noise and an exposure of their own. `splatdrag fit` trains a scene from the photos before, starting from sparse,\n"
+    "noisy points. A person's request is carried out on it: at most three handles per part, on surfaces, off by 2 % "
+    "of\n"
+    "their length, and balls around them to say what moves. What comes of it is held against photographs of the true\n"
+    "result, without noise, at six cameras within the orbit and four beyond it.\n\n"
+    "- **before**, **deformed**, **edited**, **ceiling**: PSNR of the edited region, of the trained scene as it is, "
+    "of\n"
+    "  the deformation alone (preset `preview`), of the edit, and of a scene that is trained from photos after the "
+    "edit.\n"
+    "- **gain**: of the edit over deformation alone. **share**: the part of the way from *before* to *ceiling* that "
+    "the\n"
+    "  edit goes. **beyond**: *edited* at the cameras outside the orbit only.\n"
+    "- **outside**, **vacated**, **arrived**, **SSIM** (of the edited region): of the edit.\n"
+    "- **recall**, **precision**: of what the request takes along with what moves, by opacity times area.\n"
+    "- **set**: constants may be chosen on `choose`, and never on `test`.\n\n";
+
+struct Mean {
+  int count = 0;
+  double gain = 0, deformed = 0, edited = 0, ceiling = 0, share = 0, outside = 0;
+};
+
+/// Sums, divided: of one set and corrector.
+Mean mean_of(std::span<const CaptureTrial> trials, bool is_test, const std::string& corrector) {
+  Mean mean;
+  for (const CaptureTrial& trial : trials) {
+    if (trial.is_test != is_test || trial.trial.corrector != corrector) continue;
+    ++mean.count;
+    mean.gain += trial.gain_db(), mean.deformed += trial.deformed.edited.psnr_db;
+    mean.edited += trial.trial.result.edited.psnr_db, mean.ceiling += trial.ceiling.edited.psnr_db;
+    mean.share += trial.share_of_ceiling().value_or(0), mean.outside += trial.trial.result.outside.psnr_db;
+  }
+  for (double* sum : {&mean.gain, &mean.deformed, &mean.edited, &mean.ceiling, &mean.share, &mean.outside})
+    *sum /= std::max(1, mean.count);
+  return mean;
+}
+
+std::string means(std::span<const CaptureTrial> trials, const std::vector<std::string>& correctors) {
+  std::ostringstream out;
+  out << "| set | corrector | cases | deformed, dB | edited, dB | gain, dB | ceiling, dB | share, % | outside, dB |\n"
+         "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n"
+      << std::fixed;
+  for (const bool is_test : {false, true})
+    for (const std::string& corrector : correctors) {
+      const Mean mean = mean_of(trials, is_test, corrector);
+      if (mean.count == 0) continue;
+      out << "| " << (is_test ? "test" : "choose") << " | " << corrector << " | " << mean.count << std::setprecision(2)
+          << " | " << mean.deformed << " | " << mean.edited << " | " << mean.gain << " | " << mean.ceiling << " | "
+          << std::setprecision(0) << 100 * mean.share << std::setprecision(2) << " | " << mean.outside << " |\n";
+    }
+  return out.str();
+}
+
+/// What each case is about, and which are missing.
+std::string cases(std::span<const CaptureTrial> trials) {
+  std::ostringstream out;
+  std::set<std::string> told;
+  for (const CaptureTrial& trial : trials) {
+    if (!told.insert(trial.trial.name).second) continue;
+    out << "- `" << trial.trial.name << "`" << (trial.is_test ? " (test)" : "") << ": " << trial.trial.what;
+    if (!trial.said.empty()) out << ' ' << trial.said;
+    out << '\n';
+  }
+  std::string missing;
+  for (const std::string& name : engine::captures::captured_case_names())
+    if (!told.contains(name)) missing += (missing.empty() ? "" : ", ") + ("`" + name + "`");
+  if (!missing.empty()) out << "\nNot carried out for this page: " << missing << ".\n";
+  return out.str();
+}
+
+}  // namespace
+
+std::string captures_page(std::span<const CaptureTrial> trials, const BenchOptions& options, const Machine& machine) {
+  std::ostringstream out;
+  out << "# Edits of captures whose right result is known\n\nMade by\n\n    build/release/splatdrag bench-edit "
+         "--captures";
+  for (const std::string& name : options.cases) out << " --case " << name;
+  out << " --preset " << proto::name_of(options.preset);
+  for (const std::string& corrector : options.correctors) out << " --corrector " << corrector;
+  if (options.captures.fit_iterations != CaptureOptions{}.fit_iterations)
+    out << " --fit-iterations " << options.captures.fit_iterations;
+  out << " --out out/captures --page docs/captures.md\n\non " << machine.threads << " threads, " << machine.simd
+      << ". Trained scenes are kept (`--cache`): the first run takes longer.\n\n"
+      << how << engine::captures::capture_table_head();
+  double fits = 0;
+  for (const CaptureTrial& trial : trials) {
+    out << engine::captures::capture_table_row(trial);
+    fits += trial.fit_seconds / double(2 * trials.size());
+  }
+  out << "\nA fit of " << options.captures.fit_iterations << " iterations took " << std::fixed << std::setprecision(0)
+      << fits << " s on average, on a machine that did other work, too.\n\n## Means\n\n"
+      << means(trials, options.correctors) << "\n## Cases\n\n"
+      << cases(trials);
+  return out.str();
+}
+
+}  // namespace server::cli

@@ -1,0 +1,78 @@
+#include "engine/captures/capture_trial.h"
+
+#include <gtest/gtest.h>
+
+#include "engine/params/params.h"
+#include "tests/support/data.h"
+
+namespace engine::captures {
+namespace {
+
+edit::Request with(edit::Request request, params::Preset preset) {
+  request.params = params::filled_in({}, preset);
+  return request;
+}
+
+TEST(CaptureTrial, TheShareOfTheCeilingIsAPartOfTheWay) {
+  CaptureTrial trial;
+  trial.trial.untouched.edited.psnr_db = 10;
+  trial.ceiling.edited.psnr_db = 30;
+  trial.deformed.edited.psnr_db = 12;
+  const auto share_at = [&](double db) {
+    trial.trial.result.edited.psnr_db = db;
+    return *trial.share_of_ceiling();
+  };
+  EXPECT_DOUBLE_EQ(share_at(10), 0);
+  EXPECT_DOUBLE_EQ(share_at(25), 0.75);
+  EXPECT_DOUBLE_EQ(share_at(30), 1);
+  EXPECT_LT(share_at(9), 0);
+  EXPECT_DOUBLE_EQ(trial.gain_db(), -3);
+  trial.ceiling.edited.psnr_db = 10;
+  EXPECT_FALSE(trial.share_of_ceiling()) << "nowhere to go";
+}
+
+TEST(CaptureTrial, ATinyOneFromPhotosToFigures) {
+  const support::TempDir folder;
+  const CapturedCase the_case = make_captured_case("mug").value();
+  fit::FitOptions options = training_options(150);
+  options.max_gaussians = 6000;
+  const auto ready = make_ready(the_case, options, folder.path(), grasp_by_balls);
+  ASSERT_TRUE(ready) << ready.error().message;
+  EXPECT_NE(ready->key_before, ready->key_after);
+  EXPECT_GT(ready->match.recall, 0.5);
+  EXPECT_GT(ready->match.precision, 0.5);
+  EXPECT_FALSE(ready->judged.part_before.empty());
+  const auto again = make_ready(the_case, options, folder.path(), grasp_by_balls);
+  ASSERT_TRUE(again);
+  EXPECT_EQ(again->judged.before, ready->judged.before);
+  EXPECT_EQ(again->fit_seconds, ready->fit_seconds) << "nothing was trained again";
+
+  edit::Request draft = with(ready->judged.request, params::Preset::draft);
+  draft.params.iterations = 20, draft.params.views = 6, draft.params.max_image_side = 160;
+  const auto done = carry_out(*ready, draft, with(ready->judged.request, params::Preset::preview), "scene");
+  ASSERT_TRUE(done) << done.error().message;
+  const CaptureTrial& trial = done->trial;
+  EXPECT_EQ(trial.trial.name, "mug");
+  EXPECT_GT(trial.deformed.edited.psnr_db, trial.trial.untouched.edited.psnr_db + 3);
+  EXPECT_GT(trial.ceiling.edited.psnr_db, trial.deformed.edited.psnr_db);
+  EXPECT_GT(trial.trial.result.edited.psnr_db, trial.trial.untouched.edited.psnr_db + 3);
+  EXPECT_GT(trial.share_of_ceiling().value(), 0.2);
+  EXPECT_LT(trial.share_of_ceiling().value(), 1);
+  EXPECT_GT(trial.ceiling_beyond_db, trial.untouched_beyond_db);
+  EXPECT_GT(trial.trial.result.outside.psnr_db, 20);
+  EXPECT_NE(capture_table_row(trial).find("| mug | choose | scene |"), std::string::npos);
+}
+
+TEST(CaptureTrial, HandsTheErrorOfASelectionOn) {
+  const support::TempDir folder;
+  const CapturedCase the_case = make_captured_case("mug").value();
+  const auto refuse = [](const CapturedCase&, const scene::GaussianCloud&) -> Result<Grasp> {
+    return fail(ErrorCode::unprocessable, "nothing is selected", "selection[2].sphere.radius");
+  };
+  const auto ready = make_ready(the_case, training_options(2), folder.path(), refuse);
+  ASSERT_FALSE(ready);
+  EXPECT_EQ(ready.error().where, "selection[2].sphere.radius");
+}
+
+}  // namespace
+}  // namespace engine::captures

@@ -1,0 +1,77 @@
+#include "engine/captures/grasp.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/engine/captures/samples.h"
+
+namespace engine::captures {
+namespace {
+
+/// Gaussians at x = -1, -0.9, ..., 1.
+scene::GaussianCloud line() {
+  scene::GaussianCloud cloud;
+  cloud.resize(21);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    cloud.mean.set(i, {-1 + 0.1f * float(i), 0, 0});
+    cloud.rotation.set(i, {1, 0, 0, 0});
+  }
+  return cloud;
+}
+
+CapturedCase with_handles(std::vector<edit::Handle> handles) {
+  CapturedCase out;
+  out.cameras = sample_cameras(1);  // looks along z: the picture's right is x
+  out.handles = std::move(handles);
+  return out;
+}
+
+TEST(GraspByBalls, TakesWhatIsInABall) {
+  const auto grasp = grasp_by_balls(with_handles({{{0, 0, 0}, DVec3(0, 1, 0), 0.25, 0}}), line());
+  ASSERT_TRUE(grasp) << grasp.error().message;
+  EXPECT_EQ(grasp->rows, (std::vector<std::uint32_t>{8, 9, 10, 11, 12}));
+  EXPECT_EQ(grasp->request.handles.size(), 1u);
+}
+
+TEST(GraspByBalls, DoesNotCountWhatAnAnchorHolds) {
+  const auto grasp = grasp_by_balls(
+      with_handles({{{0, 0, 0}, DVec3(0, 1, 0), 0.25, 0}, {{0.3, 0, 0}, std::nullopt, 0.25, 0}}), line());
+  ASSERT_TRUE(grasp);
+  EXPECT_EQ(grasp->rows, (std::vector<std::uint32_t>{8, 9, 10, 11}));
+}
+
+TEST(GraspByBalls, StaysInTheRegion) {
+  CapturedCase the_case = with_handles({{{0, 0, 0}, DVec3(0, 1, 0), 0.25, 0}});
+  the_case.region = edit::Region{{-0.5, 0, 0}, {1.1, 1, 1}};
+  the_case.mode = edit::Mode::extend;
+  const auto grasp = grasp_by_balls(the_case, line());
+  ASSERT_TRUE(grasp);
+  EXPECT_EQ(grasp->rows, (std::vector<std::uint32_t>{8, 9, 10}));
+  EXPECT_TRUE(grasp->request.region);
+  EXPECT_EQ(grasp->request.mode, edit::Mode::extend);
+}
+
+TEST(GraspByBalls, CarelesslyMissesAboutHalfAndTakesWhatIsBeside) {
+  CapturedCase the_case = with_handles({{{0, 0, 0}, DVec3(0, 1, 0), 0.25, 0}});
+  const auto careful = grasp_by_balls(the_case, line());
+  the_case.careless = Carelessness{};
+  const auto careless = grasp_by_balls(the_case, line());
+  ASSERT_TRUE(careful && careless);
+  const auto is_chosen = [&](std::uint32_t row) { return std::ranges::count(careless->rows, row) > 0; };
+  const auto kept = std::ranges::count_if(careful->rows, is_chosen);
+  EXPECT_GT(kept, 1);
+  EXPECT_LT(kept, 4);
+  EXPECT_GT(careless->rows.size(), std::size_t(kept)) << "things beside it, too";
+  const edit::Handle& handle = careless->request.handles[0];
+  EXPECT_LT(glm::distance(*handle.target - handle.source, DVec3(0, 1, 0)), 1e-12) << "the way is as long as before";
+}
+
+TEST(GraspByBalls, SaysWhichBallIsEmpty) {
+  const auto grasp = grasp_by_balls(with_handles({{{5, 0, 0}, DVec3(0, 1, 0), 0.25, 0}}), line());
+  ASSERT_FALSE(grasp);
+  EXPECT_EQ(grasp.error().where, "handles[0].radius");
+}
+
+}  // namespace
+}  // namespace engine::captures
