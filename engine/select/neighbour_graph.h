@@ -1,0 +1,37 @@
+// Rows joined to the rows nearest to them: what growing and connected pieces go by.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/core/soa.h"
+#include "engine/core/vec.h"
+#include "engine/neighbours/point_index.h"
+
+namespace engine::select {
+
+/// An undirected graph of n nodes: of each edge, both directions, side by side with the rest of its node.
+struct NeighbourGraph {
+  std::vector<std::uint32_t> begin;  ///< [n + 1] into `to`: the edges of node i are [begin[i], begin[i + 1]).
+  std::vector<std::uint32_t> to;     ///< [E] node at the other end, ascending for each node.
+  std::vector<std::uint32_t> back;   ///< [E] the same edge the other way.
+  std::vector<float> length;         ///< [E] world units.
+  std::vector<float> spacing;        ///< [n] mean distance of a node to its nearest ones, world units.
+
+  [[nodiscard]] std::size_t size() const { return spacing.size(); }
+};
+
+/// Means of rows as PointIndex takes them: relative to `origin`, so that none of their digits is lost, and no farther
+/// than 1e18 from it, so that squares of distances fit a float.
+[[nodiscard]] std::vector<float> points_of(const Array3& mean, std::span<const std::uint32_t> rows, DVec3 origin);
+
+/// Joins each point to the k nearest other ones (fewer where there are not as many): an edge where one of the two is
+/// among the nearest of the other. Node i is point i. The same for any number of threads.
+///   points  [n][3], n below 2^31 / (2 k)
+///   index   of these points
+[[nodiscard]] NeighbourGraph join_nearest(std::span<const float> points, const neighbours::PointIndex& index,
+                                          std::size_t k);
+
+}  // namespace engine::select
