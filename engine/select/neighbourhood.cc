@@ -33,8 +33,9 @@ constexpr float crossing = 0.3f;
 // A row that is so much nearer to one side's points, of both distances together, is that side's for certain.
 constexpr float certain = 0.1f;
 // How much the distances to both sides' points count against the border: all rows along a line from one to the other
-// are worth so many edges in all.
-constexpr float leaning = 0.2f;
+// are worth so many edges in all. With less, the cut through a surface without a border closes around one of the
+// points; with more, it does not follow a border that runs far from halfway.
+constexpr float leaning = 1.0f;
 constexpr double capacity_unit = 1 << 16;  // of a whole edge: the cut is computed in whole numbers
 
 std::vector<double> squared_distances(const Array3& mean, DVec3 from) {

@@ -26,7 +26,8 @@ struct Surroundings {
   bool operator==(const Surroundings&) const = default;
 };
 
-constexpr std::size_t max_neighbourhood = 250'000;  ///< Rows: the nearest to the middle count. About a second's work.
+/// Rows: the nearest to the middle count. A second's work on one core; three on a surface without any border.
+constexpr std::size_t max_neighbourhood = 250'000;
 
 /// The surroundings of an operation. Without a reach: four times as far as the farthest inside point, or the nearest
 /// outside one if that is farther, rounded up to a power of the square root of 2; for a point alone, a quarter of the
@@ -38,7 +39,7 @@ constexpr std::size_t max_neighbourhood = 250'000;  ///< Rows: the nearest to th
 /// between the two. Immutable, and independent of the cloud once made.
 class Neighbourhood {
  public:
-  /// About a second for 250,000 rows on one core.
+  /// Half a second for 250,000 rows on one core (bench/select_bench).
   Neighbourhood(const scene::GaussianCloud& cloud, const Surroundings& surroundings);
 
   [[nodiscard]] const Surroundings& surroundings() const { return surroundings_; }

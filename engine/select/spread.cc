@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <vector>
 
 #include "engine/neighbours/point_index.h"
@@ -12,8 +11,6 @@ namespace engine::select {
 namespace {
 
 constexpr std::size_t neighbours_joined = 8;  // a surface's row has about six around it
-// So many spacings apart, rows still hang together: a gap of two missing rows.
-constexpr float joining_spacings = 3.0f;
 
 std::vector<std::uint32_t> rows_with(const RowSet& rows, std::uint8_t value) {
   std::vector<std::uint32_t> out;
@@ -53,24 +50,7 @@ void each_within(const Array3& mean, const std::vector<std::uint32_t>& rows, con
     if (std::sqrt(double(nearest[i].squared_distance)) <= distance) use(near[i]);
 }
 
-/// Which piece each node of a graph belongs to: the lowest node of it.
-class Pieces {
- public:
-  explicit Pieces(std::size_t nodes) : parent_(nodes) { std::iota(parent_.begin(), parent_.end(), 0u); }
-
-  std::uint32_t of(std::uint32_t node) {
-    while (parent_[node] != node) node = parent_[node] = parent_[parent_[node]];
-    return node;
-  }
-  void join(std::uint32_t a, std::uint32_t b) {
-    a = of(a), b = of(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<std::uint32_t> parent_;
-};
-
+/// What hangs together.
 Pieces pieces_of(const NeighbourGraph& graph) {
   Pieces pieces(graph.size());
   for (std::uint32_t node = 0; node < graph.size(); ++node)
@@ -101,8 +81,7 @@ RowSet largest_pieces(const Array3& mean, const RowSet& selected, std::size_t n)
   if (rows.empty()) return selected;
   const std::vector<float> points = points_of(mean, rows, DVec3(mean.get(rows[0])));
   Pieces pieces = pieces_of(join_nearest(points, neighbours::PointIndex(points, 3), neighbours_joined));
-  std::vector<std::size_t> rows_of_piece(rows.size(), 0);
-  for (std::uint32_t node = 0; node < rows.size(); ++node) ++rows_of_piece[pieces.of(node)];
+  const std::vector<std::uint32_t> rows_of_piece = pieces.sizes();
   std::vector<std::uint32_t> by_size;  // pieces, by their lowest node
   for (std::uint32_t node = 0; node < rows.size(); ++node)
     if (rows_of_piece[node] > 0) by_size.push_back(node);

@@ -17,8 +17,8 @@ namespace engine::select {
 [[nodiscard]] RowSet shrunk(const Array3& mean, const RowSet& selected, double distance);
 
 /// The n largest connected pieces of the selected rows, by number of rows; of equally large ones those that begin with
-/// a lower row. Rows hang together where one is among the 8 nearest selected ones of the other, and not farther than
-/// three times the spacing (mean distance to those 8) of either.
+/// a lower row. Rows hang together where one is among the 8 nearest selected ones of the other (24 nearest, where that
+/// joins pieces), and not farther than three times the spacing (mean distance to those 8) of either.
 [[nodiscard]] RowSet largest_pieces(const Array3& mean, const RowSet& selected, std::size_t n);
 
 }  // namespace engine::select

@@ -65,6 +65,32 @@ inline Grow clicks_on(const procedural::DemoScene& demo, std::size_t object, con
   return grow;
 }
 
+/// One more click, in the middle of the largest patch of pixels that show rows wrongly selected, or wrongly not
+/// selected. False where nothing wrong is wider than two pixels.
+inline bool correct(const procedural::DemoScene& demo, std::size_t object, const scene::Camera& camera,
+                    const std::vector<std::uint8_t>& selected, Grow& grow) {
+  const std::vector<float> weight(selected.begin(), selected.end());
+  const render::Rendering rendering = render::forward(demo.cloud, camera, {.color = false}, weight);
+  const scene::Mask meant = pixels_of(demo, object, camera);
+  scene::Mask missed = meant, extra = meant;
+  for (std::size_t i = 0; i < meant.data.size(); ++i) {
+    const bool is_selected = rendering.weight.data[i] > 0.5f;
+    missed.data[i] = meant.data[i] != 0 && !is_selected;
+    extra.data[i] = meant.data[i] == 0 && is_selected;
+  }
+  for (int radius = 40; radius > 0; radius = radius * 2 / 3)
+    for (const scene::Mask* wrong : {&extra, &missed}) {
+      const std::vector<DVec2> inner = well_inside(*wrong, radius);
+      if (inner.empty()) continue;
+      render::Workspace workspace;
+      const auto hit = render::pick(demo.cloud, camera, inner[inner.size() / 2], workspace);
+      if (!hit) return false;
+      (wrong == &extra ? grow.outside : grow.inside).push_back(hit->point);
+      return true;
+    }
+  return false;
+}
+
 /// What part of the object was selected, and what part of the selection is the object; by opacity times area.
 struct Agreement {
   double recall = 0, precision = 0;

@@ -97,10 +97,10 @@ TEST(LargestPieces, GoByWhatIsSelected) {
   add_sheet(cloud, {0, 0, 0}, 12, 0.1f, Vec3(0.5f));
   RowSet selected(cloud.size(), 1);
   for (std::size_t row = 0; row < cloud.size(); ++row)
-    if (row % 12 >= 4 && row % 12 < 8) selected[row] = 0;  // four columns: five spacings from rim to rim
+    if (row % 12 >= 3 && row % 12 < 9) selected[row] = 0;  // six columns
   selected[0] = 0;
   const RowSet found = largest_pieces(cloud.mean, selected, 1);
-  for (std::size_t row = 0; row < cloud.size(); ++row) EXPECT_EQ(found[row] != 0, row % 12 >= 8) << row;
+  for (std::size_t row = 0; row < cloud.size(); ++row) EXPECT_EQ(found[row] != 0, row % 12 >= 9) << row;
 }
 
 TEST(LargestPieces, OfFewRowsAreThese) {
