@@ -29,6 +29,10 @@ class Check {
     if (changes && operation.op != Op::add)
       return bad("op", std::string(name_of(operation.action)) + " changes what is selected and takes no op but add");
     name_ = name_of(operation.action);
+    const bool searches = std::holds_alternative<Grow>(operation.action) ||
+                          (changes && !std::holds_alternative<Invert>(operation.action));
+    if (auto fits = count("", searches, searches_, max_searches, "operations that look for neighbours"); !fits)
+      return fits;
     return std::visit([&](const auto& action) { return check(action); }, operation.action);
   }
 
@@ -167,7 +171,7 @@ class Check {
   Result<void> check(const Invert&) { return {}; }
 
   std::size_t rows_;
-  std::size_t points_ = 0, views_ = 0, ranges_ = 0;
+  std::size_t points_ = 0, views_ = 0, searches_ = 0, ranges_ = 0;
   std::string where_, name_;
 };
 

@@ -29,7 +29,7 @@ struct MaskedRows {
 
 /// Lifts masks to rows: a row is named where the views show more of it inside the masks than outside. Weights are
 /// summed over all views, each in units of its picture's area, so that none counts for more by its resolution. Rows
-/// that no view shows are not named. A forward pass for each view. Source: Shen et al. 2024, "FlashSplat", eq. 6: which
+/// that no view shows are not named. A forward pass for each view. Source: Shen et al. 2024, "FlashSplat": which
 /// label of a row renders the masks best is known in closed form. Precondition: as above.
 [[nodiscard]] MaskedRows rows_in_masks(const scene::GaussianCloud& cloud, const Masks& masks,
                                        render::Workspace& workspace);

@@ -85,8 +85,9 @@ RowSet largest_pieces(const Array3& mean, const RowSet& selected, std::size_t n)
   std::vector<std::uint32_t> by_size;  // pieces, by their lowest node
   for (std::uint32_t node = 0; node < rows.size(); ++node)
     if (rows_of_piece[node] > 0) by_size.push_back(node);
-  std::stable_sort(by_size.begin(), by_size.end(),
-                   [&](std::uint32_t a, std::uint32_t b) { return rows_of_piece[a] > rows_of_piece[b]; });
+  std::sort(by_size.begin(), by_size.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return rows_of_piece[a] != rows_of_piece[b] ? rows_of_piece[a] > rows_of_piece[b] : a < b;
+  });
   RowSet kept(rows.size(), 0);
   for (std::size_t i = 0; i < std::min(n, by_size.size()); ++i) kept[by_size[i]] = 1;
   RowSet out(selected.size(), 0);

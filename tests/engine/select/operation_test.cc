@@ -120,6 +120,8 @@ TEST(ValidateSelection, BoundsWhatAListAsksForInAll) {
             "selection[2].grow.inside");
   EXPECT_EQ(where(Selection(max_views + 1, {Op::add, Polygon{front_camera(), triangle, Depth::visible}})),
             "selection[64].polygon.camera");
+  EXPECT_EQ(where(Selection(max_searches, {Op::add, Largest{1}})), "fine");
+  EXPECT_EQ(where(Selection(max_searches + 1, {Op::add, Largest{1}})), "selection[32].largest");
   EXPECT_EQ(where({{Op::add, Rows{std::vector<RowRange>(max_ranges + 1, {0, 1})}}}), "selection[0].rows");
 }
 

@@ -1,5 +1,6 @@
-// Growing on the demo scene, with the clicks of a person, against the rows that are the thing's. The constants were
-// chosen on the ball, the mug, the books and the apple on them; the pot and the apple on the table are for tests alone.
+// Selecting on the demo scene, with the clicks of a person, against the rows that are the thing's. The constants of
+// growing were chosen on the ball, the mug, the books and the apple on them; the pot and the apple on the table are for
+// tests alone.
 #include <gtest/gtest.h>
 
 #include <cstddef>
@@ -44,6 +45,33 @@ TEST(GrowOnTheDemoScene, TakesTheMug) { expect_taken(mug, "mug", 0, 0.95, 0.95);
 TEST(GrowOnTheDemoScene, TakesAnAppleOffABook) { expect_taken(apple_on_books, "apple", 0, 0.98, 0.98); }
 TEST(GrowOnTheDemoScene, TakesAnAppleItWasNotMadeFor) { expect_taken(apple_on_table, "apple", 0, 0.98, 0.98); }
 TEST(GrowOnTheDemoScene, TakesAPotItWasNotMadeForWithCorrections) { expect_taken(pot, "pot", 10, 0.85, 0.75); }
+
+TEST(MasksOfTheDemoScene, AreLiftedToTheirThings) {
+  for (const std::size_t object : {ball, mug, apple_on_table}) {
+    Masks masks;
+    for (const scene::Camera& camera : demo().cameras)
+      masks.views.push_back({camera, pixels_of(demo(), object, camera)});
+    const Agreement found = agreement(demo(), object, select(demo().cloud, {{Op::add, masks}}).value().rows);
+    EXPECT_GT(found.recall, 0.95) << demo().object_names[object];
+    EXPECT_GT(found.precision, 0.95) << demo().object_names[object];
+  }
+}
+
+TEST(PolygonsOnTheDemoScene, TakeTheVisibleSideOfTheBallAndNothingBehind) {
+  const scene::Camera& camera = demo().cameras[0];
+  const scene::Rect box = scene::bounding_box(pixels_of(demo(), ball, camera));
+  const DVec2 middle(0.5 * (box.x0 + box.x1), 0.5 * (box.y0 + box.y1)), half(0.3 * box.width(), 0.3 * box.height());
+  Polygon polygon{camera,
+                  {middle - half, middle + DVec2(half.x, -half.y), middle + half, middle + DVec2(-half.x, half.y)},
+                  Depth::visible};
+  const Agreement visible = agreement(demo(), ball, select(demo().cloud, {{Op::add, polygon}}).value().rows);
+  EXPECT_EQ(visible.precision, 1.0);
+  EXPECT_GT(visible.recall, 0.1);
+  polygon.depth = Depth::through;
+  const Agreement through = agreement(demo(), ball, select(demo().cloud, {{Op::add, polygon}}).value().rows);
+  EXPECT_LT(through.precision, 0.9) << "what lies behind it, too";
+  EXPECT_GT(through.recall, visible.recall);
+}
 
 TEST(GrowOnTheDemoScene, GivesTheSameBytesForAnyNumberOfThreads) {
   const Grow grow = clicks_on(demo(), mug, demo().cameras[0], 3);
