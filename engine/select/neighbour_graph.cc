@@ -97,13 +97,17 @@ std::vector<Pair> bridges(std::span<const float> points, const neighbours::Point
 
 }  // namespace
 
+std::array<float, 3> point_of(DVec3 point, DVec3 origin) {
+  const DVec3 offset = glm::clamp(point - origin, DVec3(-far_away), DVec3(far_away));
+  return {float(offset.x), float(offset.y), float(offset.z)};
+}
+
 std::vector<float> points_of(const Array3& mean, std::span<const std::uint32_t> rows, DVec3 origin) {
   std::vector<float> points(3 * rows.size());
   parallel_for(rows.size(), grain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const DVec3 offset = DVec3(mean.get(rows[i])) - origin;
-      for (int axis = 0; axis < 3; ++axis)
-        points[3 * i + std::size_t(axis)] = float(std::clamp(offset[axis], -far_away, far_away));
+      const std::array<float, 3> point = point_of(DVec3(mean.get(rows[i])), origin);
+      std::copy(point.begin(), point.end(), points.begin() + std::ptrdiff_t(3 * i));
     }
   });
   return points;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <numeric>
@@ -25,8 +26,9 @@ struct NeighbourGraph {
   [[nodiscard]] std::size_t size() const { return spacing.size(); }
 };
 
-/// Means of rows as PointIndex takes them: relative to `origin`, so that none of their digits is lost, and no farther
-/// than 1e18 from it, so that squares of distances fit a float.
+/// A point, and means of rows, as PointIndex takes them: relative to `origin`, so that none of their digits is lost,
+/// and no farther than 1e18 from it, so that squares of distances fit a float.
+[[nodiscard]] std::array<float, 3> point_of(DVec3 point, DVec3 origin);
 [[nodiscard]] std::vector<float> points_of(const Array3& mean, std::span<const std::uint32_t> rows, DVec3 origin);
 
 /// So many spacings apart, of either, nodes still hang together: a gap of two missing rows.

@@ -47,11 +47,14 @@ class Neighbourhood {
   /// Had the reach to be cut short, so as not to look at more than max_neighbourhood rows?
   [[nodiscard]] bool is_cut_short() const { return is_cut_short_; }
 
-  /// The rows of the thing: those on the side of the inside points of the cut through the weakest edges. Without
-  /// outside points, what lies at the reach is taken for outside, unless all else speaks against it.
+  /// The rows of the thing: those on the side of the inside points of the cut through the weakest edges. What hangs
+  /// together with none of the points is outside. Outside points beyond the reach count for nothing; without any, what
+  /// lies at the reach is taken for outside, unless all else speaks against it.
   ///   grow     with this object's surroundings
   ///   returns  rows of the cloud, ascending
-  ///   errors   unprocessable, `where` = "inside[1]" or "reach": no row within reach, or a point beyond it
+  ///   errors   unprocessable, `where` = "inside[1]": no row within reach, the point is beyond it, or all rows around
+  ///   the
+  ///            inside points are nearer to outside ones
   [[nodiscard]] Result<std::vector<std::uint32_t>> cut(const Grow& grow) const;
 
  private:

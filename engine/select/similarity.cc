@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t grain = 4'096;  // nodes of a parallel task: a choice
 
 // What difference counts for one, at the least; in a noisy capture, it is so many times what neighbours usually differ
-// by. Chosen on the ball, the mug and the books of the demo scene.
+// by. Chosen as those of neighbourhood.cc.
 constexpr float least_color = 0.10f;    // of 0 to 1, over the three channels
 constexpr float least_turn = 0.25f;     // 1 - cos of the angle between normals: 41 degrees
 constexpr float least_log_size = 0.7f;  // a factor of two

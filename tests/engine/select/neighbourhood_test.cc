@@ -88,6 +88,14 @@ TEST(Grow, StandsRowsAtOnePlaceAndFewRows) {
   EXPECT_FALSE(grown(same, {{{1, 2, 3}}, {}, {}}).empty());
   EXPECT_EQ(grown(line_of(1), {{{0, 0, 0}}, {}, {}}), (RowList{0}));
   EXPECT_EQ(grown(line_of(2), {{{0, 0, 0}}, {{1, 0, 0}}, {}}), (RowList{0}));
+  EXPECT_EQ(grown(line_of(1), {{{0, 0, 0}}, {{1e-300, 0, 0}}, 1e-300}), (RowList{0}));
+}
+
+TEST(Grow, StandsPlacesFarAway) {
+  scene::GaussianCloud cloud = line_of(20);
+  cloud.mean.x[19] = 1.05e38f;
+  EXPECT_EQ(grown(cloud, {{{9.9e37, 0, 0}}, {{9e37, 0, 0}}, 1e37}), (RowList{19}));
+  EXPECT_EQ(grown(cloud, {{{1e30, 0, 0}}, {}, 1e35}).empty(), false) << "a click into nothing is on what is nearest";
 }
 
 TEST(Grow, NamesThePointThatCannotBe) {
