@@ -87,6 +87,8 @@ class Workspace {
   friend void forward(const Layers&, const scene::Camera&, const ForwardOptions&, std::span<const float>, Workspace&,
                       Rendering&);
   friend void raise_to_largest_weights(const Layers&, const scene::Camera&, Workspace&, std::span<float>);
+  friend void add_weight_sums(const Layers&, const scene::Camera&, const scene::Image&, Workspace&, std::span<double>,
+                              std::span<double>);
   friend std::optional<PixelHit> pick(const Layers&, const scene::Camera&, DVec2, Workspace&);
   struct Impl;
   std::unique_ptr<Impl> impl_;

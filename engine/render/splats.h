@@ -271,6 +271,13 @@ void copy_tile_plane(const float* plane, scene::Rect part, float* to, std::ptrdi
 ///   out  [list.size()]
 void largest_tile_weights(const Splat* splats, std::span<const std::uint32_t> list, TilePlace place, float* out);
 
+/// The sums of each listed splat's blending weights over the pixels of a tile, and of weight times value.
+/// Pixels that are not shown count for nothing.
+///   value        [tile_size][tile_size] of the tile's pixels, row by row
+///   all, valued  [list.size()]
+void sum_tile_weights(const Splat* splats, std::span<const std::uint32_t> list, TilePlace place, const float* value,
+                      float* all, float* valued);
+
 /// Projects all layers into the buffers.
 ///   weight  [layers.size()] or empty
 void project(const Layers& layers, const ViewParams<float>& view, int sh_degree, std::span<const float> weight,

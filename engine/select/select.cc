@@ -1,0 +1,158 @@
+#include "engine/select/select.h"
+
+#include <algorithm>
+#include <type_traits>
+#include <utility>
+#include <variant>
+
+#include "engine/core/finite.h"
+#include "engine/select/shown.h"
+#include "engine/select/spread.h"
+
+namespace engine::select {
+namespace {
+
+/// Kept between selections: of a list that grows several things, and no more than some 100 MB.
+constexpr std::size_t neighbourhoods_kept = 4;
+
+/// What selecting reads of a scene has to be finite: a NaN would be on no side of anything.
+Result<void> check_finite(const scene::GaussianCloud& cloud) {
+  const auto check = [](const std::vector<float>& values, const char* name) -> Result<void> {
+    const auto bad = first_not_finite(values);
+    if (!bad) return {};
+    return fail(ErrorCode::corrupt_data, std::string(name) + " of a Gaussian is not a finite number",
+                "[" + std::to_string(*bad) + "]." + name);
+  };
+  const scene::GaussianCloud& c = cloud;
+  for (const auto& [values, name] : {std::pair{&c.mean.x, "x"},
+                                     {&c.mean.y, "y"},
+                                     {&c.mean.z, "z"},
+                                     {&c.log_scale.x, "scale_0"},
+                                     {&c.log_scale.y, "scale_1"},
+                                     {&c.log_scale.z, "scale_2"},
+                                     {&c.rotation.w, "rot_0"},
+                                     {&c.rotation.x, "rot_1"},
+                                     {&c.rotation.y, "rot_2"},
+                                     {&c.rotation.z, "rot_3"},
+                                     {&c.opacity_logit, "opacity"},
+                                     {&c.sh, "sh"}})
+    if (auto fine = check(*values, name); !fine) return fine;
+  return {};
+}
+
+void combine(Op op, const RowSet& named, RowSet& selected) {
+  for (std::size_t row = 0; row < selected.size(); ++row) switch (op) {
+      case Op::add:
+        selected[row] |= named[row];
+        break;
+      case Op::subtract:
+        selected[row] &= std::uint8_t(1 - named[row]);
+        break;
+      case Op::intersect:
+        selected[row] &= named[row];
+        break;
+    }
+}
+
+/// Fills in what is told of the rows.
+void describe(const Array3& mean, Selected& out) {
+  DVec3 sum(0.0);
+  for (std::size_t row = 0; row < out.rows.size(); ++row) {
+    if (out.rows[row] == 0) continue;
+    const Vec3 at = mean.get(row);
+    out.bounds.low = out.count == 0 ? at : glm::min(out.bounds.low, at);
+    out.bounds.high = out.count == 0 ? at : glm::max(out.bounds.high, at);
+    sum += DVec3(at);
+    ++out.count;
+  }
+  if (out.count > 0) out.centre = sum / double(out.count);
+}
+
+bool is_empty(const RowSet& rows) { return std::find(rows.begin(), rows.end(), std::uint8_t{1}) == rows.end(); }
+
+}  // namespace
+
+const Neighbourhood& Selector::neighbourhood(const Surroundings& surroundings) {
+  const auto kept = std::find_if(neighbourhoods_.begin(), neighbourhoods_.end(),
+                                 [&](const auto& one) { return one->surroundings() == surroundings; });
+  if (kept != neighbourhoods_.end()) {
+    std::rotate(kept, kept + 1, neighbourhoods_.end());
+  } else {
+    if (neighbourhoods_.size() == neighbourhoods_kept) neighbourhoods_.erase(neighbourhoods_.begin());
+    neighbourhoods_.push_back(std::make_unique<const Neighbourhood>(cloud_, surroundings));
+  }
+  return *neighbourhoods_.back();
+}
+
+Result<RowSet> Selector::rows_of(const Grow& grow, const std::string& where, Selected& so_far) {
+  RowSet named(cloud_.size(), 0);
+  if (cloud_.size() == 0) return named;
+  const Neighbourhood& around = neighbourhood(surroundings_of(cloud_.mean, grow));
+  const auto rows = around.cut(grow);
+  if (!rows) return fail(rows.error().code, rows.error().message, where + ".grow." + rows.error().where);
+  for (const std::uint32_t row : *rows) named[row] = 1;
+  if (around.is_cut_short())
+    so_far.warnings.push_back({"only the " + std::to_string(max_neighbourhood) +
+                                   " Gaussians nearest to the first inside point were looked at: lower the reach, or "
+                                   "grow larger things in several operations",
+                               where});
+  return named;
+}
+
+Result<void> Selector::carry_out(const Operation& operation, const std::string& where, Selected& so_far) {
+  const Array3& mean = cloud_.mean;
+  return std::visit(
+      [&](const auto& action) -> Result<void> {
+        using Kind = std::decay_t<decltype(action)>;
+        if constexpr (std::is_same_v<Kind, Expand>) {
+          so_far.rows = expanded(mean, so_far.rows, action.distance);
+        } else if constexpr (std::is_same_v<Kind, Shrink>) {
+          so_far.rows = shrunk(mean, so_far.rows, action.distance);
+        } else if constexpr (std::is_same_v<Kind, Largest>) {
+          so_far.rows = largest_pieces(mean, so_far.rows, std::size_t(action.n));
+        } else if constexpr (std::is_same_v<Kind, Invert>) {
+          for (std::uint8_t& row : so_far.rows) row = std::uint8_t(1 - row);
+        } else {
+          RowSet named;
+          if constexpr (std::is_same_v<Kind, Grow>) {
+            auto grown = rows_of(action, where, so_far);
+            if (!grown) return propagate(grown);
+            named = *std::move(grown);
+          } else if constexpr (std::is_same_v<Kind, Masks>) {
+            MaskedRows masked = rows_in_masks(cloud_, action, workspace_);
+            so_far.undecided += masked.undecided;
+            named = std::move(masked.rows);
+          } else if constexpr (std::is_same_v<Kind, Polygon> || std::is_same_v<Kind, Stroke>) {
+            named = rows_in(cloud_, action, workspace_);
+          } else {
+            named = rows_in(mean, action);
+          }
+          if (is_empty(named))
+            so_far.warnings.push_back({"the " + std::string(name_of(operation.action)) + " names no Gaussian", where});
+          combine(operation.op, named, so_far.rows);
+        }
+        return {};
+      },
+      operation.action);
+}
+
+Result<Selected> Selector::select(const Selection& selection) {
+  if (auto valid = validate(selection, cloud_.size()); !valid) return propagate(valid);
+  if (!is_checked_) {
+    if (auto finite = check_finite(cloud_); !finite) return propagate(finite);
+    is_checked_ = true;
+  }
+  Selected out;
+  out.rows.assign(cloud_.size(), 0);
+  for (std::size_t i = 0; i < selection.size(); ++i)
+    if (auto done = carry_out(selection[i], address(i), out); !done) return propagate(done);
+  describe(cloud_.mean, out);
+  if (out.count == 0) out.warnings.push_back({"nothing is selected", "selection"});
+  return out;
+}
+
+Result<Selected> select(const scene::GaussianCloud& cloud, const Selection& selection) {
+  return Selector(cloud).select(selection);
+}
+
+}  // namespace engine::select

@@ -1,0 +1,66 @@
+// Carries out a selection on a scene.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/core/vec.h"
+#include "engine/render/forward.h"
+#include "engine/scene/gaussian_cloud.h"
+#include "engine/select/neighbourhood.h"
+#include "engine/select/operation.h"
+#include "engine/select/shapes.h"
+
+namespace engine::select {
+
+/// Something about a selection that a person should know.
+struct Warning {
+  std::string message;  ///< One sentence.
+  std::string where;    ///< "selection[2]", or "selection" for all of it.
+  bool operator==(const Warning&) const = default;
+};
+
+/// The rows that are meant.
+struct Selected {
+  RowSet rows;                    ///< [N] 1: selected; as scene::select() takes it.
+  std::size_t count = 0;          ///< Selected rows.
+  scene::Bounds bounds;           ///< Of their means, world units; {0,0,0} twice where none is selected.
+  DVec3 centre{0.0};              ///< Mean of their means, world units; 0 where none is selected.
+  std::size_t undecided = 0;      ///< Rows that masks leave nearly even: MaskedRows::undecided, over all operations.
+  std::vector<Warning> warnings;  ///< Nothing is selected; an operation names no row; a reach was cut short.
+};
+
+/// Selects in one scene, and keeps what the next selection there can use: a user clicks on, and each click asks for all
+/// operations once more. Results do not depend on what is kept. Not for two threads at once.
+class Selector {
+ public:
+  /// Keeps a reference to the cloud, which has to stay as it is.
+  explicit Selector(const scene::GaussianCloud& cloud) : cloud_(cloud) {}
+  explicit Selector(const scene::GaussianCloud&& cloud) = delete;
+
+  /// The operations in order, each on what those before it have selected; the first on nothing. The same bytes for any
+  /// number of threads; operations on pictures may differ between instruction sets where a row is on the verge.
+  ///   errors  those of validate(); corrupt_data, `where` = "[12].x": a mean, extent, rotation or opacity of the scene
+  ///   is
+  ///           not finite; unprocessable, `where` = "selection[2].grow.inside[1]": see Neighbourhood::cut()
+  [[nodiscard]] Result<Selected> select(const Selection& selection);
+
+ private:
+  [[nodiscard]] Result<void> carry_out(const Operation& operation, const std::string& where, Selected& so_far);
+  [[nodiscard]] Result<RowSet> rows_of(const Grow& grow, const std::string& where, Selected& so_far);
+  [[nodiscard]] const Neighbourhood& neighbourhood(const Surroundings& surroundings);
+
+  const scene::GaussianCloud& cloud_;
+  bool is_checked_ = false;  ///< Are all values finite?
+  render::Workspace workspace_;
+  std::vector<std::unique_ptr<const Neighbourhood>> neighbourhoods_;  ///< The latest, latest last.
+};
+
+/// The same, for a single selection.
+[[nodiscard]] Result<Selected> select(const scene::GaussianCloud& cloud, const Selection& selection);
+
+}  // namespace engine::select

@@ -1,0 +1,110 @@
+#include "engine/select/shown.h"
+
+#include <cassert>
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+#include "engine/core/parallel.h"
+#include "engine/render/largest_weight.h"
+#include "engine/render/project.h"
+#include "engine/render/weight_sums.h"
+#include "engine/select/outline.h"
+
+namespace engine::select {
+namespace {
+
+constexpr std::size_t grain = 4'096;  // rows of a parallel task: a choice
+
+// The largest weight of a row is about its opacity times the largest transmittance in front of it. Behind the surfaces
+// of the demo scene transmittance is below 0.05 nearly everywhere; the rows of the surface itself overlap, and the
+// lower ones among them get a fifth and more.
+constexpr float shown_transmittance = 0.1f;
+
+// Masks judge rows in the shade of others, too, so that a thing is taken with what lies below its surface; but what
+// they say of a row that hardly anything of gets through to is chance. With masks of the ball, the mug, the apple and a
+// book in three views of the demo scene, recall is 0.90 to 0.98 and precision 0.98 to 1; without this, precision is
+// 0.78 to 0.89, and with the value above, recall is 0.82 to 0.94. In seven views, recall and precision are 0.98 and
+// more.
+constexpr float judged_transmittance = 0.01f;
+
+// Of the share of a row's weight that lies inside, from one half.
+constexpr double undecided_margin = 0.1;
+
+/// Does that part of the light get through to a row, of which this is the largest weight?
+bool is_reached(const scene::GaussianCloud& cloud, std::size_t row, float largest_weight, float part) {
+  return largest_weight >= part * render::opacity<float>(cloud.opacity_logit[row]);
+}
+
+RowSet visible_rows(const scene::GaussianCloud& cloud, const scene::Camera& camera, const scene::Image& inside,
+                    render::Workspace& workspace) {
+  std::vector<float> largest(cloud.size(), 0.0f);
+  render::raise_to_largest_weights(cloud, camera, workspace, largest);
+  std::vector<double> all(cloud.size(), 0.0), held(cloud.size(), 0.0);
+  render::add_weight_sums(cloud, camera, inside, workspace, all, held);
+  RowSet out(cloud.size(), 0);
+  for (std::size_t row = 0; row < cloud.size(); ++row)
+    out[row] = largest[row] >= float(render::min_alpha) && is_reached(cloud, row, largest[row], shown_transmittance) &&
+               2 * held[row] > all[row];
+  return out;
+}
+
+template <class Outline>
+RowSet rows_of_outline(const scene::GaussianCloud& cloud, const Outline& outline, render::Workspace& workspace) {
+  if (outline.depth == Depth::visible) return visible_rows(cloud, outline.camera, drawn(outline), workspace);
+  RowSet out(cloud.size(), 0);
+  parallel_for(cloud.size(), grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t row = begin; row < end; ++row) {
+      const DVec3 point = outline.camera.cam_from_world(DVec3(cloud.mean.get(row)));
+      if (point.z > render::near_plane) out[row] = holds(outline, outline.camera.pixel_from_cam(point));
+    }
+  });
+  return out;
+}
+
+}  // namespace
+
+RowSet rows_in(const scene::GaussianCloud& cloud, const Polygon& polygon, render::Workspace& workspace) {
+  return rows_of_outline(cloud, polygon, workspace);
+}
+RowSet rows_in(const scene::GaussianCloud& cloud, const Stroke& stroke, render::Workspace& workspace) {
+  return rows_of_outline(cloud, stroke, workspace);
+}
+
+MaskedRows rows_in_masks(const scene::GaussianCloud& cloud, const Masks& masks, render::Workspace& workspace) {
+  std::vector<double> all(cloud.size(), 0.0), inside(cloud.size(), 0.0);
+  std::vector<double> view_all(cloud.size()), view_inside(cloud.size());
+  std::vector<float> largest(cloud.size(), 0.0f);
+  for (const auto& [camera, image] : masks.views) {
+    scene::Image value(image.width, image.height, 1);
+    for (std::size_t pixel = 0; pixel < value.data.size(); ++pixel) value.data[pixel] = image.data[pixel] != 0;
+    std::fill(view_all.begin(), view_all.end(), 0.0);
+    std::fill(view_inside.begin(), view_inside.end(), 0.0);
+    render::add_weight_sums(cloud, camera, value, workspace, view_all, view_inside);
+    render::raise_to_largest_weights(cloud, camera, workspace, largest);
+    const double area = double(value.pixels());
+    for (std::size_t row = 0; row < cloud.size(); ++row)
+      all[row] += view_all[row] / area, inside[row] += view_inside[row] / area;
+  }
+  MaskedRows out{RowSet(cloud.size(), 0), 0};
+  for (std::size_t row = 0; row < cloud.size(); ++row) {
+    if (!(all[row] > 0) || !is_reached(cloud, row, largest[row], judged_transmittance)) continue;
+    const double share = inside[row] / all[row];
+    out.rows[row] = share > 0.5;
+    out.undecided += std::abs(share - 0.5) < undecided_margin;
+  }
+  return out;
+}
+
+double shown_share(const scene::GaussianCloud& cloud, std::span<const std::uint8_t> rows, const scene::Camera& camera,
+                   render::Workspace& workspace) {
+  assert(rows.size() == cloud.size());
+  const std::vector<float> weight(rows.begin(), rows.end());
+  render::Rendering rendering;
+  render::forward(cloud, camera, {.color = false}, weight, workspace, rendering);
+  const double all = std::accumulate(rendering.alpha.data.begin(), rendering.alpha.data.end(), 0.0);
+  const double of_rows = std::accumulate(rendering.weight.data.begin(), rendering.weight.data.end(), 0.0);
+  return all > 0 ? std::min(of_rows / all, 1.0) : 0.0;
+}
+
+}  // namespace engine::select

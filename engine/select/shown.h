@@ -1,0 +1,44 @@
+// Rows by what pictures show of them.
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include "engine/render/forward.h"
+#include "engine/scene/gaussian_cloud.h"
+#include "engine/select/operation.h"
+#include "engine/select/shapes.h"
+
+namespace engine::select {
+
+/// `visible`: the rows that the camera shows, and that have more than half of their blending weight in the view inside
+/// the outline. Shown is a row that makes up one 8-bit step (1/255) of some pixel, and to which a tenth of the light
+/// gets through there: what shines through a surface is not meant. Two forward passes.
+/// `through`: the rows that are projected into the outline from in front of the near plane.
+/// Precondition: validate() holds, and all values of the cloud are finite.
+[[nodiscard]] RowSet rows_in(const scene::GaussianCloud& cloud, const Polygon& polygon, render::Workspace& workspace);
+[[nodiscard]] RowSet rows_in(const scene::GaussianCloud& cloud, const Stroke& stroke, render::Workspace& workspace);
+
+/// Rows that masks name.
+struct MaskedRows {
+  RowSet rows;
+  /// Named or not, those of which the share inside lies within 0.1 of one half: masks that contradict each other, or a
+  /// row across a border.
+  std::size_t undecided = 0;
+};
+
+/// Lifts masks to rows: a row is named where the views show more of it inside the masks than outside. Weights are
+/// summed over all views, each in units of its picture's area, so that none counts for more by its resolution. Rows
+/// that no view shows are not named. A forward pass for each view. Source: Shen et al. 2024, "FlashSplat": which
+/// label of a row renders the masks best is known in closed form. Precondition: as above.
+[[nodiscard]] MaskedRows rows_in_masks(const scene::GaussianCloud& cloud, const Masks& masks,
+                                       render::Workspace& workspace);
+
+/// The share of what a view shows that is made of these rows, 0 to 1: the sum of their blending weights by that of all.
+/// 0 where it shows nothing.
+///   rows  [cloud.size()]
+/// Precondition: validate(camera) holds.
+[[nodiscard]] double shown_share(const scene::GaussianCloud& cloud, std::span<const std::uint8_t> rows,
+                                 const scene::Camera& camera, render::Workspace& workspace);
+
+}  // namespace engine::select

@@ -1,0 +1,95 @@
+// Selecting on the demo scene, with the clicks of a person, against the rows that are the thing's. The constants of
+// growing were chosen on the ball, the mug, the books and the apple on them; the pot and the apple on the table are for
+// tests alone.
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "engine/core/parallel.h"
+#include "tests/engine/select/clicks.h"
+#include "tests/engine/select/small_scenes.h"
+
+namespace engine::select {
+namespace {
+
+constexpr std::size_t pot = 3, apple_on_books = 8, apple_on_table = 9, mug = 10, ball = 11;
+
+const procedural::DemoScene& demo() {
+  static const procedural::DemoScene scene = procedural::make_demo_scene({.gaussians = 100'000, .views = 5});
+  return scene;
+}
+
+/// What is left to wish for after two clicks inside, four outside, and so many to correct it.
+Agreement after_clicks(std::size_t object, const scene::Camera& camera, int corrections) {
+  Grow grow = clicks_on(demo(), object, camera, 4);
+  Selector selector(demo().cloud);
+  RowSet rows = selector.select({{Op::add, grow}}).value().rows;
+  for (int i = 0; i < corrections && correct(demo(), object, camera, rows, grow); ++i)
+    rows = selector.select({{Op::add, grow}}).value().rows;
+  return agreement(demo(), object, rows);
+}
+
+void expect_taken(std::size_t object, const std::string& name, int corrections, double recall, double precision) {
+  ASSERT_EQ(demo().object_names[object], name);
+  for (const scene::Camera& camera : demo().cameras) {
+    const Agreement found = after_clicks(object, camera, corrections);
+    EXPECT_GT(found.recall, recall) << camera.name;
+    EXPECT_GT(found.precision, precision) << camera.name;
+  }
+}
+
+TEST(GrowOnTheDemoScene, TakesTheBall) { expect_taken(ball, "ball", 0, 0.99, 0.99); }
+TEST(GrowOnTheDemoScene, TakesTheMug) { expect_taken(mug, "mug", 0, 0.95, 0.95); }
+TEST(GrowOnTheDemoScene, TakesAnAppleOffABook) { expect_taken(apple_on_books, "apple", 0, 0.98, 0.98); }
+TEST(GrowOnTheDemoScene, TakesAnAppleItWasNotMadeFor) { expect_taken(apple_on_table, "apple", 0, 0.98, 0.98); }
+TEST(GrowOnTheDemoScene, TakesAPotItWasNotMadeForWithCorrections) { expect_taken(pot, "pot", 10, 0.85, 0.75); }
+
+TEST(MasksOfTheDemoScene, AreLiftedToTheirThings) {
+  for (const std::size_t object : {ball, mug, apple_on_table}) {
+    Masks masks;
+    for (const scene::Camera& camera : demo().cameras)
+      masks.views.push_back({camera, pixels_of(demo(), object, camera)});
+    const Agreement found = agreement(demo(), object, select(demo().cloud, {{Op::add, masks}}).value().rows);
+    EXPECT_GT(found.recall, 0.95) << demo().object_names[object];
+    EXPECT_GT(found.precision, 0.95) << demo().object_names[object];
+  }
+}
+
+TEST(PolygonsOnTheDemoScene, TakeTheVisibleSideOfTheBallAndNothingBehind) {
+  const scene::Camera& camera = demo().cameras[0];
+  const scene::Rect box = scene::bounding_box(pixels_of(demo(), ball, camera));
+  const DVec2 middle(0.5 * (box.x0 + box.x1), 0.5 * (box.y0 + box.y1)), half(0.3 * box.width(), 0.3 * box.height());
+  Polygon polygon{camera,
+                  {middle - half, middle + DVec2(half.x, -half.y), middle + half, middle + DVec2(-half.x, half.y)},
+                  Depth::visible};
+  const Agreement visible = agreement(demo(), ball, select(demo().cloud, {{Op::add, polygon}}).value().rows);
+  EXPECT_EQ(visible.precision, 1.0);
+  EXPECT_GT(visible.recall, 0.1);
+  polygon.depth = Depth::through;
+  const Agreement through = agreement(demo(), ball, select(demo().cloud, {{Op::add, polygon}}).value().rows);
+  EXPECT_LT(through.precision, 0.9) << "what lies behind it, too";
+  EXPECT_GT(through.recall, visible.recall);
+}
+
+TEST(GrowOnTheDemoScene, GivesTheSameBytesForAnyNumberOfThreads) {
+  const Grow grow = clicks_on(demo(), mug, demo().cameras[0], 3);
+  RowSet one, four;
+  WorkArena(1).run([&] { one = select(demo().cloud, {{Op::add, grow}}).value().rows; });
+  WorkArena(4).run([&] { four = select(demo().cloud, {{Op::add, grow}}).value().rows; });
+  EXPECT_EQ(one, four);
+}
+
+TEST(Grow, LooksAtNoMoreThanItsLimitAndSaysSo) {
+  scene::GaussianCloud cloud;
+  add_sheet(cloud, {0, 0, 0}, 510, 0.01f, Vec3(0.5f));
+  ASSERT_GT(cloud.size(), max_neighbourhood);
+  const Selected found = select(cloud, {{Op::add, Grow{{{0, 0, 0}}, {{0.5, 0, 0}}, 100.0}}}).value();
+  ASSERT_EQ(found.warnings.size(), 1u);
+  EXPECT_EQ(found.warnings[0].where, "selection[0]");
+  EXPECT_EQ(Neighbourhood(cloud, {{0, 0, 0}, 100.0}).rows().size(), max_neighbourhood);
+}
+
+}  // namespace
+}  // namespace engine::select

@@ -1,0 +1,143 @@
+#include "engine/select/neighbourhood.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "tests/engine/select/clicks.h"
+#include "tests/engine/select/small_scenes.h"
+
+namespace engine::select {
+namespace {
+
+/// Rows that growing takes; "where message" of the refusal otherwise.
+RowList grown(const scene::GaussianCloud& cloud, const Grow& grow) { return selected(cloud, {{Op::add, grow}}); }
+std::string refusal(const scene::GaussianCloud& cloud, const Grow& grow) {
+  const auto found = select(cloud, {{Op::add, grow}});
+  return found ? "fine" : found.error().where;
+}
+
+RowList numbers(std::size_t from, std::size_t to) {
+  RowList out;
+  for (std::size_t row = from; row < to; ++row) out.push_back(row);
+  return out;
+}
+
+/// Two sheets of 20 x 20 in one plane, side by side: rows 0 to 399 around (-1, 0, 0), red, and 400 to 799 around
+/// (1, 0, 0), of the other colour.
+scene::GaussianCloud two_colors(Vec3 other) {
+  scene::GaussianCloud cloud;
+  add_sheet(cloud, {-1, 0, 0}, 20, 0.1f, {0.8f, 0.1f, 0.1f});
+  add_sheet(cloud, {1, 0, 0}, 20, 0.1f, other);
+  return cloud;
+}
+
+TEST(Grow, StopsWhereTheColorChanges) {
+  const scene::GaussianCloud cloud = two_colors({0.1f, 0.1f, 0.8f});
+  EXPECT_EQ(grown(cloud, {{{-1.2, 0, 0}}, {{0.3, 0, 0}}, {}}), numbers(0, 400)) << "the border is at 0, not halfway";
+  EXPECT_EQ(grown(cloud, {{{0.3, 0.1, 0}}, {{-1.2, 0, 0}}, {}}), numbers(400, 800));
+}
+
+TEST(Grow, GoesHalfwayWhereNothingChanges) {
+  const RowList rows = grown(two_colors({0.8f, 0.1f, 0.1f}), {{{-1, 0, 0}}, {{1, 0, 0}}, {}});
+  EXPECT_GT(rows.size(), 350u);
+  EXPECT_LT(rows.size(), 450u);
+}
+
+TEST(Grow, StopsAtAnEdge) {
+  // A sheet, and another one of the same colour that rises from its rim.
+  scene::GaussianCloud cloud;
+  add_sheet(cloud, {0, 0, 0}, 20, 0.1f, Vec3(0.5f));
+  add_sheet(cloud, {0, 0, 0}, 20, 0.1f, Vec3(0.5f));
+  for (std::size_t row = 400; row < 800; ++row) {
+    const Vec3 flat = cloud.mean.get(row);
+    cloud.mean.set(row, {1.0f, flat.y, flat.x + 1});  // turned about y
+    cloud.rotation.set(row, {1, 0, 1, 0});            // with its normal, by a quarter turn
+  }
+  EXPECT_EQ(grown(cloud, {{{-0.5, 0, 0}}, {{1.0, 0, 0.4}}, {}}), numbers(0, 400));
+}
+
+TEST(Grow, TakesAThingThatStandsAloneWithoutOutsidePoints) {
+  scene::GaussianCloud cloud;
+  add_sheet(cloud, {0, 0, 0}, 20, 0.1f, Vec3(0.5f));
+  add_sheet(cloud, {4, 0, 0}, 30, 0.1f, Vec3(0.5f));
+  EXPECT_EQ(grown(cloud, {{{-0.5, 0, 0}, {0.5, 0, 0}}, {}, {}}), numbers(0, 400));
+}
+
+TEST(Grow, DoesNotTakeWhatLiesAtTheReach) {
+  scene::GaussianCloud cloud;
+  add_sheet(cloud, {0, 0, 0}, 60, 0.1f, Vec3(0.5f));
+  const RowList rows = grown(cloud, {{{0, 0, 0}}, {}, 2.0});
+  EXPECT_FALSE(rows.empty());
+  for (const std::size_t row : rows) EXPECT_LT(glm::length(cloud.mean.get(row)), 1.9f);
+}
+
+TEST(Grow, TakesSeveralPiecesThatAreClickedOn) {
+  scene::GaussianCloud cloud;
+  for (const float x : {0.0f, 2.0f, 4.0f}) add_sheet(cloud, {x, 0, 0}, 10, 0.1f, Vec3(0.5f));
+  EXPECT_EQ(grown(cloud, {{{0, 0, 0}, {2, 0, 0}}, {}, {}}), numbers(0, 200));
+  EXPECT_EQ(grown(cloud, {{{0, 0, 0}}, {{4, 0, 0}}, {}}), numbers(0, 100));
+}
+
+TEST(Grow, StandsRowsAtOnePlaceAndFewRows) {
+  scene::GaussianCloud same;
+  for (int i = 0; i < 50; ++i) add_at(same, {1, 2, 3});
+  EXPECT_FALSE(grown(same, {{{1, 2, 3}}, {}, {}}).empty());
+  EXPECT_EQ(grown(line_of(1), {{{0, 0, 0}}, {}, {}}), (RowList{0}));
+  EXPECT_EQ(grown(line_of(2), {{{0, 0, 0}}, {{1, 0, 0}}, {}}), (RowList{0}));
+  EXPECT_EQ(grown(line_of(1), {{{0, 0, 0}}, {{1e-300, 0, 0}}, 1e-300}), (RowList{0}));
+}
+
+TEST(Grow, StandsPlacesFarAway) {
+  scene::GaussianCloud cloud = line_of(20);
+  cloud.mean.x[19] = 1.05e38f;
+  EXPECT_EQ(grown(cloud, {{{9.9e37, 0, 0}}, {{9e37, 0, 0}}, 1e37}), (RowList{19}));
+  EXPECT_EQ(grown(cloud, {{{1e30, 0, 0}}, {}, 1e35}).empty(), false) << "a click into nothing is on what is nearest";
+}
+
+TEST(Grow, NamesThePointThatCannotBe) {
+  const scene::GaussianCloud cloud = two_colors({0, 0, 1});
+  EXPECT_EQ(refusal(cloud, {{{0, 50, 0}}, {}, 1.0}), "selection[0].grow.inside[0]") << "nothing is there";
+  EXPECT_EQ(refusal(cloud, {{{-1, 0, 0}, {1, 0, 0}}, {}, 0.5}), "selection[0].grow.inside[1]") << "beyond the reach";
+  EXPECT_EQ(refusal(cloud, {{{-1, 0, 0}, {1e30, 0, 0}}, {}, 0.5}), "selection[0].grow.inside[1]");
+  EXPECT_EQ(refusal(cloud, {{{-1, 0, 0}}, {{1e30, -1e30, 0}}, {}}), "fine");
+  EXPECT_EQ(refusal(cloud, {{{-1, 0, 0.5}}, {{-1, 0, 0}}, {}}), "selection[0].grow.inside[0]")
+      << "all rows around it are nearer to the outside point";
+}
+
+TEST(SurroundingsOf, AreThoseOfThePoints) {
+  const Array3 mean = line_of(9).mean;
+  const auto reach = [&](const Grow& grow) { return surroundings_of(mean, grow).reach; };
+  EXPECT_EQ(reach({{{0, 0, 0}}, {}, 0.7}), 0.7);
+  EXPECT_EQ(reach({{{0, 0, 0}, {1, 0, 0}}, {}, {}}), 4.0);
+  EXPECT_NEAR(reach({{{0, 0, 0}, {1.1, 0, 0}}, {}, {}}), 4 * std::sqrt(2.0), 1e-12) << "the next step";
+  EXPECT_EQ(reach({{{0, 0, 0}, {0.5, 0, 0}}, {{9, 0, 0}, {0, 1, 0}}, {}}), 4.0) << "the nearer outside point";
+  EXPECT_EQ(reach({{{0, 0, 0}}, {}, {}}), 1.0) << "a quarter of 4: half of the rows are nearer";
+}
+
+TEST(SurroundingsOf, StayWhileAUserClicksOn) {
+  const Array3 mean = line_of(9).mean;
+  Grow grow{{{0, 0, 0}, {0.9, 0, 0}}, {{0, 1, 0}}, {}};
+  const Surroundings first = surroundings_of(mean, grow);
+  grow.inside.push_back({0, 0.5, 0});
+  grow.outside.push_back({0.99, 0, 0});
+  EXPECT_EQ(surroundings_of(mean, grow), first);
+}
+
+TEST(Grow, TakesABallFromTwoClicks) {
+  // Of the demo scene, coarse. The slow tests have more.
+  const procedural::DemoScene demo = procedural::make_demo_scene({.gaussians = 12'000, .views = 3});
+  const std::size_t ball = demo.object_names.size() - 1;
+  ASSERT_EQ(demo.object_names[ball], "ball");
+  const Grow clicks = clicks_on(demo, ball, demo.cameras[0], 4);
+  ASSERT_EQ(clicks.inside.size(), 2u);
+  const Agreement found = agreement(demo, ball, select(demo.cloud, {{Op::add, clicks}}).value().rows);
+  EXPECT_GT(found.recall, 0.99);
+  EXPECT_GT(found.precision, 0.99);
+}
+
+}  // namespace
+}  // namespace engine::select

@@ -1,0 +1,160 @@
+#include "engine/select/select.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "engine/core/parallel.h"
+#include "engine/core/rng.h"
+#include "tests/engine/select/small_scenes.h"
+
+namespace engine::select {
+namespace {
+
+TEST(Select, ASphereHoldsWhatIsNearerThanItsRadius) {
+  EXPECT_EQ(selected(line_of(6), {{Op::add, Sphere{{2, 0, 0}, 1}}}), (RowList{2})) << "1 is not nearer than 1";
+  EXPECT_EQ(selected(line_of(6), {{Op::add, Sphere{{2, 0, 0}, 1.001}}}), (RowList{1, 2, 3}));
+  EXPECT_EQ(selected(line_of(6), {{Op::add, Sphere{{1e30, 0, 0}, 1e30}}}), (RowList{})) << "its surface is at 0";
+}
+
+TEST(Select, ABoxHoldsItsFacesAndTurns) {
+  const scene::GaussianCloud cloud = cloud_at({{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0.5f, 0.5f, 0}, {-1, 0, 0}});
+  const Box lying{{0, 0, 0}, {2, 0.5, 0.5}};
+  EXPECT_EQ(selected(cloud, {{Op::add, lying}}), (RowList{0, 4}));
+  Box turned = lying;
+  turned.rotation = {1, 0, 0, 1};  // a quarter turn about z, twice as long as it needs to be
+  EXPECT_EQ(selected(cloud, {{Op::add, turned}}), (RowList{1}));
+  turned.rotation = DQuat(std::cos(std::acos(-1.0) / 8), 0, 0, std::sin(std::acos(-1.0) / 8));  // an eighth
+  EXPECT_EQ(selected(cloud, {{Op::add, turned}}), (RowList{3}));
+}
+
+TEST(Select, APlaneHoldsTheSideOfItsNormalAndItself) {
+  EXPECT_EQ(selected(line_of(6), {{Op::add, Plane{{3, 7, 7}, {0.1, 0, 0}}}}), (RowList{3, 4, 5}));
+  EXPECT_EQ(selected(line_of(6), {{Op::add, Plane{{3, 0, 0}, {-1e38, 0, 0}}}}), (RowList{0, 1, 2, 3}));
+}
+
+TEST(Select, RowsByNumber) {
+  EXPECT_EQ(selected(line_of(6), {{Op::add, Rows{{{4, 6}, {0, 1}, {4, 5}}}}}), (RowList{0, 4, 5}));
+}
+
+TEST(Select, GoesThroughTheOperationsInOrder) {
+  const Operation low{Op::add, Rows{{{0, 4}}}}, drop{Op::subtract, Rows{{{2, 3}}}};
+  const Operation only{Op::intersect, Rows{{{1, 6}}}}, turn{Op::add, Invert{}};
+  EXPECT_EQ(selected(line_of(6), {low, drop, only}), (RowList{1, 3}));
+  EXPECT_EQ(selected(line_of(6), {drop, low, only}), (RowList{1, 2, 3})) << "there was nothing to drop";
+  EXPECT_EQ(selected(line_of(6), {only, low}), (RowList{0, 1, 2, 3})) << "what nothing and something share is nothing";
+  EXPECT_EQ(selected(line_of(6), {low, turn, drop}), (RowList{4, 5}));
+  EXPECT_EQ(selected(line_of(6), {low, drop, turn}), (RowList{2, 4, 5}));
+  EXPECT_EQ(selected(line_of(6), {turn, turn}), RowList{});
+}
+
+TEST(Select, ChangesWhatIsSelectedSoFar) {
+  const Operation three{Op::add, Rows{{{3, 4}}}};
+  EXPECT_EQ(selected(line_of(8), {three, {Op::add, Expand{2}}}), (RowList{1, 2, 3, 4, 5}));
+  EXPECT_EQ(selected(line_of(8), {three, {Op::add, Expand{2}}, {Op::add, Shrink{1}}}), (RowList{2, 3, 4}));
+  EXPECT_EQ(selected(line_of(8), {{Op::add, Shrink{1}}, three}), (RowList{3}));
+  EXPECT_EQ(selected(line_of(40), {{Op::add, Rows{{{0, 2}, {20, 40}}}}, {Op::add, Largest{1}}}).size(), 20u);
+}
+
+TEST(Select, TellsCountBoundsAndCentre) {
+  const scene::GaussianCloud cloud = cloud_at({{1, 5, 0}, {9, 9, 9}, {3, -5, 2}});
+  const Selected found = select(cloud, {{Op::add, Rows{{{0, 1}, {2, 3}}}}}).value();
+  EXPECT_EQ(found.rows, (RowSet{1, 0, 1}));
+  EXPECT_EQ(found.count, 2u);
+  EXPECT_EQ(found.bounds.low, Vec3(1, -5, 0));
+  EXPECT_EQ(found.bounds.high, Vec3(3, 5, 2));
+  EXPECT_EQ(found.centre, DVec3(2, 0, 1));
+  EXPECT_TRUE(found.warnings.empty());
+}
+
+TEST(Select, WarnsOfNothing) {
+  const Selected none = select(line_of(3), Selection{}).value();
+  EXPECT_EQ(none.count, 0u);
+  EXPECT_EQ(none.bounds.high, Vec3(0));
+  EXPECT_EQ(none.warnings, (std::vector<Warning>{{"nothing is selected", "selection"}}));
+  const Selected missed = select(line_of(3), {{Op::add, Rows{{{0, 1}}}}, {Op::subtract, Sphere{{9, 9, 9}, 1}}}).value();
+  EXPECT_EQ(missed.count, 1u);
+  EXPECT_EQ(missed.warnings, (std::vector<Warning>{{"the sphere names no Gaussian", "selection[1]"}}));
+}
+
+TEST(Select, OfAnEmptySceneIsEmpty) {
+  const Selection all{{Op::add, Sphere{{0, 0, 0}, 1}},
+                      {Op::add, Polygon{front_camera(), {{0, 0}, {9, 0}, {9, 9}}, Depth::visible}},
+                      {Op::add, Grow{{{0, 0, 0}}, {}, {}}},
+                      {Op::add, Masks{{{front_camera(), scene::Mask(100, 100)}}}},
+                      {Op::add, Expand{1}},
+                      {Op::add, Shrink{1}},
+                      {Op::add, Largest{1}},
+                      {Op::add, Invert{}}};
+  EXPECT_TRUE(select({}, all).value().rows.empty());
+}
+
+TEST(Select, RefusesAnInvalidListAndABrokenScene) {
+  const auto refused = select(line_of(3), {{Op::add, Sphere{{0, 0, 0}, -1}}});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().where, "selection[0].sphere.radius");
+  scene::GaussianCloud broken = line_of(3);
+  broken.mean.y[1] = std::numeric_limits<float>::quiet_NaN();
+  const auto poisoned = select(broken, {{Op::add, Sphere{{0, 0, 0}, 1}}});
+  ASSERT_FALSE(poisoned);
+  EXPECT_EQ(poisoned.error().code, ErrorCode::corrupt_data);
+  EXPECT_EQ(poisoned.error().where, "[1].y");
+}
+
+/// A cloud before front_camera(), and one of each operation.
+scene::GaussianCloud random_cloud(std::size_t n) {
+  scene::GaussianCloud cloud;
+  Rng rng(3);
+  for (std::size_t i = 0; i < n; ++i)
+    add_at(cloud, {rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(2, 4)}, rng.uniform(-3, 5), rng.uniform(-5, -3),
+           {rng.uniform(), rng.uniform(), rng.uniform()});
+  return cloud;
+}
+Selection one_of_each() {
+  scene::Mask mask(100, 100);
+  for (int y = 20; y < 50; ++y)
+    for (int x = 20; x < 70; ++x) mask.at(x, y) = 1;
+  return {{Op::add, Sphere{{0, 0, 3}, 0.5}},
+          {Op::add, Box{{0.5, 0, 3}, {1, 0.2, 1}, {1, 0.2, 0, 0}}},
+          {Op::add, Polygon{front_camera(), {{10, 10}, {60, 20}, {30, 70}}, Depth::visible}},
+          {Op::subtract, Stroke{front_camera(), {{10, 60}, {60, 10}}, 5, Depth::through}},
+          {Op::add, Grow{{{0.2, 0.2, 2.5}}, {{-0.5, 0, 3}}, {}}},
+          {Op::add, Masks{{{front_camera(), mask}}}},
+          {Op::intersect, Plane{{0, 0, 2.2}, {0, 0, 1}}},
+          {Op::add, Expand{0.05}},
+          {Op::add, Shrink{0.02}},
+          {Op::add, Largest{3}},
+          {Op::subtract, Rows{{{5, 50}}}}};
+}
+
+TEST(Select, GivesTheSameBytesForAnyNumberOfThreads) {
+  const scene::GaussianCloud cloud = random_cloud(6000);
+  Selected one, four;
+  WorkArena(1).run([&] { one = select(cloud, one_of_each()).value(); });
+  WorkArena(4).run([&] { four = select(cloud, one_of_each()).value(); });
+  EXPECT_GT(one.count, 100u);
+  EXPECT_LT(one.count, 5900u);
+  EXPECT_EQ(one.rows, four.rows);
+  EXPECT_EQ(one.centre, four.centre);
+  EXPECT_EQ(one.undecided, four.undecided);
+}
+
+TEST(Select, GivesTheSameWhateverWasSelectedBefore) {
+  const scene::GaussianCloud cloud = random_cloud(6000);
+  Selector kept(cloud);
+  for (int clicks = 1; clicks < 9; ++clicks) {
+    Grow grow{{{0.2, 0.2, 2.5}}, {}, {}};
+    for (int i = 1; i < clicks; ++i) grow.outside.emplace_back(0.2 - 0.1 * i, 0.2, 2.6);
+    grow.inside.emplace_back(0.25, 0.2, 2.5 + 0.05 * clicks);
+    const Selection selection{{Op::add, grow}};
+    const Selected found = kept.select(selection).value();
+    EXPECT_EQ(found.rows, select(cloud, selection).value().rows) << clicks;
+    EXPECT_GT(found.count, 0u);
+  }
+}
+
+}  // namespace
+}  // namespace engine::select

@@ -1,0 +1,121 @@
+#include "engine/select/shown.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "tests/engine/select/small_scenes.h"
+
+namespace engine::select {
+namespace {
+
+/// Before front_camera(): rows 0 and 1 at pixels (30, 50) and (70, 50); 2 and 3 far behind them, hidden by 4 to 6 and
+/// 7 to 9, which lie right behind 0 and 1.
+scene::GaussianCloud two_dots() {
+  scene::GaussianCloud cloud;
+  for (const float z : {2.0f, 4.0f})
+    for (const float x : {-0.2f, 0.2f}) {
+      add_at(cloud, {x * z, 0, z}, 12, -2.5f);
+      for (int i = 1; i < 4 && z < 3; ++i) add_at(cloud, {x * z, 0, z + 0.01f * float(i)}, 12, -2.0f);
+    }
+  scene::GaussianCloud ordered;
+  for (const std::uint32_t row : {0u, 4u, 8u, 9u, 1u, 2u, 3u, 5u, 6u, 7u}) {
+    const std::uint32_t one[] = {row};
+    scene::append_rows(ordered, cloud, one);
+  }
+  return ordered;
+}
+
+Polygon around(double x, double radius, Depth depth) {
+  return {front_camera(), {{x - radius, 35}, {x + radius, 35}, {x + radius, 65}, {x - radius, 65}}, depth};
+}
+
+RowList of(const scene::GaussianCloud& cloud, const auto& outline) {
+  render::Workspace workspace;
+  return rows_of(rows_in(cloud, outline, workspace));
+}
+
+bool has(const RowList& rows, std::size_t row) { return std::find(rows.begin(), rows.end(), row) != rows.end(); }
+
+TEST(RowsInAPolygon, AreTheFrontOnesWhereVisible) {
+  const RowList rows = of(two_dots(), around(30, 15, Depth::visible));
+  EXPECT_TRUE(has(rows, 0));
+  EXPECT_FALSE(has(rows, 1)) << "elsewhere";
+  EXPECT_FALSE(has(rows, 2)) << "hidden";
+  EXPECT_FALSE(has(rows, 3));
+}
+
+TEST(RowsInAPolygon, AreAllBehindItWhereThrough) {
+  scene::GaussianCloud cloud = two_dots();
+  add_at(cloud, {0.4f, 0, -2});      // projects to (30, 50) from behind the camera
+  add_at(cloud, {-0.02f, 0, 0.1f});  // before the near plane
+  EXPECT_EQ(of(cloud, around(30, 15, Depth::through)), (RowList{0, 2, 4, 5, 6}));
+  EXPECT_EQ(of(cloud, around(70, 15, Depth::through)), (RowList{1, 3, 7, 8, 9}));
+}
+
+TEST(RowsInAPolygon, NeedMostOfTheirWeightInside) {
+  scene::GaussianCloud cloud;
+  add_at(cloud, {0, 0, 2}, 12, -2.0f);  // at (50, 50), some 7 pixels wide
+  const auto edge_at = [&](double x) {
+    return of(cloud, Polygon{front_camera(), {{0, 0}, {x, 0}, {x, 100}, {0, 100}}, Depth::visible});
+  };
+  EXPECT_TRUE(edge_at(49).empty());
+  EXPECT_EQ(edge_at(51), RowList{0});
+}
+
+TEST(RowsInAStroke, AreThoseThatItRunsOver) {
+  const Stroke over{front_camera(), {{20, 50}, {40, 50}}, 12, Depth::visible};
+  EXPECT_TRUE(has(of(two_dots(), over), 0));
+  EXPECT_FALSE(has(of(two_dots(), over), 1));
+  EXPECT_EQ(of(two_dots(), Stroke{front_camera(), {{70, 50}}, 2, Depth::through}), (RowList{1, 3, 7, 8, 9}));
+  EXPECT_TRUE(of(two_dots(), Stroke{front_camera(), {{50, 10}}, 5, Depth::visible}).empty());
+}
+
+TEST(RowsInMasks, AreThoseShownMostlyInside) {
+  scene::GaussianCloud cloud = two_dots();
+  add_at(cloud, {-0.8f, 0, 4}, 12, -5);  // row 10, with four opaque ones before it
+  scene::Mask left(100, 100);
+  for (int y = 0; y < 100; ++y)
+    for (int x = 0; x < 50; ++x) left.at(x, y) = 1;
+  render::Workspace workspace;
+  const MaskedRows found = rows_in_masks(cloud, {{{front_camera(), left}}}, workspace);
+  EXPECT_TRUE(found.rows[0]);
+  EXPECT_FALSE(found.rows[1]);
+  EXPECT_FALSE(found.rows[10]) << "no view shows it";
+  EXPECT_EQ(found.undecided, 0u);
+}
+
+TEST(RowsInMasks, CountViewsByTheirAreaAndReportWhatIsNearlyEven) {
+  scene::GaussianCloud cloud;
+  add_at(cloud, {0, 0, 2}, 12, -2.0f);
+  scene::Camera twice = front_camera();  // the same view in twice the resolution
+  twice.fx *= 2, twice.fy *= 2, twice.cx *= 2, twice.cy *= 2, twice.width *= 2, twice.height *= 2;
+  const scene::Mask nothing(200, 200);
+  scene::Mask all(100, 100);
+  for (std::uint8_t& pixel : all.data) pixel = 1;
+  render::Workspace workspace;
+  const MaskedView says_yes{front_camera(), all}, says_no{twice, nothing};
+  const MaskedRows even = rows_in_masks(cloud, {{says_yes, says_no}}, workspace);
+  EXPECT_EQ(even.undecided, 1u) << "one view each way";
+  const MaskedRows outvoted = rows_in_masks(cloud, {{says_yes, says_no, says_yes}}, workspace);
+  EXPECT_TRUE(outvoted.rows[0]) << "although the other view has more pixels";
+  EXPECT_EQ(outvoted.undecided, 0u);
+}
+
+TEST(ShownShare, IsThatOfTheWeights) {
+  scene::GaussianCloud cloud;
+  add_at(cloud, {-0.4f, 0, 2}, 12, -2.5f);
+  add_at(cloud, {0.4f, 0, 2}, 12, -2.5f);
+  add_at(cloud, {0, 0, -2}, 12, -2.5f);
+  render::Workspace workspace;
+  const auto share = [&](const RowSet& rows) { return shown_share(cloud, rows, front_camera(), workspace); };
+  EXPECT_NEAR(share({1, 0, 0}), 0.5, 1e-3);
+  EXPECT_NEAR(share({1, 1, 0}), 1.0, 1e-6);
+  EXPECT_EQ(share({0, 0, 1}), 0.0) << "behind the camera";
+  EXPECT_EQ(shown_share(cloud_at({{0, 0, -1}}), RowSet{1}, front_camera(), workspace), 0.0) << "nothing shows";
+}
+
+}  // namespace
+}  // namespace engine::select
