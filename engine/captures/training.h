@@ -12,9 +12,8 @@
 
 namespace engine::captures {
 
-/// The fits of captured cases. 1,500 iterations of 30 photos at 320x240 take about 20 s of
-/// processor time. A third of
-/// that costs the ceiling 5 dB of the edited region (cases mug and clutter), twice as many add 0.3 dB (mug).
+/// The fits of captured cases. 1,500 iterations of 30 photos at 320x240 take about 20 s of processor time.
+/// A third of that costs the ceiling 5 dB of the edited region (cases mug and clutter), twice as many add 0.3 dB (mug).
 [[nodiscard]] fit::FitOptions training_options(int iterations = 1500);
 
 /// A trained scene.
