@@ -111,7 +111,7 @@ Result<CaptureOutcome> carry_out(const ReadyCase& ready, const edit::Request& re
   CaptureOutcome out{.trial = {}, .edited = std::move(done->edited)};
   CaptureTrial& trial = out.trial;
   trial.trial = std::move(done->trial);
-  trial.is_test = ready.is_test, trial.said = ready.said;
+  trial.is_test = ready.is_test, trial.by = ready.grasp.by, trial.said = ready.said;
   trial.deformed = evaluate::judge(ready.judged, deformed);
   trial.ceiling = evaluate::judge(ready.judged, ready.ceiling);
   trial.untouched_beyond_db = beyond_db(ready, ready.judged.before);
@@ -124,9 +124,10 @@ Result<CaptureOutcome> carry_out(const ReadyCase& ready, const edit::Request& re
 }
 
 std::string capture_table_head() {
-  return "| case | set | corrector | before, dB | deformed, dB | edited, dB | gain, dB | ceiling, dB | share, % "
+  return "| case | set | by | corrector | before, dB | deformed, dB | edited, dB | gain, dB | ceiling, dB | share, % "
          "| beyond, dB | outside, dB | vacated, dB | arrived, dB | SSIM | recall, % | precision, % | s |\n"
-         "| --- | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: "
+         "| --- | --- | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: "
+         "| ---: "
          "| ---: |\n";
 }
 
@@ -141,7 +142,8 @@ std::string capture_table_row(const CaptureTrial& trial) {
     else
       out << '-';
   };
-  out << "| " << trial.trial.name << " | " << (trial.is_test ? "test" : "choose") << " | " << trial.trial.corrector;
+  out << "| " << trial.trial.name << " | " << (trial.is_test ? "test" : "choose") << " | " << trial.by << " | "
+      << trial.trial.corrector;
   for (const double db : {trial.trial.untouched.edited.psnr_db, trial.deformed.edited.psnr_db, result.edited.psnr_db,
                           trial.gain_db(), trial.ceiling.edited.psnr_db})
     number(true, db, 2);

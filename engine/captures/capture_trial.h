@@ -41,6 +41,7 @@ struct ReadyCase {
 struct CaptureTrial {
   evaluate::Trial trial;       ///< Of the edit, with the columns of every trial; `untouched` is of the trained scene.
   bool is_test = false;        ///< See CapturedCase.
+  std::string by;              ///< See Grasp.
   std::string said;            ///< See Plan.
   evaluate::Quality deformed;  ///< Of the deformation alone.
   evaluate::Quality ceiling;   ///< Of the scene that was trained from photos after the edit.

@@ -1,8 +1,9 @@
 #include "engine/captures/grasp.h"
 
-#include <optional>
+#include <utility>
 
-#include "engine/deform/assign.h"
+#include "engine/edit/drag.h"
+#include "engine/select/select.h"
 
 namespace engine::captures {
 namespace {
@@ -12,35 +13,67 @@ namespace {
 // beyond its outline the ball takes in what it should not.
 constexpr double too_large = 1.25, off_centre = 1.2;
 
+/// To the right in the first photo.
+DVec3 right_of(const CapturedCase& the_case) { return glm::transpose(the_case.cameras.front().rotation)[0]; }
+
 void place_carelessly(const CapturedCase& the_case, edit::Handle& handle) {
-  // Off to the right in the first photo.
-  const DVec3 right = glm::transpose(the_case.cameras.front().rotation)[0];
-  const DVec3 off = off_centre * handle.radius * right;
+  const DVec3 off = off_centre * handle.radius * right_of(the_case);
   handle.source += off;
   if (handle.target) *handle.target += off;
   handle.radius *= too_large;
 }
 
-}  // namespace
+/// A request without what says which Gaussians move.
+edit::Request asked_of(const CapturedCase& the_case) {
+  edit::Request request;
+  request.mode = the_case.mode;
+  request.handles = the_case.handles;
+  return request;
+}
 
-Result<Grasp> grasp_by_balls(const CapturedCase& the_case, const scene::GaussianCloud& scene) {
-  Grasp out;
-  out.request.mode = the_case.mode;
-  out.request.handles = the_case.handles;
-  out.request.region = the_case.region;
-  std::vector<deform::Sphere> spheres;
-  for (edit::Handle& handle : out.request.handles) {
-    if (the_case.careless) place_carelessly(the_case, handle);
-    spheres.push_back({handle.source, handle.radius});
-  }
-  std::optional<deform::Box> box;
-  if (the_case.region) box = deform::Box{the_case.region->center, the_case.region->size};
-  const auto assigned = deform::assign(scene.mean, spheres, box);
+/// The request, and the rows that follow its handles.
+Result<Grasp> grasp_of(std::string by, edit::Request request, const scene::GaussianCloud& scene) {
+  const auto assigned = edit::assign(scene.mean, request);
   if (!assigned) return propagate(assigned);
+  Grasp out{std::move(by), std::move(request), {}};
   for (std::uint32_t row = 0; row < assigned->handle.size(); ++row)
     if (const auto handle = assigned->handle[row]; handle > 0 && out.request.handles[handle - 1].target)
       out.rows.push_back(row);
   return out;
+}
+
+}  // namespace
+
+Result<Grasp> grasp_by_balls(const CapturedCase& the_case, const scene::GaussianCloud& scene) {
+  edit::Request request = asked_of(the_case);
+  request.region = the_case.region;
+  if (the_case.careless)
+    for (edit::Handle& handle : request.handles) place_carelessly(the_case, handle);
+  return grasp_of("balls", std::move(request), scene);
+}
+
+Result<Grasp> grasp_by_clicks(const CapturedCase& the_case, const scene::GaussianCloud& scene) {
+  edit::Request request = asked_of(the_case);
+  select::Selection selection{{select::Op::add, select::Grow{the_case.clicks.inside, the_case.clicks.outside, {}}}};
+  if (the_case.careless) {
+    const scene::Camera& photo = the_case.cameras.front();
+    const DVec3 handle = request.handles.front().source;
+    const double depth = photo.cam_from_world(handle).z;
+    selection.push_back({select::Op::add, select::Expand{the_case.careless->beyond_px * depth / photo.fx}});
+    selection.push_back({select::Op::intersect, select::Plane{handle, right_of(the_case)}});
+  }
+  const auto selected = select::select(scene, selection);
+  if (!selected) return propagate(selected);
+  request.selected.emplace();
+  for (std::uint32_t row = 0; row < selected->rows.size(); ++row)
+    if (selected->rows[row] != 0) request.selected->push_back(row);
+  if (auto valid = edit::validate(request); !valid) return propagate(valid);
+  return grasp_of("clicks", std::move(request), scene);
+}
+
+const std::vector<NamedGrasp>& known_grasps() {
+  static const std::vector<NamedGrasp> all{{"balls", grasp_by_balls}, {"clicks", grasp_by_clicks}};
+  return all;
 }
 
 }  // namespace engine::captures

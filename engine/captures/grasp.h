@@ -1,9 +1,9 @@
-// How a request says what moves. The one place where a captured case meets a way to select: today balls around
-// handles; whoever selects otherwise gives another function.
+// How a request says what moves: the one place where a captured case meets a way to select.
 #pragma once
 
 #include <cstdint>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "engine/captures/captured_case.h"
@@ -15,6 +15,7 @@ namespace engine::captures {
 
 /// What is asked for, and what that takes along.
 struct Grasp {
+  std::string by;                   ///< How: "balls", "clicks".
   edit::Request request;            ///< Without parameters: those are a preset's.
   std::vector<std::uint32_t> rows;  ///< Rows of the trained scene that follow a handle with a target; ascending.
 };
@@ -27,5 +28,19 @@ using GraspBy = std::function<Result<Grasp>(const CapturedCase& the_case, const 
 /// and so far off to one side that about half of the thing is missing.
 ///   errors  those of deform::assign()
 [[nodiscard]] Result<Grasp> grasp_by_balls(const CapturedCase& the_case, const scene::GaussianCloud& scene);
+
+/// By a selection that grows from the clicks of the case; each of its rows goes with the nearest handle. Carelessly:
+/// the selection reaches beyond the thing by so many pixels of a photo, and ends at a plane upright to it through the
+/// first handle, so that about half of the thing is missing.
+///   errors  those of select::select() and edit::assign()
+[[nodiscard]] Result<Grasp> grasp_by_clicks(const CapturedCase& the_case, const scene::GaussianCloud& scene);
+
+/// A way to say what moves, by its name.
+struct NamedGrasp {
+  std::string name;
+  GraspBy grasp;
+};
+/// Those above.
+[[nodiscard]] const std::vector<NamedGrasp>& known_grasps();
 
 }  // namespace engine::captures

@@ -123,12 +123,6 @@ Result<Assignment> assign_selected(const Array3& mean, std::span<const std::uint
     return fail(ErrorCode::unprocessable,
                 gaussians(rows.size()) + " selected, but all outside the region: enlarge the region or leave it out",
                 "selection");
-  for (std::size_t h = 0; h < centers.size(); ++h)
-    if (result.count[h] == 0)
-      return fail(ErrorCode::unprocessable,
-                  "every selected Gaussian is nearer to another handle than to handle " + std::to_string(h + 1) +
-                      ": move this handle or leave it out",
-                  "handles[" + std::to_string(h) + "].source");
   return result;
 }
 

@@ -29,7 +29,7 @@ using HandleColumn = std::vector<std::uint16_t>;
 
 struct Assignment {
   HandleColumn handle;             ///< [N]
-  std::vector<std::size_t> count;  ///< [H] Gaussians of each handle, |P_h^i|; never 0.
+  std::vector<std::size_t> count;  ///< [H] Gaussians of each handle, |P_h^i|.
 };
 
 /// P_h^i = the Gaussians with |mean - center| < radius (strictly, in double), inside `region` (its faces included) if
@@ -42,11 +42,10 @@ struct Assignment {
                                         const std::optional<Box>& region = std::nullopt);
 
 /// Where a selection says what moves: each of its rows that lies inside `region` (if there is one) belongs to the
-/// nearest handle, however far that is; the lower index if the distances tie.
+/// nearest handle, however far that is; the lower index if the distances tie. A handle may be left without a row.
 ///   rows     ascending, of the scene (asserted)
 ///   centers  [H], H < 65536
-///   errors   unprocessable: `where` is "selection" if the region leaves no row, else "handles[2].source", the first
-///            handle that no row belongs to
+///   errors   unprocessable, `where` = "selection": the region leaves no row
 [[nodiscard]] Result<Assignment> assign_selected(const Array3& mean, std::span<const std::uint32_t> rows,
                                                  std::span<const DVec3> centers,
                                                  const std::optional<Box>& region = std::nullopt);

@@ -24,7 +24,14 @@ Result<deform::Assignment> assign(const Array3& mean, const Request& request) {
                 "selection");
   std::vector<DVec3> centers;
   for (const Handle& handle : request.handles) centers.push_back(handle.source);
-  return deform::assign_selected(mean, *request.selected, centers, region);
+  auto assignment = deform::assign_selected(mean, *request.selected, centers, region);
+  for (std::size_t h = 0; assignment && h < request.handles.size(); ++h)
+    if (request.handles[h].target && assignment->count[h] == 0)  // an anchor may hold what is beside the selection
+      return fail(ErrorCode::unprocessable,
+                  "every selected Gaussian is nearer to another handle than to handle " + std::to_string(h + 1) +
+                      ": move this handle or leave it out",
+                  "handles[" + std::to_string(h) + "].source");
+  return assignment;
 }
 
 PlannedMotion plan_motion(const WorkingScene& working, const Request& request, std::span<const DVec3> positions, int u,

@@ -1,5 +1,6 @@
 #include "server/cli/bench_captures.h"
 
+#include <algorithm>
 #include <cstdlib>
 #include <iomanip>
 #include <memory>
@@ -70,14 +71,17 @@ Result<std::vector<captures::CaptureTrial>> trials_of(const std::vector<std::str
   for (const std::string& name : names) {
     const auto made = captures::make_captured_case(name);
     if (!made) return propagate(made);
-    const auto ready = captures::make_ready(*made, captures::training_options(options.captures.fit_iterations), cache,
-                                            captures::grasp_by_balls);
-    if (!ready) return propagate(ready);
-    for (const std::string& corrector : options.correctors) {
-      auto trial = trial_of(*ready, corrector, options, machine);
-      if (!trial) return propagate(trial);
-      terminal.out << captures::capture_table_row(*trial) << std::flush;
-      trials.push_back(std::move(*trial));
+    for (const captures::NamedGrasp& way : captures::known_grasps()) {
+      if (std::ranges::find(options.captures.by, way.name) == options.captures.by.end()) continue;
+      const auto ready =
+          captures::make_ready(*made, captures::training_options(options.captures.fit_iterations), cache, way.grasp);
+      if (!ready) return propagate(ready);
+      for (const std::string& corrector : options.correctors) {
+        auto trial = trial_of(*ready, corrector, options, machine);
+        if (!trial) return propagate(trial);
+        terminal.out << captures::capture_table_row(*trial) << std::flush;
+        trials.push_back(std::move(*trial));
+      }
     }
   }
   return trials;
@@ -103,6 +107,15 @@ CLI::Option* add_capture_options(CLI::App& command, CaptureOptions& options) {
   command.add_option("--page", options.page, "Also write what --captures finds as a page for people")
       ->needs(on)
       ->type_name("FILE");
+  std::vector<std::string> ways;
+  for (const captures::NamedGrasp& way : captures::known_grasps()) ways.push_back(way.name);
+  command
+      .add_option("--by", options.by,
+                  "How a request of --captures says what moves: balls around its handles, or a selection that grows "
+                  "from at most six clicks (default: one after the other)")
+      ->needs(on)
+      ->check(CLI::IsMember(ways))
+      ->type_name("WAY");
   command.add_option("--fit-iterations", options.fit_iterations, "Photos that each fit of --captures learns from")
       ->needs(on)
       ->check(CLI::Range(1, 1'000'000))

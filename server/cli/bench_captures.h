@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "server/cli/compute.h"
 #include "server/cli/options.h"
@@ -14,8 +15,9 @@ struct BenchOptions;
 /// Options of captured cases.
 struct CaptureOptions {
   bool on = false;
-  std::string cache;  ///< Folder of trained scenes; empty: default_capture_cache().
-  std::string page;   ///< File; empty: none is written.
+  std::string cache;                               ///< Folder of trained scenes; empty: default_capture_cache().
+  std::string page;                                ///< File; empty: none is written.
+  std::vector<std::string> by{"balls", "clicks"};  ///< Names of captures::known_grasps().
   int fit_iterations = 1500;
 };
 

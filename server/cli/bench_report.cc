@@ -110,6 +110,7 @@ void decode(const ordered_json& from, evaluate::TripTrial& trial) {
 ordered_json encode(const captures::CaptureTrial& trial) {
   ordered_json out = encode(trial.trial);
   out["test"] = trial.is_test;
+  out["by"] = trial.by;
   out["said"] = trial.said;
   out["deformed"] = encode(trial.deformed);
   out["ceiling"] = encode(trial.ceiling);
@@ -129,6 +130,7 @@ ordered_json encode(const captures::CaptureTrial& trial) {
 void decode(const ordered_json& from, captures::CaptureTrial& trial) {
   decode(from, trial.trial);
   from.at("test").get_to(trial.is_test);
+  from.at("by").get_to(trial.by);
   from.at("said").get_to(trial.said);
   decode(from.at("deformed"), trial.deformed);
   decode(from.at("ceiling"), trial.ceiling);

@@ -20,7 +20,8 @@ constexpr const char* how =
     "noise and an exposure of their own. `splatdrag fit` trains a scene from the photos before, starting from sparse,\n"
     "noisy points. A person's request is carried out on it: at most three handles per part, on surfaces, off by 2 % "
     "of\n"
-    "their length, and balls around them to say what moves. What comes of it is held against photographs of the true\n"
+    "their length; what moves is said *by* balls around them, or by a selection that grows from at most six clicks. "
+    "What comes of it is held against photographs of the true\n"
     "result, without noise, at six cameras within the orbit and four beyond it.\n\n"
     "- **before**, **deformed**, **edited**, **ceiling**: PSNR of the edited region, of the trained scene as it is, "
     "of\n"
@@ -35,37 +36,45 @@ constexpr const char* how =
 
 struct Mean {
   int count = 0;
-  double gain = 0, deformed = 0, edited = 0, ceiling = 0, share = 0, outside = 0;
+  double gain = 0, deformed = 0, edited = 0, ceiling = 0, share = 0, outside = 0, recall = 0, precision = 0;
 };
 
-/// Sums, divided: of one set and corrector.
-Mean mean_of(std::span<const CaptureTrial> trials, bool is_test, const std::string& corrector) {
+/// Of one set, one way to say what moves, and one corrector.
+Mean mean_of(std::span<const CaptureTrial> trials, bool is_test, const std::string& by, const std::string& corrector) {
   Mean mean;
   for (const CaptureTrial& trial : trials) {
-    if (trial.is_test != is_test || trial.trial.corrector != corrector) continue;
+    if (trial.is_test != is_test || trial.by != by || trial.trial.corrector != corrector) continue;
     ++mean.count;
     mean.gain += trial.gain_db(), mean.deformed += trial.deformed.edited.psnr_db;
     mean.edited += trial.trial.result.edited.psnr_db, mean.ceiling += trial.ceiling.edited.psnr_db;
     mean.share += trial.share_of_ceiling().value_or(0), mean.outside += trial.trial.result.outside.psnr_db;
+    mean.recall += trial.match.recall, mean.precision += trial.match.precision;
   }
-  for (double* sum : {&mean.gain, &mean.deformed, &mean.edited, &mean.ceiling, &mean.share, &mean.outside})
+  for (double* sum : {&mean.gain, &mean.deformed, &mean.edited, &mean.ceiling, &mean.share, &mean.outside, &mean.recall,
+                      &mean.precision})
     *sum /= std::max(1, mean.count);
   return mean;
 }
 
-std::string means(std::span<const CaptureTrial> trials, const std::vector<std::string>& correctors) {
+std::string means(std::span<const CaptureTrial> trials, const BenchOptions& options) {
   std::ostringstream out;
-  out << "| set | corrector | cases | deformed, dB | edited, dB | gain, dB | ceiling, dB | share, % | outside, dB |\n"
-         "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n"
+  out << "| set | by | corrector | cases | deformed, dB | edited, dB | gain, dB | ceiling, dB | share, % | outside, dB "
+         "| "
+         "recall, % | precision, % |\n"
+         "| --- | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n"
       << std::fixed;
+  const auto add = [&](bool is_test, const std::string& by, const std::string& corrector) {
+    const Mean mean = mean_of(trials, is_test, by, corrector);
+    if (mean.count == 0) return;
+    out << "| " << (is_test ? "test" : "choose") << " | " << by << " | " << corrector << " | " << mean.count
+        << std::setprecision(2) << " | " << mean.deformed << " | " << mean.edited << " | " << mean.gain << " | "
+        << mean.ceiling << " | " << std::setprecision(0) << 100 * mean.share << std::setprecision(2) << " | "
+        << mean.outside << std::setprecision(0) << " | " << 100 * mean.recall << " | " << 100 * mean.precision
+        << " |\n";
+  };
   for (const bool is_test : {false, true})
-    for (const std::string& corrector : correctors) {
-      const Mean mean = mean_of(trials, is_test, corrector);
-      if (mean.count == 0) continue;
-      out << "| " << (is_test ? "test" : "choose") << " | " << corrector << " | " << mean.count << std::setprecision(2)
-          << " | " << mean.deformed << " | " << mean.edited << " | " << mean.gain << " | " << mean.ceiling << " | "
-          << std::setprecision(0) << 100 * mean.share << std::setprecision(2) << " | " << mean.outside << " |\n";
-    }
+    for (const std::string& by : options.captures.by)
+      for (const std::string& corrector : options.correctors) add(is_test, by, corrector);
   return out.str();
 }
 
@@ -95,6 +104,8 @@ std::string captures_page(std::span<const CaptureTrial> trials, const BenchOptio
   for (const std::string& name : options.cases) out << " --case " << name;
   out << " --preset " << proto::name_of(options.preset);
   for (const std::string& corrector : options.correctors) out << " --corrector " << corrector;
+  if (options.captures.by != CaptureOptions{}.by)
+    for (const std::string& by : options.captures.by) out << " --by " << by;
   if (options.captures.fit_iterations != CaptureOptions{}.fit_iterations)
     out << " --fit-iterations " << options.captures.fit_iterations;
   out << " --out out/captures --page docs/captures.md\n\non " << machine.threads << " threads, " << machine.simd
@@ -107,7 +118,7 @@ std::string captures_page(std::span<const CaptureTrial> trials, const BenchOptio
   }
   out << "\nA fit of " << options.captures.fit_iterations << " iterations took " << std::fixed << std::setprecision(0)
       << fits << " s on average, on a machine that did other work, too.\n\n## Means\n\n"
-      << means(trials, options.correctors) << "\n## Cases\n\n"
+      << means(trials, options) << "\n## Cases\n\n"
       << cases(trials);
   return out.str();
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "engine/core/rng.h"
 #include "tests/engine/captures/samples.h"
 
 namespace engine::captures {
@@ -71,6 +72,54 @@ TEST(GraspByBalls, SaysWhichBallIsEmpty) {
   const auto grasp = grasp_by_balls(with_handles({{{5, 0, 0}, DVec3(0, 1, 0), 0.25, 0}}), line());
   ASSERT_FALSE(grasp);
   EXPECT_EQ(grasp.error().where, "handles[0].radius");
+}
+
+/// Two dense balls of Gaussians, of another colour each, that do not touch: the first 300 rows, the others.
+scene::GaussianCloud two_balls() {
+  scene::GaussianCloud cloud;
+  cloud.resize(600);
+  Rng rng(5);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    Vec3 at;
+    do at = {rng.uniform(-0.3f, 0.3f), rng.uniform(-0.3f, 0.3f), rng.uniform(-0.3f, 0.3f)};
+    while (glm::length(at) > 0.3f);
+    cloud.mean.set(i, at + Vec3(i < 300 ? 0.0f : 1.5f, 0, 0));
+    cloud.rotation.set(i, {1, 0, 0, 0});
+    cloud.log_scale.set(i, Vec3(-3.5f));
+    cloud.opacity_logit[i] = 4;
+    for (std::size_t c = 0; c < 3; ++c) cloud.sh_row(i)[c] = (c == 0) == (i < 300) ? 1.0f : -1.0f;
+  }
+  return cloud;
+}
+
+CapturedCase with_clicks() {
+  CapturedCase out = with_handles({{{0, 0, 0}, DVec3(0, 1, 0), 0.05, 0}, {{1.5, 0, 0}, std::nullopt, 0.3, 0}});
+  out.clicks = {{{0, 0, 0.1}}, {{1.5, 0, 0.1}}};
+  return out;
+}
+
+TEST(GraspByClicks, TakesTheThingThatWasClickedAtWhateverTheRadiusOfItsHandle) {
+  const auto grasp = grasp_by_clicks(with_clicks(), two_balls());
+  ASSERT_TRUE(grasp) << grasp.error().message;
+  EXPECT_EQ(grasp->by, "clicks");
+  ASSERT_EQ(grasp->rows.size(), 300u);
+  EXPECT_EQ(grasp->rows.back(), 299u);
+  EXPECT_EQ(grasp->request.selected, grasp->rows);
+}
+
+TEST(GraspByClicks, CarelesslyMissesAboutHalf) {
+  CapturedCase the_case = with_clicks();
+  the_case.careless = Carelessness{};
+  const auto grasp = grasp_by_clicks(the_case, two_balls());
+  ASSERT_TRUE(grasp) << grasp.error().message;
+  EXPECT_GT(grasp->rows.size(), 100u);
+  EXPECT_LT(grasp->rows.size(), 200u);
+}
+
+TEST(GraspByClicks, ClicksThatSayNothingAreAnError) {
+  CapturedCase the_case = with_clicks();
+  the_case.clicks.inside.clear();
+  EXPECT_FALSE(grasp_by_clicks(the_case, two_balls()));
 }
 
 }  // namespace

@@ -79,6 +79,22 @@ TEST(Preview, ASelectionOfWhatASphereHoldsIsTheSphere) {
   EXPECT_EQ(by_sphere->counts, by_rows->counts);
 }
 
+TEST(Preview, AnAnchorMayStandBesideTheSelectionAndAHandleThatDragsMayNot) {
+  const scene::GaussianCloud cloud = ball_before_wall(200, Vec3(0), 3);
+  Request request = four_handles(Mode::move);
+  request.handles.resize(2);
+  request.selected = in_spheres(cloud, request);
+  request.handles.push_back({DVec3(0, 50, 0), std::nullopt, 0.1, 0});
+  const auto anchored = preview(plain(cloud), request);
+  ASSERT_TRUE(anchored) << anchored.error().message;
+  EXPECT_EQ(anchored->counts[2], 0u);
+  request.handles[2].target = DVec3(0, 51, 0);
+  const auto refused = preview(plain(cloud), request);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::unprocessable);
+  EXPECT_EQ(refused.error().where, "handles[2].source");
+}
+
 TEST(Preview, ASelectedRowThatTheSceneDoesNotHaveIsRefused) {
   const scene::GaussianCloud cloud = ball_before_wall(200, Vec3(0), 3);
   Request request = four_handles(Mode::move);

@@ -67,6 +67,7 @@ CaptureTrial trial_of(const std::string& name, bool is_test, double deformed, do
   trial.trial.result.edited = {edited, 0.5, 9};
   trial.ceiling.edited = {30, 0.5, 9};
   trial.is_test = is_test;
+  trial.by = "balls";
   return trial;
 }
 

@@ -56,7 +56,7 @@ TEST(BenchReport, ATripComesBackAsItWas) {
 captures::CaptureTrial sample_capture() {
   captures::CaptureTrial capture;
   capture.trial = sample_trial();
-  capture.is_test = true, capture.said = "Nearly.";
+  capture.is_test = true, capture.by = "clicks", capture.said = "Nearly.";
   capture.deformed.edited = {25.5, 0.5, 7}, capture.ceiling.edited = {40.1, 0.5, 7};
   capture.untouched_beyond_db = 19, capture.deformed_beyond_db = 20;
   capture.result_beyond_db = 21, capture.ceiling_beyond_db = 22;
