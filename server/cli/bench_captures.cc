@@ -55,7 +55,7 @@ Result<captures::CaptureTrial> trial_of(const captures::ReadyCase& ready, const 
   return cached_or_new<captures::CaptureTrial>(file, [&]() -> Result<captures::CaptureTrial> {
     auto done = captures::carry_out(ready, request, preview, corrector);
     if (!done) return propagate(done);
-    const auto pictures = evaluate::show_pictures(ready.judged, request, corrector, done->edited,
+    const auto pictures = evaluate::show_pictures(ready.judged, request, ready.grasp.by + "_" + corrector, done->edited,
                                                   std::size_t(options.pictures), picture_writer(options));
     if (!pictures) return propagate(pictures);
     return std::move(done->trial);

@@ -74,14 +74,17 @@ CaptureTrial trial_of(const std::string& name, bool is_test, double deformed, do
 TEST(CapturesPage, TellsTheSetsApartAndNamesWhatIsMissing) {
   BenchOptions options;
   options.cases = {"mug", "turn", "lid"};
-  const std::vector<CaptureTrial> trials{trial_of("mug", false, 20, 21), trial_of("turn", false, 20, 23),
-                                         trial_of("lid", true, 15, 14)};
+  std::vector<CaptureTrial> trials{trial_of("mug", false, 20, 21), trial_of("turn", false, 20, 23),
+                                   trial_of("lid", true, 15, 14), trial_of("mug", false, 24, 28)};
+  trials.back().by = "clicks";
   const std::string page = captures_page(trials, options, {.threads = 2, .simd = "AVX2"});
   EXPECT_NE(page.find("bench-edit --captures --case mug --case turn --case lid --preset draft --corrector scene"),
             std::string::npos)
       << page;
-  EXPECT_NE(page.find("| choose | scene | 2 | 20.00 | 22.00 | 2.00 | 30.00 | 60 |"), std::string::npos) << page;
-  EXPECT_NE(page.find("| test | scene | 1 | 15.00 | 14.00 | -1.00 | 30.00 | 20 |"), std::string::npos) << page;
+  EXPECT_NE(page.find("| choose | balls | scene | 2 | 20.00 | 22.00 | 2.00 | 30.00 | 60 |"), std::string::npos) << page;
+  EXPECT_NE(page.find("| test | balls | scene | 1 | 15.00 | 14.00 | -1.00 | 30.00 | 20 |"), std::string::npos) << page;
+  EXPECT_NE(page.find("| choose | clicks | scene | 1 | 24.00 | 28.00 | 4.00 | 30.00 | 90 |"), std::string::npos)
+      << page;
   EXPECT_NE(page.find("- `lid` (test): Something lid."), std::string::npos) << page;
   const std::size_t missing = page.find("Not carried out for this page: ");
   ASSERT_NE(missing, std::string::npos) << page;

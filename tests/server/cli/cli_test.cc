@@ -220,7 +220,7 @@ TEST_F(Cli, BenchEditJudgesEditsWhoseRightResultIsKnown) {
 TEST_F(Cli, BenchEditJudgesEditsOfScenesThatItTrains) {
   const std::string bench =
       "bench-edit --captures --case mug --fit-iterations 60 --preset preview --corrector none "
-      "--cache " +
+      "--by balls --cache " +
       at("trained") + " --out " + at("bench") + " --page " + at("page.md");
   const Finished run = splatdrag(bench);
   ASSERT_EQ(run.status, 0) << run.err;
@@ -234,14 +234,20 @@ TEST_F(Cli, BenchEditJudgesEditsOfScenesThatItTrains) {
   EXPECT_EQ(found["gain_db"], 0) << "a preview is the deformation alone";
   EXPECT_GT(found["recall"], 0.5);
   EXPECT_GT(found["precision"], 0.5);
-  EXPECT_NE(support::read_file(at("page.md")).find("| mug | choose | none |"), std::string::npos);
-  EXPECT_TRUE(io::read_image(at("bench/mug_none_within_0.png")));
+  EXPECT_NE(support::read_file(at("page.md")).find("| mug | choose | balls | none |"), std::string::npos);
+  EXPECT_TRUE(io::read_image(at("bench/mug_balls_none_within_0.png")));
   EXPECT_EQ(std::distance(fs::directory_iterator(at("trained")), fs::directory_iterator()), 2) << "before and after";
 
-  // Other parameters are tried on the scenes that are there.
+  // Both ways to say what moves, and other parameters, are tried on the scenes that are there.
   const double seconds = found["fit_seconds"];
-  ASSERT_EQ(splatdrag(bench + " --interpolation smooth").status, 0);
-  EXPECT_EQ(json::parse(support::read_file(at("bench/captures.json")))["captures"][0]["fit_seconds"], seconds);
+  const Finished again = splatdrag(bench + " --by clicks --interpolation smooth");
+  ASSERT_EQ(again.status, 0) << again.err;
+  const json both = json::parse(support::read_file(at("bench/captures.json")))["captures"];
+  ASSERT_EQ(both.size(), 2u);
+  for (const json& each : both) EXPECT_EQ(each["fit_seconds"], seconds);
+  EXPECT_EQ(both[0]["by"], "balls");
+  EXPECT_EQ(both[1]["by"], "clicks");
+  EXPECT_TRUE(io::read_image(at("bench/mug_clicks_none_within_0.png")));
 }
 
 TEST_F(Cli, EditWritesSceneReportAndPictures) {

@@ -133,6 +133,8 @@ TEST(Program, RefusesWrongOptionsOfCaptures) {
   refused({"--fit-iterations", "9"}, 2, "--captures");
   refused({"--captures", "--small"}, 2, "--small");
   refused({"--captures", "--scene", "a.ply", "--dataset", "d", "--request", "r.json"}, 2, "--captures");
+  refused({"--by", "clicks"}, 2, "--captures");
+  refused({"--captures", "--by", "hands"}, 2, "--by");
   refused({"--captures", "--fit-iterations", "0"}, 2, "--fit-iterations");
   refused({"--captures", "--fit-iterations", "nan"}, 2, "--fit-iterations");
   refused({"--captures", "--cache", out, "--case", "slide"}, 3, "no captured case \"slide\"");
