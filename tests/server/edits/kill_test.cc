@@ -141,8 +141,9 @@ TEST(EditKill, AtTwentyMomentsChangesNoByteOfTheResult) {
     SCOPED_TRACE(round);
     const Child child([&](const Child&) { carry_out(rough, long_edit()); });
     // An eighth at most: 20 halves of that are hardly more than the whole, and every start takes some of it.
-    // Less where it is ahead: the machine may have become quicker than it was when the whole was timed.
-    const auto part = finished * kills <= round * 20 ? 8 : 40;  // of its 20 intervals
+    // Less where it is ahead, and more where it is far behind: the machine may have become quicker than it was when the
+    // whole was timed, or slower. It has 20 intervals.
+    const int part = finished * kills > round * 20 ? 40 : 3 * finished * kills < round * 20 ? 3 : 8;
     std::this_thread::sleep_for(std::chrono::microseconds(rng.below(std::uint32_t(whole_time.count() / part))));
     child.kill();
     if (!child.ended_well()) ++killed;
