@@ -47,7 +47,7 @@ void grow_first(benchmark::State& state) {
     std::size_t selected = 0, looked_at = 0;
     for (auto _ : state) {
       const select::Neighbourhood around(demo.cloud, select::surroundings_of(demo.cloud.mean, grow));
-      selected = around.cut(grow).value().size();
+      selected = around.grow(demo.cloud, grow).value().size();
       looked_at = around.rows().size();
     }
     state.counters["selected"] = double(selected);
@@ -62,7 +62,7 @@ void grow_again(benchmark::State& state) {
   engine::WorkArena one(1);
   one.run([&] {
     const select::Neighbourhood around(demo.cloud, select::surroundings_of(demo.cloud.mean, grow));
-    for (auto _ : state) benchmark::DoNotOptimize(around.cut(grow));
+    for (auto _ : state) benchmark::DoNotOptimize(around.grow(demo.cloud, grow));
   });
 }
 

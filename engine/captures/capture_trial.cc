@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "engine/captures/photographs.h"
+#include "engine/core/rows.h"
 #include "engine/edit/preview.h"
 #include "engine/mask/mask.h"
 #include "engine/render/forward.h"
@@ -44,14 +45,6 @@ std::vector<std::uint32_t> shown_part(const CapturedCase& the_case) {
   return rows;
 }
 
-std::vector<std::uint32_t> rows_that_move(const CapturedCase& the_case, const scene::GaussianCloud& trained) {
-  const std::vector<std::uint8_t> moves = the_case.moving.holds(trained.mean);
-  std::vector<std::uint32_t> rows;
-  for (std::uint32_t row = 0; row < moves.size(); ++row)
-    if (moves[row] != 0) rows.push_back(row);
-  return rows;
-}
-
 /// PSNR of the edited region at the views outside the orbit.
 double beyond_db(const ReadyCase& ready, const scene::GaussianCloud& result) {
   const std::span<const evaluate::JudgedView> views = ready.judged.judged;
@@ -60,34 +53,39 @@ double beyond_db(const ReadyCase& ready, const scene::GaussianCloud& result) {
 
 }  // namespace
 
-Result<ReadyCase> make_ready(const CapturedCase& the_case, const fit::FitOptions& options,
-                             const std::filesystem::path& folder, const GraspBy& grasp_by) {
+Result<TrainedCase> train(const CapturedCase& the_case, const fit::FitOptions& options,
+                          const std::filesystem::path& folder) {
   auto before = trained(capture(the_case, Side::before), options, folder);
   if (!before) return propagate(before);
   auto after = trained(capture(the_case, Side::after), options, folder);
   if (!after) return propagate(after);
-  auto grasp = grasp_by(the_case, before->cloud);
+  return TrainedCase{std::move(*before), std::move(*after), true_views(the_case)};
+}
+
+Result<ReadyCase> make_ready(const CapturedCase& the_case, const TrainedCase& trained, const GraspBy& grasp_by) {
+  const auto& [before, after, views] = trained;
+  auto grasp = grasp_by(the_case, before.cloud);
   if (!grasp) return propagate(grasp);
 
   ReadyCase out;
-  out.match = match(before->cloud, grasp->rows, the_case.moving);
+  out.match = match(before.cloud, grasp->rows, the_case.moving);
   out.grasp = std::move(*grasp);
   evaluate::Case& judged = out.judged;
   judged.name = the_case.name, judged.what = the_case.what, judged.textured = the_case.textured;
-  judged.part_before = rows_that_move(the_case, before->cloud);
-  judged.before = std::move(before->cloud);
+  judged.part_before = marked_rows(the_case.moving.holds(before.cloud.mean));
+  judged.before = before.cloud;
   judged.truth = the_case.after;
   judged.part = the_case.part_after;
   judged.part_after = shown_part(the_case);
   judged.cameras = the_case.cameras, judged.held_out = the_case.held_out;
-  judged.judged = true_views(the_case);
+  judged.judged = views;
   judged.request = out.grasp.request;
   out.beyond = the_case.beyond;
-  out.ceiling = std::move(after->cloud);
+  out.ceiling = after.cloud;
   out.ceiling_gaussians = out.ceiling.size();
   out.is_test = the_case.is_test, out.said = the_case.said;
-  out.fit_seconds = before->seconds + after->seconds;
-  out.key_before = before->key, out.key_after = after->key;
+  out.fit_seconds = before.seconds + after.seconds;
+  out.key_before = before.key, out.key_after = after.key;
   return out;
 }
 

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "engine/captures/captured_case.h"
 #include "engine/captures/grasp.h"
@@ -12,12 +14,25 @@
 #include "engine/core/result.h"
 #include "engine/edit/request.h"
 #include "engine/evaluate/cases.h"
+#include "engine/evaluate/judged_view.h"
 #include "engine/evaluate/measure.h"
 #include "engine/evaluate/trial.h"
 
 namespace engine::captures {
 
-/// A case with its trained scenes.
+/// Both scenes of a case, photographed and trained: the same whichever way a request says what moves.
+struct TrainedCase {
+  Trained before, after;
+  std::vector<evaluate::JudgedView> judged;  ///< True photographs from the held-out cameras, after the edit.
+};
+
+/// Photographs a case and trains both scenes.
+///   folder  of trained(); exists
+///   errors  those of trained()
+[[nodiscard]] Result<TrainedCase> train(const CapturedCase& the_case, const fit::FitOptions& options,
+                                        const std::filesystem::path& folder);
+
+/// A case with its trained scenes, and what is asked for.
 struct ReadyCase {
   evaluate::Case judged;   ///< `before` is the trained scene, `truth` the true one after; views show true photographs.
   std::size_t beyond = 0;  ///< So many of the held-out views, the last ones, are outside the orbit.
@@ -31,11 +46,11 @@ struct ReadyCase {
   std::uint64_t key_before = 0, key_after = 0;  ///< Of the fits.
 };
 
-/// Photographs a case, trains both scenes and asks for the edit.
-///   folder  of trained(); exists
-///   errors  those of trained() and of `grasp_by`
-[[nodiscard]] Result<ReadyCase> make_ready(const CapturedCase& the_case, const fit::FitOptions& options,
-                                           const std::filesystem::path& folder, const GraspBy& grasp_by);
+/// Asks for the edit of a case.
+///   trained  train() of the case
+///   errors   those of `grasp_by`
+[[nodiscard]] Result<ReadyCase> make_ready(const CapturedCase& the_case, const TrainedCase& trained,
+                                           const GraspBy& grasp_by);
 
 /// What an edit of a captured case came to. Qualities are over all held-out views but where it says otherwise.
 struct CaptureTrial {

@@ -8,6 +8,8 @@
 #include <utility>
 
 #include "engine/core/rng.h"
+#include "engine/core/rows.h"
+#include "engine/evaluate/named_cases.h"
 #include "engine/evaluate/studio.h"
 #include "engine/fit/start.h"
 #include "engine/procedural/surfels.h"
@@ -30,6 +32,8 @@ constexpr double click_noise_px = 2;  // standard deviation of each coordinate o
 constexpr float gleam = 0.30f;        // of glossy things, see add_gloss()
 // A row that photos blend with this weight or more is shown by them.
 constexpr float shown_weight = 0.02f;
+
+constexpr const char* kind = "captured case";  // as errors call it
 
 // Purposes of derived_seed().
 constexpr std::uint32_t for_cameras = 21, for_photos = 22, for_points = 23, for_handles = 24, for_clicks = 25;
@@ -118,12 +122,8 @@ void put_scenes(const Plan& plan, CapturedCase& out) {
   moving.insert(moving.end(), out.part_before.begin(), out.part_before.end());
   out.moving = MovingPart(out.before, moving);
 
-  std::vector<float> weight(out.before.size(), 0.0f);
-  render::Workspace workspace;
-  for (const scene::Camera& camera : out.cameras)
-    render::raise_to_largest_weights(out.before, camera, workspace, weight);
-  for (std::uint32_t row = 0; row < weight.size(); ++row)
-    if (weight[row] >= shown_weight) out.shown.push_back(row);
+  out.shown =
+      rows_where(render::largest_weights(out.before, out.cameras), [](float weight) { return weight >= shown_weight; });
 }
 
 /// The surface that a person sees near a place and points at, from where the first photo was taken.
@@ -197,28 +197,18 @@ CapturedCase carry_out(const std::string& name, const Plan& plan) {
 }  // namespace
 
 const std::vector<std::string>& captured_case_names() {
-  static const std::vector<std::string> names = [] {
-    std::vector<std::string> out;
-    for (const NamedPlan& known : known_plans()) out.push_back(known.name);
-    return out;
-  }();
+  static const std::vector<std::string> names = evaluate::names_of_cases(known_plans());
   return names;
 }
 
 Result<std::vector<std::string>> choose_captured_cases(const std::vector<std::string>& names) {
-  const std::vector<std::string>& all = captured_case_names();
-  for (const std::string& name : names)
-    if (std::find(all.begin(), all.end(), name) == all.end()) return propagate(make_captured_case(name));
-  return names.empty() ? all : names;
+  return evaluate::choose_names(known_plans(), names, kind);
 }
 
 Result<CapturedCase> make_captured_case(const std::string& name) {
-  std::string names;
-  for (const NamedPlan& known : known_plans()) {
-    if (known.name == name) return carry_out(name, known.make());
-    names += (names.empty() ? "" : ", ") + known.name;
-  }
-  return fail(ErrorCode::not_found, "there is no captured case \"" + name + "\"; there are " + names, "case");
+  const auto known = evaluate::find_case(known_plans(), name, kind);
+  if (!known) return propagate(known);
+  return carry_out(name, (*known)->make());
 }
 
 Capture capture(const CapturedCase& the_case, Side side) {

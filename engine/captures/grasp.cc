@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "engine/captures/looking.h"
+#include "engine/core/rows.h"
 #include "engine/edit/drag.h"
 #include "engine/select/select.h"
 
@@ -36,10 +38,29 @@ Result<Grasp> grasp_of(std::string by, edit::Request request, const scene::Gauss
   const auto assigned = edit::assign(scene.mean, request);
   if (!assigned) return propagate(assigned);
   Grasp out{std::move(by), std::move(request), {}};
-  for (std::uint32_t row = 0; row < assigned->handle.size(); ++row)
-    if (const auto handle = assigned->handle[row]; handle > 0 && out.request.handles[handle - 1].target)
-      out.rows.push_back(row);
+  out.rows = rows_where(assigned->handle, [&](std::uint16_t handle) {
+    return handle > 0 && out.request.handles[handle - 1].target.has_value();
+  });
   return out;
+}
+
+/// By what grows from clicks; each of its rows goes with the nearest handle.
+Result<Grasp> grasp_by_growing(std::string by, select::Grow clicks, const CapturedCase& the_case,
+                               const scene::GaussianCloud& scene) {
+  edit::Request request = asked_of(the_case);
+  select::Selection selection{{select::Op::add, std::move(clicks)}};
+  if (the_case.careless) {
+    const scene::Camera& photo = the_case.cameras.front();
+    const DVec3 handle = request.handles.front().source;
+    const double depth = photo.cam_from_world(handle).z;
+    selection.push_back({select::Op::add, select::Expand{the_case.careless->beyond_px * depth / photo.fx}});
+    selection.push_back({select::Op::intersect, select::Plane{handle, right_of(the_case)}});
+  }
+  const auto selected = select::select(scene, selection);
+  if (!selected) return propagate(selected);
+  request.selected = marked_rows(selected->rows);
+  if (auto valid = edit::validate(request); !valid) return propagate(valid);
+  return grasp_of(std::move(by), std::move(request), scene);
 }
 
 }  // namespace
@@ -53,26 +74,18 @@ Result<Grasp> grasp_by_balls(const CapturedCase& the_case, const scene::Gaussian
 }
 
 Result<Grasp> grasp_by_clicks(const CapturedCase& the_case, const scene::GaussianCloud& scene) {
-  edit::Request request = asked_of(the_case);
-  select::Selection selection{{select::Op::add, select::Grow{the_case.clicks.inside, the_case.clicks.outside, {}}}};
-  if (the_case.careless) {
-    const scene::Camera& photo = the_case.cameras.front();
-    const DVec3 handle = request.handles.front().source;
-    const double depth = photo.cam_from_world(handle).z;
-    selection.push_back({select::Op::add, select::Expand{the_case.careless->beyond_px * depth / photo.fx}});
-    selection.push_back({select::Op::intersect, select::Plane{handle, right_of(the_case)}});
-  }
-  const auto selected = select::select(scene, selection);
-  if (!selected) return propagate(selected);
-  request.selected.emplace();
-  for (std::uint32_t row = 0; row < selected->rows.size(); ++row)
-    if (selected->rows[row] != 0) request.selected->push_back(row);
-  if (auto valid = edit::validate(request); !valid) return propagate(valid);
-  return grasp_of("clicks", std::move(request), scene);
+  return grasp_by_growing("clicks", {the_case.clicks.inside, the_case.clicks.outside, {}}, the_case, scene);
+}
+
+Result<Grasp> grasp_by_looking(const CapturedCase& the_case, const scene::GaussianCloud& scene) {
+  auto clicks = clicks_of_a_looking_person(the_case, scene);
+  if (!clicks) return propagate(clicks);
+  return grasp_by_growing("looking", *std::move(clicks), the_case, scene);
 }
 
 const std::vector<NamedGrasp>& known_grasps() {
-  static const std::vector<NamedGrasp> all{{"balls", grasp_by_balls}, {"clicks", grasp_by_clicks}};
+  static const std::vector<NamedGrasp> all{
+      {"balls", grasp_by_balls}, {"clicks", grasp_by_clicks}, {"looking", grasp_by_looking}};
   return all;
 }
 

@@ -15,7 +15,7 @@ namespace engine::captures {
 
 /// What is asked for, and what that takes along.
 struct Grasp {
-  std::string by;                   ///< How: "balls", "clicks".
+  std::string by;                   ///< How: "balls", "clicks", "looking".
   edit::Request request;            ///< Without parameters: those are a preset's.
   std::vector<std::uint32_t> rows;  ///< Rows of the trained scene that follow a handle with a target; ascending.
 };
@@ -34,6 +34,10 @@ using GraspBy = std::function<Result<Grasp>(const CapturedCase& the_case, const 
 /// first handle, so that about half of the thing is missing.
 ///   errors  those of select::select() and edit::assign()
 [[nodiscard]] Result<Grasp> grasp_by_clicks(const CapturedCase& the_case, const scene::GaussianCloud& scene);
+
+/// By the same, from the clicks of a person who looks where it is wrong: see looking.h.
+///   errors  those of clicks_of_a_looking_person(), select::select() and edit::assign()
+[[nodiscard]] Result<Grasp> grasp_by_looking(const CapturedCase& the_case, const scene::GaussianCloud& scene);
 
 /// A way to say what moves, by its name.
 struct NamedGrasp {

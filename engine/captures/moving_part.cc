@@ -6,18 +6,9 @@
 #include <functional>
 #include <numbers>
 
+#include "engine/render/project.h"
+
 namespace engine::captures {
-namespace {
-
-std::vector<float> interleaved(const Array3& points) {
-  std::vector<float> out;
-  out.reserve(3 * points.size());
-  for (std::size_t i = 0; i < points.size(); ++i)
-    for (int axis = 0; axis < 3; ++axis) out.push_back(points.get(i)[axis]);
-  return out;
-}
-
-}  // namespace
 
 MovingPart::MovingPart(const scene::GaussianCloud& before, std::span<const std::uint32_t> part)
     : surface_(interleaved(before.mean), 3), moves_(before.size(), 0) {
@@ -45,8 +36,7 @@ double opacity_times_area(const scene::GaussianCloud& cloud, std::size_t row) {
   std::array<double, 3> extent{std::exp(double(log_scale.x)), std::exp(double(log_scale.y)),
                                std::exp(double(log_scale.z))};
   std::sort(extent.begin(), extent.end(), std::greater<>());
-  const double opacity = 1 / (1 + std::exp(-double(cloud.opacity_logit[row])));
-  return opacity * std::numbers::pi * extent[0] * extent[1];
+  return render::opacity<double>(cloud.opacity_logit[row]) * std::numbers::pi * extent[0] * extent[1];
 }
 
 Match match(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows, const MovingPart& part) {

@@ -8,6 +8,7 @@
 
 #include "engine/core/parallel.h"
 #include "engine/core/rng.h"
+#include "engine/core/rows.h"
 #include "engine/render/forward.h"
 #include "engine/render/largest_weight.h"
 #include "engine/scene/sh.h"
@@ -110,13 +111,8 @@ std::vector<fit::Photo> take_photos(const scene::GaussianCloud& cloud, std::span
 
 std::vector<fit::ColoredPoint> sparse_points(const scene::GaussianCloud& cloud, std::span<const scene::Camera> cameras,
                                              const PointOptions& options, std::uint64_t seed) {
-  std::vector<float> weight(cloud.size(), 0.0f);
-  render::Workspace workspace;
-  for (const scene::Camera& camera : cameras) render::raise_to_largest_weights(cloud, camera, workspace, weight);
-  std::vector<std::uint32_t> visible;
-  for (std::uint32_t i = 0; i < weight.size(); ++i)
-    if (double(weight[i]) >= options.least_weight) visible.push_back(i);
-
+  const std::vector<std::uint32_t> visible = rows_where(
+      render::largest_weights(cloud, cameras), [&](float weight) { return double(weight) >= options.least_weight; });
   std::vector<fit::ColoredPoint> points;
   const std::size_t count = std::min(options.count, visible.size());
   for (std::size_t k = 0; k < count; ++k) {

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "engine/core/vec.h"
@@ -20,6 +22,21 @@ struct Array3 {
   void set(std::size_t i, Vec3 v) { x[i] = v.x, y[i] = v.y, z[i] = v.z; }
   bool operator==(const Array3&) const = default;
 };
+
+/// All points one after the other, [N][3]: as a search for neighbours takes them.
+[[nodiscard]] inline std::vector<float> interleaved(const Array3& points) {
+  std::vector<float> out;
+  out.reserve(3 * points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) out.insert(out.end(), {points.x[i], points.y[i], points.z[i]});
+  return out;
+}
+/// The same of these rows, in the order given.
+[[nodiscard]] inline std::vector<float> interleaved(const Array3& points, std::span<const std::uint32_t> rows) {
+  std::vector<float> out;
+  out.reserve(3 * rows.size());
+  for (const std::uint32_t row : rows) out.insert(out.end(), {points.x[row], points.y[row], points.z[row]});
+  return out;
+}
 
 /// N quaternions (w, x, y, z), one array per component; not necessarily of unit length.
 struct Array4 {

@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "engine/core/rows.h"
 #include "engine/deform/rigid.h"
 #include "engine/edit/handles.h"
 #include "engine/edit/messages.h"
@@ -50,10 +51,7 @@ PlannedMotion plan_motion(const WorkingScene& working, const Request& request, s
 }
 
 std::vector<std::uint32_t> dragged_rows(std::span<const std::uint16_t> handle) {
-  std::vector<std::uint32_t> rows;
-  for (std::size_t i = 0; i < handle.size(); ++i)
-    if (handle[i] != 0) rows.push_back(std::uint32_t(i));
-  return rows;
+  return rows_where(handle, [](std::uint16_t number) { return number != 0; });
 }
 
 DraggedAlone drag_alone(std::vector<std::uint32_t> rows, const scene::GaussianCloud& gaussians,

@@ -37,7 +37,9 @@ Result<void> validate(const Region& region) {
 
 Result<void> validate_selected(std::span<const std::uint32_t> rows) {
   if (rows.empty())
-    return fail(ErrorCode::unprocessable, "the selection holds no Gaussian: nothing could be dragged", "selection");
+    return fail(ErrorCode::unprocessable,
+                "the selection holds no Gaussian, so nothing could be dragged: add to it, or take less away",
+                "selection");
   if (std::ranges::adjacent_find(rows, std::greater_equal<>()) != rows.end())
     return invalid("selected rows are given once each, in ascending order", "selection");
   return {};

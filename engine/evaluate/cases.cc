@@ -12,6 +12,7 @@
 #include "engine/core/half_axes.h"
 #include "engine/core/rng.h"
 #include "engine/deform/rotate_sh.h"
+#include "engine/evaluate/named_cases.h"
 #include "engine/evaluate/studio.h"
 #include "engine/procedural/demo_scene.h"
 #include "engine/procedural/light.h"
@@ -245,6 +246,8 @@ struct Known {
   bool small = false;
 };
 
+constexpr const char* kind = "case";  // as errors call it
+
 const std::vector<Known>& known_cases() {
   static const std::vector<Known> all{{"slide", slide, true}, {"lift", lift},        {"pole", pole},
                                       {"arm", arm},           {"bush", bush},        {"apart", apart},
@@ -328,9 +331,7 @@ Case carry_out(const std::string& name, const Plan& plan) {
   for (std::size_t i = 0; i < rows_moved; ++i)
     move_row(out.truth, rows_around + i, plan.parts[moved.object[i]].motion, sh[moved.object[i]]);
 
-  std::vector<float> weight(whole.size(), 0.0f);
-  render::Workspace workspace;
-  for (const scene::Camera& camera : out.cameras) render::raise_to_largest_weights(whole, camera, workspace, weight);
+  const std::vector<float> weight = render::largest_weights(whole, out.cameras);
   std::vector<std::uint8_t> seen(whole.size());
   std::size_t kept = 0;
   for (std::size_t i = 0; i < seen.size(); ++i) {
@@ -354,32 +355,22 @@ bool is_small(const std::string& name) {
 }
 
 const std::vector<std::string>& case_names() {
-  static const std::vector<std::string> names = [] {
-    std::vector<std::string> out;
-    for (const Known& known : known_cases()) out.push_back(known.name);
-    return out;
-  }();
+  static const std::vector<std::string> names = names_of_cases(known_cases());
   return names;
 }
 
 Result<std::vector<std::string>> choose_cases(const std::vector<std::string>& names, bool small_only) {
-  const std::vector<std::string>& all = case_names();
-  for (const std::string& name : names)
-    if (std::find(all.begin(), all.end(), name) == all.end()) return propagate(make_case(name));
-  std::vector<std::string> chosen;
-  for (const std::string& name : names.empty() ? all : names)
-    if (!small_only || is_small(name)) chosen.push_back(name);
-  if (chosen.empty()) return fail(ErrorCode::invalid_argument, "none of these cases is small");
+  auto chosen = choose_names(known_cases(), names, kind);
+  if (!chosen) return chosen;
+  if (small_only) std::erase_if(*chosen, [](const std::string& name) { return !is_small(name); });
+  if (chosen->empty()) return fail(ErrorCode::invalid_argument, "none of these cases is small");
   return chosen;
 }
 
 Result<Case> make_case(const std::string& name) {
-  std::string names;
-  for (const Known& known : known_cases()) {
-    if (known.name == name) return carry_out(name, known.plan());
-    names += (names.empty() ? "" : ", ") + known.name;
-  }
-  return fail(ErrorCode::not_found, "there is no case \"" + name + "\"; there are " + names, "case");
+  const auto known = find_case(known_cases(), name, kind);
+  if (!known) return propagate(known);
+  return carry_out(name, (*known)->plan());
 }
 
 }  // namespace engine::evaluate

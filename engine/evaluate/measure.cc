@@ -26,17 +26,9 @@ scene::Mask shown(const scene::GaussianCloud& cloud, std::span<const std::uint32
 
 double miss(const Case& the_case, const scene::GaussianCloud& result) {
   if (the_case.part_after.empty() || result.size() == 0) return 0;
-  const auto positions = [](const scene::GaussianCloud& cloud, const auto& rows) {
-    std::vector<float> out;
-    for (const auto row : rows)
-      for (int axis = 0; axis < 3; ++axis) out.push_back(cloud.mean.get(row)[axis]);
-    return out;
-  };
-  std::vector<std::uint32_t> all(result.size());
-  for (std::size_t i = 0; i < all.size(); ++i) all[i] = std::uint32_t(i);
-  const neighbours::PointIndex index(positions(result, all), 3);
+  const neighbours::PointIndex index(interleaved(result.mean), 3);
   double sum = 0;
-  const auto nearest = index.nearest(positions(the_case.truth, the_case.part_after), 1);
+  const auto nearest = index.nearest(interleaved(the_case.truth.mean, the_case.part_after), 1);
   for (const neighbours::Neighbour& neighbour : nearest) sum += std::sqrt(double(neighbour.squared_distance));
   return sum / double(nearest.size());
 }

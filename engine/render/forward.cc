@@ -49,6 +49,23 @@ void store_tile(const TilePixels& tile, int x0, int y0, scene::Rect area, Render
   store(tile.weight, out.weight);
 }
 
+/// Blends the colours of tinted rows among the projected splats.
+void apply(const Tint& tint, ForwardBuffers& buffers) {
+  if (tint.rows.empty()) return;
+  const float kept = 1 - tint.strength;
+  const Vec3 added = tint.strength * tint.color;
+  parallel_for(buffers.block_sizes.size(), 16, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t b = begin; b < end; ++b)
+      for (std::size_t i = b * project_block; i < b * project_block + buffers.block_sizes[b]; ++i) {
+        Splat& splat = buffers.splats[i];
+        if (tint.rows[splat.row] == 0) continue;
+        splat.red = kept * splat.red + added.x;
+        splat.green = kept * splat.green + added.y;
+        splat.blue = kept * splat.blue + added.z;
+      }
+  });
+}
+
 void forward_simd(const Layers& layers, const scene::Camera& camera, const ForwardOptions& options,
                   std::span<const float> weight, ForwardBuffers& buffers, Rendering& out) {
   TileGrid grid{.columns = tile_columns(camera.width),
@@ -70,6 +87,7 @@ void forward_simd(const Layers& layers, const scene::Camera& camera, const Forwa
   // Where a tenth of the picture or less is wanted, most splats are elsewhere.
   const double part = double(grid.pixels.width()) * grid.pixels.height() / (double(camera.width) * camera.height);
   project(layers, view, sh_degree, weight, part < 0.1 ? Culling::by_bound : Culling::exact, grid.pixels, buffers);
+  if (options.color) apply(options.tint, buffers);
   sort_by_depth(buffers);
   bin(grid, buffers);
 
@@ -130,6 +148,7 @@ void forward(const Layers& layers, const scene::Camera& camera, const ForwardOpt
              std::span<const float> weight, Workspace& workspace, Rendering& out) {
   assert(scene::validate(camera));
   assert(weight.empty() || weight.size() == layers.size());
+  assert(options.tint.rows.empty() || options.tint.rows.size() == layers.size());
   assert(options.tiles.empty() || !options.rect);
   assert(options.semantics == Semantics::dense_stop || options.backend == Backend::reference);
   if (options.backend == Backend::reference) {

@@ -40,6 +40,13 @@ enum class Semantics {
   tile16_stop,   ///< dense_stop, and a splat only reaches the tiles its 3-sigma square meets. Reference backend only.
 };
 
+/// Rows that are drawn with their colours blended towards another one: what a person has selected, say.
+struct Tint {
+  std::span<const std::uint8_t> rows = {};  ///< [layers.size()] 1: tinted. Empty: no row is.
+  Vec3 color{0.0f};                         ///< Display-referred.
+  float strength = 0;                       ///< Share of that colour, 0 to 1.
+};
+
 /// What a forward pass draws.
 struct ForwardOptions {
   Vec3 background{0.0f};                     ///< Colour behind everything, display-referred.
@@ -50,6 +57,7 @@ struct ForwardOptions {
   std::vector<std::uint32_t> tiles = {};     ///< Not empty: render only these tiles (ascending); the rest stays zero.
   Backend backend = Backend::simd;
   Semantics semantics = Semantics::dense_stop;
+  Tint tint = {};  ///< Costs a look at each visible splat.
 };
 
 /// Pictures of the camera's size, or of options.rect. Those not asked for are empty.

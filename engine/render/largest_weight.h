@@ -2,6 +2,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "engine/render/forward.h"
 #include "engine/render/layers.h"
@@ -16,5 +17,9 @@ namespace engine::render {
 /// Precondition: that of forward().
 void raise_to_largest_weights(const Layers& layers, const scene::Camera& camera, Workspace& workspace,
                               std::span<float> out);
+
+/// The largest blending weights of all rows over these cameras. [layers.size()]
+/// Precondition: that of forward().
+[[nodiscard]] std::vector<float> largest_weights(const Layers& layers, std::span<const scene::Camera> cameras);
 
 }  // namespace engine::render

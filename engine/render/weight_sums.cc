@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "engine/core/parallel.h"
-#include "engine/render/color_tiles.h"
+#include "engine/render/listed_tiles.h"
 #include "engine/render/splats.h"
 
 namespace engine::render {
@@ -25,21 +25,17 @@ std::array<float, TilePixels::count> values_of(const scene::Image& value, TilePl
 
 void add_weight_sums(const Layers& layers, const scene::Camera& camera, const scene::Image& value, Workspace& workspace,
                      std::span<double> all, std::span<double> valued) {
-  assert(scene::validate(camera) && all.size() == layers.size() && valued.size() == layers.size());
+  assert(all.size() == layers.size() && valued.size() == layers.size());
   assert(value.width == camera.width && value.height == camera.height && value.channels == 1);
   ForwardBuffers& buffers = workspace.impl_->buffers;
-  const TileGrid grid = whole_grid(camera);
-  project(layers, view_params<float>(camera), -1, {}, Culling::exact, grid.pixels, buffers);
-  sort_by_depth(buffers);
-  bin(grid, buffers);
+  const TileGrid grid = list_splats(layers, camera, buffers);
   const std::size_t entries = buffers.tile_begin.back();
   std::vector<float> entry_all(entries), entry_valued(entries);
   parallel_for(buffers.tile_begin.size() - 1, 4, [&](std::size_t begin, std::size_t end) {
     for (std::size_t tile = begin; tile < end; ++tile) {
-      const std::uint32_t first = buffers.tile_begin[tile], count = buffers.tile_begin[tile + 1] - first;
-      const TilePlace place = place_of(tile, grid.columns, grid.pixels);
-      sum_tile_weights(buffers.splats.data(), {buffers.entries.data() + first, count}, place,
-                       values_of(value, place).data(), entry_all.data() + first, entry_valued.data() + first);
+      const auto [place, first, list] = listed_tile(grid, buffers, tile);
+      sum_tile_weights(buffers.splats.data(), list, place, values_of(value, place).data(), entry_all.data() + first,
+                       entry_valued.data() + first);
     }
   });
   // On one thread: a row may be in several tiles, and the order of its sum must not depend on the number of threads.

@@ -59,14 +59,6 @@ std::string size_text(const scene::Image& picture) {
   return size_text(picture.width, picture.height, picture.channels);
 }
 
-/// A search tree of all means.
-neighbours::PointIndex index_of(const scene::GaussianCloud& cloud) {
-  std::vector<float> points;
-  for (std::size_t i = 0; i < cloud.size(); ++i)
-    for (int axis = 0; axis < 3; ++axis) points.push_back(cloud.mean.get(i)[axis]);
-  return {points, 3};
-}
-
 }  // namespace
 
 /// What random choices are made for, in each view of each correction.
@@ -92,7 +84,7 @@ Repair::Repair(scene::GaussianCloud original, std::span<const scene::Camera> obs
   for (std::size_t v = 0; v < views_.size(); ++v)
     buffer_.push_back({std::move(unedited_.color[v]), scene::Mask(views_[v].width, views_[v].height), {}});
   unedited_.color.clear();
-  if (mode == Mode::move) originals_.emplace(index_of(original_));
+  if (mode == Mode::move) originals_.emplace(interleaved(original_.mean), 3);
 }
 
 Repair::ViewNow Repair::look(const WorkingScene& working, std::span<const std::uint32_t> hidden, std::size_t v) {

@@ -114,9 +114,7 @@ void stretch_row(scene::GaussianCloud& cloud, std::size_t row, const DMat3& stre
 
 std::size_t draw_out(WorkingScene& working) {
   const std::vector<std::uint32_t> copies = working.rows_of(working::Role::copy);
-  std::vector<float> points;
-  for (const std::uint32_t row : copies)
-    for (int axis = 0; axis < 3; ++axis) points.push_back(working.mean_at_deform().get(row)[axis]);
+  const std::vector<float> points = interleaved(working.mean_at_deform(), copies);
   const std::size_t asked = neighbours_asked + 1;  // the nearest is the copy itself
   if (copies.size() < asked) return 0;
   const auto nearest = neighbours::PointIndex(points, 3).nearest(points, asked);

@@ -56,9 +56,7 @@ std::vector<float> stretch_by_parent(const WorkingScene& working, std::span<cons
 }  // namespace
 
 std::vector<float> observed_rows(const scene::GaussianCloud& scene, std::span<const scene::Camera> cameras) {
-  std::vector<float> weight(scene.size(), 0.0f);
-  render::Workspace workspace;
-  for (const scene::Camera& camera : cameras) render::raise_to_largest_weights(scene, camera, workspace, weight);
+  std::vector<float> weight = render::largest_weights(scene, cameras);
   for (std::size_t i = 0; i < weight.size(); ++i) {
     const float opacity = std::max(render::opacity<float>(scene.opacity_logit[i]), least_opacity);
     weight[i] = std::min(weight[i] / (observed_transmittance * opacity), 1.0f);

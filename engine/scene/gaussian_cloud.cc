@@ -5,6 +5,7 @@
 #include <cassert>
 
 #include "engine/core/finite.h"
+#include "engine/core/rows.h"
 
 namespace engine::scene {
 
@@ -67,10 +68,7 @@ GaussianCloud gather(const GaussianCloud& cloud, std::span<const std::uint32_t> 
 
 GaussianCloud select(const GaussianCloud& cloud, std::span<const std::uint8_t> keep) {
   assert(keep.size() == cloud.size());
-  std::vector<std::uint32_t> rows;
-  for (std::size_t i = 0; i < keep.size(); ++i)
-    if (keep[i]) rows.push_back(std::uint32_t(i));
-  return gather(cloud, rows);
+  return gather(cloud, marked_rows(keep));
 }
 
 void drop_empty_sh_bands(GaussianCloud& cloud) {

@@ -1,43 +1,33 @@
 #include "engine/select/neighbourhood.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <map>
-#include <queue>
 #include <sstream>
 #include <string>
 #include <utility>
 
 #include "engine/core/parallel.h"
-#include "engine/select/minimum_cut.h"
+#include "engine/select/natural_border.h"
+#include "engine/select/random_walk.h"
 #include "engine/select/similarity.h"
 
 namespace engine::select {
 namespace {
 
-constexpr float infinity = std::numeric_limits<float>::infinity();
 constexpr std::size_t grain = 16'384;  // rows of a parallel task: a choice
 
-constexpr std::size_t neighbours_joined = 8;  // a surface's row has about six around it
-constexpr std::size_t rows_clicked = 4;       // nearest to a point: it lies on all of them
-
-// The rest was chosen on the ball, the mug, the books and the apple on them in the demo scene, of 60,000 and 150,000
-// Gaussians and with noise on all of their values, with two clicks on the thing and four around it.
-constexpr double reach_by_points = 4.0;  // times the distance of the points
-constexpr double reach_by_scene = 0.25;  // of the distance within which half of the rows lie
-constexpr double far_border = 0.9;       // of the reach: from here on, rows are taken for outside if no point says so
-// Crossing a border counts as much as so many times the distance between inside and outside points.
-constexpr float crossing = 0.3f;
-// A row that is so much nearer to one side's points, of both distances together, is that side's for certain.
-constexpr float certain = 0.1f;
-// How much the distances to both sides' points count against the border: all rows along a line from one to the other
-// are worth so many edges in all. With less, the cut through a surface without a border closes around one of the
-// points; with more, it does not follow a border that runs far from halfway.
-constexpr float leaning = 1.0f;
-constexpr double capacity_unit = 1 << 16;  // of a whole edge: the cut is computed in whole numbers
+constexpr std::size_t neighbours_joined = 12;  // two rings around a surface's row, but for its corners
+constexpr std::size_t rows_clicked = 4;        // of those nearest to a point, the ones that cover it most
+constexpr std::size_t rows_near_click = 24;    // that are looked at for that: the mean of a large disc may be far off
+constexpr double reach_by_points = 4.0;        // times the distance of the points
+constexpr double reach_by_scene = 0.25;        // of the distance within which half of the rows lie
+constexpr double far_border = 0.9;             // of the reach: from here on, rows are taken for outside
+// Across the sharpest border some of a walk goes on: else pieces of one thing that hardly touch would have nothing to
+// do with each other, and the solver no end. Chosen on the captured cases mug, turn, plant and rod: 1e-4 gives the same
+// where both converge, and takes three times as many steps.
+constexpr float least_weight = 1e-3f;
 
 std::vector<double> squared_distances(const Array3& mean, DVec3 from) {
   std::vector<double> out(mean.size());
@@ -52,56 +42,10 @@ std::vector<double> squared_distances(const Array3& mean, DVec3 from) {
 
 double distance(DVec3 a, DVec3 b) { return glm::length(a - b); }
 
-/// How far an inside point is from the nearest outside one, on average.
-double distance_between(const Grow& grow) {
-  double sum = 0;
-  for (const DVec3 inside : grow.inside) {
-    double least = std::numeric_limits<double>::infinity();
-    for (const DVec3 outside : grow.outside) least = std::min(least, distance(inside, outside));
-    sum += least;
-  }
-  return sum / double(grow.inside.size());
-}
-
 std::string text(double number) {
   std::ostringstream out;
   out << number;
   return out.str();
-}
-
-/// The shortest way from any of `from` to each node, where an edge is as long as `cost` says. Infinite where there is
-/// none.
-std::vector<float> shortest_ways(const NeighbourGraph& graph, std::span<const float> cost,
-                                 std::span<const std::uint32_t> from) {
-  using Reached = std::pair<float, std::uint32_t>;
-  std::vector<float> way(graph.size(), infinity);
-  std::priority_queue<Reached, std::vector<Reached>, std::greater<>> open;
-  for (const std::uint32_t node : from)
-    if (way[node] != 0) way[node] = 0, open.emplace(0.0f, node);
-  while (!open.empty()) {
-    const auto [so_far, node] = open.top();
-    open.pop();
-    if (so_far > way[node]) continue;
-    for (std::uint32_t edge = graph.begin[node]; edge < graph.begin[node + 1]; ++edge) {
-      const float there = so_far + cost[edge];
-      if (!(there < way[graph.to[edge]])) continue;
-      way[graph.to[edge]] = there;
-      open.emplace(there, graph.to[edge]);
-    }
-  }
-  return way;
-}
-
-/// How a node is drawn to either side before the cut, by the ways to both sides' points: see minimum_cut().
-///   spacing  of the node, by the distance between the points
-///   is_soft  no point says what is outside
-std::int32_t pull_of(float to_inside, float to_outside, float spacing, bool is_soft) {
-  if (to_inside == infinity) return certainly_outside;
-  if (to_outside == infinity || !(to_inside + to_outside > 0)) return certainly_inside;
-  const float share = to_outside / (to_inside + to_outside);
-  if (share >= 1 - certain) return certainly_inside;
-  if (share <= (is_soft ? 0 : certain)) return certainly_outside;
-  return std::int32_t(std::lround(std::min(leaning * spacing, 1.0f) * (2 * share - 1) * float(capacity_unit)));
 }
 
 }  // namespace
@@ -144,76 +88,76 @@ Neighbourhood::Neighbourhood(const scene::GaussianCloud& cloud, const Surroundin
   points_ = points_of(cloud.mean, rows_, surroundings.middle);
   index_ = neighbours::PointIndex(points_, 3);
   graph_ = join_nearest(points_, index_, neighbours_joined);
-  similarity_ = similarity_of_edges(cloud, rows_, graph_);
+  weight_ = similarity_of_edges(cloud, rows_, graph_);
+  for (float& one : weight_) one = std::max(one, least_weight);
 }
 
-Result<Neighbourhood::Seeds> Neighbourhood::seeds_of(const Grow& grow) const {
+Result<Neighbourhood::Seeds> Neighbourhood::seeds_of(const scene::GaussianCloud& cloud, const Grow& grow) const {
   if (rows_.empty())
     return fail(ErrorCode::unprocessable, "no Gaussian within " + text(surroundings_.reach) + " of the first point",
                 "inside[0]");
-  struct Claim {
-    float squared_distance;
-    bool is_outside;  // of equally near points the inside one wins
-    auto operator<=>(const Claim&) const = default;
-  };
   std::map<std::uint32_t, Claim> claims;
-  const auto claim = [&](DVec3 point, bool is_outside) {
-    for (const neighbours::Neighbour& node : index_.nearest(point_of(point, surroundings_.middle), rows_clicked)) {
-      const Claim one{node.squared_distance, is_outside};
-      const auto [at, is_new] = claims.emplace(node.index, one);
-      if (!is_new) at->second = std::min(at->second, one);
-    }
-  };
+  Seeds seeds;
   for (std::size_t i = 0; i < grow.inside.size(); ++i) {
     if (const double away = distance(grow.inside[i], surroundings_.middle); away > farthest_)
       return fail(ErrorCode::unprocessable,
                   "the point lies " + text(away) + " from the first one, beyond the reach of " + text(farthest_) +
                       ": grow from it in an operation of its own" + (is_cut_short_ ? "" : ", or raise the reach"),
                   "inside[" + std::to_string(i) + "]");
-    claim(grow.inside[i], false);
+    seeds.clicked.inside.push_back(claim(cloud, grow.inside[i], Given::inside, claims));
   }
   for (const DVec3 point : grow.outside)
-    if (distance(point, surroundings_.middle) <= farthest_) claim(point, true);
-  Seeds seeds;
-  for (const auto& [node, one] : claims) (one.is_outside ? seeds.outside : seeds.inside).push_back(node);
-  if (seeds.inside.empty())
+    if (distance(point, surroundings_.middle) <= farthest_)
+      seeds.clicked.outside.push_back(claim(cloud, point, Given::outside, claims));
+  seeds.given.assign(rows_.size(), Given::no);
+  for (const auto& [node, one] : claims) seeds.given[node] = one.side;
+  take_far_nodes(seeds.given);
+  const auto belongs_to = [&](Given side) {
+    return [&seeds, side](std::uint32_t n) { return seeds.given[n] != side; };
+  };
+  std::erase_if(seeds.clicked.inside, belongs_to(Given::inside));
+  std::erase_if(seeds.clicked.outside, belongs_to(Given::outside));
+  if (seeds.clicked.inside.empty())
     return fail(ErrorCode::unprocessable, "all Gaussians around the inside points are nearer to outside ones",
                 "inside[0]");
   return seeds;
 }
 
-std::vector<std::uint32_t> Neighbourhood::far_nodes() const {
-  std::vector<std::uint32_t> nodes;
-  for (std::uint32_t node = 0; node < rows_.size(); ++node) {
-    const float* at = points_.data() + 3 * node;
-    if (glm::length(DVec3(at[0], at[1], at[2])) >= far_border * farthest_) nodes.push_back(node);
+std::uint32_t Neighbourhood::claim(const scene::GaussianCloud& cloud, DVec3 point, Given side,
+                                   std::map<std::uint32_t, Claim>& claims) const {
+  struct Covering {
+    double cover;
+    float squared_distance;
+    std::uint32_t node;
+  };
+  std::vector<Covering> near;
+  for (const neighbours::Neighbour& one : index_.nearest(point_of(point, surroundings_.middle), rows_near_click))
+    near.push_back(
+        {cover(cloud, rows_[one.index], double(graph_.spacing[one.index]), point), one.squared_distance, one.index});
+  // Where nothing covers the point, the nearest count, which come first.
+  std::stable_sort(near.begin(), near.end(), [](const Covering& a, const Covering& b) { return a.cover > b.cover; });
+  near.resize(std::min(near.size(), rows_clicked));
+  for (const Covering& one : near) {
+    const Claim mine{-one.cover, one.squared_distance, side};
+    const auto [at, is_new] = claims.emplace(one.node, mine);
+    if (!is_new) at->second = std::min(at->second, mine);
   }
-  return nodes;
+  return near.front().node;
 }
 
-Result<std::vector<std::uint32_t>> Neighbourhood::cut(const Grow& grow) const {
-  auto seeds = seeds_of(grow);
-  if (!seeds) return propagate(seeds);
-  const bool is_soft = seeds->outside.empty();
-  if (is_soft) seeds->outside = far_nodes();
-  // Bounded, so that quotients of floats are numbers.
-  const double between = std::clamp(is_soft ? farthest_ : distance_between(grow), 1e-30, 1e30);
-  std::vector<float> cost(graph_.to.size());
-  for (std::size_t edge = 0; edge < cost.size(); ++edge) {
-    const float border = 1 - similarity_[edge];
-    cost[edge] = graph_.length[edge] + crossing * float(between) * border * border;
+void Neighbourhood::take_far_nodes(std::vector<Given>& given) const {
+  for (std::uint32_t node = 0; node < rows_.size(); ++node) {
+    const float* at = points_.data() + 3 * node;
+    const bool is_far = glm::length(DVec3(at[0], at[1], at[2])) >= far_border * farthest_;
+    if (is_far && given[node] == Given::no) given[node] = Given::outside;
   }
-  std::array<std::vector<float>, 2> ways;
-  parallel_for(2, 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t side = begin; side < end; ++side)
-      ways[side] = shortest_ways(graph_, cost, side == 0 ? seeds->inside : seeds->outside);
-  });
-  std::vector<std::int32_t> pull(rows_.size()), capacity(similarity_.size());
-  for (std::size_t edge = 0; edge < capacity.size(); ++edge)
-    capacity[edge] = std::int32_t(std::lround(double(similarity_[edge]) * capacity_unit));
-  for (std::size_t node = 0; node < pull.size(); ++node)
-    pull[node] = pull_of(ways[0][node], ways[1][node], graph_.spacing[node] / float(between), is_soft);
-  const std::vector<std::uint8_t> inside = minimum_cut(graph_, capacity, pull);
+}
+
+Result<std::vector<std::uint32_t>> Neighbourhood::grow(const scene::GaussianCloud& cloud, const Grow& grow) const {
+  const auto seeds = seeds_of(cloud, grow);
+  if (!seeds) return propagate(seeds);
+  const std::vector<double> potential = random_walk(graph_, weight_, seeds->given);
+  const std::vector<std::uint8_t> inside = natural_border(graph_, weight_, potential, seeds->given, seeds->clicked);
   std::vector<std::uint32_t> rows;
   for (std::size_t node = 0; node < inside.size(); ++node)
     if (inside[node] != 0) rows.push_back(rows_[node]);

@@ -1,11 +1,12 @@
 // Growing: from a few points on a thing to all of its rows, up to its natural border.
-// Source: Boykov and Jolly 2001, "Interactive graph cuts", for the cut; Price, Morse and Cohen 2010, "Geodesic graph
-// cut for interactive image segmentation", for the distances that say how likely a row is to belong to either side;
-// Boykov and Kolmogorov 2004 for the algorithm. On Gaussians in place of pixels, the terms are ours.
+// Source: Grady 2006, "Random walks for image segmentation", for who belongs to which point; Andersen, Chung and Lang
+// 2006, "Local graph partitioning using PageRank vectors", for sweeping over levels to where a piece ends by itself. On
+// Gaussians in place of pixels, the terms are ours (docs/adr/0018-growing-walks-to-natural-borders.md).
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <span>
 #include <vector>
 
@@ -13,8 +14,10 @@
 #include "engine/core/vec.h"
 #include "engine/neighbours/point_index.h"
 #include "engine/scene/gaussian_cloud.h"
+#include "engine/select/natural_border.h"
 #include "engine/select/neighbour_graph.h"
 #include "engine/select/operation.h"
+#include "engine/select/random_walk.h"
 
 namespace engine::select {
 
@@ -26,7 +29,7 @@ struct Surroundings {
   bool operator==(const Surroundings&) const = default;
 };
 
-/// Rows: the nearest to the middle count. A second's work on one core; three on a surface without any border.
+/// Rows: the nearest to the middle count. Two seconds' work on one core for a first click, 0.6 s for the next.
 constexpr std::size_t max_neighbourhood = 250'000;
 
 /// The surroundings of an operation. Without a reach: four times as far as the farthest inside point, or the nearest
@@ -36,10 +39,10 @@ constexpr std::size_t max_neighbourhood = 250'000;
 [[nodiscard]] Surroundings surroundings_of(const Array3& mean, const Grow& grow);
 
 /// The rows around a point, joined to their neighbours by edges that are the weaker the more likely a border runs
-/// between the two. Immutable, and independent of the cloud once made.
+/// between the two. Immutable.
 class Neighbourhood {
  public:
-  /// Half a second for 250,000 rows on one core (bench/select_bench).
+  /// About 1.3 s for 250,000 rows on one core, 0.5 s for 100,000 (bench/select_bench).
   Neighbourhood(const scene::GaussianCloud& cloud, const Surroundings& surroundings);
 
   [[nodiscard]] const Surroundings& surroundings() const { return surroundings_; }
@@ -47,23 +50,36 @@ class Neighbourhood {
   /// Had the reach to be cut short, so as not to look at more than max_neighbourhood rows?
   [[nodiscard]] bool is_cut_short() const { return is_cut_short_; }
 
-  /// The rows of the thing: those on the side of the inside points of the cut through the weakest edges. What hangs
-  /// together with none of the points is outside. Outside points beyond the reach count for nothing; without any, what
-  /// lies at the reach is taken for outside, unless all else speaks against it.
+  /// The rows of the thing: those from which a random walk rather ends at the inside points, up to the natural border
+  /// (natural_border.h). What lies at the reach is outside unless a point says otherwise; outside points beyond it
+  /// count for nothing.
+  ///   cloud    that this was made of
   ///   grow     with this object's surroundings
   ///   returns  rows of the cloud, ascending
-  ///   errors   unprocessable, `where` = "inside[1]": no row within reach, the point is beyond it, or all rows around
-  ///   the
-  ///            inside points are nearer to outside ones
-  [[nodiscard]] Result<std::vector<std::uint32_t>> cut(const Grow& grow) const;
+  ///   errors   unprocessable, `where` = "inside[1]": no row within reach, the point is beyond it, or outside points
+  ///   cover
+  ///            all rows around the inside points more
+  [[nodiscard]] Result<std::vector<std::uint32_t>> grow(const scene::GaussianCloud& cloud, const Grow& grow) const;
 
  private:
-  /// Nodes that are given: those nearest to the points.
-  struct Seeds {
-    std::vector<std::uint32_t> inside, outside;
+  /// What a point says of a node. Of several the least one counts: the point that the node covers most, or is nearest
+  /// to; the inside one of two alike.
+  struct Claim {
+    double minus_cover = 0;
+    float squared_distance = 0;
+    Given side = Given::inside;
+    auto operator<=>(const Claim&) const = default;
   };
-  [[nodiscard]] Result<Seeds> seeds_of(const Grow& grow) const;
-  [[nodiscard]] std::vector<std::uint32_t> far_nodes() const;
+  struct Seeds {
+    std::vector<Given> given;  ///< [nodes]
+    ClickedNodes clicked;      ///< The node that each point is on, where no point of the other side has it.
+  };
+  [[nodiscard]] Result<Seeds> seeds_of(const scene::GaussianCloud& cloud, const Grow& grow) const;
+  /// Claims the nodes that a point lies on; returns the one that covers it most.
+  std::uint32_t claim(const scene::GaussianCloud& cloud, DVec3 point, Given side,
+                      std::map<std::uint32_t, Claim>& claims) const;
+  /// Gives what lies at the reach to the outside.
+  void take_far_nodes(std::vector<Given>& given) const;
 
   Surroundings surroundings_;
   bool is_cut_short_ = false;
@@ -72,7 +88,7 @@ class Neighbourhood {
   std::vector<float> points_;     ///< [rows][3] relative to the middle.
   neighbours::PointIndex index_;  ///< Of these.
   NeighbourGraph graph_;
-  std::vector<float> similarity_;  ///< [edges] 1: the same surface goes on; 0: a border.
+  std::vector<float> weight_;  ///< [edges] 1: the same surface goes on; near 0: a border.
 };
 
 }  // namespace engine::select

@@ -1,11 +1,11 @@
 #include "engine/select/select.h"
 
 #include <algorithm>
+#include <functional>
 #include <type_traits>
 #include <utility>
 #include <variant>
 
-#include "engine/core/finite.h"
 #include "engine/select/shown.h"
 #include "engine/select/spread.h"
 
@@ -17,41 +17,23 @@ constexpr std::size_t neighbourhoods_kept = 4;
 
 /// What selecting reads of a scene has to be finite: a NaN would be on no side of anything.
 Result<void> check_finite(const scene::GaussianCloud& cloud) {
-  const auto check = [](const std::vector<float>& values, const char* name) -> Result<void> {
-    const auto bad = first_not_finite(values);
-    if (!bad) return {};
-    return fail(ErrorCode::corrupt_data, std::string(name) + " of a Gaussian is not a finite number",
-                "[" + std::to_string(*bad) + "]." + name);
-  };
-  const scene::GaussianCloud& c = cloud;
-  for (const auto& [values, name] : {std::pair{&c.mean.x, "x"},
-                                     {&c.mean.y, "y"},
-                                     {&c.mean.z, "z"},
-                                     {&c.log_scale.x, "scale_0"},
-                                     {&c.log_scale.y, "scale_1"},
-                                     {&c.log_scale.z, "scale_2"},
-                                     {&c.rotation.w, "rot_0"},
-                                     {&c.rotation.x, "rot_1"},
-                                     {&c.rotation.y, "rot_2"},
-                                     {&c.rotation.z, "rot_3"},
-                                     {&c.opacity_logit, "opacity"},
-                                     {&c.sh, "sh"}})
-    if (auto fine = check(*values, name); !fine) return fine;
-  return {};
+  const auto bad = scene::first_not_finite(cloud);
+  if (!bad) return {};
+  return fail(ErrorCode::corrupt_data, "a value of a Gaussian is not a finite number", *bad);
 }
 
 void combine(Op op, const RowSet& named, RowSet& selected) {
-  for (std::size_t row = 0; row < selected.size(); ++row) switch (op) {
-      case Op::add:
-        selected[row] |= named[row];
-        break;
-      case Op::subtract:
-        selected[row] &= std::uint8_t(1 - named[row]);
-        break;
-      case Op::intersect:
-        selected[row] &= named[row];
-        break;
-    }
+  const auto each = [&](auto&& combined) {
+    std::transform(selected.begin(), selected.end(), named.begin(), selected.begin(), combined);
+  };
+  switch (op) {
+    case Op::add:
+      return each(std::bit_or<std::uint8_t>());
+    case Op::subtract:
+      return each([](std::uint8_t before, std::uint8_t row) { return std::uint8_t(before & ~row); });
+    case Op::intersect:
+      return each(std::bit_and<std::uint8_t>());
+  }
 }
 
 /// Fills in what is told of the rows.
@@ -88,7 +70,7 @@ Result<RowSet> Selector::rows_of(const Grow& grow, const std::string& where, Sel
   RowSet named(cloud_.size(), 0);
   if (cloud_.size() == 0) return named;
   const Neighbourhood& around = neighbourhood(surroundings_of(cloud_.mean, grow));
-  const auto rows = around.cut(grow);
+  const auto rows = around.grow(cloud_, grow);
   if (!rows) return fail(rows.error().code, rows.error().message, where + ".grow." + rows.error().where);
   for (const std::uint32_t row : *rows) named[row] = 1;
   if (around.is_cut_short())

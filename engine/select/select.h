@@ -44,9 +44,8 @@ class Selector {
 
   /// The operations in order, each on what those before it have selected; the first on nothing. The same bytes for any
   /// number of threads; operations on pictures may differ between instruction sets where a row is on the verge.
-  ///   errors  those of validate(); corrupt_data, `where` = "[12].x": a mean, extent, rotation or opacity of the scene
-  ///   is
-  ///           not finite; unprocessable, `where` = "selection[2].grow.inside[1]": see Neighbourhood::cut()
+  ///   errors  those of validate(); corrupt_data, `where` = "[12].x": see scene::first_not_finite(); unprocessable,
+  ///           `where` = "selection[2].grow.inside[1]": see Neighbourhood::cut()
   [[nodiscard]] Result<Selected> select(const Selection& selection);
 
  private:

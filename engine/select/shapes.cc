@@ -22,13 +22,13 @@ RowSet rows_where(const Array3& mean, Passes&& passes) {
 
 double largest_of(DVec3 v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
 
-/// The rotation of a quaternion of any length but zero.
+}  // namespace
+
 DMat3 rotation_of(DQuat q) {
   const double largest = std::max({std::abs(q.w), std::abs(q.x), std::abs(q.y), std::abs(q.z)});
+  if (!(largest > 0)) return DMat3(1.0);
   return glm::mat3_cast(glm::normalize(q / largest));  // first near 1, so that no square overflows or vanishes
 }
-
-}  // namespace
 
 RowSet rows_in(const Array3& mean, const Sphere& sphere) {
   // Numbers up to 1e38: their squares fit a double.

@@ -5,17 +5,23 @@
 #include <span>
 #include <vector>
 
+#include "engine/core/vec.h"
 #include "engine/scene/gaussian_cloud.h"
 #include "engine/select/neighbour_graph.h"
 
 namespace engine::select {
 
-/// exp(-e) for each edge, where e sums squares of: distance by spacing, difference of colours (of SH band 0), angle
-/// between normals (of flat Gaussians), difference of log sizes; each by what is usual in this graph. The same both
-/// ways.
+/// For each edge how much the two Gaussians overlap (Bhattacharyya coefficient: distance, normals and extents in one),
+/// times exp(-e), where e sums the squared difference of their colours, up to a limit, and the angle between their
+/// normals, where they are flat. Colours are those of SH band 0, evened out over neighbours that overlap and look
+/// alike: single Gaussians of a trained scene differ from what they show together. The same both ways.
 ///   rows     [n] of the cloud, one per node
 ///   returns  [edges], in [0, 1]
 [[nodiscard]] std::vector<float> similarity_of_edges(const scene::GaussianCloud& cloud,
                                                      std::span<const std::uint32_t> rows, const NeighbourGraph& graph);
+
+/// How much a Gaussian covers a point: its opacity times its falloff there, 0 to 1.
+///   spacing  of its node, world units: none counts as thinner than half of that
+[[nodiscard]] double cover(const scene::GaussianCloud& cloud, std::size_t row, double spacing, DVec3 point);
 
 }  // namespace engine::select

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "engine/core/rows.h"
 #include "engine/neighbours/point_index.h"
 #include "engine/select/neighbour_graph.h"
 
@@ -12,11 +13,8 @@ namespace {
 
 constexpr std::size_t neighbours_joined = 8;  // a surface's row has about six around it
 
-std::vector<std::uint32_t> rows_with(const RowSet& rows, std::uint8_t value) {
-  std::vector<std::uint32_t> out;
-  for (std::size_t row = 0; row < rows.size(); ++row)
-    if (rows[row] == value) out.push_back(std::uint32_t(row));
-  return out;
+std::vector<std::uint32_t> others_of(const RowSet& rows) {
+  return rows_where(rows, [](std::uint8_t row) { return row == 0; });
 }
 
 /// Of `rows`, those not farther than `distance` from the box of `others`, axis by axis: no other can be near one.
@@ -66,18 +64,18 @@ Pieces pieces_of(const NeighbourGraph& graph) {
 
 RowSet expanded(const Array3& mean, const RowSet& selected, double distance) {
   RowSet out = selected;
-  each_within(mean, rows_with(selected, 0), rows_with(selected, 1), distance, [&](std::uint32_t row) { out[row] = 1; });
+  each_within(mean, others_of(selected), marked_rows(selected), distance, [&](std::uint32_t row) { out[row] = 1; });
   return out;
 }
 
 RowSet shrunk(const Array3& mean, const RowSet& selected, double distance) {
   RowSet out = selected;
-  each_within(mean, rows_with(selected, 1), rows_with(selected, 0), distance, [&](std::uint32_t row) { out[row] = 0; });
+  each_within(mean, marked_rows(selected), others_of(selected), distance, [&](std::uint32_t row) { out[row] = 0; });
   return out;
 }
 
 RowSet largest_pieces(const Array3& mean, const RowSet& selected, std::size_t n) {
-  const std::vector<std::uint32_t> rows = rows_with(selected, 1);
+  const std::vector<std::uint32_t> rows = marked_rows(selected);
   if (rows.empty()) return selected;
   const std::vector<float> points = points_of(mean, rows, DVec3(mean.get(rows[0])));
   Pieces pieces = pieces_of(join_nearest(points, neighbours::PointIndex(points, 3), neighbours_joined));

@@ -6,20 +6,13 @@
 #include <numeric>
 #include <utility>
 
+#include "engine/core/rows.h"
 #include "engine/scene/cloud_arrays.h"
 #include "engine/scene/opacity.h"
 #include "engine/working/mode.h"
 
 namespace engine::working {
 namespace {
-
-template <class Wanted>
-std::vector<std::uint32_t> rows_where(const std::vector<Role>& role, Wanted wanted) {
-  std::vector<std::uint32_t> rows;
-  for (std::size_t i = 0; i < role.size(); ++i)
-    if (wanted(role[i])) rows.push_back(std::uint32_t(i));
-  return rows;
-}
 
 /// Every column has a value for each row.
 bool is_whole(const Members& members) {

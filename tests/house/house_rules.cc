@@ -20,7 +20,6 @@ struct Reserved {
 const std::vector<Reserved>& reserved() {
   static const std::vector<Reserved> list = {
       {"flann/", {"engine/neighbours"}},
-      {"boost/", {"engine/select"}, false},
       {"torch/", {"engine/diffusion"}, false},
       {"ATen/", {"engine/diffusion"}, false},
       {"OpenImageIO/", {"engine/io"}},

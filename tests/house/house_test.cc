@@ -76,7 +76,6 @@ TEST(HouseRules, ReportALibraryInTheWrongRoom) {
   EXPECT_EQ(complaints("engine/scene/image.cc", "#include <nlohmann/json.hpp>\n"), 1u);
   EXPECT_EQ(complaints("engine/io/ply.cc", "#include <flann/flann.hpp>\n#include <torch/torch.h>\n"), 2u);
   EXPECT_EQ(complaints("engine/io/ply.cc", "#include <tbb/parallel_for.h>\n#include <httplib.h>\n"), 2u);
-  EXPECT_EQ(complaints("engine/io/ply.cc", "#include <boost/graph/boykov_kolmogorov_max_flow.hpp>\n"), 1u);
   EXPECT_EQ(complaints("engine/io/ply.cc", "#include <vector>\n// #include <torch/torch.h>\n"), 0u);
 }
 

@@ -64,6 +64,10 @@ std::vector<ReferenceSplat<Real>> reference_splats(const Layers& layers, const V
     splat.at = project<Real>(view, stored.mean, stored.log_scale, stored.rotation);
     if (!splat.at.visible) continue;
     splat.color = color(view, stored.mean, at.cloud.sh_row(at.row), degree);
+    if (const Tint& tint = options.tint; !tint.rows.empty() && tint.rows[i] != 0)
+      for (int c = 0; c < 3; ++c)
+        splat.color[std::size_t(c)] =
+            Real(1 - tint.strength) * splat.color[std::size_t(c)] + Real(tint.strength * tint.color[c]);
     splats.push_back(splat);
   }
   std::stable_sort(splats.begin(), splats.end(), [](const ReferenceSplat<Real>& a, const ReferenceSplat<Real>& b) {

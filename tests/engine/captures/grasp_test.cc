@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <numeric>
 
+#include "engine/captures/looking.h"
 #include "engine/core/rng.h"
 #include "tests/engine/captures/samples.h"
 
@@ -120,6 +122,47 @@ TEST(GraspByClicks, ClicksThatSayNothingAreAnError) {
   CapturedCase the_case = with_clicks();
   the_case.clicks.inside.clear();
   EXPECT_FALSE(grasp_by_clicks(the_case, two_balls()));
+}
+
+/// The first ball is what moves.
+CapturedCase seen_by_cameras() {
+  CapturedCase out = with_clicks();
+  out.clicks = {};  // not needed
+  out.cameras = sample_cameras(11);
+  out.before = two_balls();
+  std::vector<std::uint32_t> part(300);
+  std::iota(part.begin(), part.end(), 0u);
+  out.moving = MovingPart(out.before, part);
+  return out;
+}
+
+TEST(GraspByLooking, FindsTheThingByItself) {
+  const auto grasp = grasp_by_looking(seen_by_cameras(), two_balls());
+  ASSERT_TRUE(grasp) << grasp.error().message;
+  EXPECT_EQ(grasp->by, "looking");
+  EXPECT_EQ(grasp->rows.size(), 300u);
+  EXPECT_EQ(grasp->rows.back(), 299u);
+}
+
+TEST(GraspByLooking, ClicksAtMostSixTimesAndTheSameEachTime) {
+  const CapturedCase the_case = seen_by_cameras();
+  scene::GaussianCloud one_color = two_balls();
+  for (std::size_t i = 300; i < one_color.size(); ++i) {  // the other ball touches this one and has its colour
+    one_color.mean.x[i] -= 0.95f;
+    for (std::size_t c = 0; c < 3; ++c) one_color.sh_row(i)[c] = one_color.sh_row(0)[c];
+  }
+  const auto clicks = clicks_of_a_looking_person(the_case, one_color);
+  ASSERT_TRUE(clicks) << clicks.error().message;
+  EXPECT_LE(clicks->inside.size() + clicks->outside.size(), std::size_t(most_clicks));
+  const auto again = clicks_of_a_looking_person(the_case, one_color);
+  EXPECT_EQ(again->inside, clicks->inside);
+  EXPECT_EQ(again->outside, clicks->outside);
+}
+
+TEST(GraspByLooking, NothingToBeSeenIsAnError) {
+  CapturedCase the_case = seen_by_cameras();
+  the_case.moving = {};
+  EXPECT_FALSE(grasp_by_looking(the_case, two_balls()));
 }
 
 }  // namespace

@@ -100,6 +100,34 @@ TEST_P(BackendTest, AWeightOfOneBlendsToAlphaAndTheSumOfMasksIsTheirUnion) {
   }
 }
 
+TEST_P(BackendTest, ATintBlendsTheColoursOfItsRowsAndNothingElse) {
+  const auto cloud = cloud_in_view(200, 4);
+  std::vector<std::uint8_t> odd(cloud.size());
+  std::vector<float> share(cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i) odd[i] = i % 2, share[i] = float(i % 2);
+  ForwardOptions options = everything(GetParam());
+  const auto plain = forward(cloud, off_centre_camera(), options, share);
+  options.tint = {.rows = odd, .color = {1.0f, 0.25f, 0.0f}, .strength = 1.0f};
+  const auto tinted = forward(cloud, off_centre_camera(), options, share);
+  options.tint.strength = 0.5f;
+  const auto half = forward(cloud, off_centre_camera(), options, share);
+  EXPECT_EQ(tinted.alpha, plain.alpha);
+  EXPECT_EQ(tinted.depth, plain.depth);
+  EXPECT_NE(tinted.color, plain.color);
+  for (std::size_t i = 0; i < plain.color.data.size(); ++i)
+    EXPECT_NEAR(half.color.data[i], (plain.color.data[i] + tinted.color.data[i]) / 2, 2e-6f);
+
+  const std::vector<std::uint8_t> all(cloud.size(), 1);
+  options.background = Vec3(0.0f);
+  options.tint = {.rows = all, .color = {1.0f, 0.25f, 0.0f}, .strength = 1.0f};
+  const auto whole = forward(cloud, off_centre_camera(), options);
+  for (std::size_t i = 0; i < whole.alpha.data.size(); ++i) {
+    EXPECT_NEAR(whole.color.plane(0)[i], whole.alpha.data[i], 2e-6f);
+    EXPECT_NEAR(whole.color.plane(1)[i], 0.25f * whole.alpha.data[i], 2e-6f);
+    EXPECT_NEAR(whole.color.plane(2)[i], 0.0f, 1e-6f);
+  }
+}
+
 TEST_P(BackendTest, ARectangleIsACutOutOfTheWholePicture) {
   const auto cloud = cloud_in_view(400, 5);
   const std::vector<float> weight(cloud.size(), 0.7f);

@@ -135,7 +135,7 @@ TEST(Grow, TakesABallFromTwoClicks) {
   const Grow clicks = clicks_on(demo, ball, demo.cameras[0], 4);
   ASSERT_EQ(clicks.inside.size(), 2u);
   const Agreement found = agreement(demo, ball, select(demo.cloud, {{Op::add, clicks}}).value().rows);
-  EXPECT_GT(found.recall, 0.99);
+  EXPECT_GT(found.recall, 0.93);
   EXPECT_GT(found.precision, 0.99);
 }
 

@@ -1,0 +1,165 @@
+#include "engine/captures/looking.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "engine/core/rng.h"
+#include "engine/mask/mask.h"
+#include "engine/render/forward.h"
+#include "engine/render/pick.h"
+#include "engine/select/select.h"
+
+namespace engine::captures {
+namespace {
+
+// These figures are choices, and part of the definition of the cases.
+constexpr std::uint64_t seed = 12;      // of where clicks go
+constexpr std::size_t every_photo = 5;  // is looked at: six of thirty
+constexpr int least_depth = 2;          // pixels from a patch's middle to its rim: what a person takes for wrong
+constexpr double noise_by_depth = 0.5;  // of that distance; no click is noisier
+constexpr double click_noise_px = 2;    // as those of the cases' own clicks
+
+/// Rows of a scene as a view shows them: 1 where they are most of a pixel.
+scene::Mask shown(const scene::GaussianCloud& cloud, const std::vector<std::uint8_t>& rows, const scene::Camera& camera,
+                  render::Workspace& workspace) {
+  const std::vector<float> weight(rows.begin(), rows.end());
+  render::Rendering rendering;
+  render::forward(cloud, camera, {.color = false}, weight, workspace, rendering);
+  return mask::mask2d(rendering.weight);
+}
+
+/// A patch of pixels that are wrong in the same way.
+struct Patch {
+  std::size_t pixels = 0;
+  std::size_t view = 0;
+  int x = 0, y = 0, depth = 0;  ///< Its middle: of the pixel farthest from the rim, and how far that is.
+  bool is_missed = false;       ///< Else it is tinted and should not be.
+};
+
+/// Steps to the nearest pixel that is not set, or beyond the picture: by rows and columns.
+std::vector<int> depths(const scene::Mask& mask) {
+  std::vector<int> depth(mask.data.size(), 0);
+  const auto at = [&](int x, int y) {
+    return x < 0 || y < 0 || x >= mask.width || y >= mask.height ? 0 : depth[std::size_t(y * mask.width + x)];
+  };
+  for (int y = 0; y < mask.height; ++y)
+    for (int x = 0; x < mask.width; ++x)
+      if (mask.at(x, y) != 0) depth[std::size_t(y * mask.width + x)] = 1 + std::min(at(x - 1, y), at(x, y - 1));
+  for (int y = mask.height - 1; y >= 0; --y)
+    for (int x = mask.width - 1; x >= 0; --x)
+      if (int& here = depth[std::size_t(y * mask.width + x)]; here > 0)
+        here = std::min(here, 1 + std::min(at(x + 1, y), at(x, y + 1)));
+  return depth;
+}
+
+/// Connected patches of a mask, by shared edges, of which some pixel is deep enough.
+void find_patches(const scene::Mask& wrong, std::size_t view, bool is_missed, std::vector<Patch>& patches) {
+  const std::vector<int> depth = depths(wrong);
+  scene::Mask open = wrong;
+  std::vector<std::pair<int, int>> stack;
+  for (int y = 0; y < wrong.height; ++y)
+    for (int x = 0; x < wrong.width; ++x) {
+      if (open.at(x, y) == 0) continue;
+      Patch patch{.view = view, .is_missed = is_missed};
+      open.at(x, y) = 0;
+      stack.assign(1, {x, y});
+      while (!stack.empty()) {
+        const auto [px, py] = stack.back();
+        stack.pop_back();
+        ++patch.pixels;
+        if (const int here = depth[std::size_t(py * wrong.width + px)]; here > patch.depth)
+          patch.x = px, patch.y = py, patch.depth = here;
+        for (const auto& [nx, ny] : {std::pair{px + 1, py}, {px - 1, py}, {px, py + 1}, {px, py - 1}}) {
+          if (nx < 0 || ny < 0 || nx >= wrong.width || ny >= wrong.height || open.at(nx, ny) == 0) continue;
+          open.at(nx, ny) = 0;
+          stack.emplace_back(nx, ny);
+        }
+      }
+      if (patch.depth >= least_depth) patches.push_back(patch);
+    }
+}
+
+/// The person's eyes: what the views show of the part, and of a selection.
+class Looking {
+ public:
+  Looking(const CapturedCase& the_case, const scene::GaussianCloud& scene) : scene_(scene) {
+    const std::vector<std::uint8_t> part = the_case.moving.holds(the_case.before.mean);
+    for (std::size_t i = 0; i < the_case.cameras.size(); i += every_photo) {
+      cameras_.push_back(the_case.cameras[i]);
+      meant_.push_back(shown(the_case.before, part, cameras_.back(), workspace_));
+    }
+  }
+
+  struct Seen {
+    std::size_t wrong = 0;       ///< Pixels, over all views.
+    std::vector<Patch> patches;  ///< Largest first.
+  };
+  Seen look_at(const std::vector<std::uint8_t>& selected) {
+    Seen seen;
+    for (std::size_t view = 0; view < cameras_.size(); ++view) {
+      const scene::Mask tinted = shown(scene_, selected, cameras_[view], workspace_);
+      scene::Mask missed = meant_[view], extra = tinted;
+      for (std::size_t i = 0; i < tinted.data.size(); ++i) {
+        missed.data[i] &= std::uint8_t(1 - tinted.data[i]);
+        extra.data[i] &= std::uint8_t(1 - meant_[view].data[i]);
+      }
+      seen.wrong += missed.area() + extra.area();
+      find_patches(missed, view, true, seen.patches);
+      find_patches(extra, view, false, seen.patches);
+    }
+    std::stable_sort(seen.patches.begin(), seen.patches.end(),
+                     [](const Patch& a, const Patch& b) { return a.pixels > b.pixels; });
+    return seen;
+  }
+
+  /// The surface that a click on the patch hits.
+  std::optional<DVec3> click(const Patch& patch, Rng& rng) {
+    const double noise = std::min(click_noise_px, noise_by_depth * double(patch.depth));
+    DVec2 pixel(patch.x + 0.5, patch.y + 0.5);
+    for (int axis = 0; axis < 2; ++axis) pixel[axis] += noise * std::clamp(double(rng.normal()), -2.0, 2.0);
+    const auto hit = render::pick(scene_, cameras_[patch.view], pixel, workspace_);
+    return hit ? std::optional(hit->point) : std::nullopt;
+  }
+
+ private:
+  const scene::GaussianCloud& scene_;
+  std::vector<scene::Camera> cameras_;
+  std::vector<scene::Mask> meant_;
+  render::Workspace workspace_;
+};
+
+}  // namespace
+
+Result<select::Grow> clicks_of_a_looking_person(const CapturedCase& the_case, const scene::GaussianCloud& scene) {
+  Looking eyes(the_case, scene);
+  select::Selector selector(scene);
+  select::Grow clicks;
+  Looking::Seen seen = eyes.look_at(std::vector<std::uint8_t>(scene.size(), 0));
+  std::size_t next = 0;  // patch to click on
+  std::optional<Error> refusal;
+  for (int click = 0; click < most_clicks && next < seen.patches.size(); ++click) {
+    Rng rng(seed, std::uint64_t(click));
+    const Patch patch = seen.patches[next++];
+    const auto point = eyes.click(patch, rng);
+    if (!point) continue;
+    select::Grow tried = clicks;
+    (patch.is_missed ? tried.inside : tried.outside).push_back(*point);
+    const auto selected = selector.select({{select::Op::add, tried}});
+    if (!selected) {  // undone
+      refusal = selected.error();
+      continue;
+    }
+    Looking::Seen then = eyes.look_at(selected->rows);
+    if (then.wrong >= seen.wrong && !clicks.inside.empty()) continue;
+    clicks = std::move(tried), seen = std::move(then), next = 0;
+  }
+  if (clicks.inside.empty() && refusal) return fail(refusal->code, refusal->message, refusal->where);
+  if (clicks.inside.empty())
+    return fail(ErrorCode::unprocessable, "no photo shows the part to select wider than a few pixels");
+  return clicks;
+}
+
+}  // namespace engine::captures

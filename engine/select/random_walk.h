@@ -1,0 +1,29 @@
+// Where a walk along the edges of a graph ends.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/select/neighbour_graph.h"
+
+namespace engine::select {
+
+/// Whether a node is given, and for which side.
+enum class Given : std::uint8_t { no, inside, outside };
+
+/// For each node how likely a random walk that begins there comes to a node that is given for the inside before it
+/// comes to one that is given for the outside: 1 at the former, 0 at the latter and where there is no way to either.
+/// At each node the walk takes one of its edges, each as likely as it has weight.
+///   weight   [edges] 0 or more, the same both ways
+///   given    [nodes]
+///   returns  [nodes] 0 to 1. Not to the last digit: levels that lie within a thousandth of each other may be
+///   exchanged.
+///            The same bytes for any number of threads.
+/// Source: Grady 2006, "Random walks for image segmentation", section III: the combinatorial Dirichlet problem, solved
+/// by conjugate gradients, which begin on a coarser graph (Bornemann and Deuflhard 1996, "The cascadic multigrid
+/// method").
+[[nodiscard]] std::vector<double> random_walk(const NeighbourGraph& graph, std::span<const float> weight,
+                                              std::span<const Given> given);
+
+}  // namespace engine::select

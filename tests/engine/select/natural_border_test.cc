@@ -1,0 +1,78 @@
+#include "engine/select/natural_border.h"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+#include <vector>
+
+#include "tests/engine/select/weighted_graphs.h"
+
+namespace engine::select {
+namespace {
+
+/// The nodes inside, after clicks on nodes.
+std::vector<std::uint32_t> inside(const WeightedGraph& on, const ClickedNodes& clicked) {
+  std::vector<Given> given(on.graph.size(), Given::no);
+  for (const std::uint32_t node : clicked.inside) given[node] = Given::inside;
+  for (const std::uint32_t node : clicked.outside) given[node] = Given::outside;
+  const std::vector<double> potential = random_walk(on.graph, on.weight, given);
+  std::vector<std::uint32_t> out;
+  const auto label = natural_border(on.graph, on.weight, potential, given, clicked);
+  for (std::uint32_t node = 0; node < label.size(); ++node)
+    if (label[node] != 0) out.push_back(node);
+  return out;
+}
+
+std::vector<std::uint32_t> numbers(std::uint32_t from, std::uint32_t to) {
+  std::vector<std::uint32_t> out(to - from);
+  std::iota(out.begin(), out.end(), from);
+  return out;
+}
+
+/// Chains of 10, 10 and 20 nodes, end to end, joined weakly.
+WeightedGraph three_chains(float first_joint, float second_joint) {
+  std::vector<WeightedEdge> edges = chain(0, 40);
+  edges[9].weight = first_joint;
+  edges[19].weight = second_joint;
+  return graph_of(40, edges);
+}
+
+TEST(NaturalBorder, IsWhereEdgesAreWeakNotHalfway) {
+  EXPECT_EQ(inside(three_chains(0.01f, 1), {{0}, {39}}), numbers(0, 10));
+  EXPECT_EQ(inside(three_chains(1, 0.01f), {{0}, {39}}), numbers(0, 20));
+}
+
+TEST(NaturalBorder, IsTheOneThatEndsALargerPieceOfTwoAlike) {
+  EXPECT_EQ(inside(three_chains(0.01f, 0.01f), {{0}, {39}}), numbers(0, 20))
+      << "as weak a joint, and twice as much behind it";
+}
+
+TEST(NaturalBorder, LeavesPiecesThatAreClickedOnToTheirSide) {
+  EXPECT_EQ(inside(three_chains(0.01f, 0.01f), {{0}, {15, 39}}), numbers(0, 10));
+  EXPECT_EQ(inside(three_chains(0.01f, 0.01f), {{0, 15}, {39}}), numbers(0, 20));
+}
+
+TEST(NaturalBorder, IsHalfwayWhereNothingElseDecides) {
+  const std::size_t taken = inside(graph_of(40, chain(0, 40)), {{0}, {39}}).size();
+  EXPECT_GE(taken, 18u);
+  EXPECT_LE(taken, 22u);
+}
+
+TEST(NaturalBorder, AnOutsideClickTakesMoreThanItsOwnNode) {
+  // On a grid without any border, a click amid it is not a hole of one node in all the rest.
+  constexpr std::uint32_t side = 15;
+  const WeightedGraph even = graph_of(side * side, grid(side));
+  const std::size_t taken = inside(even, {{side * 7 + 2}, {side * 7 + 12}}).size();
+  EXPECT_GT(taken, 70u);
+  EXPECT_LT(taken, 155u);
+}
+
+TEST(NaturalBorder, TakesAllThatCanBeReachedWhereNothingIsOutside) {
+  std::vector<WeightedEdge> edges = chain(0, 5);
+  for (const WeightedEdge& edge : chain(5, 9)) edges.push_back(edge);
+  EXPECT_EQ(inside(graph_of(9, edges), {{1}, {}}), numbers(0, 5));
+  EXPECT_EQ(inside(graph_of(1, {}), {{0}, {}}), numbers(0, 1));
+}
+
+}  // namespace
+}  // namespace engine::select

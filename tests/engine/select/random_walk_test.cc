@@ -1,0 +1,94 @@
+#include "engine/select/random_walk.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "engine/core/parallel.h"
+#include "engine/core/rng.h"
+#include "tests/engine/select/weighted_graphs.h"
+
+namespace engine::select {
+namespace {
+
+std::vector<double> walk(const WeightedGraph& on, std::vector<std::uint32_t> inside,
+                         std::vector<std::uint32_t> outside) {
+  std::vector<Given> given(on.graph.size(), Given::no);
+  for (const std::uint32_t node : inside) given[node] = Given::inside;
+  for (const std::uint32_t node : outside) given[node] = Given::outside;
+  return random_walk(on.graph, on.weight, given);
+}
+
+TEST(RandomWalk, FallsEvenlyAlongAChain) {
+  const std::vector<double> x = walk(graph_of(5, chain(0, 5)), {0}, {4});
+  for (std::size_t node = 0; node < 5; ++node) EXPECT_NEAR(x[node], 1 - 0.25 * double(node), 1e-4);
+}
+
+TEST(RandomWalk, DropsWhereAnEdgeIsWeak) {
+  // As voltages do along resistors of 1, 10 and 1.
+  const std::vector<double> x = walk(graph_of(4, {{0, 1, 1}, {1, 2, 0.1f}, {2, 3, 1}}), {0}, {3});
+  EXPECT_NEAR(x[1], 11.0 / 12, 1e-4);
+  EXPECT_NEAR(x[2], 1.0 / 12, 1e-4);
+}
+
+TEST(RandomWalk, StandsWhatIsGivenForNobodyAndWhatIsAlone) {
+  const WeightedGraph two_chains = graph_of(7, [] {
+    auto edges = chain(0, 3);
+    for (const WeightedEdge& edge : chain(3, 6)) edges.push_back(edge);
+    return edges;  // node 6 is alone
+  }());
+  EXPECT_EQ(walk(two_chains, {}, {}), std::vector<double>(7, 0.0));
+  const std::vector<double> x = walk(two_chains, {1}, {});
+  for (const std::size_t node : {0u, 1u, 2u}) EXPECT_NEAR(x[node], 1, 1e-4) << node;
+  for (const std::size_t node : {3u, 4u, 5u, 6u}) EXPECT_EQ(x[node], 0) << node;
+  EXPECT_EQ(walk(graph_of(1, {}), {0}, {}), std::vector<double>{1.0});
+  EXPECT_TRUE(random_walk({.begin = {0}, .to = {}, .back = {}, .length = {}, .spacing = {}}, {}, {}).empty());
+}
+
+TEST(RandomWalk, StandsEdgesWithoutWeight) {
+  const std::vector<double> x = walk(graph_of(3, {{0, 1, 0}, {1, 2, 0}}), {0}, {2});
+  EXPECT_EQ(x, (std::vector<double>{1, 0, 0}));
+}
+
+/// A grid that is made coarser several times, with weights over three orders of magnitude.
+WeightedGraph rough_grid(std::uint32_t side) {
+  std::vector<WeightedEdge> edges = grid(side);
+  Rng rng(5);
+  for (WeightedEdge& edge : edges) edge.weight = float(std::pow(10.0, -3.0 * double(rng.uniform())));
+  return graph_of(std::size_t(side) * side, edges);
+}
+
+TEST(RandomWalk, IsTheMeanOfItsNeighboursOnALargeGraph) {
+  constexpr std::uint32_t side = 120;
+  const WeightedGraph rough = rough_grid(side);
+  const std::uint32_t inside = side / 4 * (side + 1), outside = 3 * side / 4 * (side + 1);
+  const std::vector<double> x = walk(rough, {inside}, {outside});
+  double worst = 0, sum = 0;
+  for (std::uint32_t node = 0; node < x.size(); ++node) {
+    ASSERT_GE(x[node], 0);
+    ASSERT_LE(x[node], 1);
+    if (node == inside || node == outside) continue;
+    double mean = 0, degree = 0;
+    for (std::uint32_t edge = rough.graph.begin[node]; edge < rough.graph.begin[node + 1]; ++edge) {
+      mean += double(rough.weight[edge]) * x[rough.graph.to[edge]];
+      degree += double(rough.weight[edge]);
+    }
+    const double off = std::abs(x[node] - mean / degree);
+    worst = std::max(worst, off);
+    sum += off;
+  }
+  EXPECT_LT(worst, 0.02);
+  EXPECT_LT(sum / double(x.size()), 1e-4);
+}
+
+TEST(RandomWalk, GivesTheSameBytesForAnyNumberOfThreads) {
+  const WeightedGraph rough = rough_grid(120);
+  std::vector<double> one, four;
+  WorkArena(1).run([&] { one = walk(rough, {7}, {14'000}); });
+  WorkArena(4).run([&] { four = walk(rough, {7}, {14'000}); });
+  EXPECT_EQ(one, four);
+}
+
+}  // namespace
+}  // namespace engine::select
