@@ -145,7 +145,7 @@ std::vector<Sample> demo_samples(Service& service) {
   const auto [id, bare] = service.add("demo", std::move(demo.cloud), demo.cameras);
   EditRequest drawn = ball, large = ball;
   drawn.mode = proto::Mode::extend;
-  for (proto::Handle& each : large.handles) each.radius *= 3;
+  for (proto::Handle& each : large.handles) each.radius = 3 * each.radius.value();
   auto big = engine::procedural::make_demo_scene({.gaussians = 500'000});
   const auto [big_id, big_bare] = service.add("large", std::move(big.cloud), big.cameras);
   return {

@@ -6,7 +6,7 @@
 #include <string>
 #include <variant>
 
-#include "proto/edit_request.h"
+#include "proto/wire.h"
 
 namespace proto {
 

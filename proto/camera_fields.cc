@@ -75,6 +75,27 @@ Camera read_camera(const JsonField& field) {
   return read_pinhole(field);
 }
 
+nlohmann::ordered_json encode(const PinholeCamera& camera) {
+  return {{"width", camera.width},
+          {"height", camera.height},
+          {"fx", camera.fx},
+          {"fy", camera.fy},
+          {"cx", camera.cx},
+          {"cy", camera.cy},
+          {"cam_from_world", camera.cam_from_world}};
+}
+
+nlohmann::ordered_json encode(const Camera& camera) {
+  if (const auto* pinhole = std::get_if<PinholeCamera>(&camera)) return encode(*pinhole);
+  const auto& look_at = std::get<LookAtCamera>(camera);
+  nlohmann::ordered_json out{{"eye", look_at.eye}, {"target", look_at.target}};
+  if (look_at.up) out["up"] = *look_at.up;
+  out["fov_y_deg"] = look_at.fov_y_deg;
+  out["width"] = look_at.width;
+  out["height"] = look_at.height;
+  return out;
+}
+
 Viewpoint read_viewpoint(const JsonField& object, const Members& members) {
   const auto camera = members.optional("camera"), view = members.optional("view");
   if (camera.has_value() == view.has_value()) {

@@ -1,6 +1,7 @@
 // Cameras read out of a JSON document. For the .cc files of this room.
 #pragma once
 
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "proto/camera.h"
@@ -13,6 +14,10 @@ namespace proto {
 
 /// Exactly one of `camera` and `view` among the members of `object`.
 [[nodiscard]] Viewpoint read_viewpoint(const JsonField& object, const Members& members);
+
+/// The reverse of read_camera().
+[[nodiscard]] nlohmann::ordered_json encode(const Camera& camera);
+[[nodiscard]] nlohmann::ordered_json encode(const PinholeCamera& camera);
 
 /// A vertical field of view, degrees.
 [[nodiscard]] double read_fov(const JsonField& field);

@@ -8,6 +8,7 @@
 #include "proto/json_fields.h"
 #include "proto/json_text.h"
 #include "proto/params_fields.h"
+#include "proto/selection_fields.h"
 
 namespace proto {
 namespace {
@@ -21,12 +22,14 @@ using nlohmann::ordered_json;
 
 constexpr int no_limit = std::numeric_limits<int>::max();
 
-Handle read_handle(const JsonField& field) {
+/// selected  a selection says what moves: the radius may be left out
+Handle read_handle(const JsonField& field, bool selected) {
   const Members members(field, {"source", "target", "radius", "group"});
   Handle handle;
   if (const auto source = members.required("source")) handle.source = source->point();
   if (const auto target = members.optional("target")) handle.target = target->point();
-  if (const auto radius = members.required("radius")) handle.radius = radius->length();
+  if (const auto radius = selected ? members.optional("radius") : members.required("radius"))
+    handle.radius = radius->length();
   if (const auto group = members.optional("group")) handle.group = group->whole(0, no_limit);
   return handle;
 }
@@ -40,16 +43,19 @@ Region read_region(const JsonField& field, std::string_view size_name) {
 }
 
 EditRequest read_edit_request(const JsonField& field) {
-  const Members members(field, {"scene", "version", "mode", "preset", "prompt", "handles", "region", "params"});
+  const Members members(field,
+                        {"scene", "version", "mode", "preset", "prompt", "handles", "selection", "region", "params"});
   EditRequest request;
   if (const auto f = members.optional("scene")) request.scene = f->text();
   if (const auto f = members.optional("version")) request.version = f->whole(0, no_limit);
   if (const auto f = members.optional("mode")) request.mode = f->one_of(engine::names<Mode>);
   if (const auto f = members.optional("preset")) request.preset = f->one_of(engine::names<Preset>);
   if (const auto f = members.optional("prompt"); f && !f->is_null()) request.prompt = f->text();
+  const auto selection = members.optional("selection");
   if (const auto handles = members.required("handles"))
     for (const JsonField& handle : handles->elements(1, max_handles, "handles"))
-      request.handles.push_back(read_handle(handle));
+      request.handles.push_back(read_handle(handle, selection.has_value()));
+  if (selection) request.selection = read_selection(*selection);
   if (const auto f = members.optional("region")) request.region = read_region(*f, "size");
   if (const auto f = members.optional("params")) request.params = read_params(*f);
   return request;
@@ -138,7 +144,7 @@ std::string listed(const std::vector<std::string>& names) {
 ordered_json encode(const Handle& handle) {
   ordered_json out{{"source", handle.source}};
   if (handle.target) out["target"] = *handle.target;
-  out["radius"] = handle.radius;
+  if (handle.radius) out["radius"] = *handle.radius;
   out["group"] = handle.group;
   return out;
 }
@@ -203,6 +209,7 @@ std::string to_json(const EditRequest& request) {
   if (request.prompt) out["prompt"] = *request.prompt;
   ordered_json& handles = out["handles"] = ordered_json::array();
   for (const Handle& handle : request.handles) handles.push_back(encode(handle));
+  if (request.selection) out["selection"] = encode(*request.selection);
   if (request.region) out["region"] = {{"center", request.region->center}, {"size", request.region->size}};
   out["params"] = encode(request.params);
   return pretty(out);

@@ -1,7 +1,6 @@
 // The edit request as it travels: JSON in, a plain struct, JSON out. The names are the contract with clients.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -10,12 +9,10 @@
 
 #include "engine/core/result.h"
 #include "engine/params/params.h"
+#include "proto/selection.h"
+#include "proto/wire.h"
 
 namespace proto {
-
-using engine::Result;
-
-using Point = std::array<double, 3>;  ///< World units, the file's own frame.
 
 using engine::name_of;  // of an enumerator, such as "shortest_arc"
 using engine::params::Annealing;
@@ -30,17 +27,15 @@ using engine::params::Rotation;
 /// The parameters that a request gives; the rest is left to the preset.
 using Params = engine::params::GivenParams;
 
-// Limits of what is read. All are choices: far above what people send, far below what would hurt.
-constexpr std::size_t max_handles = 256;
-constexpr std::size_t max_text_bytes = 4096;  ///< Length of a prompt or a name.
-constexpr double max_coordinate = 1e12;       ///< Absolute value, world units.
+constexpr std::size_t max_handles = 256;  ///< A choice: far above what people send, far below what would hurt.
 
 /// A point on the part that is dragged, and where it is to go.
 struct Handle {
   Point source{};
-  std::optional<Point> target;  ///< Where the handle is to go; without one it is an anchor.
-  double radius = 0;            ///< World units, above 0.
-  int group = 0;                ///< Its group, from 0 up.
+  std::optional<Point> target;        ///< Where the handle is to go; without one it is an anchor.
+  std::optional<double> radius = {};  ///< World units, above 0. Left out only with a selection: how far it then grips
+                                      ///< is found from what is selected.
+  int group = 0;                      ///< Its group, from 0 up.
   bool operator==(const Handle&) const = default;
 };
 
@@ -55,18 +50,13 @@ struct EditRequest {
   std::optional<std::string> scene;  ///< Id of a scene that a service holds.
   std::optional<int> version;        ///< Version of that scene, from 0 up.
   Mode mode = Mode::move;
-  std::optional<Preset> preset;       ///< None: standard.
-  std::optional<std::string> prompt;  ///< For a corrector that reads one.
-  std::vector<Handle> handles;        ///< 1 to max_handles
+  std::optional<Preset> preset;        ///< None: standard.
+  std::optional<std::string> prompt;   ///< For a corrector that reads one.
+  std::vector<Handle> handles;         ///< 1 to max_handles
+  std::optional<Selection> selection;  ///< What moves. None: the handles' spheres.
   std::optional<Region> region;
   Params params;
   bool operator==(const EditRequest&) const = default;
-};
-
-/// What a JSON document may be; checked while it is read, before memory grows with it.
-struct JsonLimits {
-  std::size_t max_bytes = std::size_t{1} << 20;
-  int max_depth = 16;  ///< Arrays and objects within one another.
 };
 
 /// Decodes a request. Strict: a field that is unknown, missing, given twice, of the wrong type, not finite or out of

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "proto/edit_request.h"
+#include "proto/wire.h"
 
 namespace proto {
 

@@ -70,20 +70,14 @@ bool JsonField::boolean() const {
   return false;
 }
 
-std::string JsonField::text() const {
-  if (value_->is_string() && value_->get_ref<const std::string&>().size() <= max_text_bytes)
+std::string JsonField::text(std::size_t max_bytes) const {
+  if (value_->is_string() && value_->get_ref<const std::string&>().size() <= max_bytes)
     return value_->get<std::string>();
-  expected("a string of at most " + std::to_string(max_text_bytes) + " bytes");
+  expected("a string of at most " + std::to_string(max_bytes) + " bytes");
   return {};
 }
 
-Point JsonField::point() const {
-  Point point{};
-  const auto coordinates = elements(3, 3, "numbers");
-  for (std::size_t i = 0; i < coordinates.size(); ++i)
-    point[i] = coordinates[i].number(-max_coordinate, max_coordinate);
-  return point;
-}
+Point JsonField::point() const { return numbers<3>(-max_coordinate, max_coordinate); }
 
 Point JsonField::edges() const {
   Point size{1, 1, 1};

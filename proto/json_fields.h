@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "engine/core/names.h"
-#include "proto/edit_request.h"
+#include "proto/wire.h"
 
 namespace proto {
 
@@ -35,9 +35,12 @@ class JsonField {
   [[nodiscard]] int whole(int low, int high) const;
   [[nodiscard]] std::uint64_t unsigned_number() const;
   [[nodiscard]] bool boolean() const;
-  [[nodiscard]] std::string text() const;  ///< A string of at most max_text_bytes.
-  [[nodiscard]] Point point() const;       ///< Three coordinates within max_coordinate.
-  [[nodiscard]] Point edges() const;       ///< Three length()s.
+  [[nodiscard]] std::string text(std::size_t max_bytes = max_text_bytes) const;
+  [[nodiscard]] Point point() const;  ///< Three coordinates within max_coordinate.
+  [[nodiscard]] Point edges() const;  ///< Three length()s.
+  /// N numbers, each low <= x <= high.
+  template <std::size_t N>
+  [[nodiscard]] std::array<double, N> numbers(double low, double high) const;
   template <class E, std::size_t N>
   [[nodiscard]] E one_of(const std::array<Name<E>, N>& names) const;
   /// The elements of an array of low to high of `things`.
@@ -75,6 +78,14 @@ class Members {
 
   JsonField object_;
 };
+
+template <std::size_t N>
+std::array<double, N> JsonField::numbers(double low, double high) const {
+  std::array<double, N> values{};
+  const auto fields = elements(N, N, "numbers");
+  for (std::size_t i = 0; i < fields.size(); ++i) values[i] = fields[i].number(low, high);
+  return values;
+}
 
 template <class E, std::size_t N>
 E JsonField::one_of(const std::array<Name<E>, N>& names) const {

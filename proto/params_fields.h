@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/params/params.h"
+#include "proto/edit_request.h"
 #include "proto/json_fields.h"
 
 namespace proto {

@@ -34,10 +34,15 @@ void read_options(const Members& members, RenderRequest& request) {
   if (const auto f = members.optional("background")) request.background = read_colour(*f);
   if (const auto f = members.optional("sh_degree")) request.sh_degree = f->whole(0, 3);
   if (const auto f = members.optional("quality")) request.quality = f->whole(1, 100);
+  if (const auto f = members.optional("selection")) {
+    request.selection = f->text();
+    if (request.content != PictureContent::color) f->refuse("only colours are tinted: leave this or `what` out");
+  }
 }
 
 RenderRequest read_request(const JsonField& field) {
-  const Members members(field, {"camera", "view", "what", "format", "max_side", "background", "sh_degree", "quality"});
+  const Members members(
+      field, {"camera", "view", "what", "format", "max_side", "background", "sh_degree", "quality", "selection"});
   RenderRequest request;
   request.viewpoint = read_viewpoint(field, members);
   read_options(members, request);
@@ -46,7 +51,7 @@ RenderRequest read_request(const JsonField& field) {
 
 RenderRequest read_query(const JsonField& field) {
   const Members members(field, {"view", "eye", "target", "up", "fov", "width", "height", "what", "format", "max_side",
-                                "background", "sh_degree", "quality"});
+                                "background", "sh_degree", "quality", "selection"});
   RenderRequest request;
   if (const auto view = members.optional("view")) {
     request.viewpoint = view->text();
@@ -89,7 +94,7 @@ json list(std::string_view text) {
 }
 
 json value_of(std::string_view name, const std::string& text) {
-  if (name == "view" || name == "what" || name == "format") return text;
+  if (name == "view" || name == "what" || name == "format" || name == "selection") return text;
   if (name == "eye" || name == "target" || name == "up" || name == "background") return list(text);
   return scalar(text);
 }
@@ -104,8 +109,8 @@ Result<RenderRequest> decode(const json& document, RenderRequest (*read)(const J
 }  // namespace
 
 std::vector<std::string> render_queries() {
-  return {"view", "eye",    "target",   "up",         "fov",       "width",  "height",
-          "what", "format", "max_side", "background", "sh_degree", "quality"};
+  return {"view", "eye",    "target",   "up",         "fov",       "width",   "height",
+          "what", "format", "max_side", "background", "sh_degree", "quality", "selection"};
 }
 
 Result<RenderRequest> parse_render_request(std::string_view text, const JsonLimits& limits) {

@@ -24,6 +24,7 @@ struct RenderRequest {
   Point background{};                              ///< Colour, each 0 to 1.
   int sh_degree = 3;                               ///< 0 to 3: bands above are left out.
   int quality = 90;                                ///< 1 to 100, of a JPEG.
+  std::optional<std::string> selection = {};       ///< Id of a selection: what it selects is tinted.
   bool operator==(const RenderRequest&) const = default;
 };
 
@@ -31,7 +32,7 @@ struct RenderRequest {
 [[nodiscard]] Result<RenderRequest> parse_render_request(std::string_view text, const JsonLimits& limits = {});
 
 /// Names of the query parameters: view; eye, target, up, fov, width, height; what, format, max_side, background,
-/// sh_degree, quality.
+/// sh_degree, quality, selection.
 [[nodiscard]] std::vector<std::string> render_queries();
 
 /// Reads the request from a query: view=NAME, or eye=x,y,z&target=x,y,z&width=px&height=px with up=x,y,z and

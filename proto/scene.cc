@@ -64,12 +64,10 @@ ordered_json encode(const Scene& scene) {
 }
 
 ordered_json encode(const View& view) {
-  const PinholeCamera& camera = view.camera;
-  return {{"name", view.name},       {"width", camera.width},
-          {"height", camera.height}, {"fx", camera.fx},
-          {"fy", camera.fy},         {"cx", camera.cx},
-          {"cy", camera.cy},         {"cam_from_world", camera.cam_from_world},
-          {"photo", view.photo}};
+  ordered_json out{{"name", view.name}};
+  out.update(encode(view.camera));
+  out["photo"] = view.photo;
+  return out;
 }
 
 std::string read_name(const JsonField& field) {

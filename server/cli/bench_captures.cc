@@ -71,10 +71,11 @@ Result<std::vector<captures::CaptureTrial>> trials_of(const std::vector<std::str
   for (const std::string& name : names) {
     const auto made = captures::make_captured_case(name);
     if (!made) return propagate(made);
+    const auto trained = captures::train(*made, captures::training_options(options.captures.fit_iterations), cache);
+    if (!trained) return propagate(trained);
     for (const captures::NamedGrasp& way : captures::known_grasps()) {
       if (std::ranges::find(options.captures.by, way.name) == options.captures.by.end()) continue;
-      const auto ready =
-          captures::make_ready(*made, captures::training_options(options.captures.fit_iterations), cache, way.grasp);
+      const auto ready = captures::make_ready(*made, *trained, way.grasp);
       if (!ready) return propagate(ready);
       for (const std::string& corrector : options.correctors) {
         auto trial = trial_of(*ready, corrector, options, machine);
@@ -111,8 +112,8 @@ CLI::Option* add_capture_options(CLI::App& command, CaptureOptions& options) {
   for (const captures::NamedGrasp& way : captures::known_grasps()) ways.push_back(way.name);
   command
       .add_option("--by", options.by,
-                  "How a request of --captures says what moves: balls around its handles, or a selection that grows "
-                  "from at most six clicks (default: one after the other)")
+                  "How a request of --captures says what moves: balls around its handles, a selection that grows from "
+                  "at most six clicks, or from as many of a person who looks and corrects (default: one after another)")
       ->needs(on)
       ->check(CLI::IsMember(ways))
       ->type_name("WAY");

@@ -15,9 +15,9 @@ struct BenchOptions;
 /// Options of captured cases.
 struct CaptureOptions {
   bool on = false;
-  std::string cache;                               ///< Folder of trained scenes; empty: default_capture_cache().
-  std::string page;                                ///< File; empty: none is written.
-  std::vector<std::string> by{"balls", "clicks"};  ///< Names of captures::known_grasps().
+  std::string cache;  ///< Folder of trained scenes; empty: default_capture_cache().
+  std::string page;   ///< File; empty: none is written.
+  std::vector<std::string> by{"balls", "clicks", "looking"};  ///< Names of captures::known_grasps().
   int fit_iterations = 1500;
 };
 
@@ -33,7 +33,7 @@ CLI::Option* add_capture_options(CLI::App& command, CaptureOptions& options);
 [[nodiscard]] Result<std::filesystem::path> default_capture_cache();
 
 /// Carries captured cases out; writes captures.json, captures.md and pictures into options.out, which exists.
-///   errors  those of captures::choose_captured_cases(), make_ready() and carry_out(), and of writing
+///   errors  those of captures::choose_captured_cases(), train(), make_ready() and carry_out(), and of writing
 [[nodiscard]] Result<void> run_captures(const BenchOptions& options, const Machine& machine, Terminal& terminal);
 
 }  // namespace server::cli

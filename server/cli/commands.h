@@ -7,6 +7,7 @@ namespace server::cli {
 
 void add_serve_command(CLI::App& program, Action& action);
 void add_edit_command(CLI::App& program, Action& action);
+void add_select_command(CLI::App& program, Action& action);
 void add_fit_command(CLI::App& program, Action& action);
 void add_render_command(CLI::App& program, Action& action);
 void add_info_command(CLI::App& program, Action& action);

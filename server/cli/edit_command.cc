@@ -24,6 +24,7 @@
 #include "server/cli/progress_display.h"
 #include "server/cli/request_file.h"
 #include "server/edits/convert.h"
+#include "server/edits/convert_selection.h"
 #include "server/pictures/picture_names.h"
 #include "server/pictures/pictures.h"
 
@@ -44,7 +45,7 @@ struct EditOptions {
 
 /// Errors of the engine name a field of the request; the user knows that field by its place in the file.
 void locate_in_file(engine::Error& error, const EditOptions& options, const proto::RequestFile& file) {
-  for (const char* field : {"handles", "region", "params"})
+  for (const char* field : {"handles", "selection", "region", "params"})
     if (error.where.starts_with(field)) {
       error.where = path(options.request).filename().string() + ":" + file.address_of(error.where);
       return;
@@ -61,7 +62,7 @@ Result<BothRequests> load_request(const EditOptions& options) {
   auto file = read_request(options.request, options.name);
   if (!file) return propagate(file);
   auto request = edits::to_engine(file->request);
-  if (request)
+  if (request && !file->request.selection)  // else it is whole only once that has been carried out
     if (const auto valid = edit::validate(*request); !valid) request = propagate(valid);
   if (!request) {
     locate_in_file(request.error(), options, *file);
@@ -75,6 +76,15 @@ Result<std::vector<scene::Camera>> load_cameras(const std::string& dataset) {
   const auto read = io::read_dataset(dataset, {.points = false});
   if (!read) return propagate(read);
   return io::cameras_of(*read);
+}
+
+/// Carries the selection of a request out, if it has one.
+///   returns  warnings
+Result<std::vector<std::string>> select_rows(const scene::GaussianCloud& input,
+                                             const std::vector<scene::Camera>& cameras, BothRequests& request) {
+  const auto& selection = request.file.request.selection;
+  if (!selection) return std::vector<std::string>();
+  return edits::select_rows(input, *selection, {.views = cameras, .up = request.engine.up}, request.engine);
 }
 
 /// Before, after and mask of the best views.
@@ -123,8 +133,9 @@ Result<edit::Outcome> run_with_progress(const scene::GaussianCloud& input, const
   return edit::run(input, cameras, request.engine, {.corrector = corrector.get()}, observer);
 }
 
-std::vector<std::string> all_warnings(const edit::Report& report, const proto::EditRequest& request) {
-  std::vector<std::string> warnings = report.warnings;
+std::vector<std::string> all_warnings(std::vector<std::string> warnings, const edit::Report& report,
+                                      const proto::EditRequest& request) {
+  warnings.insert(warnings.end(), report.warnings.begin(), report.warnings.end());
   for (std::string& warning : edits::warnings_about(request)) warnings.push_back(std::move(warning));
   return warnings;
 }
@@ -143,7 +154,7 @@ Result<void> write_results(const path& folder, std::size_t pictured_views, const
 
 Result<void> run(const EditOptions& options, Terminal& terminal) {
   const path folder = options.out;
-  const auto request = load_request(options);
+  auto request = load_request(options);
   if (!request) return propagate(request);
   if (auto safe = keep_input_safe(options.scene, folder / "scene.ply"); !safe) return safe;
   if (auto made = make_folder(folder); !made) return made;
@@ -154,7 +165,9 @@ Result<void> run(const EditOptions& options, Terminal& terminal) {
     const auto cameras = load_cameras(options.dataset);
     if (!cameras) return propagate(cameras);
     const auto start = std::chrono::steady_clock::now();
-    auto outcome = run_with_progress(input->cloud, *cameras, *request, terminal);
+    const auto selected = select_rows(input->cloud, *cameras, *request);
+    auto outcome = selected ? run_with_progress(input->cloud, *cameras, *request, terminal)
+                            : Result<edit::Outcome>(propagate(selected));
     if (!outcome) {
       locate_in_file(outcome.error(), options, request->file);
       return propagate(outcome);
@@ -163,9 +176,9 @@ Result<void> run(const EditOptions& options, Terminal& terminal) {
     report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     report.scene_file = path(options.scene).filename().string();
     report.machine = machine;
-    report.request = edits::resolved(request->file.request, outcome->report.resolved);
+    report.request = edits::resolved(request->file.request, outcome->report.resolved, request->engine.handles);
     report.edit = outcome->report;
-    report.edit.warnings = all_warnings(outcome->report, request->file.request);
+    report.edit.warnings = all_warnings(*selected, outcome->report, request->file.request);
     for (const std::string& warning : report.edit.warnings) terminal.err << "warning: " << warning << '\n';
     auto written = write_results(folder, std::size_t(options.pictures), *input, *outcome, report);
     if (written) summarise(terminal.out, folder, report);
@@ -182,7 +195,7 @@ void add_edit_command(CLI::App& program, Action& action) {
   command
       ->add_option("--dataset", options->dataset,
                    "Folder with the scene's cameras (COLMAP, transforms.json or an INRIA model); without it, cameras "
-                   "are placed around the handles")
+                   "are placed around the handles. A selection in the request names views of it")
       ->type_name("DIR");
   command
       ->add_option("--request", options->request,

@@ -46,6 +46,7 @@ void describe(CLI::App& program, Action& action) {
   program.footer(sources + "See splatdrag --help for the exit status.");  // of the subcommands, which inherit it
   add_serve_command(program, action);
   add_edit_command(program, action);
+  add_select_command(program, action);
   add_fit_command(program, action);
   add_render_command(program, action);
   add_info_command(program, action);

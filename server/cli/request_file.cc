@@ -3,18 +3,33 @@
 #include "engine/io/read_bytes.h"
 
 namespace server::cli {
+namespace {
 
-engine::Result<proto::RequestFile> read_request(const std::filesystem::path& path, const std::string& name) {
+/// What `parse` makes of a file's text; its errors name the file.
+template <class Parse>
+auto read_file(const std::filesystem::path& path, Parse parse)
+    -> decltype(parse(std::string_view(), proto::JsonLimits())) {
   const proto::JsonLimits limits;
   const auto bytes = engine::io::read_bytes(path, limits.max_bytes);
   if (!bytes) return engine::propagate(bytes);
-  const std::string_view text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
-  auto request = proto::parse_request_file(text, name, limits);
-  if (!request) {
-    std::string& where = request.error().where;
+  auto read = parse(std::string_view(reinterpret_cast<const char*>(bytes->data()), bytes->size()), limits);
+  if (!read) {
+    std::string& where = read.error().where;
     where = path.filename().string() + (where.empty() ? "" : ":") + where;
   }
-  return request;
+  return read;
+}
+
+}  // namespace
+
+engine::Result<proto::RequestFile> read_request(const std::filesystem::path& path, const std::string& name) {
+  return read_file(path, [&](std::string_view text, const proto::JsonLimits& limits) {
+    return proto::parse_request_file(text, name, limits);
+  });
+}
+
+engine::Result<proto::Selection> read_selection(const std::filesystem::path& path) {
+  return read_file(path, proto::parse_selection);
 }
 
 }  // namespace server::cli

@@ -1,4 +1,4 @@
-// Edit requests on disk.
+// Edit requests and selections on disk.
 #pragma once
 
 #include <filesystem>
@@ -6,6 +6,7 @@
 
 #include "engine/core/result.h"
 #include "proto/edit_request.h"
+#include "proto/selection.h"
 
 namespace server::cli {
 
@@ -15,5 +16,8 @@ namespace server::cli {
 ///           "drags.json:ear_up.handles[2].radius"
 [[nodiscard]] engine::Result<proto::RequestFile> read_request(const std::filesystem::path& path,
                                                               const std::string& name);
+
+/// Reads a file of {"selection": [...]}. Errors as read_request().
+[[nodiscard]] engine::Result<proto::Selection> read_selection(const std::filesystem::path& path);
 
 }  // namespace server::cli

@@ -1,5 +1,6 @@
 #include "server/edits/convert.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "engine/correct/scene_corrector.h"
@@ -63,7 +64,7 @@ engine::Result<edit::Request> to_engine(const proto::EditRequest& request) {
     edit::Handle& to = out.handles.emplace_back();
     to.source = to_vec(handle.source);
     if (handle.target) to.target = to_vec(*handle.target);
-    to.radius = handle.radius;
+    to.radius = handle.radius.value_or(0);
     to.group = handle.group;
   }
   if (request.region) out.region = {to_vec(request.region->center), to_vec(request.region->size)};
@@ -72,10 +73,13 @@ engine::Result<edit::Request> to_engine(const proto::EditRequest& request) {
   return out;
 }
 
-proto::EditRequest resolved(const proto::EditRequest& request, const edit::Params& used) {
+proto::EditRequest resolved(const proto::EditRequest& request, const edit::Params& used,
+                            const std::vector<edit::Handle>& handles) {
   proto::EditRequest out = request;
   out.preset = preset_of(request);
   out.params = engine::params::as_given(used);
+  for (std::size_t h = 0; h < std::min(out.handles.size(), handles.size()); ++h)
+    if (handles[h].radius > 0) out.handles[h].radius = handles[h].radius;
   return out;
 }
 

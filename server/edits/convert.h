@@ -36,12 +36,16 @@ namespace server::edits {
 ///   errors  unsupported: no (`where` is "params.corrector", say)
 [[nodiscard]] engine::Result<void> available(const engine::edit::Params& params);
 
-/// The engine's request, with what was left open filled in from the preset.
+/// The engine's request, with what was left open filled in from the preset. Of a selection it says nothing yet, and
+/// radii that are left to one are 0: see hand_over().
 ///   errors  as available()
 [[nodiscard]] engine::Result<engine::edit::Request> to_engine(const proto::EditRequest& request);
 
-/// The request as it was carried out: `request` with every parameter that the edit used filled in.
-[[nodiscard]] proto::EditRequest resolved(const proto::EditRequest& request, const engine::edit::Params& used);
+/// The request as it was carried out: `request` with every parameter that the edit used filled in, and the radius of
+/// every handle.
+///   handles  those used, if they are known; a radius of 0 is not
+[[nodiscard]] proto::EditRequest resolved(const proto::EditRequest& request, const engine::edit::Params& used,
+                                          const std::vector<engine::edit::Handle>& handles = {});
 
 /// Fields of the request that are given, but without effect on this edit.
 [[nodiscard]] std::vector<std::string> fields_without_effect(const proto::EditRequest& request);

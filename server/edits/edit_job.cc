@@ -18,6 +18,7 @@
 #include "engine/render/forward.h"
 #include "proto/edit_record.h"
 #include "server/edits/convert.h"
+#include "server/edits/convert_selection.h"
 #include "server/edits/estimate.h"
 #include "server/edits/interval_pictures.h"
 #include "server/edits/record_keeper.h"
@@ -98,7 +99,18 @@ class Run {
     return {};
   }
 
+  /// Says what moves, if a selection does.
+  Result<void> select_rows() {
+    if (!asked_.selection) return {};
+    const auto warnings =
+        edits::select_rows(*input_, *asked_.selection, {.views = cameras_, .up = request_.up}, request_);
+    if (!warnings) return propagate(warnings);
+    for (const std::string& warning : *warnings) keeper_.warn(warning);
+    return {};
+  }
+
   Result<void> work() {
+    if (auto selected = select_rows(); !selected) return selected;
     keeper_.expect_after(seconds_to_publish(input_->size()));
     pictures_.emplace(context_.folder(), *input_, workshop_.pictured_views);
     auto outcome = run();
@@ -110,7 +122,8 @@ class Run {
   void tell_assignment(const edit::Report& report) {
     proto::EditRecord& record = keeper_.record();
     record.intervals = report.resolved.intervals;
-    record.request = resolved(asked_, report.resolved);
+    record.request = resolved(asked_, report.resolved, request_.handles);
+    record.request->selection.reset();  // it may be long, and the job's payload has it
     record.simd = engine::render::simd_target();
     record.handles.clear();
     for (const edit::HandleReport& handle : report.handles) record.handles.push_back({handle.gaussians});

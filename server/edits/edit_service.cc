@@ -12,6 +12,7 @@
 #include "engine/jobs/worker.h"
 #include "proto/time_text.h"
 #include "server/edits/convert.h"
+#include "server/edits/convert_selection.h"
 #include "server/edits/edit_job.h"
 #include "server/edits/estimate.h"
 #include "server/edits/interval_pictures.h"
@@ -72,11 +73,12 @@ struct Checked {
   edit::Request request;
   scenes::LoadedVersion version;
   edit::PreviewOutcome preview;
+  std::vector<std::string> selection_warnings;
 
   [[nodiscard]] proto::EditRequest resolved_for(const proto::EditRequest& asked) const {
     edit::Params params = request.params;
     params.intervals = preview.intervals;
-    return resolved(asked, params);
+    return resolved(asked, params, request.handles);
   }
   [[nodiscard]] std::vector<proto::HandleCount> handles() const {
     std::vector<proto::HandleCount> counts;
@@ -84,28 +86,51 @@ struct Checked {
     return counts;
   }
   [[nodiscard]] std::vector<std::string> warnings(const proto::EditRequest& asked) const {
-    std::vector<std::string> all = preview.warnings;
+    std::vector<std::string> all = selection_warnings;
+    all.insert(all.end(), preview.warnings.begin(), preview.warnings.end());
     for (std::string& warning : warnings_about(asked)) all.push_back(std::move(warning));
     return all;
   }
 };
 
-Result<Checked> check(scenes::SceneStore& scenes, const proto::EditRequest& asked) {
+/// Carries the selection of a request out, if it has one, and hands its rows over.
+///   returns  warnings
+Result<std::vector<std::string>> select_rows(Selections& selections, const proto::EditRequest& asked,
+                                             const scenes::LoadedVersion& version, edit::Request& request) {
+  if (!asked.selection) return std::vector<std::string>();
+  const auto resolved_selection = selections.resolve(*asked.scene, *asked.selection);
+  if (!resolved_selection) return propagate(resolved_selection);
+  const auto made = selections.make(version, *resolved_selection);
+  if (!made) return propagate(made);
+  const auto views = selections.cameras_about(*asked.scene, (*made)->asked);
+  if (!views) return propagate(views);
+  return hand_over((*made)->selected, *views,
+                   [&](const auto& cameras) { return selections.shown_shares(version, **made, cameras); }, request);
+}
+
+Result<Checked> check(scenes::SceneStore& scenes, Selections& selections, const proto::EditRequest& asked) {
   auto request = to_engine(asked);
   if (!request) return propagate(request);
-  if (const auto valid = edit::validate(*request); !valid) return propagate(valid);
+  if (!asked.selection)  // else the request is whole only once that has been carried out
+    if (const auto valid = edit::validate(*request); !valid) return propagate(valid);
   auto version = scenes.load(*asked.scene, std::to_string(*asked.version));
   if (!version) return propagate(version);
+  auto warnings = select_rows(selections, asked, *version, *request);
+  if (!warnings) return propagate(warnings);
   auto preview = edit::preview(version->cloud, *request);
   if (!preview) return propagate(preview);
-  return Checked{std::move(*request), std::move(*version), std::move(*preview)};
+  return Checked{std::move(*request), std::move(*version), std::move(*preview), std::move(*warnings)};
 }
 
 }  // namespace
 
 struct EditService::Impl {
   Impl(scenes::SceneStore& store, ServiceOptions given)
-      : scenes(store), options(std::move(given)), arena(options.threads, engine::Priority::low) {}
+      : scenes(store),
+        options(std::move(given)),
+        own_selections(store),
+        selections(options.selections != nullptr ? *options.selections : own_selections),
+        arena(options.threads, engine::Priority::low) {}
 
   [[nodiscard]] std::filesystem::path jobs_folder() const { return options.folder / "jobs"; }
 
@@ -149,6 +174,8 @@ struct EditService::Impl {
 
   scenes::SceneStore& scenes;
   const ServiceOptions options;
+  Selections own_selections;
+  Selections& selections;
   engine::WorkArena arena;
   NamedLocks scenes_in_use;  ///< By scene: shared while an edit of it is accepted, alone in while_idle().
   NamedLocks results;        ///< By edit; see Workshop.
@@ -175,7 +202,7 @@ Result<EditService::Submission> EditService::submit(const proto::EditRequest& re
   if (!earlier) return propagate(earlier);
   if (*earlier) return Submission{status_of(**earlier), false};
   const auto hold = impl_->scenes_in_use.lock_shared(*asked->scene);
-  if (const auto checked = check(impl_->scenes, *asked); !checked) return propagate(checked);
+  if (const auto checked = check(impl_->scenes, impl_->selections, *asked); !checked) return propagate(checked);
   const auto submission = impl_->queue->submit(job);
   if (!submission) return propagate(submission);
   return Submission{status_of(submission->job), submission->created};
@@ -184,7 +211,7 @@ Result<EditService::Submission> EditService::submit(const proto::EditRequest& re
 Result<proto::EditEstimate> EditService::estimate(const proto::EditRequest& request) {
   const auto asked = canonical(request);
   if (!asked) return propagate(asked);
-  const auto checked = check(impl_->scenes, *asked);
+  const auto checked = check(impl_->scenes, impl_->selections, *asked);
   if (!checked) return propagate(checked);
   const auto dataset = impl_->scenes.dataset(*asked->scene);
   if (!dataset) return propagate(dataset);
@@ -211,7 +238,7 @@ Result<proto::Preview> EditService::preview(const proto::EditRequest& request) {
   const auto start = steady_clock::now();
   const auto asked = canonical(request);
   if (!asked) return propagate(asked);
-  const auto checked = check(impl_->scenes, *asked);
+  const auto checked = check(impl_->scenes, impl_->selections, *asked);
   if (!checked) return propagate(checked);
   const edit::PreviewOutcome& outcome = checked->preview;
   const auto added = impl_->scenes.add_preview(*asked->scene, *asked->version, outcome.overlay);

@@ -20,6 +20,7 @@
 #include "engine/optim/perceptual.h"
 #include "proto/edit_request.h"
 #include "proto/edit_status.h"
+#include "server/edits/selections.h"
 #include "server/scenes/scene_store.h"
 
 namespace server::edits {
@@ -35,6 +36,8 @@ struct ServiceOptions {
   spdlog::logger* logger = nullptr;  ///< Is told what becomes of edits; outlives the service. Null: nobody is.
   /// The loss inside masks; outlives the service. Null: the engine's own.
   engine::optim::PerceptualLoss* perceptual = nullptr;
+  /// Where previews find what their selection selects; outlives the service. Null: it keeps its own.
+  Selections* selections = nullptr;
 };
 
 /// Safe to call from any thread.
@@ -51,9 +54,9 @@ class EditService {
     bool created = true;  ///< false: the idempotency key had been used for this very request.
   };
   /// Accepts an edit: on disk when this returns. The scene, its version and every field are checked first, and each
-  /// handle is held against the scene.
-  ///   errors  invalid_argument, not_found (`where` "scene", "version"), unprocessable (a handle without Gaussians; a
-  ///           key used for another request), unsupported, busy
+  /// handle is held against the scene; a selection is carried out.
+  ///   errors  invalid_argument, not_found (`where` "scene", "version"; a view of a selection), unprocessable (a handle
+  ///           without Gaussians, an empty selection; a key used for another request), unsupported, busy
   [[nodiscard]] Result<Submission> submit(const proto::EditRequest& request, const std::string& idempotency_key);
   /// What submit() would do, and what it would cost. Errors as submit().
   [[nodiscard]] Result<proto::EditEstimate> estimate(const proto::EditRequest& request);

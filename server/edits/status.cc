@@ -1,5 +1,6 @@
 #include "server/edits/status.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "engine/edit/handles.h"
@@ -18,7 +19,11 @@ proto::EditRequest resolved_now(const proto::EditRequest& asked) {
   if (!request) return asked;
   auto params = request->params;
   params.intervals = engine::edit::resolved_intervals(*request);
-  return resolved(asked, params);
+  proto::EditRequest out = resolved(asked, params, request->handles);
+  const bool radii_are_known =
+      std::ranges::all_of(asked.handles, [](const auto& handle) { return handle.radius.has_value(); });
+  if (!radii_are_known && !asked.params.intervals) out.params.intervals.reset();  // the selected part decides
+  return out;
 }
 
 void fill_in(proto::EditStatus& status, proto::EditRecord record, const jobs::Job& job) {
@@ -40,7 +45,10 @@ void fill_in(proto::EditStatus& status, proto::EditRecord record, const jobs::Jo
     if (finished.interval <= job.finished_intervals && job.state != jobs::JobState::cancelled)
       status.finished_intervals.push_back(std::move(finished));
   status.handles = std::move(record.handles);
-  if (record.request) status.request = std::move(*record.request);
+  if (record.request) {
+    record.request->selection = std::move(status.request.selection);  // it is kept once, in the payload
+    status.request = std::move(*record.request);
+  }
   status.timings = std::move(record.timings);
   status.warnings = std::move(record.warnings);
   status.simd = std::move(record.simd);

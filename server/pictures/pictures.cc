@@ -1,7 +1,6 @@
 #include "server/pictures/pictures.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -11,13 +10,11 @@ using engine::scene::Image;
 using engine::scene::Mask;
 
 Image with_mask_shown(const Image& picture, const Mask& mask) {
-  constexpr std::array<float, 3> tint{1.0f, 0.1f, 0.6f};  // magenta: rare in photographs
-  constexpr float share = 0.5f;                           // of the tint: the picture still shows; a choice
   Image tinted = picture;
   for (int c = 0; c < tinted.channels; ++c) {
     const auto plane = tinted.plane(c);
     for (std::size_t i = 0; i < plane.size(); ++i)
-      if (mask.data[i] != 0) plane[i] += share * (tint[std::size_t(c)] - plane[i]);
+      if (mask.data[i] != 0) plane[i] += tint_share * (tint_color[c] - plane[i]);
   }
   return tinted;
 }

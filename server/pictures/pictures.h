@@ -1,9 +1,15 @@
 // What is done with rendered pictures before they are shown.
 #pragma once
 
+#include "engine/core/vec.h"
 #include "engine/scene/image.h"
 
 namespace server::pictures {
+
+/// What is singled out for people is tinted: magenta, which is rare in photographs, and so much that the picture still
+/// shows. A choice.
+inline const engine::Vec3 tint_color{1.0f, 0.1f, 0.6f};
+inline constexpr float tint_share = 0.5f;
 
 /// The picture with the pixels of the mask tinted. Both have the same size.
 [[nodiscard]] engine::scene::Image with_mask_shown(const engine::scene::Image& picture,

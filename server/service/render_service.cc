@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <chrono>
 #include <new>
+#include <span>
 #include <sstream>
 
 #include "server/http/negotiation.h"
+#include "server/pictures/pictures.h"
 
 namespace server::service {
 namespace {
@@ -32,6 +34,24 @@ std::vector<float> weights_of_changes(const render::Layers& layers) {
   return weights;
 }
 
+/// One byte for each row of the layers, from one for each row of the merged cloud; 0 for hidden ones.
+std::vector<std::uint8_t> on_layers(const render::Layers& layers, std::span<const std::uint8_t> merged) {
+  std::vector<std::uint8_t> bytes(layers.size(), 0);
+  const std::size_t base_rows = layers.base->size();
+  auto next_hidden = layers.hidden.begin();
+  std::size_t at = 0, changed = 0;
+  for (std::size_t row = 0; row < base_rows; ++row) {
+    if (next_hidden == layers.hidden.end() || *next_hidden != row) {
+      bytes[row] = merged[at++];
+      continue;
+    }
+    ++next_hidden;
+    if (changed < layers.changed.size() && layers.changed[changed] == row) bytes[base_rows + changed++] = merged[at++];
+  }
+  std::copy(merged.begin() + std::ptrdiff_t(at), merged.end(), bytes.begin() + std::ptrdiff_t(base_rows + changed));
+  return bytes;
+}
+
 }  // namespace
 
 RenderService::RenderService(const RenderServiceOptions& options)
@@ -50,6 +70,7 @@ std::string RenderService::etag(const scenes::LoadedVersion& version, const Pict
     text << ' ' << camera.translation[i] << ' ' << order.background[i];
     for (int j = 0; j < 3; ++j) text << ' ' << camera.rotation[i][j];
   }
+  if (order.selection) text << ' ' << order.selection->id;
   return http::etag_of(text.str());
 }
 
@@ -111,6 +132,9 @@ Result<Picture> RenderService::render(const scenes::LoadedVersion& version, cons
     arena_.run([&] {
       const render::DrawnVersion drawn(version.cloud);
       const render::Layers layers = drawn.layers();
+      const auto tinted =
+          order.selection ? on_layers(layers, order.selection->selected.rows) : std::vector<std::uint8_t>();
+      forward.tint = {.rows = tinted, .color = pictures::tint_color, .strength = pictures::tint_share};
       const auto weights = order.content == PictureContent::mask ? weights_of_changes(layers) : std::vector<float>();
       render::forward(layers, order.camera, forward, weights, canvas.workspace, canvas.rendering);
     });

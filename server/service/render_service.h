@@ -16,6 +16,7 @@
 #include "engine/render/forward.h"
 #include "engine/render/pick.h"
 #include "engine/scene/camera.h"
+#include "server/edits/selections.h"
 #include "server/pictures/picture_content.h"
 #include "server/scenes/scene_store.h"
 #include "server/service/fair_semaphore.h"
@@ -38,9 +39,10 @@ struct PictureOrder {
   engine::scene::Camera camera;
   PictureContent content = PictureContent::color;
   engine::io::ImageFormat format = engine::io::ImageFormat::jpeg;
-  engine::Vec3 background{0.0f};                 ///< Display-referred.
-  int sh_degree = engine::scene::max_sh_degree;  ///< Bands above are left out.
-  int quality = 90;                              ///< Quality of a JPEG, 1 to 100.
+  engine::Vec3 background{0.0f};                                    ///< Display-referred.
+  int sh_degree = engine::scene::max_sh_degree;                     ///< Bands above are left out.
+  int quality = 90;                                                 ///< Quality of a JPEG, 1 to 100.
+  std::shared_ptr<const edits::MadeSelection> selection = nullptr;  ///< Made on the version: its rows are tinted.
 };
 
 /// A picture as a file.

@@ -55,7 +55,4 @@ class SceneViews {
   scenes::BoundedCache virtual_;
 };
 
-/// The pinhole camera of the wire.
-[[nodiscard]] proto::PinholeCamera to_proto(const engine::scene::Camera& camera);
-
 }  // namespace server::service

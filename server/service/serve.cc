@@ -120,6 +120,8 @@ Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& lo
   if (!scenes) return propagate(scenes);
   for (const engine::Error& damage : (*scenes)->damaged())
     http::log(logger, spdlog::level::err, "a scene cannot be used: " + damage.message, {{"where", damage.where}});
+  edits::Selections selections(**scenes);
+  options.edits.selections = &selections;
   auto edits = edits::EditService::open(**scenes, options.edits);
   if (!edits) return propagate(edits);
   RenderService renders(options.renders);
@@ -128,7 +130,7 @@ Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& lo
   http::Metrics metrics;
   add_gauges(metrics, **scenes, **edits, renders);
   http::Router router = routes::all_routes(
-      {**scenes, **edits, options.edit_limits, renders, views, guard, metrics, service_info(options)});
+      {**scenes, **edits, selections, options.edit_limits, renders, views, guard, metrics, service_info(options)});
   auto server = http::HttpServer::start(options.http, std::move(router), guard, metrics, logger);
   if (!server) return propagate(server);
   out << "splatdrag " << SPLATDRAG_VERSION << " is listening on " << (*server)->url() << '\n' << std::flush;

@@ -161,6 +161,12 @@ describe('a picture', () => {
 describe('a pick', () => {
   const pick = async (version, body) => (await client.post(`/v1/scenes/${scene.id}/versions/${version}/pick`, body)).json();
 
+  test('selects what a pick counts', async () => {
+    const [{ source: center, radius }] = demo.ball.handles;
+    const selected = (await client.post(`/v1/scenes/${scene.id}/versions/0/select`, { selection: [{ sphere: { center, radius } }] })).json();
+    assert.equal(selected.count, (await pick(0, { point: center, radius })).gaussians_in_radius);
+  });
+
   test('finds the surface under a pixel, and counts around it', async () => {
     const view = (await client.get(`/v1/scenes/${scene.id}/views`)).json().views[0];
     const hit = await pick(0, { view: view.name, x: 160.5, y: 140.5, radius: 0.3 });

@@ -13,7 +13,7 @@ http::Router all_routes(const RouteDependencies& dependencies) {
                             [&edits = dependencies.edits](const std::string& scene, const auto& change) {
                               return edits.while_idle(scene, change);
                             }});
-  add_render_routes(router, dependencies.scenes, dependencies.views, dependencies.renders);
+  add_render_routes(router, {dependencies.scenes, dependencies.views, dependencies.renders, dependencies.selections});
   add_edit_routes(router, dependencies.edits, {.limits = dependencies.edit_limits});
   add_system_routes(router, {dependencies.guard, dependencies.metrics, dependencies.info,
                              [&edits = dependencies.edits] { return edits.trouble(); }, page_files(),

@@ -3,6 +3,7 @@
 
 #include "proto/service_info.h"
 #include "server/edits/edit_service.h"
+#include "server/edits/selections.h"
 #include "server/http/access_guard.h"
 #include "server/http/metrics.h"
 #include "server/http/router.h"
@@ -17,6 +18,7 @@ namespace server::service::routes {
 struct RouteDependencies {
   scenes::SceneStore& scenes;
   edits::EditService& edits;
+  edits::Selections& selections;
   EditLimits edit_limits;
   RenderService& renders;
   SceneViews& views;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -11,6 +12,8 @@
 #include "engine/scene/overlay.h"
 #include "proto/pick.h"
 #include "proto/render_request.h"
+#include "proto/selection.h"
+#include "server/edits/convert_selection.h"
 #include "server/edits/points.h"
 
 namespace server::service::routes {
@@ -26,12 +29,7 @@ using http::Reply;
 using proto::PictureFormat;
 using scenes::LoadedVersion;
 
-/// What both routes work with.
-struct Dependencies {
-  scenes::SceneStore& store;
-  SceneViews& views;
-  RenderService& renders;
-};
+using Dependencies = RenderRouteDependencies;
 
 const char* media_type(PictureFormat format) {
   switch (format) {
@@ -100,6 +98,11 @@ Result<Reply> render(const Call& call, const Dependencies& dependencies, const p
   for (int i = 0; i < 3; ++i) order.background[i] = float(request.background[std::size_t(i)]);
   order.sh_degree = request.sh_degree;
   order.quality = request.quality;
+  if (request.selection) {
+    auto selection = dependencies.selections.find(*version, *request.selection);
+    if (!selection) return propagate(selection);
+    order.selection = *std::move(selection);
+  }
   Reply reply;
   reply.media_type = media_type(*format);
   reply.etag = dependencies.renders.etag(*version, order);
@@ -201,10 +204,37 @@ Result<Reply> post_pick(const Call& call, const Dependencies& dependencies) {
   return Reply::json(proto::to_json(*result));
 }
 
+proto::SelectionSummary summary_of(const edits::MadeSelection& made) {
+  const auto& selected = made.selected;
+  proto::SelectionSummary summary;
+  summary.id = made.id;
+  summary.count = selected.count;
+  summary.low = edits::to_point(engine::DVec3(selected.bounds.low));
+  summary.high = edits::to_point(engine::DVec3(selected.bounds.high));
+  summary.centre = edits::to_point(selected.centre);
+  summary.undecided = selected.undecided;
+  summary.warnings = edits::warnings_of(selected);
+  return summary;
+}
+
+Result<Reply> post_select(const Call& call, const Dependencies& dependencies) {
+  const auto asked = proto::parse_selection(call.body());
+  if (!asked) return propagate(asked);
+  const std::string& id = call.path("id");
+  const auto version = dependencies.store.load(id, call.path("v"));
+  if (!version) return propagate(version);
+  const auto resolved = dependencies.selections.resolve(id, *asked);
+  if (!resolved) return propagate(resolved);
+  Result<std::shared_ptr<const edits::MadeSelection>> made;
+  auto done = dependencies.renders.run_in_turn([&] { made = dependencies.selections.make(*version, *resolved); });
+  if (!done) return propagate(done);
+  if (!made) return propagate(made);
+  return Reply::json(proto::to_json(summary_of(**made)));
+}
+
 }  // namespace
 
-void add_render_routes(http::Router& router, scenes::SceneStore& store, SceneViews& views, RenderService& renders) {
-  const Dependencies dependencies{store, views, renders};
+void add_render_routes(http::Router& router, const RenderRouteDependencies& dependencies) {
   const std::string version = "/v1/scenes/{id}/versions/{v}";
   router.add({.method = "GET",
               .path = version + "/render",
@@ -218,6 +248,11 @@ void add_render_routes(http::Router& router, scenes::SceneStore& store, SceneVie
   router.add({.method = "POST",
               .path = version + "/pick",
               .handler = [dependencies](const Call& call) { return post_pick(call, dependencies); },
+              .body = http::Body::json,
+              .queries = {}});
+  router.add({.method = "POST",
+              .path = version + "/select",
+              .handler = [dependencies](const Call& call) { return post_select(call, dependencies); },
               .body = http::Body::json,
               .queries = {}});
 }

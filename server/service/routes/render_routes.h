@@ -1,6 +1,7 @@
-// /v1/scenes/{id}/versions/{v}/render and .../pick.
+// /v1/scenes/{id}/versions/{v}/render, .../pick and .../select.
 #pragma once
 
+#include "server/edits/selections.h"
 #include "server/http/router.h"
 #include "server/scenes/scene_store.h"
 #include "server/service/render_service.h"
@@ -8,7 +9,15 @@
 
 namespace server::service::routes {
 
-/// Adds these routes. All of the rest outlives the router.
-void add_render_routes(http::Router& router, scenes::SceneStore& store, SceneViews& views, RenderService& renders);
+/// What these routes work with; all of it outlives the router.
+struct RenderRouteDependencies {
+  scenes::SceneStore& store;
+  SceneViews& views;
+  RenderService& renders;
+  edits::Selections& selections;
+};
+
+/// Adds these routes.
+void add_render_routes(http::Router& router, const RenderRouteDependencies& dependencies);
 
 }  // namespace server::service::routes

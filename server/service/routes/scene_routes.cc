@@ -6,6 +6,7 @@
 
 #include "proto/scene.h"
 #include "proto/time_text.h"
+#include "server/edits/cameras.h"
 #include "server/edits/points.h"
 #include "server/pictures/photo_comparison.h"
 
@@ -174,7 +175,7 @@ Result<Reply> get_views(const Call& call, SceneViews& views) {
   if (!set) return propagate(set);
   std::vector<proto::View> out;
   for (const SceneView& view : (*set)->views)
-    out.push_back({view.camera.name, service::to_proto(view.camera), view.photo});
+    out.push_back({view.camera.name, edits::to_proto(view.camera), view.photo});
   return Reply::json(proto::to_json(out, (*set)->is_virtual ? "virtual" : "dataset"));
 }
 

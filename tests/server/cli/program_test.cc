@@ -40,7 +40,7 @@ TEST(Program, ListsExactlyTheSubcommandsThereAre) {
   const Finished run = splatdrag({"--help"});
   EXPECT_EQ(run.status, 0);
   std::size_t listed = 0;
-  for (const char* name : {"serve", "edit", "fit", "render", "info", "convert", "demo-scene", "bench-edit"}) {
+  for (const char* name : {"serve", "edit", "select", "fit", "render", "info", "convert", "demo-scene", "bench-edit"}) {
     EXPECT_NE(run.out.find("\n  " + std::string(name) + " "), std::string::npos) << name;
     ++listed;
   }
@@ -75,10 +75,11 @@ TEST(Program, SaysItsVersion) {
 }
 
 TEST(Program, RefusesAWrongCommandLineInOneLine) {
-  expect_error({}, 2, "a subcommand is required: serve edit fit render info convert demo-scene bench-edit");
+  expect_error({}, 2, "a subcommand is required: serve edit select fit render info convert demo-scene bench-edit");
   expect_error({"bake"}, 2, "\"bake\" is no subcommand");
   expect_error({"serve"}, 2, "--data-dir is required");
   expect_error({"edit"}, 2, "--scene is required");
+  expect_error({"select", "a.ply"}, 2, "--selection is required");
   expect_error({"info", "--scene", "a.ply", "--frob"}, 2, "--frob");
   expect_error({"edit", "--threads", "-1"}, 2, "--threads");
   expect_error({"--config", "/nonexistent.toml", "info", "--scene", "a.ply"}, 2, "/nonexistent.toml");

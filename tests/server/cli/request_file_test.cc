@@ -39,5 +39,17 @@ TEST(RequestFile, RefusesAFileThatIsTooLargeOrAbsent) {
   EXPECT_EQ(read_request(folder.path(), "").error().code, ErrorCode::invalid_argument);
 }
 
+TEST(SelectionFile, IsReadAndNamesItsFileInErrors) {
+  const support::TempDir folder;
+  const auto file = folder.path() / "part.json";
+  support::write_file(file, R"({"selection": [{"rows": [[0, 3]]}]})");
+  const auto selection = read_selection(file);
+  ASSERT_TRUE(selection) << selection.error().message;
+  EXPECT_EQ(selection->size(), 1u);
+  support::write_file(file, R"({"selection": [{"rows": [[0, -3]]}]})");
+  ASSERT_FALSE(read_selection(file));
+  EXPECT_EQ(read_selection(file).error().where, "part.json:selection[0].rows[0][1]");
+}
+
 }  // namespace
 }  // namespace server::cli

@@ -157,6 +157,113 @@ TEST_F(ServiceTest, ACorrectedEditGoesOnToTheSameBytes) {
   EXPECT_EQ(version_bytes(*store, scene, *resumed.result_version), version_bytes(*store, scene, *whole.result_version));
 }
 
+/// Moves the ball by what is selected; its handle says nothing of how far it grips.
+proto::EditRequest move_selected_ball(const std::string& scene, int intervals = 2) {
+  proto::EditRequest request = move_and_correct_ball(scene, intervals);
+  request.handles[0].radius.reset();
+  request.selection = {{.action = proto::selection::Sphere{{0, 0, 0}, 0.3}}};
+  return request;
+}
+
+TEST_F(ServiceTest, MovesWhatIsSelected) {
+  proto::EditRequest request = move_selected_ball(scene);
+  request.preset = proto::Preset::preview;
+  request.params = move_ball(scene).params;
+  const auto by_ball = wait_for_end(*service, submit(move_ball(scene)));
+  const auto accepted = value(service->submit(request, ""));
+  EXPECT_EQ(accepted.status.request.selection, request.selection);
+  const auto done = wait_for_end(*service, accepted.status.id);
+  ASSERT_EQ(done.state, "succeeded") << done.error->message;
+  EXPECT_EQ(done.handles.at(0).gaussians, 200u);
+  EXPECT_EQ(done.request.selection, request.selection);
+  ASSERT_TRUE(done.request.handles[0].radius) << "what was used is said";
+  EXPECT_NEAR(*done.request.handles[0].radius, 0.175, 0.001) << "that of the ball";
+  EXPECT_EQ(version_bytes(*store, scene, *done.result_version), version_bytes(*store, scene, *by_ball.result_version));
+
+  request.selection->push_back(
+      {.op = proto::selection::Op::subtract, .action = proto::selection::Plane{{0, 0, 0}, {0, 1, 0}}});
+  const auto half = value(service->preview(request));
+  EXPECT_GT(half.handles.at(0).gaussians, 50u);
+  EXPECT_LT(half.handles.at(0).gaussians, 150u);
+  request.region = proto::Region{{0, 0, 0}, {0.1, 4, 4}};
+  EXPECT_LT(value(service->preview(request)).handles.at(0).gaussians, half.handles.at(0).gaussians)
+      << "within the region";
+}
+
+TEST_F(ServiceTest, LeavesTheNumberOfIntervalsToWhatIsSelected) {
+  proto::EditRequest request = move_selected_ball(scene);
+  request.params.intervals.reset();
+  request.handles[0].target = proto::Point{1, 0, 0};
+  request.mode = proto::Mode::extend;
+  submit(move_ball_slowly(scene));
+  const auto waiting = value(service->submit(request, "")).status;
+  EXPECT_EQ(waiting.request.params.intervals, std::nullopt) << "not known before it begins";
+  EXPECT_EQ(waiting.intervals, 0);
+  const auto estimate = value(service->estimate(request));
+  EXPECT_EQ(estimate.intervals, 3);
+  EXPECT_EQ(estimate.request.params.intervals, 3);
+  EXPECT_EQ(estimate.request.selection, request.selection);
+  EXPECT_EQ(wait_for_end(*service, waiting.id).intervals, 3);
+}
+
+TEST_F(ServiceTest, AnEditOfASelectionGoesOnToTheSameBytes) {
+  const auto whole = wait_for_end(*service, submit(move_selected_ball(scene, 3)));
+  ASSERT_EQ(whole.state, "succeeded") << whole.error->message;
+  const auto id = submit(move_selected_ball(scene, 3));
+  wait_for_interval(*service, id, 1);
+  reopen();
+  const auto resumed = wait_for_end(*service, id);
+  ASSERT_EQ(resumed.state, "succeeded");
+  EXPECT_EQ(resumed.request, whole.request);
+  EXPECT_EQ(version_bytes(*store, scene, *resumed.result_version), version_bytes(*store, scene, *whole.result_version));
+}
+
+TEST_F(ServiceTest, SaysWhatIsWrongWithASelection) {
+  struct Case {
+    const char* what;
+    proto::selection::Action action;
+    ErrorCode code;
+    const char* where;
+  };
+  const Case cases[] = {
+      {"empty", proto::selection::Sphere{{9, 9, 9}, 0.1}, ErrorCode::unprocessable, "selection"},
+      {"no such row", proto::selection::Rows{{{0, 345}}}, ErrorCode::unprocessable, "selection[0].rows[0]"},
+      {"no dataset", proto::selection::Stroke{"a.png", {{1, 1}}, 3}, ErrorCode::not_found, "selection[0].stroke.view"},
+      {"nothing there", proto::selection::Grow{{{0, 90, 0}}, {}, 1}, ErrorCode::unprocessable,
+       "selection[0].grow.inside[0]"},
+  };
+  for (const Case& c : cases) {
+    SCOPED_TRACE(c.what);
+    proto::EditRequest request = move_selected_ball(scene);
+    request.selection = {{.action = c.action}};
+    for (const auto& error : {service->submit(request, "").error(), service->estimate(request).error(),
+                              service->preview(request).error()}) {
+      EXPECT_EQ(error.code, c.code) << error.message;
+      EXPECT_EQ(error.where, c.where) << error.message;
+    }
+  }
+  proto::EditRequest request = move_selected_ball(scene);
+  request.handles.push_back({.source = {50, 0, 0}, .target = proto::Point{51, 0, 0}, .radius = {}});
+  const auto lonely = service->preview(request);
+  ASSERT_FALSE(lonely);
+  EXPECT_EQ(lonely.error().where, "handles[1].source") << lonely.error().message;
+}
+
+TEST_F(ServiceTest, WarnsOfWhatASelectionTakesTooMuchOf) {
+  proto::EditRequest request = move_ball(scene);
+  const proto::PinholeCamera close{32, 32, 200, 200, 16, 16, {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 4}}}};
+  request.selection = {{.action = proto::selection::Sphere{{0, 0, 0}, 0.3}},
+                       {.action = proto::selection::Stroke{proto::Camera(close), {{16, 16}}, 40}},
+                       {.action = proto::selection::Sphere{{40, 0, 0}, 0.1}}};
+  const auto warnings = value(service->preview(request)).warnings;
+  EXPECT_TRUE(std::ranges::any_of(warnings, [](const auto& w) { return w.starts_with("the selection takes"); }));
+  EXPECT_TRUE(
+      std::ranges::any_of(warnings, [](const auto& w) { return w == "selection[2]: the sphere names no Gaussian"; }));
+  EXPECT_EQ(value(service->estimate(request)).warnings, warnings);
+  const auto done = wait_for_end(*service, submit(request));
+  for (const std::string& warning : warnings) EXPECT_TRUE(std::ranges::count(done.warnings, warning)) << warning;
+}
+
 TEST_F(ServiceTest, ShowsPicturesOfEveryInterval) {
   const auto id = submit(move_ball(scene));
   wait_for_end(*service, id);

@@ -37,6 +37,7 @@ TEST(AllRoutes, AreThoseOfTheContract) {
   store_options.folder = folder.path() / "scenes";
   auto scenes = scenes::SceneStore::open(store_options);
   ASSERT_TRUE(scenes) << scenes.error().message;
+  edits::Selections selections(**scenes);
   edits::ServiceOptions edit_options;
   edit_options.folder = folder.path() / "edits";
   auto edits = edits::EditService::open(**scenes, edit_options);
@@ -45,7 +46,7 @@ TEST(AllRoutes, AreThoseOfTheContract) {
   SceneViews views(**scenes, renders);
   http::AccessGuard guard({});
   http::Metrics metrics;
-  const http::Router router = all_routes({**scenes, **edits, {}, renders, views, guard, metrics, {}});
+  const http::Router router = all_routes({**scenes, **edits, selections, {}, renders, views, guard, metrics, {}});
 
   std::set<std::string> page;
   for (const EmbeddedFile& file : page_files()) page.insert("GET /" + std::string(file.name));

@@ -12,7 +12,8 @@ namespace {
 using engine::ErrorCode;
 using RenderRoutes = RouteFixture;
 
-const std::string render_path = "/v1/scenes/{id}/versions/{v}/render", pick_path = "/v1/scenes/{id}/versions/{v}/pick";
+const std::string render_path = "/v1/scenes/{id}/versions/{v}/render", pick_path = "/v1/scenes/{id}/versions/{v}/pick",
+                  select_path = "/v1/scenes/{id}/versions/{v}/select";
 
 FakeCall from_front(FakeCall request) {
   request.in_query = {{"eye", "0,0,-4"}, {"target", "0,0,0"}, {"width", "64"}, {"height", "48"}};
@@ -272,6 +273,139 @@ TEST_F(RenderRoutes, NameEveryWrongFieldOfAPick) {
   EXPECT_EQ(where(R"({"view":"nowhere","x":1,"y":1})"), "view");
   EXPECT_EQ(where(R"({"point":[0,0,0],"radius":-1})"), "radius");
   EXPECT_EQ(where("{"), "line 1, column 1");
+}
+
+/// The left half of the wall, and a camera on it.
+const std::string left_half = R"({"selection": [{"plane": {"point": [-0.05, 0, 0], "normal": [-1, 0, 0]}}]})";
+
+TEST_F(RenderRoutes, SelectAndSayWhat) {
+  const std::string id = add_wall();
+  const auto reply = call("POST", select_path, with_body(id, left_half));
+  ASSERT_TRUE(reply) << reply.error().message << reply.error().where;
+  const json answer = json::parse(reply->body);
+  EXPECT_EQ(answer["count"], 10 * 21);
+  EXPECT_NEAR(answer["bounds"]["low"][0].get<double>(), -1.0, 1e-6);
+  EXPECT_NEAR(answer["bounds"]["high"][0].get<double>(), -0.1, 1e-6);
+  EXPECT_NEAR(answer["centre"][0].get<double>(), -0.55, 1e-6);
+  EXPECT_EQ(answer["undecided"], 0);
+  EXPECT_EQ(answer["warnings"], json::array());
+  EXPECT_EQ(json::parse(call("POST", select_path, with_body(id, left_half))->body)["id"], answer["id"]);
+  const auto nothing = call("POST", select_path, with_body(id, R"({"selection": []})"));
+  ASSERT_TRUE(nothing) << "it is not an error";
+  EXPECT_EQ(json::parse(nothing->body)["count"], 0);
+  EXPECT_EQ(json::parse(nothing->body)["warnings"], json::array({"nothing is selected"}));
+}
+
+TEST_F(RenderRoutes, SelectByWhatACameraShows) {
+  const std::string id = add_wall();
+  const auto count = [&](const std::string& depth) {
+    const auto reply =
+        call("POST", select_path,
+             with_body(id, R"({"selection": [{"stroke": {"camera": {"eye": [0, 0, -4], "target": [0, 0, 0],
+      "up": [0, -1, 0], "width": 64, "height": 48}, "points": [[32, 24]], "radius": 0.5, "depth": ")" +
+                               depth + R"("}}]})"));
+    return reply ? json::parse(reply->body)["count"].get<int>() : -1;
+  };
+  EXPECT_EQ(count("through"), 1);
+  EXPECT_EQ(count("visible"), 0) << "half of it shows beside so small a disc";
+}
+
+TEST_F(RenderRoutes, TintWhatIsSelected) {
+  const std::string id = add_wall();
+  const auto reply = call("POST", select_path, with_body(id, left_half));
+  ASSERT_TRUE(reply);
+  FakeCall request = from_front(about(id));
+  request.in_query["format"] = "png";
+  const auto plain = call("GET", render_path, request);
+  request.in_query["selection"] = json::parse(reply->body)["id"].get<std::string>();
+  const auto tinted = call("GET", render_path, request);
+  ASSERT_TRUE(plain && tinted);
+  EXPECT_NE(plain->etag, tinted->etag);
+  const auto before = decoded(*plain), after = decoded(*tinted);
+  int left = 0;
+  for (int y = 0; y < before.height; ++y)
+    for (int x = 0; x < before.width; ++x) {
+      const float change = after.at(x, y, 0) - before.at(x, y, 0);
+      if (x > 34) {
+        EXPECT_EQ(change, 0) << x << ' ' << y;
+      } else if (change > 0.2f) {
+        ++left;
+      }
+    }
+  EXPECT_GT(left, 100);
+  request.known_etag = tinted->etag;
+  EXPECT_EQ(call("GET", render_path, request)->status, 304);
+  const auto posted =
+      call("POST", render_path,
+           with_body(id, R"({"camera": {"eye": [0, 0, -4], "target": [0, 0, 0], "width": 64, "height": 48},
+                                     "format": "png", "selection": ")" +
+                             request.in_query["selection"] + R"("})"));
+  ASSERT_TRUE(posted) << posted.error().message;
+  EXPECT_EQ(posted->etag, tinted->etag);
+}
+
+TEST_F(RenderRoutes, TintWhatIsSelectedInAnEditedVersion) {
+  const std::string id = add_wall();
+  const auto base = cloud_of(id, "0");
+  scenes::Overlay edit =
+      engine::scene::no_change(base);  // the first column goes, the last one is another, one is added
+  std::vector<std::uint32_t> last;
+  for (std::uint32_t row = 0; row < base.size(); ++row) {
+    if (row % 21 == 0) edit.removed.push_back(row);
+    if (row % 21 == 20) last.push_back(row);
+  }
+  edit.changed = last;
+  last.push_back(5);
+  engine::scene::append_rows(edit.rows, base, last);
+  ASSERT_TRUE(store->add_version(id, 0, "e1", edit));
+  write(temp.path() / "merged.ply", cloud_of(id, "1"));
+  const std::string merged = store->add_upload(temp.path() / "merged.ply", "merged.ply", "")->id;
+  const auto picture = [&](const std::string& scene, const std::string& version) {
+    FakeCall select = with_body(scene, R"({"selection": [{"rows": [[15, 25], [390, 421]]}]})");
+    select.in_path["v"] = version;
+    const auto made = call("POST", select_path, select);
+    if (!made) throw std::runtime_error(made.error().message);
+    FakeCall request = from_front(about(scene, version));
+    request.in_query["eye"] = "1.3,-0.7,-4";  // from aside: no two have the same depth
+    request.in_query["format"] = "png";
+    request.in_query["selection"] = json::parse(made->body)["id"].get<std::string>();
+    return call("GET", render_path, request)->body;
+  };
+  EXPECT_EQ(cloud_of(id, "1").size(), 421u);
+  EXPECT_TRUE(picture(id, "1") == picture(merged, "0"));
+}
+
+TEST_F(RenderRoutes, NameASelectionThatIsNotThere) {
+  const std::string id = add_wall();
+  FakeCall request = from_front(about(id));
+  request.in_query["selection"] = "q0123456789abcdef";
+  const auto lost = call("GET", render_path, request);
+  ASSERT_FALSE(lost);
+  EXPECT_EQ(lost.error().code, ErrorCode::not_found);
+  EXPECT_EQ(lost.error().where, "selection");
+  EXPECT_NE(lost.error().message.find("post it again"), std::string::npos);
+  request.in_query["what"] = "depth";
+  EXPECT_EQ(call("GET", render_path, request).error().code, ErrorCode::invalid_argument) << "only colours are tinted";
+}
+
+TEST_F(RenderRoutes, NameEveryWrongFieldOfASelection) {
+  const std::string id = add_wall();
+  const auto where = [&](const std::string& operation) {
+    const auto reply = call("POST", select_path, with_body(id, R"({"selection": [)" + operation + "]}"));
+    return reply ? "accepted" : reply.error().where;
+  };
+  EXPECT_EQ(where(R"({"rows": [[0, 441]]})"), "accepted");
+  EXPECT_EQ(where(R"({"rows": [[0, 442]]})"), "selection[0].rows[0]");
+  EXPECT_EQ(where(R"({"rows": [[3, 3]]})"), "selection[0].rows[0]");
+  EXPECT_EQ(where(R"({"op": "subtract", "invert": true})"), "selection[0].op");
+  EXPECT_EQ(where(R"({"grow": {"inside": [[0, 0, 0], [900, 0, 0]], "reach": 1}})"), "selection[0].grow.inside[1]");
+  EXPECT_EQ(where(R"({"stroke": {"view": "nowhere", "points": [[1, 1]], "radius": 1}})"), "selection[0].stroke.view");
+  EXPECT_EQ(where(R"({"stroke": {"camera": {"eye": [0, 0, -4], "target": [0, 0, 0], "width": 16384, "height": 16384},
+                     "points": [[1, 1]], "radius": 1}})"),
+            "selection[0].stroke.camera.width");
+  std::string searches;
+  for (int i = 0; i < 33; ++i) searches += std::string(i == 0 ? "" : ",") + R"({"expand": 1})";
+  EXPECT_EQ(where(searches), "selection[32].expand");
 }
 
 }  // namespace

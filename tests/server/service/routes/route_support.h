@@ -45,15 +45,17 @@ struct FakeCall : http::Call {
 struct RouteFixture : scenes::StoreFixture {
   RenderService renders{{.threads = 2, .max_waiting = 8, .max_side = 256}};
   std::unique_ptr<SceneViews> views;
+  std::unique_ptr<edits::Selections> selections;
   http::Router router;
 
   RouteFixture() { connect(); }
   void connect() {
     views = std::make_unique<SceneViews>(*store, renders);
+    selections = std::make_unique<edits::Selections>(*store);
     router = {};
     add_scene_routes(router,
                      {*store, renders, *views, [](const std::string&, const auto& change) { return change(); }});
-    add_render_routes(router, *store, *views, renders);
+    add_render_routes(router, {*store, *views, renders, *selections});
   }
 
   engine::Result<http::Reply> call(const std::string& method, const std::string& path, const FakeCall& request) {
