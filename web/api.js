@@ -132,6 +132,8 @@ export async function render(id, version, body, signal) {
 
 export const pick = (id, version, body, signal) =>
   json(`${versionPath(id, version)}/pick`, jsonBody("POST", body, { signal }));
+export const select = (id, version, selection, signal) =>
+  json(`${versionPath(id, version)}/select`, jsonBody("POST", { selection }, { signal }));
 export const fileUrl = (id, version, format) => `${versionPath(id, version)}/file?format=${part(format)}`;
 
 export const createPreview = (request, signal) => json("/v1/previews", jsonBody("POST", request, { signal }));

@@ -139,15 +139,18 @@ export function showHelp() {
     ["Drag a handle's dot", "set where it goes"],
     ["Wheel over a dot", "its radius"],
     ["Arrow keys", "orbit; with Shift: move sideways"],
-    ["Enter", "place a handle in the middle of the picture"],
+    ["Enter", "place a handle, or a point that selects, in the middle of the picture"],
     ["F", "turn about the point under the pointer"],
+    ["S", "select what moves, and back to handles"],
+    ["1, 2, 3", "select by clicks, brush, lasso"],
+    ["Right click, or Alt", "selecting: what is not meant"],
     ["[ and ]", "previous, next view"],
     ["R", "back to the start"],
     ["B (hold)", "compare with before"],
     ["P", "preview"],
     ["Del", "remove the selected handle"],
     ["Ctrl + Z, Ctrl + Shift + Z", "undo, redo what you placed"],
-    ["Esc", "select nothing; give a drag up"],
+    ["Esc", "give a drag up; end selecting; no handle"],
   ];
   const dialog = modal(
     h(
@@ -163,6 +166,11 @@ export function showHelp() {
         "ol",
         { class: "steps" },
         h("li", {}, "Click a part of the scene: a handle takes hold of the Gaussians within its radius."),
+        h(
+          "li",
+          {},
+          "To say more exactly what moves, select it: click it, paint over it or draw around it. What is selected is tinted.",
+        ),
         h(
           "li",
           {},

@@ -15,6 +15,7 @@ import {
 } from "./camera.js";
 import { History } from "./history.js";
 import { previewKey, requestOf } from "./requests.js";
+import { NOTHING_SELECTED, Selecting } from "./selecting.js";
 import { follow, hasEnded, merged } from "./watch.js";
 
 // Choices: how long after the last change of a handle or of the request something is done about it.
@@ -33,7 +34,8 @@ export const NOTHING_OPEN = {
   layer: "color",
   comparing: false,
   compareWith: null, // A version; null: the one before.
-  handles: [], // {id, source, normal, target, radius, group}
+  ...NOTHING_SELECTED,
+  handles: [], // {id, source, normal, target, radius, grip, group}; grip: the radius to go with a selection, or null
   selected: null, // Id of a handle.
   dragging: false,
   constraint: "view",
@@ -54,8 +56,11 @@ export const NOTHING_OPEN = {
 };
 
 // What outlives a reload: as it is; and all, of which open() puts back what still fits the scene.
-const LASTING_KEYS = ["region", "mode", "preset", "prompt", "params", "autoPreview", "layer", "tab", "constraint"];
-const STORED_KEYS = ["pose", "version", "handles", "viewName", ...LASTING_KEYS];
+const LASTING_KEYS = [
+  ...["region", "mode", "preset", "prompt", "params", "autoPreview", "layer", "tab", "constraint"],
+  ...["selectTool", "selectDepth", "brushRadius", "tinted"],
+];
+const STORED_KEYS = ["pose", "version", "handles", "selection", "viewName", ...LASTING_KEYS];
 
 /** The members of an object that have these names, as far as it has them. */
 const only = (names, from) =>
@@ -67,7 +72,9 @@ export function parentOf(scene, version) {
 }
 
 /** Which version is on the screen: a number, or the id of a preview. */
-export function shownVersion({ scene, version, preview, comparing, compareWith }) {
+export function shownVersion({ scene, version, preview: made, comparing, compareWith, selectMode }) {
+  // What is selected is selected on the version, not on what a preview has made of it.
+  const preview = selectMode ? null : made;
   if (!comparing) return preview ? preview.version : version;
   if (compareWith !== null) return compareWith;
   return preview ? version : (parentOf(scene, version) ?? version);
@@ -75,6 +82,7 @@ export function shownVersion({ scene, version, preview, comparing, compareWith }
 
 export class Editor {
   #history = new History();
+  #placed = null;
   #timers = new Map();
   #following = new Map();
   #counting = null;
@@ -88,13 +96,26 @@ export class Editor {
   /**   say(message, options)  a short message to the user */
   constructor(store, memory, say) {
     Object.assign(this, { store, memory, say });
-    store.watch(["handles", "version", "scene", "dragging"], () => this.#countSoon());
+    this.selecting = new Selecting(store, { place: (selection) => this.#place({ selection }), say });
+    store.watch(["handles", "selection", "version", "scene", "dragging"], () => this.#countSoon());
     store.watch(["layer", "version", "preview"], ({ layer, version, preview }) => {
       // Version 0 does not differ from itself.
       if (layer === "mask" && version === 0 && !preview) store.set({ layer: "color" });
     });
-    store.watch(["handles", "version", "region", "mode", "preset", "params", "autoPreview", "dragging"], () =>
-      this.#requestChanged(),
+    store.watch(
+      [
+        "handles",
+        "selection",
+        "version",
+        "region",
+        "mode",
+        "preset",
+        "params",
+        "autoPreview",
+        "dragging",
+        "selectMode",
+      ],
+      () => this.#requestChanged(),
     );
     store.watch(STORED_KEYS, () => this.#saveSoon());
   }
@@ -115,7 +136,8 @@ export class Editor {
     const version = scene.versions.some((v) => v.version === stored.version)
       ? stored.version
       : scene.versions.at(-1).version;
-    const handles = stored.version === version && Array.isArray(stored.handles) ? stored.handles : [];
+    const placed = (list) => (stored.version === version && Array.isArray(list) ? list : []);
+    const handles = placed(stored.handles);
     this.#nextId = Math.max(0, ...handles.map((h) => h.id)) + 1;
     const pose = isPose(stored.pose) ? stored.pose : null;
     this.#lastView = stored.viewName ?? null;
@@ -124,6 +146,7 @@ export class Editor {
       scene,
       version,
       handles,
+      selection: placed(stored.selection),
       pose: pose ?? (scene.dataset ? null : firstPose(scene)),
       viewName: pose ? (stored.viewName ?? null) : null,
     });
@@ -243,22 +266,31 @@ export class Editor {
     this.store.set({ version, comparing: false, compareWith: null, preview: null, problem: null, estimate: null });
   }
 
-  // --- handles ---------------------------------------------------------------------------------------------------
+  // --- what is placed: handles and the selection -------------------------------------------------------------------
 
-  #setHandles(handles, note = true) {
-    if (note) this.#history.note(this.state.handles);
+  /** What undo brings back: {handles, selection}; the same object as long as both are. */
+  #present() {
+    const { handles, selection } = this.state;
+    if (this.#placed?.handles !== handles || this.#placed.selection !== selection)
+      this.#placed = { handles, selection };
+    return this.#placed;
+  }
+
+  /** Puts handles, a selection, or both in place of what is there. */
+  #place({ handles = this.state.handles, selection = this.state.selection }, note = true) {
+    if (note) this.#history.note(this.#present());
     const { selected } = this.state;
-    this.store.set({ handles, selected: handles.some((h) => h.id === selected) ? selected : null });
+    this.store.set({ handles, selection, selected: handles.some((h) => h.id === selected) ? selected : null });
   }
 
   undo() {
-    const handles = this.#history.undo(this.state.handles);
-    if (handles) this.#setHandles(handles, false);
+    const placed = this.#history.undo(this.#present());
+    if (placed) this.#place(placed, false);
   }
 
   redo() {
-    const handles = this.#history.redo(this.state.handles);
-    if (handles) this.#setHandles(handles, false);
+    const placed = this.#history.redo(this.#present());
+    if (placed) this.#place(placed, false);
   }
 
   get canUndo() {
@@ -289,9 +321,10 @@ export class Editor {
         normal: picked.normal ?? null,
         target: null,
         radius: this.#defaultRadius(),
+        grip: null,
         group: this.state.handles.at(-1)?.group ?? 0,
       };
-      this.#setHandles([...this.state.handles, handle]);
+      this.#place({ handles: [...this.state.handles, handle] });
       // The handle is on the version, not on what a preview has made of it.
       this.store.set({ selected: handle.id, tab: "drag" });
     } catch (error) {
@@ -308,18 +341,15 @@ export class Editor {
 
   /** Changes a handle. `note`: can be undone (not each step of a drag). */
   change(id, patch, note = true) {
-    this.#setHandles(
-      this.state.handles.map((h) => (h.id === id ? { ...h, ...patch } : h)),
-      note,
-    );
+    this.#place({ handles: this.state.handles.map((h) => (h.id === id ? { ...h, ...patch } : h)) }, note);
   }
 
   remove(id) {
-    this.#setHandles(this.state.handles.filter((h) => h.id !== id));
+    this.#place({ handles: this.state.handles.filter((h) => h.id !== id) });
   }
 
   removeAll() {
-    if (this.state.handles.length) this.#setHandles([]);
+    if (this.state.handles.length) this.#place({ handles: [] });
   }
 
   select(id) {
@@ -330,8 +360,8 @@ export class Editor {
    *    at  {x, y} where the pointer took hold, pixels
    *  Returns {move(x, y), end(), giveUp()}. */
   dragTarget(id, camera, at) {
-    const before = this.state.handles;
-    const handle = before.find((h) => h.id === id);
+    const before = this.#present();
+    const handle = before.handles.find((h) => h.id === id);
     const from = handle.target ?? handle.source;
     const seen = project(camera, from) ?? at;
     const [gripX, gripY] = [seen.x - at.x, seen.y - at.y];
@@ -365,7 +395,9 @@ export class Editor {
   }
 
   #countSoon() {
-    if (this.state.scene) this.#later("count", COUNT_DELAY_MS, () => this.#count());
+    const { scene, selection } = this.state;
+    // With a selection, it is not their spheres that say what handles move.
+    this.#later("count", COUNT_DELAY_MS, () => scene && selection.length === 0 && this.#count());
   }
 
   async #count() {
@@ -388,8 +420,10 @@ export class Editor {
     }
   }
 
-  /** How many Gaussians lie within a handle's radius: {gaussians, error}; null while that is not known. */
+  /** How many Gaussians lie within a handle's radius: {gaussians, error}; null while that is not known, and where a
+   *  selection says what moves. */
   countOf(handle) {
+    if (this.state.selection.length > 0) return null;
     const count = this.state.counts[handle.id];
     return count?.key === this.#countKey(handle) ? count : null;
   }
@@ -401,7 +435,7 @@ export class Editor {
   }
 
   #requestChanged() {
-    const { scene, handles, preview, problem, autoPreview, dragging } = this.state;
+    const { scene, handles, preview, problem, autoPreview, dragging, selectMode } = this.state;
     if (!scene) return;
     const request = this.request();
     const key = previewKey(request, this.state.info?.parameters);
@@ -412,8 +446,9 @@ export class Editor {
       if (preview) this.store.set({ preview: null });
       return;
     }
-    if (autoPreview && !dragging && preview?.key !== key && this.state.problem === null)
-      this.#later("preview", PREVIEW_DELAY_MS, () => this.preview());
+    // While somebody selects, a preview is not on the screen: it can wait.
+    if (autoPreview && !dragging && !selectMode && preview?.key !== key && this.state.problem === null)
+      this.#later("preview", PREVIEW_DELAY_MS, () => !this.state.selectMode && this.preview());
   }
 
   /** Whether the preview on the screen shows what is asked for now. */
@@ -425,6 +460,7 @@ export class Editor {
   async preview() {
     const { scene, handles } = this.state;
     if (!scene || !handles.some((h) => h.target)) return;
+    this.selecting.use(null);
     this.#previewing?.abort();
     const abort = (this.#previewing = new AbortController());
     const request = this.request();
@@ -486,16 +522,19 @@ export class Editor {
 
   /** Puts a request on the screen, in place of what is there. */
   load(request) {
+    const { selection = [] } = request;
     const handles = request.handles.map((handle) => ({
       id: this.#nextId++,
       source: handle.source,
       normal: null,
       target: handle.target ?? null,
-      radius: handle.radius,
+      radius: handle.radius ?? this.#defaultRadius(),
+      grip: selection.length ? (handle.grip ?? handle.radius ?? null) : null,
       group: handle.group ?? 0,
     }));
-    this.#setHandles(handles);
+    this.#place({ handles, selection });
     this.store.set({
+      selectMode: false,
       selected: null,
       mode: request.mode ?? "move",
       preset: request.preset ?? "",
@@ -578,8 +617,9 @@ export class Editor {
         label: "Show",
         run: () => this.showVersion(edit.result_version),
       });
-    // What was dragged is where it should be: the handles have done their work. They can be had back by undo.
-    this.#setHandles([]);
+    // What was dragged is where it should be: handles and selection have done their work. They can be had back by undo.
+    this.#place({ handles: [], selection: [] });
+    this.selecting.use(null);
     this.showVersion(edit.result_version);
     say(`Version ${edit.result_version} is ready. Hold B to compare it with version ${edit.version}.`);
   }

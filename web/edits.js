@@ -4,6 +4,7 @@ import { askConfirmation, say, showPictures } from "./dialogs.js";
 import { attrs, h, keyedList, problemPlace, showProblem, text } from "./dom.js";
 import { count, counted, duration, gaussians, loss, when } from "./format.js";
 import { warnings } from "./request_panel.js";
+import { describe } from "./selection.js";
 import { hasEnded } from "./watch.js";
 
 const STATES = {
@@ -121,7 +122,8 @@ function card(editor, id) {
     const edit = current();
     if (edit.version !== editor.state.version) editor.showVersion(edit.version);
     editor.load(edit.request);
-    say(`The handles of ${id} are back on version ${edit.version}.`);
+    const what = edit.request.selection?.length ? "The handles and the selection" : "The handles";
+    say(`${what} of ${id} are back on version ${edit.version}.`);
   });
   const forget = button(
     "✕",
@@ -226,6 +228,8 @@ function factsOf(edit) {
   }
   for (const { stage, seconds } of edit.timings) facts.push([STAGES[stage] ?? stage, duration(seconds)]);
   const { mode, preset, params = {} } = edit.request;
+  const { selection = [] } = edit.request;
+  if (selection.length) facts.push(["Selection", selection.map(describe).join(", ")]);
   facts.push(["Mode", mode], ...(preset ? [["Preset", preset]] : []));
   for (const [key, value] of Object.entries(params))
     facts.push([key, Array.isArray(value) ? value.join(", ") || "none" : String(value)]);

@@ -10,6 +10,12 @@ import { distance } from "./vectors.js";
 // The radius slider covers this range around the scene's radius, on a logarithmic scale of this many steps.
 const SLIDER = { low: 1e-3, high: 2, steps: 400 };
 
+const NO_HANDLES = {
+  spheres: "No handles yet. Click a part of the scene to take hold of it, then drag the dot to where it should go.",
+  selection:
+    "What is selected moves with a handle: take “Handles”, click on it, then drag the dot to where it should go.",
+};
+
 function sliderOf(radius, sceneRadius) {
   const { low, high, steps } = SLIDER;
   return Math.round((steps * Math.log(radius / (low * sceneRadius))) / Math.log(high / low));
@@ -32,54 +38,22 @@ export class HandleList {
       (handle) => handle.id,
       (handle) => this.#card(handle.id),
     );
-    const undo = h(
-      "button",
-      {
-        type: "button",
-        class: "icon",
-        title: "Undo (Ctrl + Z)",
-        "aria-label": "Undo",
-        testid: "undo-handles",
-        onclick: () => editor.undo(),
-      },
-      "↶",
-    );
-    const redo = h(
-      "button",
-      {
-        type: "button",
-        class: "icon",
-        title: "Redo (Ctrl + Shift + Z)",
-        "aria-label": "Redo",
-        testid: "redo-handles",
-        onclick: () => editor.redo(),
-      },
-      "↷",
-    );
     const clear = h(
       "button",
       { type: "button", class: "small", testid: "clear-handles", onclick: () => editor.removeAll() },
       "Clear",
     );
-    const empty = h(
-      "p",
-      { class: "empty", testid: "no-handles" },
-      "No handles yet. Click a part of the scene to take hold of it, then drag the dot to where it should go.",
+    const empty = h("p", { class: "empty", testid: "no-handles" });
+    this.element = h("section", {}, h("div", { class: "row between" }, h("h2", {}, "Handles"), clear), empty, list);
+    editor.store.watch(
+      ["handles", "selection", "selected", "counts", "preview", "problem", "scene", "version"],
+      ({ handles, selection }) => {
+        empty.hidden = handles.length > 0;
+        text(empty, selection.length > 0 ? NO_HANDLES.selection : NO_HANDLES.spheres);
+        clear.disabled = handles.length === 0;
+        this.#update(handles);
+      },
     );
-    this.element = h(
-      "section",
-      {},
-      h("div", { class: "row between" }, h("h2", {}, "Handles"), h("div", { class: "row" }, undo, redo, clear)),
-      empty,
-      list,
-    );
-    editor.store.watch(["handles", "selected", "counts", "preview", "problem", "scene", "version"], ({ handles }) => {
-      empty.hidden = handles.length > 0;
-      clear.disabled = handles.length === 0;
-      undo.disabled = !editor.canUndo;
-      redo.disabled = !editor.canRedo;
-      this.#update(handles);
-    });
   }
 
   #card(id) {
@@ -166,6 +140,15 @@ export class HandleList {
       noted = true;
     });
     slider.addEventListener("change", () => (noted = false));
+    const grip = numberField({
+      label: "Radius",
+      testid: "grip",
+      min: 0,
+      optional: true,
+      placeholder: "from the selection",
+      changed: (r) => r !== 0 && change({ grip: r }),
+    });
+    const radiusRow = h("div", { class: "row" }, slider, radius.element, grip.element);
     const group = numberField({
       label: "Group",
       testid: "group",
@@ -186,12 +169,7 @@ export class HandleList {
       h(
         "div",
         { class: "radius-row" },
-        h(
-          "div",
-          { class: "field" },
-          h("span", { class: "name" }, "Radius"),
-          h("div", { class: "row" }, slider, radius.element),
-        ),
+        h("div", { class: "field" }, h("span", { class: "name" }, "Radius"), radiusRow),
         h(
           "div",
           {
@@ -228,7 +206,12 @@ export class HandleList {
         anchorRow.hidden = !!handle.target;
         source.update(handle.source);
         if (handle.target) target.update(handle.target);
+        const bySphere = editor.state.selection.length === 0;
+        slider.hidden = radius.element.hidden = !bySphere;
+        grip.element.hidden = bySphere;
+        attrs(radiusRow, { class: bySphere ? "row" : "row wide" });
         radius.update(handle.radius);
+        grip.update(handle.grip ?? null);
         const sceneRadius = editor.state.scene?.radius || 1;
         if (document.activeElement !== slider || !noted) slider.valueAsNumber = sliderOf(handle.radius, sceneRadius);
         group.update(handle.group);
@@ -243,6 +226,13 @@ export class HandleList {
     const answer = this.#editor.countOf(handle);
     const preview = this.#editor.previewIsCurrent ? this.#editor.state.preview : null;
     const own = preview?.handles[i]?.gaussians;
+    if (this.#editor.state.selection.length > 0) {
+      // What each handle moves is what of the selection is nearest to it: only the service tells.
+      text(held, own === undefined ? "by selection" : gaussians(own));
+      attrs(held, { "data-empty": own === 0 });
+      note.hidden = true;
+      return;
+    }
     text(held, answer === null ? "…" : answer.gaussians === null ? "?" : gaussians(answer.gaussians));
     attrs(held, { "data-empty": answer?.gaussians === 0 });
     const shares = own !== undefined && answer?.gaussians > own;

@@ -10,6 +10,7 @@ import { counted } from "./format.js";
 import { HandleList } from "./handles.js";
 import { buildRequestPanel, importFile } from "./request_panel.js";
 import { buildScenes, SCENE_FILES } from "./scenes.js";
+import { buildSelectionPanel, buildTools, SELECT_TOOLS } from "./selection_panel.js";
 import { SceneMemory, Store } from "./store.js";
 import { buildToolbar } from "./toolbar.js";
 import { buildVersions } from "./versions.js";
@@ -31,9 +32,13 @@ const goTo = (id) => (location.hash = id ? `#/scenes/${id}` : "#/");
 const scenes = buildScenes(byId("home"), { store, memory, open: goTo });
 const viewer = new Viewer(editor);
 buildToolbar(editor, viewer);
+buildTools(editor);
 const run = buildRequestPanel(editor);
 const versions = buildVersions(editor);
-byId("tab-drag").append(h("div", { class: "scroll" }, new HandleList(editor).element, run.element), run.footer);
+byId("tab-drag").append(
+  h("div", { class: "scroll" }, buildSelectionPanel(editor), new HandleList(editor).element, run.element),
+  run.footer,
+);
 byId("tab-edits").append(h("div", { class: "scroll" }, buildEdits(editor)));
 byId("tab-scene").append(h("div", { class: "scroll" }, versions.element));
 buildTabs();
@@ -57,10 +62,7 @@ store.watch(["scene"], ({ scene }) => {
 });
 store.watch(["info"], ({ info }) => {
   if (!info) return;
-  text(
-    byId("service"),
-    `${info.version} · ${info.simd?.target ?? "scalar"} · ${counted(info.threads, "thread")}`,
-  );
+  text(byId("service"), `${info.version} · ${info.simd?.target ?? "scalar"} · ${counted(info.threads, "thread")}`);
   byId("sign-out").hidden = !info.token_required;
 });
 
@@ -159,9 +161,11 @@ function listenToKeys() {
     r: () => editor.home(),
     f: () => viewer.focusHere(),
     p: () => editor.preview(),
+    s: () => editor.selecting.toggle(),
+    ...Object.fromEntries(SELECT_TOOLS.map(([tool], i) => [String(i + 1), () => editor.selecting.use(tool)])),
     delete: () => editor.state.selected !== null && editor.remove(editor.state.selected),
     backspace: () => editor.state.selected !== null && editor.remove(editor.state.selected),
-    escape: () => viewer.giveUpDrag() || editor.select(null),
+    escape: () => viewer.giveUpDrag() || (editor.state.selectMode ? editor.selecting.use(null) : editor.select(null)),
     b: () => store.set({ comparing: true }),
   };
   document.addEventListener("keydown", (event) => {

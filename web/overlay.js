@@ -1,4 +1,5 @@
-// What is drawn over the picture: handles with their spheres and targets, the region. Geometry comes from camera.js.
+// What is drawn over the picture: handles with their spheres and targets, the region, the points and lines that select.
+// Geometry comes from camera.js.
 
 import { boxEdges, project, projectSegment, sphereOutline } from "./camera.js";
 import { attrs, keyedList, s } from "./dom.js";
@@ -23,12 +24,24 @@ export class Overlay {
   #svg;
   #region;
   #update;
+  #updateClicks;
+  #sketch;
+  #cursor;
+  #spheres = true;
 
   constructor(svg, { grab, nudge, wheel, focused }) {
     this.#svg = svg;
     this.#region = s("path", { class: "region", testid: "region-outline" });
     const handles = s("g");
-    svg.append(this.#region, handles);
+    const clicks = s("g");
+    this.#sketch = s("path", { class: "sketch", testid: "sketch" });
+    this.#cursor = s("circle", { class: "brush-cursor", testid: "brush-cursor", display: "none" });
+    svg.append(this.#region, this.#sketch, handles, clicks, this.#cursor);
+    this.#updateClicks = keyedList(
+      clicks,
+      ({ key }) => key,
+      ({ click }) => this.#click(click.kind),
+    );
     this.#update = keyedList(
       handles,
       (item) => item.handle.id,
@@ -62,11 +75,16 @@ export class Overlay {
 
   /** Draws.
    *    camera   that of the picture on the screen, in CSS pixels
-   *    items    [{handle, selected, bad}] */
-  draw(camera, items, region) {
+   *    items    [{handle, selected, bad}]
+   *    region   a box, or null
+   *    clicks   [{point, kind}] of a selection
+   *    spheres  whether it is their spheres that say what handles move */
+  draw(camera, items, { region, clicks, spheres }) {
     this.#camera = camera;
+    this.#spheres = spheres;
     attrs(this.#svg, { viewBox: `0 0 ${camera.width} ${camera.height}` });
     this.#update(items);
+    this.#updateClicks(clicks.map((click, i) => ({ key: `${i}${click.kind}`, click })));
     const edges = region ? boxEdges(region.center, region.size) : [];
     const lines = edges.map(([a, b]) => projectSegment(camera, a, b)).filter(Boolean);
     attrs(this.#region, {
@@ -84,6 +102,46 @@ export class Overlay {
     });
   }
 
+  /** A point that was clicked: + on the thing, − not on it. */
+  #click(kind) {
+    const inside = kind === "inside";
+    const element = s(
+      "g",
+      { class: `click ${kind}`, role: "img", "aria-label": inside ? "Point on the thing" : "Point that is not it" },
+      s("circle", { r: 8.5 }),
+      s("path", { d: inside ? "M-4.5 0H4.5M0 -4.5V4.5" : "M-4.5 0H4.5" }),
+    );
+    return {
+      element,
+      update: ({ click }, i) => {
+        const seen = project(this.#camera, click.point);
+        attrs(element, {
+          transform: seen ? at(seen) : null,
+          display: seen ? null : "none",
+          "data-testid": `click-${i}`,
+        });
+      },
+    };
+  }
+
+  /** Shows the line that is being drawn, {tool, points, radius, subtracts}; null: none. */
+  sketch(line) {
+    if (!line) return attrs(this.#sketch, { d: null });
+    const { tool, points, radius, subtracts } = line;
+    const brush = tool === "brush";
+    attrs(this.#sketch, {
+      class: `sketch ${tool}${subtracts ? " subtracts" : ""}`,
+      // A dot is a line of no length.
+      d: path(points.length > 1 ? points : [points[0], points[0]], !brush),
+      "stroke-width": brush ? 2 * radius : 2,
+    });
+  }
+
+  /** Shows the brush where the pointer is, {x, y}; null: nowhere. */
+  cursor(place, radius = 0) {
+    attrs(this.#cursor, place ? { cx: place.x, cy: place.y, r: radius, display: null } : { display: "none" });
+  }
+
   #draw({ handle, selected, bad }, i, { element, sphere, line, source, target }) {
     const camera = this.#camera;
     attrs(element, {
@@ -92,7 +150,7 @@ export class Overlay {
     });
     const from = project(camera, handle.source);
     const to = handle.target ? project(camera, handle.target) : null;
-    const outline = sphereOutline(camera, handle.source, handle.radius);
+    const outline = this.#spheres ? sphereOutline(camera, handle.source, handle.radius) : null;
     attrs(sphere, { d: outline ? path(outline, true) : null });
     attrs(source, {
       transform: from ? at(from) : null,

@@ -6,6 +6,7 @@ import { choice, labelled, pointField, segments, toggle } from "./fields.js";
 import { bytes, count, counted, duration, gaussians } from "./format.js";
 import { paramFields } from "./params.js";
 import { partOf, readRequests } from "./requests.js";
+import { whatMoves } from "./selection.js";
 
 const CONSTRAINTS = [
   ["view", "View", "In the plane that faces you (V)"],
@@ -138,9 +139,11 @@ export function buildRequestPanel(editor) {
   const problem = problemPlace("run-problem");
   const answer = h("div", { class: "answer", role: "status", testid: "run-answer" });
 
+  const moving = h("p", { class: "note", testid: "what-moves" });
   const element = h(
     "section",
     { class: "run" },
+    moving,
     h("div", { class: "field" }, h("span", { class: "name" }, "Drag targets"), constraint.element),
     h("div", { class: "field" }, h("span", { class: "name" }, "Mode"), mode.element),
     settings,
@@ -178,9 +181,11 @@ export function buildRequestPanel(editor) {
     },
   );
 
+  store.watch(["selection", "selectionAnswer"], (state) => text(moving, whatMoves(state)));
   store.watch(
     [
       "handles",
+      "selection",
       "previewing",
       "submitting",
       "problem",
@@ -276,7 +281,8 @@ export async function importFile(editor, file, place) {
     if (name === null) return;
     const { request } = requests.find((r) => r.name === name);
     editor.load(request);
-    say(`${counted(request.handles.length, "handle")} imported from ${file.name}.`);
+    const selected = request.selection.length ? " and a selection" : "";
+    say(`${counted(request.handles.length, "handle")}${selected} imported from ${file.name}.`);
   } catch (error) {
     showProblem(place, { detail: `${file.name}: ${error.detail ?? problemText(error)}`, where: error.where });
   }

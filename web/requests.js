@@ -11,7 +11,7 @@ export class ImportError extends Error {
 }
 
 /** The request that the screen describes. What is left to the service's defaults is left out. */
-export function requestOf({ scene, version, mode, preset, prompt, handles, region, params }) {
+export function requestOf({ scene, version, mode, preset, prompt, handles, selection = [], region, params }) {
   const given = Object.entries(params ?? {}).filter(
     ([, value]) => value !== null && value !== undefined && value !== "",
   );
@@ -21,25 +21,32 @@ export function requestOf({ scene, version, mode, preset, prompt, handles, regio
     mode,
     ...(preset ? { preset } : {}),
     ...(prompt ? { prompt } : {}),
-    handles: handles.map(({ source, target, radius, group }) => ({
-      source,
-      ...(target ? { target } : {}),
-      radius,
-      group,
+    handles: handles.map((handle) => ({
+      source: handle.source,
+      ...(handle.target ? { target: handle.target } : {}),
+      ...radiusGiven(handle, selection),
+      group: handle.group,
     })),
+    ...(selection.length ? { selection } : {}),
     ...(region ? { region } : {}),
     ...(given.length ? { params: Object.fromEntries(given) } : {}),
   };
 }
 
+/** A handle's sphere says what moves only where no selection does. With one, a radius is given if somebody gave one. */
+function radiusGiven({ radius, grip = null }, selection) {
+  if (selection.length === 0) return { radius };
+  return grip === null ? {} : { radius: grip };
+}
+
 /** What of the screen decides how a preview looks: two equal texts, the same preview. It shows where Gaussians go, so of
  *  the `parameters` that the service describes those of the motion count, and any that it does not describe. */
 export function previewKey(request, parameters = []) {
-  const { handles, mode, region, params = {}, preset, scene, version } = request;
+  const { handles, selection, mode, region, params = {}, preset, scene, version } = request;
   const others = new Set(parameters.filter(({ part }) => part !== "motion").map(({ name }) => name));
   const motion = Object.entries(params).filter(([name]) => !others.has(name));
   motion.sort(([a], [b]) => (a < b ? -1 : 1));
-  return JSON.stringify({ scene, version, handles, mode, region, preset, motion });
+  return JSON.stringify({ scene, version, handles, selection, mode, region, preset, motion });
 }
 
 /** "max_image_side" as a person reads it. */
@@ -129,7 +136,8 @@ function modeOf(value, where) {
 }
 
 function readRequest(document, where) {
-  known(document, ["scene", "version", "mode", "preset", "prompt", "handles", "region", "params"], where);
+  known(document, ["scene", "version", "mode", "preset", "prompt", "handles", "selection", "region", "params"], where);
+  const selection = readSelection(document.selection, within(where, "selection"));
   const handles = list(document.handles, within(where, "handles")).map((handle, i) => {
     const at = within(where, `handles[${i}]`);
     if (!isObject(handle)) throw new ImportError("expected an object", at);
@@ -137,7 +145,7 @@ function readRequest(document, where) {
     return {
       source: point(handle.source, `${at}.source`),
       target: handle.target === undefined ? null : point(handle.target, `${at}.target`),
-      radius: positive(handle.radius, `${at}.radius`),
+      ...readRadius(handle.radius, selection, `${at}.radius`),
       group: groupNumber(handle.group ?? 0, `${at}.group`),
     };
   });
@@ -155,9 +163,25 @@ function readRequest(document, where) {
     preset: document.preset ?? null,
     prompt: document.prompt ?? null,
     handles,
+    selection,
     region,
     params: { ...params },
   };
+}
+
+/** Operations as they are: what each may hold is the service's to judge. */
+function readSelection(value, where) {
+  if (value === undefined || (Array.isArray(value) && value.length === 0)) return [];
+  return list(value, where).map((operation, i) => {
+    if (!isObject(operation)) throw new ImportError("expected an object", `${where}[${i}]`);
+    return operation;
+  });
+}
+
+/** The radius of a handle, which a selection makes needless; null: the page's own. */
+function readRadius(value, selection, where) {
+  if (selection.length === 0) return { radius: positive(value, where) };
+  return { radius: null, grip: value === undefined ? null : positive(value, where) };
 }
 
 function readReleased(document, where) {
@@ -186,5 +210,13 @@ function readReleased(document, where) {
     known(mask, ["center", "xyz"], at("local_mask"));
     region = { center: point(mask.center, at("local_mask.center")), size: edges(mask.xyz, at("local_mask.xyz")) };
   }
-  return { mode: modeOf(document.mode ?? "move", at("mode")), preset: null, prompt: null, handles, region, params: {} };
+  return {
+    mode: modeOf(document.mode ?? "move", at("mode")),
+    preset: null,
+    prompt: null,
+    handles,
+    selection: [],
+    region,
+    params: {},
+  };
 }

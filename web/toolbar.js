@@ -11,6 +11,30 @@ const LAYERS = [
   ["mask", "Changed", "White: what differs from version 0"],
 ];
 
+/** What to do first with each tool, and what the pointer does. */
+const HINTS = {
+  handle: [
+    "Click the part you want to move",
+    "A handle takes hold of it. Then drag its dot to where it should go.",
+    "Drag: orbit · Right drag: move · Wheel: nearer · Click: place a handle",
+  ],
+  grow: [
+    "Click the thing you mean",
+    "It is selected up to its border. Right-click what was taken along by mistake.",
+    "Click: on the thing · Right click: not it · Drag: orbit · Wheel: nearer",
+  ],
+  brush: [
+    "Paint over what you mean",
+    "Drag with the left button; with the right one you look around.",
+    "Drag: paint · Alt + drag: the opposite · Right drag: orbit · Wheel: nearer",
+  ],
+  lasso: [
+    "Draw around what you mean",
+    "Drag with the left button; with the right one you look around.",
+    "Drag: draw · Alt + drag: the opposite · Right drag: orbit · Wheel: nearer",
+  ],
+};
+
 export function buildToolbar(editor, viewer) {
   const { store } = editor;
   const icon = (label, testid, title, onclick) =>
@@ -80,19 +104,28 @@ export function buildToolbar(editor, viewer) {
   );
   byId("chips").append(chip, back);
 
+  const keysLine = h("span", { class: "muted keys-line" });
   byId("status").append(
     h("span", { id: "picture-size", testid: "picture-size" }),
     h("span", { class: "spacer" }),
-    h("span", { class: "muted keys-line" }, "Drag: orbit · Right drag: move · Wheel: nearer · Click: place a handle"),
+    keysLine,
   );
 
-  byId("hint").append(
-    h("strong", {}, "Click the part you want to move"),
-    h("span", {}, "A handle takes hold of it. Then drag its dot to where it should go."),
-  );
+  const hint = h("strong", {});
+  const hintMore = h("span", {});
+  byId("hint").append(hint, hintMore);
+  store.watch(["selectMode", "selectTool"], () => {
+    const [lead, more, keys] = HINTS[viewer.tool];
+    text(hint, lead);
+    text(hintMore, more);
+    text(keysLine, keys);
+  });
 
   store.watch(
-    ["scene", "version", "views", "viewName", "viewsKind", "layer", "comparing", "compareWith", "preview", "handles"],
+    [
+      ...["scene", "version", "views", "viewName", "viewsKind", "layer", "comparing", "compareWith", "preview"],
+      ...["handles", "selection", "selectMode"],
+    ],
     (state) => {
       const { scene } = state;
       if (!scene) return;
@@ -130,7 +163,9 @@ export function buildToolbar(editor, viewer) {
       );
       attrs(chip, { class: previewing ? "chip preview" : state.comparing ? "chip compare" : "chip" });
       back.hidden = !previewing;
-      byId("hint").hidden = state.handles.length > 0 || scene.versions.length > 1;
+      byId("hint").hidden = state.selectMode
+        ? state.selection.length > 0
+        : state.handles.length > 0 || scene.versions.length > 1;
     },
   );
 }

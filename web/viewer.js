@@ -19,12 +19,14 @@ import { shownVersion } from "./editor.js";
 import { AdaptiveSide, FrameQueue, Recent } from "./frames.js";
 import { Overlay } from "./overlay.js";
 import { partOf } from "./requests.js";
+import { clicksOf, thinned } from "./selection.js";
 
 // All of these are choices, tried by hand.
 const MAX_SIDE = 1600; // Pixels of the longer side of a picture at rest: sharp enough on a large window.
 const STILL_AFTER_MS = 160; // Without a movement, before the picture is requested at its full size.
 const CLICK_PX = 4; // A pointer that moves less than this has clicked, not dragged.
 const ORBIT_PER_PX = 0.0055; // Radians: half a turn across 570 pixels.
+const SKETCH_PX = 2; // A line that is drawn has a corner this often at most.
 const MAX_CACHED_PICTURES = 6; // Enough to go back and forth between two versions and three layers.
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }; // Right, down.
 const THUMBNAIL = { width: 320, height: 200 };
@@ -69,9 +71,15 @@ export class Viewer {
     });
     this.#listen();
     const { store } = editor;
-    store.watch(["pose", "layer", "version", "preview", "comparing", "compareWith"], () => this.refresh());
+    store.watch(
+      ["pose", "layer", "version", "preview", "comparing", "compareWith", "selectMode", "selectionAnswer", "tinted"],
+      () => this.refresh(),
+    );
     store.watch(["scene"], ({ scene }) => this.#sceneChanged(scene));
-    store.watch(["handles", "selected", "region", "problem", "pose"], () => this.#drawOverlay());
+    store.watch(["handles", "selected", "selection", "selectMode", "region", "problem", "pose"], () =>
+      this.#drawOverlay(),
+    );
+    store.watch(["selectMode", "selectTool", "brushRadius"], () => this.#toolChanged());
     new ResizeObserver(() => this.#resized()).observe(this.#view);
   }
 
@@ -119,10 +127,11 @@ export class Viewer {
     const full = pictureSize(width * density, height * density, limit);
     const size = large ? full : pictureSize(full.width, full.height, this.#adaptive.side);
     const version = shownVersion(this.#state);
-    const key = JSON.stringify([scene.id, version, layer, pictureKey(pose), size]);
+    const selection = this.#editor.selecting.idFor(version);
+    const key = JSON.stringify([scene.id, version, layer, selection, pictureKey(pose), size]);
     // On a fast service, pictures while moving are as large as any.
     const complete = size.width === full.width && size.height === full.height;
-    return { key, large, complete, scene: scene.id, version, layer, pose, size };
+    return { key, large, complete, scene: scene.id, version, layer, selection, pose, size };
   }
 
   /** Asks for what the state says should be on the screen: a small picture at once, the full one when it is still. */
@@ -152,6 +161,7 @@ export class Viewer {
       !!displayed &&
       displayed.version === job.version &&
       displayed.layer === job.layer &&
+      displayed.selection === job.selection &&
       pictureKey(displayed.pose) === pictureKey(job.pose)
     );
   }
@@ -164,6 +174,7 @@ export class Viewer {
       {
         camera: onTheWire({ ...job.pose, ...job.size }),
         what: job.layer,
+        ...(job.selection ? { selection: job.selection } : {}),
         format: "jpeg",
         quality: job.complete ? 92 : 75,
       },
@@ -180,6 +191,7 @@ export class Viewer {
       this.#recent.put(job.key, picture);
       this.#thumbnailSoon();
     }
+    if (job.selection) this.#editor.selecting.seen(job.selection);
     this.#message("");
     this.#show(picture, job, ms);
   }
@@ -192,6 +204,7 @@ export class Viewer {
     attrs(this.#view, {
       "data-version": job.version,
       "data-layer": job.layer,
+      "data-selection": job.selection,
       "data-quality": job.complete ? "full" : "moving",
     });
     const time = ms === null ? "" : ` · ${Math.round(ms)} ms`;
@@ -208,6 +221,8 @@ export class Viewer {
   #failed(error, job) {
     this.#notBusy();
     if (job.scene !== this.#state.scene?.id) return;
+    if (error.status === 404 && job.selection && error.where === "selection")
+      return this.#editor.selecting.lost(job.selection);
     if (error.status === 404 && String(job.version).startsWith("p")) return this.#editor.previewExpired(job.version);
     this.#message(`No picture: ${error.detail ?? error.message}`);
     // The service is full, restarting, or loads the scene: it will answer later. Anything else stays as it is.
@@ -237,7 +252,8 @@ export class Viewer {
   #thumbnailSoon() {
     clearTimeout(this.#thumbnailTimer);
     this.#thumbnailTimer = setTimeout(() => {
-      if (this.#displayed?.job.layer !== "color" || this.#displayed.job.scene !== this.#state.scene?.id) return;
+      if (this.#displayed?.job.layer !== "color" || this.#displayed.job.selection) return;
+      if (this.#displayed.job.scene !== this.#state.scene?.id) return;
       const small = Object.assign(document.createElement("canvas"), THUMBNAIL);
       const { width, height } = this.#displayed.picture;
       const factor = Math.max(THUMBNAIL.width / width, THUMBNAIL.height / height);
@@ -251,14 +267,31 @@ export class Viewer {
   #drawOverlay() {
     const { camera } = this;
     if (!camera) return;
-    const { handles, selected, problem, region } = this.#state;
+    const { handles, selected, problem, region, selection, selectMode } = this.#state;
     const at = problem ? partOf(problem.error.where) : {};
     const items = handles.map((handle, i) => ({
       handle,
       selected: handle.id === selected,
       bad: at.part === "handle" && at.index === i,
     }));
-    this.#overlay.draw(camera, items, region);
+    this.#overlay.draw(camera, items, {
+      region,
+      clicks: selectMode ? clicksOf(selection) : [],
+      spheres: selection.length === 0,
+    });
+  }
+
+  #toolChanged() {
+    const { tool } = this;
+    attrs(this.#view, { "data-tool": tool });
+    if (tool !== "brush") this.#overlay.cursor(null);
+    if (this.#gesture?.kind === "draw") this.giveUpDrag();
+  }
+
+  /** What the pointer does: "handle", "grow", "brush" or "lasso". */
+  get tool() {
+    const { selectMode, selectTool } = this.#state;
+    return selectMode ? selectTool : "handle";
   }
 
   // --- the hand --------------------------------------------------------------------------------------------------
@@ -270,7 +303,10 @@ export class Viewer {
     on("pointermove", (event) => this.#move(event));
     on("pointerup", (event) => this.#up(event));
     on("pointercancel", (event) => this.#cancel(event));
-    on("pointerleave", () => (this.#pointerAt = null));
+    on("pointerleave", () => {
+      this.#pointerAt = null;
+      this.#overlay.cursor(null);
+    });
     on("contextmenu", (event) => event.preventDefault());
     on("wheel", (event) => this.#wheel(event), { passive: false });
     on("keydown", (event) => this.#key(event));
@@ -288,12 +324,47 @@ export class Viewer {
     this.#pointers.set(event.pointerId, this.#place(event));
     this.#view.setPointerCapture(event.pointerId);
     if (this.#pointers.size === 2) {
-      if (this.#gesture?.drag) this.#gesture.drag.giveUp();
+      this.#gesture?.drag?.giveUp();
       this.#gesture = { kind: "pinch", ...this.#pinch() };
     } else if (this.#pointers.size === 1 && !this.#gesture) {
-      const sideways = event.button === 2 || event.button === 1 || event.shiftKey;
-      this.#gesture = { kind: sideways ? "pan" : "orbit", from: this.#place(event), button: event.button };
+      const from = this.#place(event);
+      this.#gesture = { kind: this.#kindOf(event), from, button: event.button, other: event.altKey };
+      if (this.#gesture.kind === "draw") this.#gesture.drag = this.#sketch(from, event.altKey);
     }
+  }
+
+  /** What a pointer that goes down on the picture begins. Where the left button draws, the right one orbits. */
+  #kindOf({ button, shiftKey }) {
+    const draws = this.tool === "brush" || this.tool === "lasso";
+    if (button === 1 || shiftKey) return "pan";
+    if (draws) return button === 2 ? "orbit" : "draw";
+    return button === 2 ? "pan" : "orbit";
+  }
+
+  /** A stroke or a lasso that is being drawn. Returns {move(x, y), end(), giveUp()}. */
+  #sketch({ x, y }, other) {
+    const { tool, camera } = this;
+    const selecting = this.#editor.selecting;
+    let points = [[x, y]];
+    const show = () =>
+      this.#overlay.sketch({
+        tool,
+        points,
+        radius: this.#state.brushRadius,
+        subtracts: selecting.subtracts(other),
+      });
+    show();
+    return {
+      move: (toX, toY) => {
+        points = thinned([...points, [toX, toY]], SKETCH_PX);
+        show();
+      },
+      end: () => {
+        this.#overlay.sketch(null);
+        selecting.draw(tool, camera, points, other);
+      },
+      giveUp: () => this.#overlay.sketch(null),
+    };
   }
 
   /** The pointer took hold of a handle's dot. */
@@ -316,6 +387,7 @@ export class Viewer {
   #move(event) {
     const to = this.#place(event);
     this.#pointerAt = to;
+    if (this.tool === "brush" && event.pointerType !== "touch") this.#overlay.cursor(to, this.#state.brushRadius);
     const from = this.#pointers.get(event.pointerId);
     const gesture = this.#gesture;
     if (!from || !gesture) return;
@@ -338,7 +410,7 @@ export class Viewer {
       gesture.started = true;
     }
     this.#pointers.set(event.pointerId, to);
-    if (gesture.kind === "drag") return gesture.drag.move(to.x, to.y);
+    if (gesture.drag) return gesture.drag.move(to.x, to.y);
     const [dx, dy] = [to.x - from.x, to.y - from.y];
     if (gesture.kind === "orbit")
       this.#turn((pose) => orbited(pose, dx * ORBIT_PER_PX, dy * ORBIT_PER_PX, this.#editor.worldUp));
@@ -354,8 +426,11 @@ export class Viewer {
       return;
     }
     this.#gesture = null;
-    if (gesture.kind === "drag") gesture.drag.end();
-    else if (!gesture.started && gesture.kind === "orbit" && gesture.button === 0) this.#click(gesture.from);
+    if (gesture.drag) return gesture.drag.end();
+    if (gesture.started) return;
+    const { kind, button, from, other } = gesture;
+    if (kind === "orbit" && button === 0) this.#click(from, other);
+    else if (this.tool === "grow" && button === 2) this.#click(from, true);
   }
 
   #cancel(event) {
@@ -364,8 +439,14 @@ export class Viewer {
     this.#gesture = null;
   }
 
-  #click({ x, y }) {
-    this.#editor.place(this.camera, x, y);
+  /** A click, or Enter in the middle.
+   *    other  with Alt, or the right button: takes away where it would add, and the other way round */
+  #click({ x, y }, other = false) {
+    const { tool, camera } = this;
+    const { selecting } = this.#editor;
+    if (tool === "handle") this.#editor.place(camera, x, y);
+    else if (tool === "grow") selecting.click(camera, x, y, other);
+    else if (tool === "brush") selecting.draw("brush", camera, [[x, y]], other);
   }
 
   #turn(change) {
@@ -387,6 +468,8 @@ export class Viewer {
 
   /** The wheel turned over a handle's dot: towards the user, a larger sphere. */
   #resize(id, event) {
+    // With a selection, there is no sphere to resize.
+    if (this.#state.selection.length > 0) return;
     event.preventDefault();
     event.stopPropagation();
     const { radius } = this.#state.handles.find((h) => h.id === id);
@@ -397,14 +480,15 @@ export class Viewer {
   // --- the keyboard ----------------------------------------------------------------------------------------------
 
   #key(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.target !== this.#view || !this.camera) return;
+    if (event.ctrlKey || event.metaKey || event.target !== this.#view || !this.camera) return;
+    if (event.altKey && event.key !== "Enter") return;
     const arrow = ARROWS[event.key];
     if (arrow && event.shiftKey)
       this.#turn((pose) => panned({ ...pose, ...this.#size }, -30 * arrow[0], -30 * arrow[1]));
     else if (arrow) this.#turn((pose) => orbited(pose, 0.09 * arrow[0], 0.09 * arrow[1], this.#editor.worldUp));
     else if (event.key === "+" || event.key === "=") this.#turn((pose) => dollied(pose, 0.9, this.#nearest()));
     else if (event.key === "-" || event.key === "_") this.#turn((pose) => dollied(pose, 1 / 0.9, this.#nearest()));
-    else if (event.key === "Enter") this.#click({ x: this.#size.width / 2, y: this.#size.height / 2 });
+    else if (event.key === "Enter") this.#click({ x: this.#size.width / 2, y: this.#size.height / 2 }, event.altKey);
     else return;
     // Only who works by keyboard needs to see where the middle is.
     this.#view.classList.add("by-keyboard");

@@ -9,7 +9,7 @@ import { extname, join, normalize } from "node:path";
 import { fileURLToPath } from "node:url";
 import { deflateSync } from "node:zlib";
 
-import { axes, focal, onViewPlane, rayThrough } from "../../web/camera.js";
+import { axes, focal, onViewPlane, project, rayThrough } from "../../web/camera.js";
 import { add, addScaled, distance, dot, scale, sub, unit } from "../../web/vectors.js";
 
 const WEB = fileURLToPath(new URL("../../web/", import.meta.url));
@@ -76,11 +76,20 @@ function madeUpPoints() {
   return points;
 }
 
-/** What the drag does here: everything within a radius follows its handle. */
-function dragged(points, { handles, mode }) {
+/** Which handle a point follows, as a function: the nearest one within whose radius it is; with a selection, the nearest. */
+function follows(points, { handles, selection }) {
+  if (!selection) return ({ p }) => nearestHandle(p, handles);
+  const held = selected(points, selection);
+  const endless = handles.map((handle) => ({ ...handle, radius: Infinity }));
+  return (point) => (held.has(point) ? nearestHandle(point.p, endless) : -1);
+}
+
+/** What the drag does here: everything within a radius, or selected, follows its handle. */
+function dragged(points, { handles, mode, selection }) {
   const out = [];
+  const handleOf = follows(points, { handles, selection });
   for (const point of points) {
-    const i = nearestHandle(point.p, handles);
+    const i = handleOf(point);
     const handle = handles[i];
     if (!handle?.target) {
       out.push(point);
@@ -90,6 +99,37 @@ function dragged(points, { handles, mode }) {
     if (mode === "extend") out.push(point);
   }
   return out;
+}
+
+/** Which points a selection holds here: balls of a fixed size around what was clicked, and what is drawn on. */
+function selected(points, selection) {
+  const held = new Set();
+  for (const step of selection) {
+    const named = points.filter((point) => names(step, point));
+    if (step.invert) points.forEach((point) => (held.has(point) ? held.delete(point) : held.add(point)));
+    else if (step.op === "intersect") for (const point of held) named.includes(point) || held.delete(point);
+    else for (const point of named) step.op === "subtract" ? held.delete(point) : held.add(point);
+  }
+  return held;
+}
+
+function names({ grow, stroke, polygon }, { p }) {
+  const nearest = (centres) => Math.min(Infinity, ...centres.map((centre) => distance(p, centre)));
+  if (grow) return nearest(grow.inside) < Math.min(0.5, nearest(grow.outside ?? []));
+  const drawn = stroke ?? polygon;
+  const seen = drawn && project({ ...drawn.camera, fov: drawn.camera.fov_y_deg }, p);
+  if (!seen) return false;
+  const apart = ([x, y]) => Math.hypot(seen.x - x, seen.y - y);
+  return stroke ? drawn.points.some((at) => apart(at) < drawn.radius) : encloses(drawn.points, seen);
+}
+
+/** Whether a polygon encloses a pixel: it is crossed an odd number of times on the way to the right. */
+function encloses(corners, { x, y }) {
+  const crossed = corners.filter(([bx, by], i) => {
+    const [ax, ay] = corners.at(i - 1);
+    return ay > y !== by > y && x < ax + ((y - ay) * (bx - ax)) / (by - ay);
+  });
+  return crossed.length % 2 === 1;
 }
 
 function nearestHandle(p, handles) {
@@ -102,13 +142,14 @@ function nearestHandle(p, handles) {
   return best;
 }
 
-function draw(points, camera, what) {
+function draw(points, camera, what, tinted = new Set()) {
   const { width, height } = camera;
   const pixels = Buffer.alloc(width * height * 3, 0);
   const depths = new Float32Array(width * height).fill(Infinity);
   const { right, down, forward } = axes(camera);
   const f = focal(camera);
-  for (const { p, c, moved } of points) {
+  for (const point of points) {
+    const { p, c, moved } = point;
     const v = sub(p, camera.eye);
     const z = dot(v, forward);
     if (z < 0.05) continue;
@@ -121,7 +162,8 @@ function draw(points, camera, what) {
         if (z >= depths[k]) continue;
         depths[k] = z;
         const g = what === "depth" ? Math.max(0, 255 - z * 25) : moved ? 255 : 0;
-        const [red, green, blue] = what === "color" ? c : [g, g, g];
+        const plain = what === "color" ? c : [g, g, g];
+        const [red, green, blue] = tinted.has(point) ? plain.map((x, n) => (x + [255, 26, 153][n]) / 2) : plain;
         pixels[3 * k] = red;
         pixels[3 * k + 1] = green;
         pixels[3 * k + 2] = blue;
@@ -220,6 +262,7 @@ export function start({ port = 0, token = null, slow = 0, empty = false, tick = 
       dataset,
       versions: [{ version: 0, parent: null, edit: null, created: now(), points }],
       previews: new Map(),
+      selections: new Map(),
     };
     scenes.set(sceneId, scene);
     return scene;
@@ -285,8 +328,9 @@ export function start({ port = 0, token = null, slow = 0, empty = false, tick = 
     const points = findPoints(scene, request.version ?? 0);
     if (!request.handles?.length) fail(400, "invalid_argument", "expected 1 to 256 handles", "handles");
     const counts = request.handles.map(() => 0);
-    for (const { p } of points) {
-      const i = nearestHandle(p, request.handles);
+    const handleOf = follows(points, request);
+    for (const point of points) {
+      const i = handleOf(point);
       if (i >= 0) counts[i] += 1;
     }
     counts.forEach((n, i) => {
@@ -310,7 +354,10 @@ export function start({ port = 0, token = null, slow = 0, empty = false, tick = 
       request.params?.intervals ??
       Math.min(
         20,
-        Math.max(1, ...request.handles.map((h) => (h.target ? Math.ceil(distance(h.source, h.target) / h.radius) : 1))),
+        Math.max(
+          1,
+          ...request.handles.map((h) => (h.target ? Math.ceil(distance(h.source, h.target) / (h.radius ?? 1)) : 1)),
+        ),
       );
     return { scene, points, counts: counts.map((gaussians) => ({ gaussians })), intervals };
   }
@@ -502,7 +549,11 @@ export function start({ port = 0, token = null, slow = 0, empty = false, tick = 
       /^\/v1\/scenes\/(\w+)\/versions\/(\w+)\/render$/,
       async ({ match, json, reply }) => {
         const camera = cameraOf(json.camera);
-        const { pixels } = draw(findPoints(findScene(match[1]), match[2]), camera, json.what ?? "color");
+        const scene = findScene(match[1]);
+        const asked = json.selection ? scene.selections.get(json.selection) : [];
+        if (!asked) fail(404, "not_found", "this version has no such selection: post it again", "selection");
+        const points = findPoints(scene, match[2]);
+        const { pixels } = draw(points, camera, json.what ?? "color", selected(points, asked));
         if (slow) await new Promise((resolve) => setTimeout(resolve, slow));
         return reply(200, png(pixels, camera.width, camera.height), { "Content-Type": "image/png" });
       },
@@ -530,6 +581,28 @@ export function start({ port = 0, token = null, slow = 0, empty = false, tick = 
         const { forward } = axes(camera);
         const point = onViewPlane(camera, json.x, json.y, addScaled(camera.eye, forward, depth));
         return answer(point, depth, scale(rayThrough(camera, json.x, json.y).direction, -1));
+      },
+    ],
+    [
+      "POST",
+      /^\/v1\/scenes\/(\w+)\/versions\/(\w+)\/select$/,
+      ({ match, json }) => {
+        const scene = findScene(match[1]);
+        const held = [...selected(findPoints(scene, match[2]), json.selection)].map(({ p }) => p);
+        const name = id("q", scene.selections.size + 1);
+        scene.selections.set(name, json.selection);
+        const over = (reduce) => [0, 1, 2].map((axis) => (held.length ? reduce(held.map((p) => p[axis])) : 0));
+        return {
+          id: name,
+          count: held.length,
+          bounds: {
+            low: over((x) => x.reduce((a, b) => Math.min(a, b))),
+            high: over((x) => x.reduce((a, b) => Math.max(a, b))),
+          },
+          centre: over((x) => x.reduce((a, b) => a + b) / x.length),
+          undecided: 0,
+          warnings: held.length ? [] : ["nothing is selected"],
+        };
       },
     ],
     [

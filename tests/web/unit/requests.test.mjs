@@ -2,7 +2,15 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 
-import { ImportError, labelOf, partOf, previewKey, readRequests, requestOf, usualValue } from "../../../web/requests.js";
+import {
+  ImportError,
+  labelOf,
+  partOf,
+  previewKey,
+  readRequests,
+  requestOf,
+  usualValue,
+} from "../../../web/requests.js";
 
 const example = (name) => readFileSync(new URL(`../../../proto/examples/${name}`, import.meta.url), "utf8");
 const only = (text) => {
@@ -58,6 +66,23 @@ test("what is exported can be imported again", () => {
     const exported = requestOf({ ...request, scene: "s000001", version: 2 });
     assert.deepEqual(only(JSON.stringify(exported)), request);
   }
+});
+
+test("a request with a selection needs no radius, and keeps one that it has", () => {
+  const { selection } = JSON.parse(example("selection.json"));
+  const document = { handles: [{ source: [0, 0, 0] }, { source: [1, 0, 0], radius: 0.5 }], selection };
+  const request = only(JSON.stringify(document));
+  assert.deepEqual(request.selection, selection);
+  const exported = requestOf({ ...request, scene: "s000001", version: 0 });
+  assert.deepEqual(
+    exported.handles.map((h) => h.radius),
+    [undefined, 0.5],
+  );
+  assert.deepEqual(only(JSON.stringify(exported)), request);
+  refused({ handles: [{ source: [0, 0, 0] }] }, "handles[0].radius");
+  refused({ handles: [{ source: [0, 0, 0] }], selection: [] }, "handles[0].radius");
+  refused({ handles: [{ source: [0, 0, 0] }], selection: [3] }, "selection[0]");
+  refused({ handles: [{ source: [0, 0, 0] }], selection: {} }, "selection");
 });
 
 test("a file of several requests keeps their names and drops comments", () => {
@@ -144,6 +169,7 @@ test("a preview is stale when what it shows has changed, and only then", () => {
   );
   assert.notEqual(key({}), key({ params: { unheard_of: 1 } }), "it might be of the motion");
   assert.notEqual(key({}), key({ handles: [{ ...base.handles[0], radius: 2 }] }));
+  assert.notEqual(key({}), key({ selection: [{ invert: true }] }));
 });
 
 test("a parameter is named for people, and its default is that of the preset", () => {

@@ -1,0 +1,166 @@
+// Selecting: clicks, strokes and lassos become operations, and the service says what they hold. No elements here.
+
+import * as api from "./api.js";
+import { onTheWire } from "./camera.js";
+import { FrameQueue } from "./frames.js";
+import { inverted, polygonOf, strokeOf, withClick } from "./selection.js";
+
+/** What there is before anything is selected. Of the tools, the last four outlive a reload. */
+export const NOTHING_SELECTED = {
+  selection: [], // Operations, as on the wire.
+  selectionAnswer: null, // {key, version, id, count, ...} or {key, version, error}: what the service last said.
+  selectionWaits: false, // Whether that is of an earlier selection.
+  selectMode: false, // The pointer selects; else it places and drags handles.
+  selectTool: "grow", // "grow", "brush" or "lasso"
+  selectOp: "add",
+  clickKind: "inside", // Of a click to grow: on the thing ("inside"), or not.
+  nextThing: false, // The next click begins another thing.
+  selectDepth: "visible",
+  brushRadius: 18, // Pixels; a choice.
+  tinted: true,
+};
+
+const OPPOSITE = { add: "subtract", subtract: "add", intersect: "subtract" };
+const PASSING = [0, 429, 503]; // The service is full, restarting, or loads the scene: it will answer later.
+
+export class Selecting {
+  #queue;
+  #again = null;
+  #lost = null; // Id of a selection that had to be posted again, until it has been seen.
+
+  /**   place(selection)        puts a selection on the screen; can be undone
+   *    say(message, options)   a short message to the user */
+  constructor(store, { place, say }) {
+    Object.assign(this, { store, place, say });
+    // Of the selections made while one is being asked about, only the latest is asked about next.
+    this.#queue = new FrameQueue({
+      load: ({ scene, version, selection }, signal) => api.select(scene, version, selection, signal),
+      onPicture: (answer, { key, version }) => this.#answered({ ...answer, key, version }),
+      onError: (error, { key, version }) => this.#failed({ key, version, error }),
+    });
+    store.watch(["selection", "version", "scene"], () => this.#changed());
+  }
+
+  get #state() {
+    return this.store.state;
+  }
+
+  // --- what it holds ---------------------------------------------------------------------------------------------
+
+  #job() {
+    const { scene, version, selection } = this.#state;
+    return { key: JSON.stringify([scene.id, version, selection]), scene: scene.id, version, selection };
+  }
+
+  #changed() {
+    clearTimeout(this.#again);
+    const { scene, selection, selectionAnswer } = this.#state;
+    if (!scene || selection.length === 0) {
+      this.#queue.clear();
+      return this.store.set({ selectionAnswer: null, selectionWaits: false });
+    }
+    const job = this.#job();
+    const known = selectionAnswer?.key === job.key && !selectionAnswer.error;
+    if (known && !this.#queue.busy) return;
+    this.store.set({ selectionWaits: true });
+    this.#queue.request(job);
+  }
+
+  #answered(answer) {
+    if (!this.#state.scene) return;
+    this.store.set({ selectionAnswer: answer, selectionWaits: answer.key !== this.#job().key });
+  }
+
+  #failed(answer) {
+    this.#answered(answer);
+    const { status, retryAfter } = answer.error;
+    if (PASSING.includes(status)) this.#again = setTimeout(() => this.#changed(), 1000 * (retryAfter ?? 2));
+  }
+
+  /** The selection that pictures of a version are to tint; null if there is none. */
+  idFor(version) {
+    const { selectionAnswer, tinted, layer } = this.#state;
+    const shows = tinted && layer === "color" && selectionAnswer?.version === version && selectionAnswer.count > 0;
+    return shows ? selectionAnswer.id : null;
+  }
+
+  /** The service has forgotten a selection: it is posted again, and nobody notices. One that is lost at once when it
+   *  was posted again is shown without tint, rather than asked for without end. */
+  lost(id) {
+    const { selectionAnswer } = this.#state;
+    if (selectionAnswer?.id !== id) return;
+    if (this.#lost === id) return this.store.set({ selectionAnswer: { ...selectionAnswer, id: null } });
+    this.#lost = id;
+    this.#queue.request(this.#job());
+  }
+
+  /** A picture has shown the selection. */
+  seen(id) {
+    if (this.#lost === id) this.#lost = null;
+  }
+
+  // --- making it -------------------------------------------------------------------------------------------------
+
+  /** A click to grow.
+   *    other  the other kind of point than the one that is switched on */
+  async click(camera, x, y, other = false) {
+    const { scene, version, clickKind } = this.#state;
+    const kind = (clickKind === "outside") !== other ? "outside" : "inside";
+    let picked;
+    try {
+      picked = await api.pick(scene.id, version, { camera: onTheWire(camera), x, y });
+    } catch (error) {
+      return this.say(`Nothing could be selected: ${error.message}`, { kind: "bad" });
+    }
+    const { scene: present, version: shown, selection, selectOp: op, nextThing: fresh } = this.#state;
+    if (present?.id !== scene.id || shown !== version) return;
+    if (!picked.hit) return this.say("There is nothing here to select.", { seconds: 3 });
+    const next = withClick(selection, { op, kind, point: picked.point, fresh });
+    if (!next) return this.say("First click the thing itself, then what is not part of it.", { seconds: 4 });
+    this.store.set({ nextThing: false, tab: "drag" });
+    this.place(next);
+  }
+
+  /** A stroke of the brush, or a lasso.
+   *    points  [x, y], pixels of the camera
+   *    other   subtracts where adding is switched on, and the other way round */
+  draw(tool, camera, points, other = false) {
+    const { selection, selectOp, selectDepth: depth, brushRadius: radius } = this.#state;
+    const drawn = { op: other ? OPPOSITE[selectOp] : selectOp, camera: onTheWire(camera), points, radius, depth };
+    const made = tool === "brush" ? strokeOf(drawn) : polygonOf(drawn);
+    if (!made) return this.say("Draw the lasso around what you mean.", { seconds: 3 });
+    this.store.set({ tab: "drag" });
+    this.place([...selection, made]);
+  }
+
+  /** Whether the next stroke or lasso takes away. */
+  subtracts(other) {
+    return (other ? OPPOSITE[this.#state.selectOp] : this.#state.selectOp) === "subtract";
+  }
+
+  remove(index) {
+    this.place(this.#state.selection.filter((_, i) => i !== index));
+  }
+
+  invert() {
+    this.place(inverted(this.#state.selection));
+  }
+
+  clear() {
+    if (this.#state.selection.length) this.place([]);
+  }
+
+  // --- tools -----------------------------------------------------------------------------------------------------
+
+  /** Takes a tool in hand; null: the one for handles. */
+  use(tool) {
+    if (!tool) return this.store.set({ selectMode: false });
+    // Depth and changes have no tint: what is selected has to be seen.
+    this.store.set({ selectMode: true, selectTool: tool, layer: "color", comparing: false, selected: null });
+  }
+
+  toggle() {
+    const { selectMode, selectTool } = this.#state;
+    this.use(selectMode ? null : selectTool);
+  }
+}

@@ -1,0 +1,185 @@
+// Selecting, for the eye and the hand: the row of tools above the picture, and in the panel what is selected.
+
+import { attrs, byId, h, keyedList, problemPlace, showProblem, text } from "./dom.js";
+import { choice, segments, toggle } from "./fields.js";
+import { count, gaussians } from "./format.js";
+import { warnings } from "./request_panel.js";
+import { describe, sentence, share } from "./selection.js";
+
+const HANDS = [
+  ["handle", "Handles", "Click to place a handle, drag its dot to where it should go (S)"],
+  ["select", "Select", "Say what moves (S)"],
+];
+export const SELECT_TOOLS = [
+  ["grow", "Click", "Click a thing: it is selected up to its border (1)"],
+  ["brush", "Brush", "Paint over what is meant (2)"],
+  ["lasso", "Lasso", "Draw around what is meant (3)"],
+];
+const OPS = [
+  ["add", "Add", "To what is selected"],
+  ["subtract", "Subtract", "From what is selected. With Alt, the brush and the lasso do the opposite"],
+  ["intersect", "Keep only", "What is selected and meant here; all else no longer is"],
+];
+const KINDS = [
+  ["inside", "+ On it", "The next click is on the thing"],
+  ["outside", "− Not it", "The next click is on what is not the thing. So is a right click, or one with Alt"],
+];
+const DEPTHS = [
+  ["visible", "Visible", "Only the surface that is seen"],
+  ["through", "Through", "All that is behind one another there"],
+];
+const BRUSH = { low: 3, high: 80 }; // Pixels.
+
+/** The tools, above the picture. */
+export function buildTools(editor) {
+  const { store, selecting } = editor;
+  const set = (name) => (value) => store.set({ [name]: value });
+  const row = (label, testid, options, changed) => segments({ label, testid, options, changed });
+
+  const hand = row("What the pointer does", "hand", HANDS, (value) =>
+    selecting.use(value === "select" ? store.state.selectTool : null),
+  );
+  const tool = row("Select by", "select-tool", SELECT_TOOLS, (value) => selecting.use(value));
+  const op = choice({ label: "What is done with it", testid: "select-op", options: OPS, changed: set("selectOp") });
+  const kind = row("A click is", "click-kind", KINDS, set("clickKind"));
+  const next = h(
+    "button",
+    {
+      type: "button",
+      class: "small",
+      testid: "next-thing",
+      title: "The next click begins another thing, instead of saying more of this one",
+      onclick: () => store.set({ nextThing: !store.state.nextThing, clickKind: "inside" }),
+    },
+    "Next thing",
+  );
+  const depth = row("How deep", "select-depth", DEPTHS, set("selectDepth"));
+  const size = h("input", { type: "range", min: BRUSH.low, max: BRUSH.high, step: 1, testid: "brush-radius" });
+  size.addEventListener("input", () => store.set({ brushRadius: size.valueAsNumber }));
+  const brushSize = h("label", { class: "brush-size" }, h("span", {}, "Size"), size);
+  const tools = h(
+    "div",
+    { class: "row wrap select-tools" },
+    tool.element,
+    op.element,
+    kind.element,
+    next,
+    brushSize,
+    depth.element,
+  );
+  const undo = step("↶", "undo", "Undo (Ctrl + Z)", () => editor.undo());
+  const redo = step("↷", "redo", "Redo (Ctrl + Shift + Z)", () => editor.redo());
+  byId("tools").append(
+    hand.element,
+    tools,
+    h("span", { class: "spacer" }),
+    h("div", { class: "row tight" }, undo, redo),
+  );
+
+  const shown = ["selectMode", "selectTool", "selectOp", "clickKind", "nextThing", "selectDepth", "brushRadius"];
+  store.watch([...shown, "selection", "handles"], (state) => {
+    const { selectMode, selectTool } = state;
+    hand.update(selectMode ? "select" : "handle");
+    tools.hidden = !selectMode;
+    tool.update(selectTool);
+    op.update(state.selectOp);
+    kind.update(state.clickKind);
+    depth.update(state.selectDepth);
+    size.valueAsNumber = state.brushRadius;
+    attrs(next, { "aria-pressed": String(state.nextThing) });
+    next.disabled = !state.selection.some((o) => o.grow);
+    kind.element.hidden = next.hidden = selectTool !== "grow";
+    depth.element.hidden = selectTool === "grow";
+    brushSize.hidden = selectTool !== "brush";
+    undo.disabled = !editor.canUndo;
+    redo.disabled = !editor.canRedo;
+  });
+}
+
+const step = (label, testid, title, onclick) =>
+  h("button", { type: "button", class: "icon", title, "aria-label": title, testid, onclick }, label);
+
+/** What is selected, in the panel. */
+export function buildSelectionPanel(editor) {
+  const { store, selecting } = editor;
+  const button = (label, testid, title, onclick) =>
+    h("button", { type: "button", class: "small", testid, title, onclick }, label);
+  const invert = button("Invert", "invert-selection", "Select all that is not selected now", () => selecting.invert());
+  const clear = button("Clear", "clear-selection", "Select nothing", () => selecting.clear());
+  const tinted = toggle({
+    label: "Tint",
+    testid: "tinted",
+    title: "Show in the picture what is selected",
+    changed: (on) => store.set({ tinted: on }),
+  });
+  const held = h("p", { class: "selected-count", role: "status", testid: "selection-count" });
+  const notes = h("div", { class: "stack", testid: "selection-warnings" });
+  const problem = problemPlace("selection-problem");
+  const empty = h(
+    "p",
+    { class: "note", testid: "no-selection" },
+    "Nothing is selected: each handle moves the Gaussians in its sphere. Select, to say more exactly what moves.",
+  );
+  const list = h("ol", {
+    class: "steps-of-selection",
+    testid: "selection-steps",
+    "aria-label": "Steps of the selection",
+  });
+  const update = keyedList(
+    list,
+    ({ i }) => i,
+    () => stepRow(selecting),
+  );
+  const tools = h("div", { class: "row" }, tinted.element, invert, clear);
+  const element = h(
+    "section",
+    { class: "selection", "aria-label": "Selection" },
+    h("div", { class: "row between" }, h("h2", {}, "Selection"), tools),
+    ...[empty, held, problem, notes, list],
+  );
+
+  store.watch(["selection", "selectionAnswer", "selectionWaits", "tinted", "scene", "version"], (state) => {
+    const { selection, selectionAnswer: answer } = state;
+    empty.hidden = selection.length > 0;
+    for (const part of [tools, held, list]) part.hidden = selection.length === 0;
+    tinted.update(state.tinted);
+    text(held, countLine(state));
+    attrs(held, { "data-waits": state.selectionWaits, "data-count": answer?.count ?? null });
+    showProblem(problem, answer?.error ? { detail: sentence(answer.error.detail), where: stepOf(answer.error) } : null);
+    notes.replaceChildren(...warnings((answer?.warnings ?? []).map(sentence)));
+    notes.hidden = !answer?.warnings?.length;
+    update(selection.map((operation, i) => ({ operation, i })));
+  });
+  return element;
+}
+
+/** "Step 3" for an error of the third operation; else its address as it is. */
+function stepOf({ where }) {
+  const [, index] = /^selection\[(\d+)\]/.exec(where ?? "") ?? [];
+  return index === undefined ? where : `Step ${Number(index) + 1}`;
+}
+
+function countLine({ scene, version, selectionAnswer: answer, selectionWaits }) {
+  if (!answer || answer.error) return selectionWaits ? "Selecting…" : "";
+  const whole = scene?.versions.find((v) => v.version === version)?.gaussians ?? 0;
+  const part = whole > 0 ? ` (${share(answer.count, whole)})` : "";
+  return `${gaussians(answer.count)} selected${part}${selectionWaits ? " …" : ""}`;
+}
+
+function stepRow(selecting) {
+  let index = 0;
+  const name = h("span", {});
+  const remove = h("button", { type: "button", class: "icon", onclick: () => selecting.remove(index) }, "✕");
+  return {
+    element: h("li", { class: "row between" }, name, remove),
+    update: ({ operation, i }) => {
+      index = i;
+      text(name, `${count(i + 1)}. ${describe(operation)}`);
+      attrs(remove, {
+        title: "Remove this step",
+        "aria-label": `Remove step ${i + 1}`,
+        "data-testid": `selection-remove-${i}`,
+      });
+    },
+  };
+}
