@@ -5,7 +5,8 @@
 #
 # USES are the room's arrows: the only rooms whose headers it may include (tests/house holds the #include lines
 # against them). LINKS are third-party libraries. Tests live in tests/<folder>/ and carry the label of their list:
-# unit (milliseconds each), golden (reference vectors and real captures), slow. Their names begin with the folder.
+# unit (milliseconds each), golden (reference vectors and real captures), slow. Their names begin with the folder. The
+# target all_LABEL builds all programs of a label.
 
 add_library(splatdrag_warnings INTERFACE)
 target_compile_options(splatdrag_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
@@ -29,8 +30,18 @@ function(splatdrag_tests target label folder library)
   list(TRANSFORM ARGN PREPEND ${CMAKE_SOURCE_DIR}/tests/${folder}/)
   add_executable(${target} ${ARGN})
   target_link_libraries(${target} PRIVATE ${library} splatdrag_test_support splatdrag_warnings GTest::gtest_main)
-  include(GoogleTest)
-  gtest_discover_tests(${target} TEST_PREFIX ${folder}/ DISCOVERY_TIMEOUT 60 PROPERTIES LABELS ${label} TIMEOUT 900)
+  if(NOT TARGET all_${label})
+    add_custom_target(all_${label})
+  endif()
+  add_dependencies(all_${label} ${target})
+  if(SPLATDRAG_SANITIZE)
+    # To start a program under a sanitizer takes longer than most tests do: one process for all of a program's.
+    add_test(NAME ${folder}/${label} COMMAND ${target})
+    set_tests_properties(${folder}/${label} PROPERTIES LABELS ${label} TIMEOUT 1800)
+  else()
+    include(GoogleTest)
+    gtest_discover_tests(${target} TEST_PREFIX ${folder}/ DISCOVERY_TIMEOUT 60 PROPERTIES LABELS ${label} TIMEOUT 900)
+  endif()
 endfunction()
 
 function(splatdrag_room kind folder name)
