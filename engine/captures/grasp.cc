@@ -1,10 +1,17 @@
 #include "engine/captures/grasp.h"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
+#include <vector>
 
 #include "engine/captures/looking.h"
+#include "engine/captures/moving_part.h"
+#include "engine/captures/outlines.h"
 #include "engine/core/rows.h"
 #include "engine/edit/drag.h"
+#include "engine/mask/mask.h"
+#include "engine/render/forward.h"
 #include "engine/select/select.h"
 
 namespace engine::captures {
@@ -14,6 +21,12 @@ namespace {
 // definition of the cases. The ball's rim runs through about the middle of the thing: half of it is left out, and
 // beyond its outline the ball takes in what it should not.
 constexpr double too_large = 1.25, off_centre = 1.2;
+
+// Factors that bare balls are tried with: finer steps than a person would take.
+constexpr double least_factor = 0.25, most_factor = 2.0;
+constexpr int factors = 25;
+
+constexpr int too_wide_px = 5;  // beyond the true outline: what segmentation tools are off by at worst
 
 /// To the right in the first photo.
 DVec3 right_of(const CapturedCase& the_case) { return glm::transpose(the_case.cameras.front().rotation)[0]; }
@@ -44,11 +57,10 @@ Result<Grasp> grasp_of(std::string by, edit::Request request, const scene::Gauss
   return out;
 }
 
-/// By what grows from clicks; each of its rows goes with the nearest handle.
-Result<Grasp> grasp_by_growing(std::string by, select::Grow clicks, const CapturedCase& the_case,
-                               const scene::GaussianCloud& scene) {
+/// By a selection; each of its rows goes with the nearest handle.
+Result<Grasp> grasp_by_selection(std::string by, select::Selection selection, const CapturedCase& the_case,
+                                 const scene::GaussianCloud& scene) {
   edit::Request request = asked_of(the_case);
-  select::Selection selection{{select::Op::add, std::move(clicks)}};
   if (the_case.careless) {
     const scene::Camera& photo = the_case.cameras.front();
     const DVec3 handle = request.handles.front().source;
@@ -63,6 +75,23 @@ Result<Grasp> grasp_by_growing(std::string by, select::Grow clicks, const Captur
   return grasp_of(std::move(by), std::move(request), scene);
 }
 
+/// The photos that were taken farthest to the left, in the middle and farthest to the right.
+std::vector<scene::Camera> three_photos(const CapturedCase& the_case) {
+  const DVec3 right = right_of(the_case);
+  const auto [left_most, right_most] = std::ranges::minmax_element(
+      the_case.cameras, {}, [&](const scene::Camera& c) { return glm::dot(c.centre(), right); });
+  return {*left_most, the_case.cameras.front(), *right_most};
+}
+
+Result<Grasp> grasp_by_outlines(std::string by, int beyond_px, const CapturedCase& the_case,
+                                const scene::GaussianCloud& scene) {
+  select::Masks masks;
+  render::Workspace workspace;
+  for (const scene::Camera& camera : three_photos(the_case))
+    masks.views.push_back({camera, mask::dilate(true_outline(the_case, camera, workspace), beyond_px)});
+  return grasp_by_selection(std::move(by), {{select::Op::add, std::move(masks)}}, the_case, scene);
+}
+
 }  // namespace
 
 Result<Grasp> grasp_by_balls(const CapturedCase& the_case, const scene::GaussianCloud& scene) {
@@ -73,19 +102,51 @@ Result<Grasp> grasp_by_balls(const CapturedCase& the_case, const scene::Gaussian
   return grasp_of("balls", std::move(request), scene);
 }
 
+Result<Grasp> grasp_by_bare_balls(const CapturedCase& the_case, const scene::GaussianCloud& scene) {
+  const auto grasp = [&](double factor) {
+    edit::Request request = asked_of(the_case);
+    for (edit::Handle& handle : request.handles)
+      if (handle.target) handle.radius *= factor;
+    return grasp_of("bare", std::move(request), scene);
+  };
+  double best = 1, best_f1 = -1;
+  for (int i = 0; i < factors; ++i) {
+    const double factor = least_factor * std::pow(most_factor / least_factor, double(i) / (factors - 1));
+    const auto tried = grasp(factor);
+    if (!tried) continue;
+    const auto [recall, precision] = match(scene, tried->rows, the_case.moving);
+    const double f1 = recall + precision > 0 ? 2 * recall * precision / (recall + precision) : 0;
+    if (f1 > best_f1) best = factor, best_f1 = f1;
+  }
+  auto out = grasp(best);
+  if (!out || !the_case.careless) return out;
+  for (edit::Handle& handle : out->request.handles) place_carelessly(the_case, handle);
+  return grasp_of("bare", std::move(out->request), scene);
+}
+
 Result<Grasp> grasp_by_clicks(const CapturedCase& the_case, const scene::GaussianCloud& scene) {
-  return grasp_by_growing("clicks", {the_case.clicks.inside, the_case.clicks.outside, {}}, the_case, scene);
+  const select::Grow clicks{the_case.clicks.inside, the_case.clicks.outside, {}};
+  return grasp_by_selection("clicks", {{select::Op::add, clicks}}, the_case, scene);
 }
 
 Result<Grasp> grasp_by_looking(const CapturedCase& the_case, const scene::GaussianCloud& scene) {
   auto clicks = clicks_of_a_looking_person(the_case, scene);
   if (!clicks) return propagate(clicks);
-  return grasp_by_growing("looking", *std::move(clicks), the_case, scene);
+  return grasp_by_selection("looking", {{select::Op::add, *std::move(clicks)}}, the_case, scene);
+}
+
+Result<Grasp> grasp_by_masks(const CapturedCase& the_case, const scene::GaussianCloud& scene) {
+  return grasp_by_outlines("masks", 0, the_case, scene);
+}
+
+Result<Grasp> grasp_by_wide_masks(const CapturedCase& the_case, const scene::GaussianCloud& scene) {
+  return grasp_by_outlines("wide_masks", too_wide_px, the_case, scene);
 }
 
 const std::vector<NamedGrasp>& known_grasps() {
-  static const std::vector<NamedGrasp> all{
-      {"balls", grasp_by_balls}, {"clicks", grasp_by_clicks}, {"looking", grasp_by_looking}};
+  static const std::vector<NamedGrasp> all{{"balls", grasp_by_balls},   {"bare", grasp_by_bare_balls},
+                                           {"clicks", grasp_by_clicks}, {"looking", grasp_by_looking},
+                                           {"masks", grasp_by_masks},   {"wide_masks", grasp_by_wide_masks}};
   return all;
 }
 

@@ -15,19 +15,25 @@ namespace engine::captures {
 
 /// What is asked for, and what that takes along.
 struct Grasp {
-  std::string by;                   ///< How: "balls", "clicks", "looking".
+  std::string by;                   ///< How: "balls", "bare", "clicks", "looking", "masks", "wide_masks".
   edit::Request request;            ///< Without parameters: those are a preset's.
   std::vector<std::uint32_t> rows;  ///< Rows of the trained scene that follow a handle with a target; ascending.
 };
 
-/// Says what moves, from the case (its handles, clicks, carelessness; never its truth) and the scene trained from its
-/// photos.
+/// Says what moves, from the case (its handles, clicks, carelessness; and its truth only where it says so)
+/// and the scene trained from its photos.
 using GraspBy = std::function<Result<Grasp>(const CapturedCase& the_case, const scene::GaussianCloud& scene)>;
 
 /// By a ball around each handle, and a box where the case has one. Carelessly: balls too large by a quarter
 /// and so far off to one side that about half of the thing is missing.
 ///   errors  those of deform::assign()
 [[nodiscard]] Result<Grasp> grasp_by_balls(const CapturedCase& the_case, const scene::GaussianCloud& scene);
+
+/// By a ball around each handle and nothing else, as the paper has it, and as well as anybody could choose its size:
+/// the radii of the case times the factor whose rows match what moves best (F1, the harmonic mean of recall and
+/// precision). Carelessly: those balls, placed as above.
+///   errors  those of deform::assign(), where no factor gives every handle a row
+[[nodiscard]] Result<Grasp> grasp_by_bare_balls(const CapturedCase& the_case, const scene::GaussianCloud& scene);
 
 /// By a selection that grows from the clicks of the case; each of its rows goes with the nearest handle. Carelessly:
 /// the selection reaches beyond the thing by so many pixels of a photo, and ends at a plane upright to it through the
@@ -38,6 +44,12 @@ using GraspBy = std::function<Result<Grasp>(const CapturedCase& the_case, const 
 /// By the same, from the clicks of a person who looks where it is wrong: see looking.h.
 ///   errors  those of clicks_of_a_looking_person(), select::select() and edit::assign()
 [[nodiscard]] Result<Grasp> grasp_by_looking(const CapturedCase& the_case, const scene::GaussianCloud& scene);
+
+/// By masks of three photos, those taken farthest to the left, in the middle and farthest to the right: the true
+/// outline of what moves; or that and all pixels within 5 of it. Carelessly: as clicks.
+///   errors  those of select::select() and edit::assign()
+[[nodiscard]] Result<Grasp> grasp_by_masks(const CapturedCase& the_case, const scene::GaussianCloud& scene);
+[[nodiscard]] Result<Grasp> grasp_by_wide_masks(const CapturedCase& the_case, const scene::GaussianCloud& scene);
 
 /// A way to say what moves, by its name.
 struct NamedGrasp {

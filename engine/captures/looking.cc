@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "engine/captures/outlines.h"
 #include "engine/core/rng.h"
-#include "engine/mask/mask.h"
 #include "engine/render/forward.h"
 #include "engine/render/pick.h"
 #include "engine/select/select.h"
@@ -21,15 +21,6 @@ constexpr std::size_t every_photo = 5;  // is looked at: six of thirty
 constexpr int least_depth = 2;          // pixels from a patch's middle to its rim: what a person takes for wrong
 constexpr double noise_by_depth = 0.5;  // of that distance; no click is noisier
 constexpr double click_noise_px = 2;    // as those of the cases' own clicks
-
-/// Rows of a scene as a view shows them: 1 where they are most of a pixel.
-scene::Mask shown(const scene::GaussianCloud& cloud, const std::vector<std::uint8_t>& rows, const scene::Camera& camera,
-                  render::Workspace& workspace) {
-  const std::vector<float> weight(rows.begin(), rows.end());
-  render::Rendering rendering;
-  render::forward(cloud, camera, {.color = false}, weight, workspace, rendering);
-  return mask::mask2d(rendering.weight);
-}
 
 /// A patch of pixels that are wrong in the same way.
 struct Patch {
@@ -86,10 +77,9 @@ void find_patches(const scene::Mask& wrong, std::size_t view, bool is_missed, st
 class Looking {
  public:
   Looking(const CapturedCase& the_case, const scene::GaussianCloud& scene) : scene_(scene) {
-    const std::vector<std::uint8_t> part = the_case.moving.holds(the_case.before.mean);
     for (std::size_t i = 0; i < the_case.cameras.size(); i += every_photo) {
       cameras_.push_back(the_case.cameras[i]);
-      meant_.push_back(shown(the_case.before, part, cameras_.back(), workspace_));
+      meant_.push_back(true_outline(the_case, cameras_.back(), workspace_));
     }
   }
 

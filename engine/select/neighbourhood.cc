@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "engine/core/parallel.h"
+#include "engine/neighbours/morton.h"
 #include "engine/select/natural_border.h"
 #include "engine/select/random_walk.h"
 #include "engine/select/similarity.h"
@@ -23,6 +24,8 @@ constexpr std::size_t rows_clicked = 4;        // of those nearest to a point, t
 constexpr std::size_t rows_near_click = 24;    // that are looked at for that: the mean of a large disc may be far off
 constexpr double reach_by_points = 4.0;        // times the distance of the points
 constexpr double reach_by_scene = 0.25;        // of the distance within which half of the rows lie
+constexpr double most_of_rows = 0.98;          // that masks name: the others may be floaters
+constexpr double reach_by_rows = 1.5;          // times the distance of those from their middle
 constexpr double far_border = 0.9;             // of the reach: from here on, rows are taken for outside
 // Across the sharpest border some of a walk goes on: else pieces of one thing that hardly touch would have nothing to
 // do with each other, and the solver no end. Chosen on the captured cases mug, turn, plant and rod: 1e-4 gives the same
@@ -40,6 +43,12 @@ std::vector<double> squared_distances(const Array3& mean, DVec3 from) {
   return out;
 }
 
+std::vector<std::uint32_t> in_order(std::span<const std::uint32_t> values, std::span<const std::uint32_t> order) {
+  std::vector<std::uint32_t> out(order.size());
+  for (std::size_t i = 0; i < order.size(); ++i) out[i] = values[order[i]];
+  return out;
+}
+
 double distance(DVec3 a, DVec3 b) { return glm::length(a - b); }
 
 std::string text(double number) {
@@ -47,6 +56,9 @@ std::string text(double number) {
   out << number;
   return out.str();
 }
+
+/// So much or a little more, so that the next click rarely asks for other surroundings.
+double by_steps(double reach) { return std::exp2(std::ceil(2 * std::log2(reach)) / 2); }
 
 }  // namespace
 
@@ -57,16 +69,32 @@ Surroundings surroundings_of(const Array3& mean, const Grow& grow) {
   for (const DVec3 point : grow.inside) farthest = std::max(farthest, distance(middle, point));
   for (const DVec3 point : grow.outside) nearest = std::min(nearest, distance(middle, point));
   if (std::isfinite(nearest)) farthest = std::max(farthest, nearest);
-  if (farthest > 0) {
-    // By steps, so that the next click rarely asks for other surroundings.
-    const double steps = std::ceil(2 * std::log2(reach_by_points * farthest));
-    return {middle, std::exp2(steps / 2)};
-  }
+  if (farthest > 0) return {middle, by_steps(reach_by_points * farthest)};
   std::vector<double> squared = squared_distances(mean, middle);
   const auto half = squared.begin() + std::ptrdiff_t(squared.size() / 2);
   std::nth_element(squared.begin(), half, squared.end());
   // Rows at the very same place as the point: anything above nothing holds them.
   return {middle, std::max(reach_by_scene * std::sqrt(*half), 1e-30)};
+}
+
+std::optional<Surroundings> surroundings_of(const Array3& mean, std::span<const std::uint8_t> rows) {
+  DVec3 sum(0.0);
+  std::vector<double> squared;
+  for (std::size_t row = 0; row < rows.size(); ++row)
+    if (rows[row] != 0) sum += DVec3(mean.get(row)), squared.push_back(0);
+  if (squared.empty()) return std::nullopt;
+  const DVec3 middle = sum / double(squared.size());
+  auto next = squared.begin();
+  for (std::size_t row = 0; row < rows.size(); ++row) {
+    if (rows[row] == 0) continue;
+    const DVec3 offset = DVec3(mean.get(row)) - middle;
+    *next++ = glm::dot(offset, offset);
+  }
+  const auto nearly_all = squared.begin() + std::ptrdiff_t(most_of_rows * double(squared.size() - 1));
+  std::nth_element(squared.begin(), nearly_all, squared.end());
+  const double farthest = reach_by_rows * std::sqrt(*nearly_all);
+  if (!(farthest > 0)) return std::nullopt;  // all at one place: nothing lies between them
+  return Surroundings{middle, by_steps(farthest)};
 }
 
 Neighbourhood::Neighbourhood(const scene::GaussianCloud& cloud, const Surroundings& surroundings)
@@ -85,6 +113,8 @@ Neighbourhood::Neighbourhood(const scene::GaussianCloud& cloud, const Surroundin
     rows_.resize(max_neighbourhood);
     std::sort(rows_.begin(), rows_.end());
   }
+  const std::vector<std::uint32_t> order = neighbours::morton_order(points_of(cloud.mean, rows_, surroundings.middle));
+  rows_ = in_order(rows_, order);
   points_ = points_of(cloud.mean, rows_, surroundings.middle);
   index_ = neighbours::PointIndex(points_, 3);
   graph_ = join_nearest(points_, index_, neighbours_joined);
@@ -158,9 +188,21 @@ Result<std::vector<std::uint32_t>> Neighbourhood::grow(const scene::GaussianClou
   if (!seeds) return propagate(seeds);
   const std::vector<double> potential = random_walk(graph_, weight_, seeds->given);
   const std::vector<std::uint8_t> inside = natural_border(graph_, weight_, potential, seeds->given, seeds->clicked);
+  return rows_where_marked(inside);
+}
+
+std::vector<std::uint32_t> Neighbourhood::settle(std::span<const Given> given) const {
+  const std::vector<double> potential = random_walk(graph_, weight_, given);
+  std::vector<std::uint8_t> inside(rows_.size());
+  for (std::size_t node = 0; node < inside.size(); ++node) inside[node] = potential[node] > 0.5;
+  return rows_where_marked(inside);
+}
+
+std::vector<std::uint32_t> Neighbourhood::rows_where_marked(std::span<const std::uint8_t> nodes) const {
   std::vector<std::uint32_t> rows;
-  for (std::size_t node = 0; node < inside.size(); ++node)
-    if (inside[node] != 0) rows.push_back(rows_[node]);
+  for (std::size_t node = 0; node < nodes.size(); ++node)
+    if (nodes[node] != 0) rows.push_back(rows_[node]);
+  std::sort(rows.begin(), rows.end());
   return rows;
 }
 

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -29,7 +30,7 @@ struct Surroundings {
   bool operator==(const Surroundings&) const = default;
 };
 
-/// Rows: the nearest to the middle count. Two seconds' work on one core for a first click, 0.6 s for the next.
+/// Rows: the nearest to the middle count. A first click then takes 1.2 s of one core, the next ones 0.35 s.
 constexpr std::size_t max_neighbourhood = 250'000;
 
 /// The surroundings of an operation. Without a reach: four times as far as the farthest inside point, or the nearest
@@ -38,15 +39,20 @@ constexpr std::size_t max_neighbourhood = 250'000;
 /// Precondition: validate() holds, and the scene has a row.
 [[nodiscard]] Surroundings surroundings_of(const Array3& mean, const Grow& grow);
 
+/// The surroundings of rows: half as far again from their middle as nearly all of them lie, rounded up as above. None
+/// without a row.
+///   rows  [N] 1 for each of them
+[[nodiscard]] std::optional<Surroundings> surroundings_of(const Array3& mean, std::span<const std::uint8_t> rows);
+
 /// The rows around a point, joined to their neighbours by edges that are the weaker the more likely a border runs
 /// between the two. Immutable.
 class Neighbourhood {
  public:
-  /// About 1.3 s for 250,000 rows on one core, 0.5 s for 100,000 (bench/select_bench).
+  /// About 0.9 s for 250,000 rows on one core, 0.35 s for 100,000 (bench/select_bench).
   Neighbourhood(const scene::GaussianCloud& cloud, const Surroundings& surroundings);
 
   [[nodiscard]] const Surroundings& surroundings() const { return surroundings_; }
-  [[nodiscard]] std::span<const std::uint32_t> rows() const { return rows_; }  ///< Ascending.
+  [[nodiscard]] std::span<const std::uint32_t> rows() const { return rows_; }  ///< In the order of nodes.
   /// Had the reach to be cut short, so as not to look at more than max_neighbourhood rows?
   [[nodiscard]] bool is_cut_short() const { return is_cut_short_; }
 
@@ -60,6 +66,11 @@ class Neighbourhood {
   ///   cover
   ///            all rows around the inside points more
   [[nodiscard]] Result<std::vector<std::uint32_t>> grow(const scene::GaussianCloud& cloud, const Grow& grow) const;
+
+  /// For each node that is not given, the side at which a random walk from it rather ends; where there is no way to
+  /// either, the outside. The rows that are inside, given or not, ascending.
+  ///   given  [rows().size()], by node
+  [[nodiscard]] std::vector<std::uint32_t> settle(std::span<const Given> given) const;
 
  private:
   /// What a point says of a node. Of several the least one counts: the point that the node covers most, or is nearest
@@ -78,15 +89,17 @@ class Neighbourhood {
   /// Claims the nodes that a point lies on; returns the one that covers it most.
   std::uint32_t claim(const scene::GaussianCloud& cloud, DVec3 point, Given side,
                       std::map<std::uint32_t, Claim>& claims) const;
+  [[nodiscard]] std::vector<std::uint32_t> rows_where_marked(
+      std::span<const std::uint8_t> nodes) const;  ///< Ascending.
   /// Gives what lies at the reach to the outside.
   void take_far_nodes(std::vector<Given>& given) const;
 
   Surroundings surroundings_;
   bool is_cut_short_ = false;
-  std::vector<std::uint32_t> rows_;
-  double farthest_ = 0;           ///< Of the rows, from the middle, if the reach was cut short; else the reach.
-  std::vector<float> points_;     ///< [rows][3] relative to the middle.
-  neighbours::PointIndex index_;  ///< Of these.
+  std::vector<std::uint32_t> rows_;  ///< By node: in an order in which near ones come together.
+  double farthest_ = 0;              ///< Of the rows, from the middle, if the reach was cut short; else the reach.
+  std::vector<float> points_;        ///< [rows][3] relative to the middle.
+  neighbours::PointIndex index_;     ///< Of these.
   NeighbourGraph graph_;
   std::vector<float> weight_;  ///< [edges] 1: the same surface goes on; near 0: a border.
 };

@@ -30,6 +30,7 @@ class Check {
       return bad("op", std::string(name_of(operation.action)) + " changes what is selected and takes no op but add");
     name_ = name_of(operation.action);
     const bool searches = std::holds_alternative<Grow>(operation.action) ||
+                          std::holds_alternative<Masks>(operation.action) ||
                           (changes && !std::holds_alternative<Invert>(operation.action));
     if (auto fits = count("", searches, searches_, max_searches, "operations that look for neighbours"); !fits)
       return fits;

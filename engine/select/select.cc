@@ -81,6 +81,20 @@ Result<RowSet> Selector::rows_of(const Grow& grow, const std::string& where, Sel
   return named;
 }
 
+RowSet Selector::rows_of(const Masks& masks, Selected& so_far) {
+  MaskedRows masked = rows_in_masks(cloud_, masks, workspace_);
+  so_far.undecided += masked.undecided;
+  const auto surroundings = surroundings_of(cloud_.mean, masked.inside);
+  if (!surroundings) return std::move(masked.inside);
+  const Neighbourhood& around = neighbourhood(*surroundings);
+  std::vector<Given> given;
+  given.reserve(around.rows().size());
+  for (const std::uint32_t row : around.rows())
+    given.push_back(masked.judged[row] == 0 ? Given::no : masked.inside[row] != 0 ? Given::inside : Given::outside);
+  for (const std::uint32_t row : around.settle(given)) masked.inside[row] = 1;
+  return std::move(masked.inside);
+}
+
 Result<void> Selector::carry_out(const Operation& operation, const std::string& where, Selected& so_far) {
   const Array3& mean = cloud_.mean;
   return std::visit(
@@ -101,9 +115,7 @@ Result<void> Selector::carry_out(const Operation& operation, const std::string& 
             if (!grown) return propagate(grown);
             named = *std::move(grown);
           } else if constexpr (std::is_same_v<Kind, Masks>) {
-            MaskedRows masked = rows_in_masks(cloud_, action, workspace_);
-            so_far.undecided += masked.undecided;
-            named = std::move(masked.rows);
+            named = rows_of(action, so_far);
           } else if constexpr (std::is_same_v<Kind, Polygon> || std::is_same_v<Kind, Stroke>) {
             named = rows_in(cloud_, action, workspace_);
           } else {

@@ -51,6 +51,7 @@ class Selector {
  private:
   [[nodiscard]] Result<void> carry_out(const Operation& operation, const std::string& where, Selected& so_far);
   [[nodiscard]] Result<RowSet> rows_of(const Grow& grow, const std::string& where, Selected& so_far);
+  [[nodiscard]] RowSet rows_of(const Masks& masks, Selected& so_far);
   [[nodiscard]] const Neighbourhood& neighbourhood(const Surroundings& surroundings);
 
   const scene::GaussianCloud& cloud_;

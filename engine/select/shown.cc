@@ -86,12 +86,14 @@ MaskedRows rows_in_masks(const scene::GaussianCloud& cloud, const Masks& masks, 
     for (std::size_t row = 0; row < cloud.size(); ++row)
       all[row] += view_all[row] / area, inside[row] += view_inside[row] / area;
   }
-  MaskedRows out{RowSet(cloud.size(), 0), 0};
+  MaskedRows out{RowSet(cloud.size(), 0), RowSet(cloud.size(), 0), 0};
   for (std::size_t row = 0; row < cloud.size(); ++row) {
     if (!(all[row] > 0) || !is_reached(cloud, row, largest[row], judged_transmittance)) continue;
     const double share = inside[row] / all[row];
-    out.rows[row] = share > 0.5;
-    out.undecided += std::abs(share - 0.5) < undecided_margin;
+    const bool is_even = std::abs(share - 0.5) < undecided_margin;
+    out.undecided += is_even;
+    out.judged[row] = !is_even;
+    out.inside[row] = !is_even && share > 0.5;
   }
   return out;
 }

@@ -19,18 +19,19 @@ namespace engine::select {
 [[nodiscard]] RowSet rows_in(const scene::GaussianCloud& cloud, const Polygon& polygon, render::Workspace& workspace);
 [[nodiscard]] RowSet rows_in(const scene::GaussianCloud& cloud, const Stroke& stroke, render::Workspace& workspace);
 
-/// Rows that masks name.
+/// What masks say of rows.
 struct MaskedRows {
-  RowSet rows;
-  /// Named or not, those of which the share inside lies within 0.1 of one half: masks that contradict each other, or a
-  /// row across a border.
+  RowSet inside;  ///< [N] 1 for rows that are judged to be inside.
+  RowSet judged;  ///< [N] 1 where the masks say enough for a judgement, either way.
+  /// Rows that the views show, of which the share inside lies within 0.1 of one half: masks that contradict each other,
+  /// or a row across a border. Not judged.
   std::size_t undecided = 0;
 };
 
-/// Lifts masks to rows: a row is named where the views show more of it inside the masks than outside. Weights are
-/// summed over all views, each in units of its picture's area, so that none counts for more by its resolution. Rows
-/// that no view shows are not named. A forward pass for each view. Source: Shen et al. 2024, "FlashSplat": which
-/// label of a row renders the masks best is known in closed form. Precondition: as above.
+/// Lifts masks to rows: inside is a row of which the views show more inside the masks than outside. Weights are summed
+/// over all views, each in units of its picture's area, so that none counts for more by its resolution. What no view
+/// shows is not judged. A forward pass for each view. Source: Shen et al. 2024, "FlashSplat": which label of a row
+/// renders the masks best is known in closed form. Precondition: as above.
 [[nodiscard]] MaskedRows rows_in_masks(const scene::GaussianCloud& cloud, const Masks& masks,
                                        render::Workspace& workspace);
 

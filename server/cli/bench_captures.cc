@@ -52,7 +52,7 @@ Result<captures::CaptureTrial> trial_of(const captures::ReadyCase& ready, const 
   preview.params = edits::preset_params(proto::Preset::preview, preview);
   const path file = cache_file(options, machine, ready.judged.name, corrector, hexadecimal(ready.key_before),
                                hexadecimal(ready.key_after), request);
-  return cached_or_new<captures::CaptureTrial>(file, [&]() -> Result<captures::CaptureTrial> {
+  auto trial = cached_or_new<captures::CaptureTrial>(file, [&]() -> Result<captures::CaptureTrial> {
     auto done = captures::carry_out(ready, request, preview, corrector);
     if (!done) return propagate(done);
     const auto pictures = evaluate::show_pictures(ready.judged, request, ready.grasp.by + "_" + corrector, done->edited,
@@ -60,6 +60,8 @@ Result<captures::CaptureTrial> trial_of(const captures::ReadyCase& ready, const 
     if (!pictures) return propagate(pictures);
     return std::move(done->trial);
   });
+  if (trial) trial->by = ready.grasp.by;  // another way may have asked for the same
+  return trial;
 }
 
 /// Every case with every corrector. Rows are shown as they come.
@@ -111,9 +113,11 @@ CLI::Option* add_capture_options(CLI::App& command, CaptureOptions& options) {
   std::vector<std::string> ways;
   for (const captures::NamedGrasp& way : captures::known_grasps()) ways.push_back(way.name);
   command
-      .add_option("--by", options.by,
-                  "How a request of --captures says what moves: balls around its handles, a selection that grows from "
-                  "at most six clicks, or from as many of a person who looks and corrects (default: one after another)")
+      .add_option(
+          "--by", options.by,
+          "How a request of --captures says what moves: balls around its handles (within a box; or bare, of the "
+          "best size), a selection that grows from at most six clicks, or from as many of a person who looks "
+          "and corrects, or masks of three photos, true or five pixels too wide (default: all in turn)")
       ->needs(on)
       ->check(CLI::IsMember(ways))
       ->type_name("WAY");

@@ -76,6 +76,36 @@ TEST(GraspByBalls, SaysWhichBallIsEmpty) {
   EXPECT_EQ(grasp.error().where, "handles[0].radius");
 }
 
+TEST(GraspByBareBalls, ChoosesTheSizeThatMatchesWhatMovesBest) {
+  CapturedCase the_case = with_handles({{{0, 0, 0}, DVec3(0, 1, 0), 0.9, 0}, {{0.8, 0, 0}, std::nullopt, 0.05, 0}});
+  the_case.region = edit::Region{{0, 0, 0}, {0.1, 1, 1}};
+  the_case.moving = MovingPart(line(), std::vector<std::uint32_t>{7, 8, 9, 10, 11, 12, 13});
+  const auto grasp = grasp_by_bare_balls(the_case, line());
+  ASSERT_TRUE(grasp) << grasp.error().message;
+  EXPECT_EQ(grasp->by, "bare");
+  EXPECT_EQ(grasp->rows, (std::vector<std::uint32_t>{7, 8, 9, 10, 11, 12, 13}));
+  EXPECT_FALSE(grasp->request.region);
+  EXPECT_LT(grasp->request.handles[0].radius, 0.4);
+  EXPECT_EQ(grasp->request.handles[1].radius, 0.05) << "anchors hold what they held";
+}
+
+TEST(GraspByBareBalls, CarelesslyThoseBallsAreOffCentreAndTooLarge) {
+  CapturedCase the_case = with_handles({{{0, 0, 0}, DVec3(0, 1, 0), 0.9, 0}});
+  the_case.moving = MovingPart(line(), std::vector<std::uint32_t>{8, 9, 10, 11, 12});
+  const auto careful = grasp_by_bare_balls(the_case, line());
+  the_case.careless = Carelessness{};
+  const auto careless = grasp_by_bare_balls(the_case, line());
+  ASSERT_TRUE(careful && careless);
+  EXPECT_GT(careless->request.handles[0].radius, careful->request.handles[0].radius);
+  EXPECT_GT(careless->request.handles[0].source.x, 0.1);
+}
+
+TEST(GraspByBareBalls, SaysWhichBallIsEmptyAtAnySize) {
+  const auto grasp = grasp_by_bare_balls(with_handles({{{5, 0, 0}, DVec3(0, 1, 0), 0.25, 0}}), line());
+  ASSERT_FALSE(grasp);
+  EXPECT_EQ(grasp.error().where, "handles[0].radius");
+}
+
 /// Two dense balls of Gaussians, of another colour each, that do not touch: the first 300 rows, the others.
 scene::GaussianCloud two_balls() {
   scene::GaussianCloud cloud;

@@ -139,5 +139,51 @@ TEST(Grow, TakesABallFromTwoClicks) {
   EXPECT_GT(found.precision, 0.99);
 }
 
+/// Node by node, what the rows say.
+std::vector<Given> given_by_row(const Neighbourhood& around, const std::vector<Given>& of_row) {
+  std::vector<Given> given;
+  for (const std::uint32_t row : around.rows()) given.push_back(of_row[row]);
+  return given;
+}
+
+TEST(Settle, GivesEachRowToTheSideThatItHangsTogetherWith) {
+  scene::GaussianCloud cloud = two_colors({0.1f, 0.1f, 0.8f});
+  add_sheet(cloud, {0, 0, 50}, 5, 0.1f, {0.8f, 0.1f, 0.1f});  // joined to nothing
+  std::vector<Given> of_row(cloud.size(), Given::no);
+  for (std::size_t row = 0; row < 800; ++row)
+    if (cloud.mean.x[row] < -1.8f)
+      of_row[row] = Given::inside;
+    else if (cloud.mean.x[row] > 1.8f)
+      of_row[row] = Given::outside;
+  const Neighbourhood around(cloud, {{0, 0, 0}, 100.0});
+  const std::vector<std::uint32_t> rows = around.settle(given_by_row(around, of_row));
+  EXPECT_EQ(RowList(rows.begin(), rows.end()), numbers(0, 400));
+}
+
+TEST(Settle, LeavesWhatIsGiven) {
+  const scene::GaussianCloud cloud = line_of(6);
+  const Neighbourhood around(cloud, {{0, 0, 0}, 100.0});
+  const std::vector<Given> of_row{Given::outside, Given::inside,  Given::outside,
+                                  Given::outside, Given::outside, Given::outside};
+  EXPECT_EQ(around.settle(given_by_row(around, of_row)), (std::vector<std::uint32_t>{1}));
+}
+
+TEST(SurroundingsOfRows, HoldNearlyAllOfThemAndALittleMore) {
+  const scene::GaussianCloud cloud = line_of(101);
+  std::vector<std::uint8_t> rows(101, 0);
+  for (std::size_t row = 0; row < 51; ++row) rows[row] = 1;
+  const auto around = surroundings_of(cloud.mean, rows);
+  ASSERT_TRUE(around);
+  EXPECT_EQ(around->middle, DVec3(25, 0, 0));
+  EXPECT_GT(around->reach, 1.4 * 24);
+  EXPECT_LT(around->reach, 2.2 * 25);
+}
+
+TEST(SurroundingsOfRows, AreNoneOfNoRowAndOfASinglePlace) {
+  const scene::GaussianCloud cloud = cloud_at({{1, 2, 3}, {1, 2, 3}});
+  EXPECT_FALSE(surroundings_of(cloud.mean, std::vector<std::uint8_t>{0, 0}));
+  EXPECT_FALSE(surroundings_of(cloud.mean, std::vector<std::uint8_t>{1, 1}));
+}
+
 }  // namespace
 }  // namespace engine::select

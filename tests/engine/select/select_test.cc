@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -90,6 +91,20 @@ TEST(Select, OfAnEmptySceneIsEmpty) {
                       {Op::add, Largest{1}},
                       {Op::add, Invert{}}};
   EXPECT_TRUE(select({}, all).value().rows.empty());
+}
+
+TEST(Select, MasksTakeAlongWhatNoViewShowsButHangsTogether) {
+  scene::GaussianCloud cloud;
+  add_sheet(cloud, {-0.3f, 0, 2}, 20, 0.02f, {0.8f, 0.1f, 0.1f});      // shown
+  add_sheet(cloud, {-0.3f, 0, 2.03f}, 16, 0.02f, {0.8f, 0.1f, 0.1f});  // right behind it
+  add_sheet(cloud, {0.3f, 0, 2}, 20, 0.02f, {0.1f, 0.1f, 0.8f});       // shown, outside
+  add_sheet(cloud, {0.3f, 0, 2.03f}, 16, 0.02f, {0.1f, 0.1f, 0.8f});   // right behind that
+  scene::Mask left(100, 100);
+  for (int y = 0; y < 100; ++y)
+    for (int x = 0; x < 50; ++x) left.at(x, y) = 1;
+  RowList wanted(400 + 256);
+  std::iota(wanted.begin(), wanted.end(), std::size_t{0});
+  EXPECT_EQ(selected(cloud, {{Op::add, Masks{{{front_camera(), left}}}}}), wanted);
 }
 
 TEST(Select, RefusesAnInvalidListAndABrokenScene) {

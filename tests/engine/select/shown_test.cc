@@ -81,9 +81,9 @@ TEST(RowsInMasks, AreThoseShownMostlyInside) {
     for (int x = 0; x < 50; ++x) left.at(x, y) = 1;
   render::Workspace workspace;
   const MaskedRows found = rows_in_masks(cloud, {{{front_camera(), left}}}, workspace);
-  EXPECT_TRUE(found.rows[0]);
-  EXPECT_FALSE(found.rows[1]);
-  EXPECT_FALSE(found.rows[10]) << "no view shows it";
+  EXPECT_TRUE(found.inside[0] && found.judged[0]);
+  EXPECT_TRUE(!found.inside[1] && found.judged[1]);
+  EXPECT_FALSE(found.inside[10] || found.judged[10]) << "no view shows it";
   EXPECT_EQ(found.undecided, 0u);
 }
 
@@ -99,8 +99,9 @@ TEST(RowsInMasks, CountViewsByTheirAreaAndReportWhatIsNearlyEven) {
   const MaskedView says_yes{front_camera(), all}, says_no{twice, nothing};
   const MaskedRows even = rows_in_masks(cloud, {{says_yes, says_no}}, workspace);
   EXPECT_EQ(even.undecided, 1u) << "one view each way";
+  EXPECT_FALSE(even.judged[0]);
   const MaskedRows outvoted = rows_in_masks(cloud, {{says_yes, says_no, says_yes}}, workspace);
-  EXPECT_TRUE(outvoted.rows[0]) << "although the other view has more pixels";
+  EXPECT_TRUE(outvoted.inside[0]) << "although the other view has more pixels";
   EXPECT_EQ(outvoted.undecided, 0u);
 }
 
