@@ -107,6 +107,18 @@ TEST(Select, MasksTakeAlongWhatNoViewShowsButHangsTogether) {
   EXPECT_EQ(selected(cloud, {{Op::add, Masks{{{front_camera(), left}}}}}), wanted);
 }
 
+TEST(Select, MasksThatReachALittleTooFarEndWhereTheThingDoes) {
+  scene::GaussianCloud cloud;
+  add_sheet(cloud, {-0.2f, 0, 2}, 20, 0.02f, {0.8f, 0.1f, 0.1f});  // pixels 30 to 50
+  add_sheet(cloud, {0.2f, 0, 2}, 20, 0.02f, {0.1f, 0.1f, 0.8f});   // pixels 50 to 70
+  scene::Mask too_wide(100, 100);
+  for (int y = 0; y < 100; ++y)
+    for (int x = 0; x < 52; ++x) too_wide.at(x, y) = 1;
+  RowList red(400);
+  std::iota(red.begin(), red.end(), std::size_t{0});
+  EXPECT_EQ(selected(cloud, {{Op::add, Masks{{{front_camera(), too_wide}}}}}), red);
+}
+
 TEST(Select, RefusesAnInvalidListAndABrokenScene) {
   const auto refused = select(line_of(3), {{Op::add, Sphere{{0, 0, 0}, -1}}});
   ASSERT_FALSE(refused);

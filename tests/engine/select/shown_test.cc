@@ -87,6 +87,19 @@ TEST(RowsInMasks, AreThoseShownMostlyInside) {
   EXPECT_EQ(found.undecided, 0u);
 }
 
+TEST(RowsInMasks, SayNothingOfWhatIsNearTheirBorder) {
+  scene::GaussianCloud cloud;
+  for (const float x : {0.0f, 0.1f}) add_at(cloud, {x, 0, 2}, 12, -6.0f);  // at pixels 50 and 55, half a pixel wide
+  scene::Mask left(100, 100);
+  for (int y = 0; y < 100; ++y)
+    for (int x = 0; x < 51; ++x) left.at(x, y) = 1;
+  render::Workspace workspace;
+  const MaskedRows found = rows_in_masks(cloud, {{{front_camera(), left}}}, workspace);
+  EXPECT_FALSE(found.judged[0]);
+  EXPECT_TRUE(found.judged[1]);
+  EXPECT_EQ(found.undecided, 1u);
+}
+
 TEST(RowsInMasks, CountViewsByTheirAreaAndReportWhatIsNearlyEven) {
   scene::GaussianCloud cloud;
   add_at(cloud, {0, 0, 2}, 12, -2.0f);
