@@ -59,16 +59,18 @@ Result<TrainedCase> train(const CapturedCase& the_case, const fit::FitOptions& o
   if (!before) return propagate(before);
   auto after = trained(capture(the_case, Side::after), options, folder);
   if (!after) return propagate(after);
-  return TrainedCase{std::move(*before), std::move(*after), true_views(the_case)};
+  std::vector<double> shown = shown_areas(before->cloud, the_case.cameras);
+  return TrainedCase{std::move(*before), std::move(*after), std::move(shown), true_views(the_case)};
 }
 
 Result<ReadyCase> make_ready(const CapturedCase& the_case, const TrainedCase& trained, const GraspBy& grasp_by) {
-  const auto& [before, after, views] = trained;
+  const auto& [before, after, shown, views] = trained;
   auto grasp = grasp_by(the_case, before.cloud);
   if (!grasp) return propagate(grasp);
 
   ReadyCase out;
-  out.match = match(before.cloud, grasp->rows, the_case.moving);
+  out.match = match(before.cloud, grasp->rows, the_case.moving, opacities_times_area(before.cloud));
+  out.shown = match(before.cloud, grasp->rows, the_case.moving, shown);
   out.grasp = std::move(*grasp);
   evaluate::Case& judged = out.judged;
   judged.name = the_case.name, judged.what = the_case.what, judged.textured = the_case.textured;
@@ -116,17 +118,18 @@ Result<CaptureOutcome> carry_out(const ReadyCase& ready, const edit::Request& re
   trial.deformed_beyond_db = beyond_db(ready, deformed);
   trial.result_beyond_db = beyond_db(ready, out.edited);
   trial.ceiling_beyond_db = beyond_db(ready, ready.ceiling);
-  trial.match = ready.match;
+  trial.match = ready.match, trial.shown = ready.shown;
   trial.fit_seconds = ready.fit_seconds;
   return out;
 }
 
 std::string capture_table_head() {
   return "| case | set | by | corrector | before, dB | deformed, dB | edited, dB | gain, dB | ceiling, dB | share, % "
-         "| beyond, dB | outside, dB | vacated, dB | arrived, dB | SSIM | recall, % | precision, % | s |\n"
+         "| beyond, dB | outside, dB | vacated, dB | arrived, dB | SSIM | recall, % | precision, % | recall of shown, "
+         "% "
+         "| precision of shown, % | s |\n"
          "| --- | --- | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: "
-         "| ---: "
-         "| ---: |\n";
+         "| ---: | ---: | ---: | ---: |\n";
 }
 
 std::string capture_table_row(const CaptureTrial& trial) {
@@ -151,8 +154,10 @@ std::string capture_table_row(const CaptureTrial& trial) {
   for (const evaluate::RegionQuality* region : {&result.outside, &result.vacated, &result.arrived})
     number(region->pixels > 0, region->psnr_db, 2);
   number(true, result.edited.ssim, 4);
-  number(true, 100 * trial.match.recall, 0);
-  number(true, 100 * trial.match.precision, 0);
+  for (const Match& match : {trial.match, trial.shown}) {
+    number(true, 100 * match.recall, 0);
+    number(true, 100 * match.precision, 0);
+  }
   number(true, trial.trial.seconds, 1);
   out << " |\n";
   return out.str();

@@ -23,6 +23,7 @@ namespace engine::captures {
 /// Both scenes of a case, photographed and trained: the same whichever way a request says what moves.
 struct TrainedCase {
   Trained before, after;
+  std::vector<double> shown;                 ///< What the photos show of each row of `before`: shown_areas().
   std::vector<evaluate::JudgedView> judged;  ///< True photographs from the held-out cameras, after the edit.
 };
 
@@ -38,7 +39,8 @@ struct ReadyCase {
   std::size_t beyond = 0;  ///< So many of the held-out views, the last ones, are outside the orbit.
   scene::GaussianCloud ceiling;  ///< Trained from photos after the edit.
   Grasp grasp;                   ///< What is asked for; its request is that of `judged`.
-  Match match;                   ///< Of the grasp with what moves.
+  Match match;                   ///< Of the grasp with what moves, by opacity times area.
+  Match shown;                   ///< The same by what the photos show: without what nobody has seen.
   bool is_test = false;          ///< See CapturedCase.
   std::string said;              ///< See Plan.
   double fit_seconds = 0;        ///< Of both fits, when they were done.
@@ -62,7 +64,7 @@ struct CaptureTrial {
   evaluate::Quality ceiling;   ///< Of the scene that was trained from photos after the edit.
   /// PSNR of the edited region at the views outside the orbit, dB.
   double untouched_beyond_db = 0, deformed_beyond_db = 0, result_beyond_db = 0, ceiling_beyond_db = 0;
-  Match match;             ///< Of what was asked for with what moves.
+  Match match, shown;      ///< See ReadyCase.
   double fit_seconds = 0;  ///< Of both fits.
 
   [[nodiscard]] double gain_db() const;  ///< Of the edit over deformation alone, in the edited region.

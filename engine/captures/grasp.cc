@@ -109,12 +109,13 @@ Result<Grasp> grasp_by_bare_balls(const CapturedCase& the_case, const scene::Gau
       if (handle.target) handle.radius *= factor;
     return grasp_of("bare", std::move(request), scene);
   };
+  const std::vector<double> counts = opacities_times_area(scene);
   double best = 1, best_f1 = -1;
   for (int i = 0; i < factors; ++i) {
     const double factor = least_factor * std::pow(most_factor / least_factor, double(i) / (factors - 1));
     const auto tried = grasp(factor);
     if (!tried) continue;
-    const auto [recall, precision] = match(scene, tried->rows, the_case.moving);
+    const auto [recall, precision] = match(scene, tried->rows, the_case.moving, counts);
     const double f1 = recall + precision > 0 ? 2 * recall * precision / (recall + precision) : 0;
     if (f1 > best_f1) best = factor, best_f1 = f1;
   }

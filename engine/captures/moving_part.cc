@@ -7,6 +7,8 @@
 #include <numbers>
 
 #include "engine/render/project.h"
+#include "engine/render/weight_sums.h"
+#include "engine/scene/image.h"
 
 namespace engine::captures {
 
@@ -31,25 +33,34 @@ bool MovingPart::holds(DVec3 place) const {
   return holds(one)[0] != 0;
 }
 
-double opacity_times_area(const scene::GaussianCloud& cloud, std::size_t row) {
-  const Vec3 log_scale = cloud.log_scale.get(row);
-  std::array<double, 3> extent{std::exp(double(log_scale.x)), std::exp(double(log_scale.y)),
-                               std::exp(double(log_scale.z))};
-  std::sort(extent.begin(), extent.end(), std::greater<>());
-  return render::opacity<double>(cloud.opacity_logit[row]) * std::numbers::pi * extent[0] * extent[1];
+std::vector<double> opacities_times_area(const scene::GaussianCloud& cloud) {
+  std::vector<double> out(cloud.size());
+  for (std::size_t row = 0; row < out.size(); ++row) {
+    const DVec3 log_scale(cloud.log_scale.get(row));
+    std::array<double, 3> extent{std::exp(log_scale.x), std::exp(log_scale.y), std::exp(log_scale.z)};
+    std::sort(extent.begin(), extent.end(), std::greater<>());
+    out[row] = render::opacity<double>(cloud.opacity_logit[row]) * std::numbers::pi * extent[0] * extent[1];
+  }
+  return out;
 }
 
-Match match(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows, const MovingPart& part) {
+std::vector<double> shown_areas(const scene::GaussianCloud& cloud, std::span<const scene::Camera> cameras) {
+  std::vector<double> all(cloud.size(), 0.0), valued(cloud.size(), 0.0);
+  render::Workspace workspace;
+  for (const scene::Camera& camera : cameras)
+    render::add_weight_sums(cloud, camera, scene::Image(camera.width, camera.height, 1), workspace, all, valued);
+  return all;
+}
+
+Match match(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows, const MovingPart& part,
+            std::span<const double> counts) {
   const std::vector<std::uint8_t> moves = part.holds(cloud.mean);
   double moving = 0, chosen = 0, both = 0;
-  auto next = rows.begin();
-  for (std::size_t i = 0; i < moves.size(); ++i) {
-    const bool is_chosen = next != rows.end() && *next == i;
-    if (is_chosen) ++next;
-    const double weight = opacity_times_area(cloud, i);
-    if (moves[i] != 0) moving += weight;
-    if (is_chosen) chosen += weight;
-    if (is_chosen && moves[i] != 0) both += weight;
+  for (std::size_t row = 0; row < moves.size(); ++row)
+    if (moves[row] != 0) moving += counts[row];
+  for (const std::uint32_t row : rows) {
+    chosen += counts[row];
+    if (moves[row] != 0) both += counts[row];
   }
   return {moving > 0 ? both / moving : 1, chosen > 0 ? both / chosen : 1};
 }

@@ -9,6 +9,7 @@
 #include "engine/core/soa.h"
 #include "engine/core/vec.h"
 #include "engine/neighbours/point_index.h"
+#include "engine/scene/camera.h"
 #include "engine/scene/gaussian_cloud.h"
 
 namespace engine::captures {
@@ -36,17 +37,22 @@ class MovingPart {
   std::vector<std::uint8_t> moves_;  ///< By point of surface_.
 };
 
-/// How much of a picture a Gaussian can fill: its opacity times the area of its two longer axes (pi sigma_1 sigma_2,
-/// world units squared). What recall and precision count.
-[[nodiscard]] double opacity_times_area(const scene::GaussianCloud& cloud, std::size_t row);
+/// How much of a picture each Gaussian can fill: its opacity times the area of its two longer axes (pi sigma_1 sigma_2,
+/// world units squared).
+[[nodiscard]] std::vector<double> opacities_times_area(const scene::GaussianCloud& cloud);
 
-/// How well chosen rows match those that move, by opacity times area. 0 to 1.
+/// How much of the pictures each Gaussian fills: the sum of its blending weights, pixels.
+[[nodiscard]] std::vector<double> shown_areas(const scene::GaussianCloud& cloud,
+                                              std::span<const scene::Camera> cameras);
+
+/// How well chosen rows match those that move. 0 to 1.
 struct Match {
   double recall = 0;     ///< Of what moves, the part that was chosen; 1 where nothing moves.
   double precision = 0;  ///< Of what was chosen, the part that moves; 1 where nothing was chosen.
 };
-/// Precondition: rows ascend.
+///   rows    ascending
+///   counts  [cloud.size()] what each row counts, 0 or more
 [[nodiscard]] Match match(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
-                          const MovingPart& part);
+                          const MovingPart& part, std::span<const double> counts);
 
 }  // namespace engine::captures

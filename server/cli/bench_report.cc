@@ -123,6 +123,8 @@ ordered_json encode(const captures::CaptureTrial& trial) {
                       {"ceiling", trial.ceiling_beyond_db}};
   out["recall"] = trial.match.recall;
   out["precision"] = trial.match.precision;
+  out["shown_recall"] = trial.shown.recall;
+  out["shown_precision"] = trial.shown.precision;
   out["fit_seconds"] = trial.fit_seconds;
   return out;
 }
@@ -141,6 +143,8 @@ void decode(const ordered_json& from, captures::CaptureTrial& trial) {
   beyond.at("ceiling").get_to(trial.ceiling_beyond_db);
   from.at("recall").get_to(trial.match.recall);
   from.at("precision").get_to(trial.match.precision);
+  from.at("shown_recall").get_to(trial.shown.recall);
+  from.at("shown_precision").get_to(trial.shown.precision);
   from.at("fit_seconds").get_to(trial.fit_seconds);
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iomanip>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <vector>
@@ -38,12 +39,25 @@ constexpr const char* how =
     "the\n"
     "  edit goes. **beyond**: *edited* at the cameras outside the orbit only.\n"
     "- **outside**, **vacated**, **arrived**, **SSIM** (of the edited region): of the edit.\n"
-    "- **recall**, **precision**: of what the request takes along with what moves, by opacity times area.\n"
+    "- **recall**, **precision**: of what the request takes along with what moves, by opacity times area; **of "
+    "shown**:\n"
+    "  by what the photos show, without the undersides and insides that nobody has seen.\n"
+    "- **over bare** (of means): *edited*, beside that of bare balls on the same cases.\n"
     "- **set**: constants may be chosen on `choose`, and never on `test`.\n\n";
 
+/// What an edit gains over the same by bare balls, dB of the edited region. Nothing where those were not tried.
+std::optional<double> gain_over_bare_balls(std::span<const CaptureTrial> trials, const CaptureTrial& one) {
+  for (const CaptureTrial& other : trials)
+    if (other.by == "bare" && other.trial.name == one.trial.name && other.trial.corrector == one.trial.corrector)
+      return one.trial.result.edited.psnr_db - other.trial.result.edited.psnr_db;
+  return std::nullopt;
+}
+
 struct Mean {
-  int count = 0;
-  double gain = 0, deformed = 0, edited = 0, ceiling = 0, share = 0, outside = 0, recall = 0, precision = 0;
+  int count = 0, beside_bare = 0;
+  double over_bare = 0;
+  double gain = 0, deformed = 0, edited = 0, ceiling = 0, share = 0, outside = 0, recall = 0, precision = 0,
+         shown_recall = 0, shown_precision = 0;
 };
 
 /// Of one set, one way to say what moves, and one corrector.
@@ -56,7 +70,10 @@ Mean mean_of(std::span<const CaptureTrial> trials, bool is_test, const std::stri
     mean.edited += trial.trial.result.edited.psnr_db, mean.ceiling += trial.ceiling.edited.psnr_db;
     mean.share += trial.share_of_ceiling().value_or(0), mean.outside += trial.trial.result.outside.psnr_db;
     mean.recall += trial.match.recall, mean.precision += trial.match.precision;
+    mean.shown_recall += trial.shown.recall, mean.shown_precision += trial.shown.precision;
+    if (const auto gain = gain_over_bare_balls(trials, trial)) ++mean.beside_bare, mean.over_bare += *gain;
   }
+  mean.over_bare /= std::max(1, mean.beside_bare);
   for (double* sum : {&mean.gain, &mean.deformed, &mean.edited, &mean.ceiling, &mean.share, &mean.outside, &mean.recall,
                       &mean.precision})
     *sum /= std::max(1, mean.count);
@@ -67,8 +84,8 @@ std::string means(std::span<const CaptureTrial> trials, const BenchOptions& opti
   std::ostringstream out;
   out << "| set | by | corrector | cases | deformed, dB | edited, dB | gain, dB | ceiling, dB | share, % | outside, dB "
          "| "
-         "recall, % | precision, % |\n"
-         "| --- | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n"
+         "recall, % | precision, % | recall of shown, % | precision of shown, % | over bare, dB |\n"
+         "| --- | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n"
       << std::fixed;
   const auto add = [&](bool is_test, const std::string& by, const std::string& corrector) {
     const Mean mean = mean_of(trials, is_test, by, corrector);
@@ -76,8 +93,13 @@ std::string means(std::span<const CaptureTrial> trials, const BenchOptions& opti
     out << "| " << (is_test ? "test" : "choose") << " | " << by << " | " << corrector << " | " << mean.count
         << std::setprecision(2) << " | " << mean.deformed << " | " << mean.edited << " | " << mean.gain << " | "
         << mean.ceiling << " | " << std::setprecision(0) << 100 * mean.share << std::setprecision(2) << " | "
-        << mean.outside << std::setprecision(0) << " | " << 100 * mean.recall << " | " << 100 * mean.precision
-        << " |\n";
+        << mean.outside << std::setprecision(0) << " | " << 100 * mean.recall << " | " << 100 * mean.precision << " | "
+        << 100 * mean.shown_recall << " | " << 100 * mean.shown_precision << " | ";
+    if (mean.beside_bare > 0)
+      out << std::setprecision(2) << mean.over_bare;
+    else
+      out << '-';
+    out << " |\n";
   };
   for (const bool is_test : {false, true})
     for (const std::string& by : options.captures.by)

@@ -144,7 +144,7 @@ TEST(CapturedCases, BallsTakeMostOfTheTruePartUnlessTheyArePlacedCarelessly) {
     const CapturedCase& the_case = made(name);
     const auto grasp = grasp_by_balls(the_case, the_case.before);
     ASSERT_TRUE(grasp) << grasp.error().message;
-    const Match found = match(the_case.before, grasp->rows, the_case.moving);
+    const Match found = match(the_case.before, grasp->rows, the_case.moving, opacities_times_area(the_case.before));
     if (the_case.careless) {
       EXPECT_LT(found.recall, 0.55);
       EXPECT_GT(found.recall, 0.2);

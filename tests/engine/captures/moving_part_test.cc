@@ -4,6 +4,9 @@
 
 #include <cmath>
 #include <numbers>
+#include <vector>
+
+#include "tests/engine/captures/samples.h"
 
 namespace engine::captures {
 namespace {
@@ -38,16 +41,36 @@ TEST(MovingPart, OfAllPlacesAtOnceIsThatOfEach) {
   EXPECT_EQ(moving.holds(row_of_discs().mean), (std::vector<std::uint8_t>{0, 0, 0, 1}));
 }
 
-TEST(OpacityTimesArea, CountsTheTwoLongerAxes) {
-  EXPECT_NEAR(opacity_times_area(row_of_discs(), 0), 0.5 * std::numbers::pi * 0.2 * 0.1, 1e-8);
+TEST(OpacitiesTimesArea, CountTheTwoLongerAxes) {
+  EXPECT_NEAR(opacities_times_area(row_of_discs())[0], 0.5 * std::numbers::pi * 0.2 * 0.1, 1e-8);
 }
 
-TEST(Match, CountsByOpacityTimesArea) {
+TEST(ShownAreas, CountWhatIsInFrontAndNothingBehindIt) {
+  scene::GaussianCloud cloud;
+  cloud.resize(2);  // one behind the other, both wider than the picture
+  for (std::size_t i = 0; i < 2; ++i) {
+    cloud.mean.set(i, {0, 0, float(2 + i)});
+    cloud.rotation.set(i, {1, 0, 0, 0});
+    cloud.log_scale.set(i, {3, 3, -3});
+    cloud.opacity_logit[i] = 0;
+  }
+  scene::Camera front = sample_camera(0);
+  front.rotation = DMat3(1.0), front.translation = DVec3(0.0);
+  const std::vector<double> once = shown_areas(cloud, std::vector{front});
+  const double pixels = front.width * front.height;
+  EXPECT_NEAR(once[0], 0.5 * pixels, 0.01 * pixels);
+  EXPECT_NEAR(once[1], 0.25 * pixels, 0.01 * pixels);
+  EXPECT_NEAR(shown_areas(cloud, std::vector{front, front})[1], 2 * once[1], 1e-3);
+}
+
+TEST(Match, CountsByWhatItIsGiven) {
   scene::GaussianCloud cloud = row_of_discs();
   cloud.log_scale.set(2, {std::log(0.01f), std::log(0.4f), std::log(0.1f)});  // twice as large
   const std::vector<std::uint32_t> part{1, 2};
   const MovingPart moving(row_of_discs(), part);
-  const auto matched = [&](std::vector<std::uint32_t> rows) { return match(cloud, rows, moving); };
+  const auto matched = [&](std::vector<std::uint32_t> rows) {
+    return match(cloud, rows, moving, opacities_times_area(cloud));
+  };
   EXPECT_NEAR(matched({1}).recall, 1.0 / 3, 1e-6);
   EXPECT_NEAR(matched({1}).precision, 1, 1e-6);
   EXPECT_NEAR(matched({0, 2}).recall, 2.0 / 3, 1e-6);
@@ -56,7 +79,8 @@ TEST(Match, CountsByOpacityTimesArea) {
   EXPECT_NEAR(matched({0, 1, 2, 3}).precision, 3.0 / 5, 1e-6);
   EXPECT_EQ(matched({}).recall, 0);
   EXPECT_EQ(matched({}).precision, 1) << "nothing was chosen";
-  EXPECT_EQ(match(cloud, std::vector<std::uint32_t>{0}, MovingPart()).recall, 1) << "nothing moves";
+  EXPECT_EQ(match(cloud, std::vector<std::uint32_t>{0}, MovingPart(), std::vector<double>(4, 1.0)).recall, 1)
+      << "nothing moves";
 }
 
 }  // namespace
