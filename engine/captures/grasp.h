@@ -15,9 +15,10 @@ namespace engine::captures {
 
 /// What is asked for, and what that takes along.
 struct Grasp {
-  std::string by;                   ///< How: "balls", "bare", "clicks", "looking", "masks", "wide_masks".
-  edit::Request request;            ///< Without parameters: those are a preset's.
-  std::vector<std::uint32_t> rows;  ///< Rows of the trained scene that follow a handle with a target; ascending.
+  std::string by;         ///< How: "balls", "bare", "clicks", "looking", "masks", "wide_masks".
+  edit::Request request;  ///< Without parameters: those are a preset's.
+  std::vector<std::uint32_t>
+      rows;  ///< Of the trained scene: selected ones, or those in balls that have a target. Ascending.
 };
 
 /// Says what moves, from the case (its handles, clicks, carelessness; and its truth only where it says so)

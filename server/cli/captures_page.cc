@@ -75,7 +75,7 @@ Mean mean_of(std::span<const CaptureTrial> trials, bool is_test, const std::stri
   }
   mean.over_bare /= std::max(1, mean.beside_bare);
   for (double* sum : {&mean.gain, &mean.deformed, &mean.edited, &mean.ceiling, &mean.share, &mean.outside, &mean.recall,
-                      &mean.precision})
+                      &mean.precision, &mean.shown_recall, &mean.shown_precision})
     *sum /= std::max(1, mean.count);
   return mean;
 }

@@ -139,6 +139,14 @@ TEST(GraspByClicks, TakesTheThingThatWasClickedAtWhateverTheRadiusOfItsHandle) {
   EXPECT_EQ(grasp->request.selected, grasp->rows);
 }
 
+TEST(GraspByClicks, CountsWhatIsSelectedNextToAnAnchorToo) {
+  CapturedCase the_case = with_clicks();
+  the_case.handles.push_back({{0.2, 0, 0}, std::nullopt, 0.1, 0});
+  const auto grasp = grasp_by_clicks(the_case, two_balls());
+  ASSERT_TRUE(grasp) << grasp.error().message;
+  EXPECT_EQ(grasp->rows.size(), 300u);
+}
+
 TEST(GraspByClicks, CarelesslyMissesAboutHalf) {
   CapturedCase the_case = with_clicks();
   the_case.careless = Carelessness{};
