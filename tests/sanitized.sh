@@ -14,4 +14,4 @@ case "${1:-}" in
 esac
 cmake --preset "$1" -DSPLATDRAG_BENCHMARKS=OFF
 cmake --build --preset "$1" --parallel "$(nproc)"
-exec ctest --preset "$1" --parallel 2 --no-tests=error
+exec ctest --preset "$1" --parallel 2 --no-tests=error --stop-on-failure

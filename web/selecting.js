@@ -5,7 +5,7 @@ import { onTheWire } from "./camera.js";
 import { FrameQueue } from "./frames.js";
 import { inverted, polygonOf, strokeOf, withClick } from "./selection.js";
 
-/** What there is before anything is selected. Of the tools, the last four outlive a reload. */
+/** What there is before anything is selected. Tool, depth, radius and tint outlive a reload. */
 export const NOTHING_SELECTED = {
   selection: [], // Operations, as on the wire.
   selectionAnswer: null, // {key, version, id, count, ...} or {key, version, error}: what the service last said.

@@ -20,14 +20,18 @@ export function thinned(points, apart) {
   return kept;
 }
 
+/** Whether an operation changes what all before it have selected: what one of those names is no longer what is seen. */
+const changesAll = (step) => opOf(step) === "intersect" || Object.keys(step).some((name) => name in CHANGES);
+
 /** A selection with one more click of click-to-grow. All clicks of one thing are one operation, whatever was brushed
- *  since: the last one that grows with this `op`.
+ *  since: the last one that grows with this `op`, unless the selection was inverted, narrowed or the like since.
  *    kind   "inside": the point is on the thing; "outside": it is not
  *    fresh  this click begins another thing
  *  Returns null where "outside" has no thing to be outside of. */
 export function withClick(selection, { op, kind, point, fresh = false }) {
-  const at = fresh ? -1 : selection.findLastIndex((o) => o.grow && opOf(o) === op);
-  if (at < 0) return kind === "inside" ? [...selection, operation(op, { grow: { inside: [point] } })] : null;
+  const isThis = (o) => Boolean(o.grow) && opOf(o) === op;
+  const at = fresh ? -1 : selection.findLastIndex((o) => isThis(o) || changesAll(o));
+  if (at < 0 || !isThis(selection[at])) return kind === "inside" ? [...selection, operation(op, { grow: { inside: [point] } })] : null;
   const { grow } = selection[at];
   const grown = { ...selection[at], grow: { ...grow, [kind]: [...(grow[kind] ?? []), point] } };
   return selection.map((o, i) => (i === at ? grown : o));

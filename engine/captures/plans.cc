@@ -152,6 +152,24 @@ Plan block_turned() {
   return plan;
 }
 
+Plan board_slid() {
+  const DVec3 foot = dat(-0.25, 0, -0.3);
+  const Object board{
+      "board",
+      {Vec3(foot), 0.25f},
+      box({0, 0, 0}, {0.7f, 0.05f, 0.5f}, checks(srgb(232, 222, 196), srgb(96, 38, 34), 0.12f), on_things)};
+  const auto on_board = [&](float x, float z) { return DVec3(board.placement.world(at(x, 0.05f, z))); };
+  Plan plan{.what = "A chequered board, thin and flat on a table, slid aside."};
+  plan.surroundings = evaluate::furnished_room();
+  plan.things = {{board, shifted(dat(0.55, 0, -0.05))}};
+  plan.orbit = {.target = dat(0, 0.05, -0.25), .distance = 3.3, .lowest = 16, .highest = 40};
+  plan.grips = {{on_board(0, -0.1f), 0.45}};
+  plan.region = standing_on(0, foot, {0.85, 0.2, 0.7});
+  plan.clicks = {{on_board(-0.2f, 0), on_board(0.15f, 0.12f), on_board(0.25f, -0.15f)},
+                 {on_board(0, -0.4f), on_board(0.5f, 0), on_board(-0.5f, 0)}};
+  return plan;
+}
+
 Plan ball_scaled() {
   constexpr double radius = 0.2, factor = 1.4;
   const DVec3 foot = dat(-0.1, 0, -0.3);
@@ -258,6 +276,7 @@ const std::vector<NamedPlan>& known_plans() {
                                           {"barrel", apple_on_barrel},
                                           {"clutter", crate_before_clutter},
                                           {"turn", block_turned},
+                                          {"board", board_slid},
                                           {"scale", ball_scaled},
                                           {"rod", rod_drawn_out},
                                           {"lid", lid_opened},

@@ -16,53 +16,59 @@ constexpr double halfway = 0.3;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-/// Pieces of a graph whose nodes come one by one, with what leaves them.
+/// Pieces of a graph whose nodes come one by one, and the sum of the conductances of those that clicks are on.
 class GrowingPieces {
  public:
-  GrowingPieces(const NeighbourGraph& graph, std::span<const float> weight)
-      : graph_(graph),
-        weight_(weight),
-        pieces_(graph.size()),
-        is_in_(graph.size(), 0),
-        leaving_(graph.size(), 0.0),
-        volume_(graph.size(), 0.0) {
+  ///   clicked  nodes; one that is clicked twice counts twice
+  GrowingPieces(const NeighbourGraph& graph, std::span<const float> weight, std::span<const std::uint32_t> clicked)
+      : graph_(graph), weight_(weight), pieces_(graph.size()), is_in_(graph.size(), 0), of_(graph.size()) {
     for (const float one : weight) all_ += double(one);
+    for (const std::uint32_t node : clicked) ++of_[node].clicks;
+    clicks_to_come_ = clicked.size();
   }
 
   void take(std::uint32_t node) {
     is_in_[node] = 1;
+    Piece joined = of_[node];
+    clicks_to_come_ -= joined.clicks;
     for (std::uint32_t edge = graph_.begin[node]; edge < graph_.begin[node + 1]; ++edge)
-      volume_[node] += double(weight_[edge]);
-    leaving_[node] = volume_[node];
-    std::uint32_t piece = pieces_.of(node);
+      joined.volume += double(weight_[edge]);
+    joined.leaving = joined.volume;
     for (std::uint32_t edge = graph_.begin[node]; edge < graph_.begin[node + 1]; ++edge) {
       const std::uint32_t other = graph_.to[edge];
       if (is_in_[other] == 0) continue;
-      if (const std::uint32_t joined = pieces_.of(other); joined != piece) {
-        const double leaving = leaving_[piece] + leaving_[joined], volume = volume_[piece] + volume_[joined];
-        pieces_.join(piece, joined);
-        piece = pieces_.of(node);
-        leaving_[piece] = leaving, volume_[piece] = volume;
+      if (const std::uint32_t piece = pieces_.of(other); piece != pieces_.of(node)) {
+        sum_ -= conductance(of_[piece]);
+        joined.leaving += of_[piece].leaving, joined.volume += of_[piece].volume, joined.clicks += of_[piece].clicks;
+        pieces_.join(node, piece);
       }
-      leaving_[piece] -= 2 * double(weight_[edge]);
+      joined.leaving -= 2 * double(weight_[edge]);
     }
+    of_[pieces_.of(node)] = joined;
+    sum_ += conductance(joined);
   }
 
-  /// Of the piece that a node is on; infinite before the node is taken.
-  [[nodiscard]] double conductance(std::uint32_t node) {
-    if (is_in_[node] == 0) return infinity;
-    const std::uint32_t piece = pieces_.of(node);
-    const double lesser = std::min(volume_[piece], all_ - volume_[piece]);
-    return lesser > 0 ? std::max(leaving_[piece], 0.0) / lesser : 0.0;
-  }
+  /// Of the pieces that clicks are on, each as often as it was clicked; infinite before all of them are taken.
+  [[nodiscard]] double conductances() const { return clicks_to_come_ > 0 ? infinity : std::max(sum_, 0.0); }
 
  private:
+  struct Piece {
+    double leaving = 0, volume = 0;  ///< Weights of the edges that leave it; of all edges, both ways.
+    std::size_t clicks = 0;
+  };
+  [[nodiscard]] double conductance(const Piece& piece) const {
+    if (piece.clicks == 0) return 0;
+    const double lesser = std::min(piece.volume, all_ - piece.volume);
+    return lesser > 0 ? double(piece.clicks) * std::max(piece.leaving, 0.0) / lesser : 0.0;
+  }
+
   const NeighbourGraph& graph_;
   std::span<const float> weight_;
   Pieces pieces_;
   std::vector<std::uint8_t> is_in_;
-  std::vector<double> leaving_, volume_;  ///< By the node that Pieces names a piece by.
-  double all_ = 0;
+  std::vector<Piece> of_;  ///< By the node that Pieces names a piece by; before, a node's clicks.
+  std::size_t clicks_to_come_ = 0;
+  double all_ = 0, sum_ = 0;
 };
 
 /// [n + 1] After so many nodes of the order, the sum of the conductances of the pieces that the clicks are on.
@@ -70,11 +76,10 @@ std::vector<double> conductances(const NeighbourGraph& graph, std::span<const fl
                                  std::span<const std::uint32_t> order, std::span<const std::uint32_t> clicked) {
   std::vector<double> out(order.size() + 1, clicked.empty() ? 0.0 : infinity);
   if (clicked.empty()) return out;
-  GrowingPieces pieces(graph, weight);
+  GrowingPieces pieces(graph, weight, clicked);
   for (std::size_t i = 0; i < order.size(); ++i) {
     pieces.take(order[i]);
-    out[i + 1] = 0;
-    for (const std::uint32_t node : clicked) out[i + 1] += pieces.conductance(node);
+    out[i + 1] = pieces.conductances();
   }
   return out;
 }

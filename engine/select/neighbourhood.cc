@@ -69,12 +69,13 @@ Surroundings surroundings_of(const Array3& mean, const Grow& grow) {
   for (const DVec3 point : grow.inside) farthest = std::max(farthest, distance(middle, point));
   for (const DVec3 point : grow.outside) nearest = std::min(nearest, distance(middle, point));
   if (std::isfinite(nearest)) farthest = std::max(farthest, nearest);
-  if (farthest > 0) return {middle, by_steps(reach_by_points * farthest)};
   std::vector<double> squared = squared_distances(mean, middle);
   const auto half = squared.begin() + std::ptrdiff_t(squared.size() / 2);
   std::nth_element(squared.begin(), half, squared.end());
+  const double by_scene = reach_by_scene * std::sqrt(*half);
+  const double by_points = farthest > 0 ? by_steps(reach_by_points * farthest) : 0;
   // Rows at the very same place as the point: anything above nothing holds them.
-  return {middle, std::max(reach_by_scene * std::sqrt(*half), 1e-30)};
+  return {middle, std::max({by_scene, by_points, 1e-30})};
 }
 
 std::optional<Surroundings> surroundings_of(const Array3& mean, std::span<const std::uint8_t> rows) {

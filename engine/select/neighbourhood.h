@@ -33,9 +33,9 @@ struct Surroundings {
 /// Rows: the nearest to the middle count. A first click then takes 1.2 s of one core, the next ones 0.35 s.
 constexpr std::size_t max_neighbourhood = 250'000;
 
-/// The surroundings of an operation. Without a reach: four times as far as the farthest inside point, or the nearest
-/// outside one if that is farther, rounded up to a power of the square root of 2; for a point alone, a quarter of the
-/// distance within which half of the scene's rows lie.
+/// The surroundings of an operation. Without a reach: a quarter of the distance within which half of the scene's rows
+/// lie; or four times as far as the farthest inside point, or as the nearest outside one if that is farther, rounded up
+/// to a power of the square root of 2. The farther of the two.
 /// Precondition: validate() holds, and the scene has a row.
 [[nodiscard]] Surroundings surroundings_of(const Array3& mean, const Grow& grow);
 
@@ -63,8 +63,7 @@ class Neighbourhood {
   ///   grow     with this object's surroundings
   ///   returns  rows of the cloud, ascending
   ///   errors   unprocessable, `where` = "inside[1]": no row within reach, the point is beyond it, or outside points
-  ///   cover
-  ///            all rows around the inside points more
+  ///            cover all rows around the inside points more
   [[nodiscard]] Result<std::vector<std::uint32_t>> grow(const scene::GaussianCloud& cloud, const Grow& grow) const;
 
   /// For each node that is not given, the side at which a random walk from it rather ends; where there is no way to

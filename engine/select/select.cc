@@ -50,6 +50,11 @@ void describe(const Array3& mean, Selected& out) {
   if (out.count > 0) out.centre = sum / double(out.count);
 }
 
+/// What a person should know who meant more than is ever looked at.
+std::string cut_short(const std::string& and_what_now) {
+  return "only the " + std::to_string(max_neighbourhood) + " Gaussians were looked at that are nearest " + and_what_now;
+}
+
 bool is_empty(const RowSet& rows) { return std::find(rows.begin(), rows.end(), std::uint8_t{1}) == rows.end(); }
 
 }  // namespace
@@ -74,14 +79,13 @@ Result<RowSet> Selector::rows_of(const Grow& grow, const std::string& where, Sel
   if (!rows) return fail(rows.error().code, rows.error().message, where + ".grow." + rows.error().where);
   for (const std::uint32_t row : *rows) named[row] = 1;
   if (around.is_cut_short())
-    so_far.warnings.push_back({"only the " + std::to_string(max_neighbourhood) +
-                                   " Gaussians nearest to the first inside point were looked at: lower the reach, or "
-                                   "grow larger things in several operations",
+    so_far.warnings.push_back({cut_short("to the first inside point: lower the reach, or grow larger things in several "
+                                         "operations"),
                                where});
   return named;
 }
 
-RowSet Selector::rows_of(const Masks& masks, Selected& so_far) {
+RowSet Selector::rows_of(const Masks& masks, const std::string& where, Selected& so_far) {
   MaskedRows masked = rows_in_masks(cloud_, masks, workspace_);
   so_far.undecided += masked.undecided;
   const auto surroundings = surroundings_of(cloud_.mean, masked.inside);
@@ -92,6 +96,10 @@ RowSet Selector::rows_of(const Masks& masks, Selected& so_far) {
   for (const std::uint32_t row : around.rows())
     given.push_back(masked.judged[row] == 0 ? Given::no : masked.inside[row] != 0 ? Given::inside : Given::outside);
   for (const std::uint32_t row : around.settle(given)) masked.inside[row] = 1;
+  if (around.is_cut_short())
+    so_far.warnings.push_back({cut_short("to the middle of what the masks show: of those farther away, only what their "
+                                         "views show well is taken"),
+                               where});
   return std::move(masked.inside);
 }
 
@@ -115,7 +123,7 @@ Result<void> Selector::carry_out(const Operation& operation, const std::string& 
             if (!grown) return propagate(grown);
             named = *std::move(grown);
           } else if constexpr (std::is_same_v<Kind, Masks>) {
-            named = rows_of(action, so_far);
+            named = rows_of(action, where, so_far);
           } else if constexpr (std::is_same_v<Kind, Polygon> || std::is_same_v<Kind, Stroke>) {
             named = rows_in(cloud_, action, workspace_);
           } else {

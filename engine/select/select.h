@@ -45,13 +45,13 @@ class Selector {
   /// The operations in order, each on what those before it have selected; the first on nothing. The same bytes for any
   /// number of threads; operations on pictures may differ between instruction sets where a row is on the verge.
   ///   errors  those of validate(); corrupt_data, `where` = "[12].x": see scene::first_not_finite(); unprocessable,
-  ///           `where` = "selection[2].grow.inside[1]": see Neighbourhood::cut()
+  ///           `where` = "selection[2].grow.inside[1]": see Neighbourhood::grow()
   [[nodiscard]] Result<Selected> select(const Selection& selection);
 
  private:
   [[nodiscard]] Result<void> carry_out(const Operation& operation, const std::string& where, Selected& so_far);
   [[nodiscard]] Result<RowSet> rows_of(const Grow& grow, const std::string& where, Selected& so_far);
-  [[nodiscard]] RowSet rows_of(const Masks& masks, Selected& so_far);
+  [[nodiscard]] RowSet rows_of(const Masks& masks, const std::string& where, Selected& so_far);
   [[nodiscard]] const Neighbourhood& neighbourhood(const Surroundings& surroundings);
 
   const scene::GaussianCloud& cloud_;

@@ -119,14 +119,16 @@ Result<void> run(const SelectOptions& options, Terminal& terminal) {
     const auto selected = carry_out(options, *asked, input->cloud, cameras);
     if (!selected) return propagate(selected);
     print(*selected, input->cloud.size(), terminal);
+    if (selected->count == 0 && (!options.out.empty() || (!options.pictures.empty() && cameras.empty())))
+      return engine::fail(engine::ErrorCode::unprocessable,
+                          "nothing is selected: there is nothing to write or to look at",
+                          options.out.empty() ? "--pictures" : "--out");
     if (!options.pictures.empty()) {
       if (cameras.empty()) cameras = virtual_cameras(input->cloud, *selected, options.views);
       const auto chosen = spread(cameras, std::size_t(options.views));
       if (auto done = write_pictures(options.pictures, input->cloud, *selected, chosen, terminal); !done) return done;
     }
     if (options.out.empty()) return {};
-    if (selected->count == 0)
-      return engine::fail(engine::ErrorCode::unprocessable, "nothing is selected: there is no scene to write", "--out");
     const io::SceneFile part{scene::select(input->cloud, selected->rows), input->layout};
     return io::write_scene(options.out, part, io::SceneFormat::ply);
   });

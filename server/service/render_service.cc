@@ -90,7 +90,7 @@ Result<void> RenderService::run_in_turn(const std::function<void()>& work) {
   try {
     arena_.run(work);
   } catch (const std::bad_alloc&) {
-    return fail(ErrorCode::too_large, "this does not fit into the memory of the machine: ask for a smaller picture");
+    return fail(ErrorCode::too_large, "this does not fit into the memory of the machine: ask for smaller pictures");
   }
   return {};
 }

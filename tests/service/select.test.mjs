@@ -73,7 +73,7 @@ describe('a selection', () => {
     assert.equal(wrong.json().where, 'selection[0].masks[0].image');
   });
 
-  test('is tinted in pictures, which cost what plain ones do', async () => {
+  test('is tinted in pictures', async () => {
     const { id } = await select([{ sphere: ball }]);
     const plain = await client.get(`${version}/render`, { query: inQuery });
     const tinted = await client.get(`${version}/render`, { query: { ...inQuery, selection: id } });

@@ -168,6 +168,14 @@ TEST(Settle, LeavesWhatIsGiven) {
   EXPECT_EQ(around.settle(given_by_row(around, of_row)), (std::vector<std::uint32_t>{1}));
 }
 
+TEST(SurroundingsOfClicks, OfTwoClicksAtNearlyOnePlaceAreThoseOfOne) {
+  const scene::GaussianCloud cloud = line_of(101);
+  const Surroundings one = surroundings_of(cloud.mean, {{{50, 0, 0}}, {}, {}});
+  EXPECT_EQ(surroundings_of(cloud.mean, {{{50, 0, 0}, {50.001, 0, 0}}, {}, {}}), one);
+  EXPECT_EQ(surroundings_of(cloud.mean, {{{50, 0, 0}}, {{50.5, 0, 0}}, {}}), one);
+  EXPECT_GT(surroundings_of(cloud.mean, {{{50, 0, 0}, {60, 0, 0}}, {}, {}}).reach, one.reach);
+}
+
 TEST(SurroundingsOfRows, HoldNearlyAllOfThemAndALittleMore) {
   const scene::GaussianCloud cloud = line_of(101);
   std::vector<std::uint8_t> rows(101, 0);

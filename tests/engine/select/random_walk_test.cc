@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include "engine/core/parallel.h"
@@ -80,6 +82,48 @@ TEST(RandomWalk, IsTheMeanOfItsNeighboursOnALargeGraph) {
   }
   EXPECT_LT(worst, 0.02);
   EXPECT_LT(sum / double(x.size()), 1e-4);
+}
+
+/// The same by conjugate gradients to rounding, without any graph of merged nodes.
+std::vector<double> reference(const WeightedGraph& graph, std::uint32_t inside, std::uint32_t outside) {
+  const std::size_t n = graph.graph.size();
+  const auto is_free = [&](std::size_t node) { return node != inside && node != outside; };
+  const auto laplacian = [&](const std::vector<double>& x) {
+    std::vector<double> out(n, 0.0);
+    for (std::uint32_t node = 0; node < n; ++node)
+      for (std::uint32_t edge = graph.graph.begin[node]; edge < graph.graph.begin[node + 1]; ++edge)
+        if (is_free(node)) out[node] += double(graph.weight[edge]) * (x[node] - x[graph.graph.to[edge]]);
+    return out;
+  };
+  const auto product = [](const std::vector<double>& a, const std::vector<double>& b) {
+    return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
+  };
+  std::vector<double> x(n, 0.0);
+  x[inside] = 1;
+  std::vector<double> residual = laplacian(x);
+  for (double& one : residual) one = -one;
+  std::vector<double> direction = residual;
+  double size = product(residual, residual);
+  for (int step = 0; step < 20'000 && size > 1e-26; ++step) {
+    const std::vector<double> along = laplacian(direction);
+    const double length = size / product(direction, along);
+    for (std::size_t node = 0; node < n; ++node)
+      x[node] += length * direction[node], residual[node] -= length * along[node];
+    const double next = product(residual, residual);
+    for (std::size_t node = 0; node < n; ++node) direction[node] = residual[node] + next / size * direction[node];
+    size = next;
+  }
+  return x;
+}
+
+TEST(RandomWalk, IsThatOfAPlainSolverOnALargeGraph) {
+  const WeightedGraph rough = rough_grid(120);
+  const std::vector<double> x = walk(rough, {30 * 121}, {90 * 121}), exact = reference(rough, 30 * 121, 90 * 121);
+  double worst = 0;
+  for (std::size_t node = 0; node < x.size(); ++node) worst = std::max(worst, std::abs(x[node] - exact[node]));
+  EXPECT_LT(worst, 1e-3);
+  const auto [least, most] = std::ranges::minmax(exact);
+  EXPECT_GT(most - least, 0.9) << "there is something to be wrong about";
 }
 
 TEST(RandomWalk, GivesTheSameBytesForAnyNumberOfThreads) {

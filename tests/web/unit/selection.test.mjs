@@ -54,6 +54,19 @@ test("a click after a stroke still belongs to the thing, and another thing begin
   assert.equal(next[0], before[0]);
 });
 
+test("a click begins another thing where the selection was inverted or cut since", () => {
+  const grown = click([], "inside", [1, 0, 0]);
+  const lasso = { op: "intersect", polygon: { camera: CAMERA, points: [[1, 1], [9, 1], [9, 9]], depth: "visible" } };
+  for (const change of [{ invert: true }, { shrink: 0.1 }, { largest: 1 }, lasso, { ...grown[0], op: "intersect" }]) {
+    const next = click([...grown, change], "inside", [2, 0, 0]);
+    assert.deepEqual(next, [...grown, change, { grow: { inside: [[2, 0, 0]] } }]);
+    assert.deepEqual(click(next, "outside", [3, 0, 0])[2].grow.outside, [[3, 0, 0]]);
+    assert.equal(click([...grown, change], "outside", [2, 0, 0]), null);
+  }
+  const kept = click(grown, "inside", [2, 0, 0], { op: "intersect" });
+  assert.equal(click(kept, "inside", [3, 0, 0], { op: "intersect" }).length, 2);
+});
+
 test("what is taken away grows apart from what is added", () => {
   const added = click([], "inside", [1, 0, 0]);
   const taken = click(added, "inside", [2, 0, 0], { op: "subtract" });
