@@ -24,6 +24,7 @@ constexpr std::size_t rows_clicked = 4;        // of those nearest to a point, t
 constexpr std::size_t rows_near_click = 24;    // that are looked at for that: the mean of a large disc may be far off
 constexpr double reach_by_points = 4.0;        // times the distance of the points
 constexpr double reach_by_scene = 0.25;        // of the distance within which half of the rows lie
+constexpr double beside_scene = 4.0;           // times that distance: farther away, there is nothing worth mention
 constexpr double most_of_rows = 0.98;          // that masks name: the others may be floaters
 constexpr double reach_by_rows = 1.5;          // times the distance of those from their middle
 constexpr double far_border = 0.9;             // of the reach: from here on, rows are taken for outside
@@ -68,11 +69,12 @@ Surroundings surroundings_of(const Array3& mean, const Grow& grow) {
   double farthest = 0, nearest = std::numeric_limits<double>::infinity();
   for (const DVec3 point : grow.inside) farthest = std::max(farthest, distance(middle, point));
   for (const DVec3 point : grow.outside) nearest = std::min(nearest, distance(middle, point));
-  if (std::isfinite(nearest)) farthest = std::max(farthest, nearest);
   std::vector<double> squared = squared_distances(mean, middle);
   const auto half = squared.begin() + std::ptrdiff_t(squared.size() / 2);
   std::nth_element(squared.begin(), half, squared.end());
-  const double by_scene = reach_by_scene * std::sqrt(*half);
+  const double half_of_scene = std::sqrt(*half), by_scene = reach_by_scene * half_of_scene;
+  // An outside point that is nowhere near the scene says nothing of the thing's size.
+  if (nearest <= beside_scene * half_of_scene) farthest = std::max(farthest, nearest);
   const double by_points = farthest > 0 ? by_steps(reach_by_points * farthest) : 0;
   // Rows at the very same place as the point: anything above nothing holds them.
   return {middle, std::max({by_scene, by_points, 1e-30})};

@@ -34,8 +34,8 @@ struct Surroundings {
 constexpr std::size_t max_neighbourhood = 250'000;
 
 /// The surroundings of an operation. Without a reach: a quarter of the distance within which half of the scene's rows
-/// lie; or four times as far as the farthest inside point, or as the nearest outside one if that is farther, rounded up
-/// to a power of the square root of 2. The farther of the two.
+/// lie; or four times as far as the farthest inside point, or as the nearest outside one if that is farther, but not
+/// four times as far as half of the rows, rounded up to a power of the square root of 2. The farther of the two.
 /// Precondition: validate() holds, and the scene has a row.
 [[nodiscard]] Surroundings surroundings_of(const Array3& mean, const Grow& grow);
 

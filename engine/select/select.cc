@@ -130,7 +130,12 @@ Result<void> Selector::carry_out(const Operation& operation, const std::string& 
             named = rows_in(mean, action);
           }
           if (is_empty(named))
-            so_far.warnings.push_back({"the " + std::string(name_of(operation.action)) + " names no Gaussian", where});
+            so_far.warnings.push_back(
+                {"the " + std::string(name_of(operation.action)) +
+                     (std::holds_alternative<Masks>(operation.action) || std::holds_alternative<Rows>(operation.action)
+                          ? " name no Gaussian"
+                          : " names no Gaussian"),
+                 where});
           combine(operation.op, named, so_far.rows);
         }
         return {};

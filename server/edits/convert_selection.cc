@@ -39,7 +39,8 @@ Result<scene::Camera> camera_of(const proto::Viewpoint& viewpoint, const Viewpoi
   if (found != known.views.end()) return *found;
   if (known.views.empty())
     return fail(ErrorCode::not_found,
-                "views of a selection are those of a dataset, which is not there: give the camera itself, as `camera`",
+                "views of a selection are those of a dataset, and none was given: name one, or give the camera itself, "
+                "as `camera`",
                 where + ".view");
   std::vector<std::string> first;
   for (const scene::Camera& view : known.views.first(std::min<std::size_t>(known.views.size(), 3)))

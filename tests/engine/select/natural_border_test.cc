@@ -42,9 +42,33 @@ TEST(NaturalBorder, IsWhereEdgesAreWeakNotHalfway) {
   EXPECT_EQ(inside(three_chains(1, 0.01f), {{0}, {39}}), numbers(0, 20));
 }
 
+/// Strips of a surface, 20 wide and 10, 10 and 40 long, end to end, joined weakly: rows of 20 nodes.
+WeightedGraph three_strips(float first_joint, float second_joint) {
+  constexpr std::uint32_t wide = 20, rows = 60;
+  std::vector<WeightedEdge> edges;
+  for (std::uint32_t row = 0; row < rows; ++row)
+    for (std::uint32_t i = 0; i < wide; ++i) {
+      const std::uint32_t node = row * wide + i;
+      if (i + 1 < wide) edges.push_back({node, node + 1});
+      const float along = row == 9 ? first_joint : row == 19 ? second_joint : 1.0f;
+      if (row + 1 < rows) edges.push_back({node, node + wide, along});
+    }
+  return graph_of(wide * rows, edges);
+}
+
 TEST(NaturalBorder, IsTheOneThatEndsALargerPieceOfTwoAlike) {
-  EXPECT_EQ(inside(three_chains(0.01f, 0.01f), {{0}, {39}}), numbers(0, 20))
+  EXPECT_EQ(inside(three_strips(0.01f, 0.01f), {{10}, {1190}}), numbers(0, 400))
       << "as weak a joint, and twice as much behind it";
+}
+
+TEST(NaturalBorder, IsTheWeakerOneThoughItEndsASmallerPiece) {
+  EXPECT_EQ(inside(three_strips(0.01f, 1), {{10}, {1190}}), numbers(0, 200));
+  EXPECT_EQ(inside(three_strips(0.05f, 0.4f), {{10}, {1190}}), numbers(0, 200));
+}
+
+TEST(NaturalBorder, IsTheOneBeyondAllThatIsClickedOn) {
+  EXPECT_EQ(inside(three_strips(0.05f, 0.1f), {{10, 310}, {1190}}), numbers(0, 400))
+      << "who clicks on two pieces means one thing";
 }
 
 TEST(NaturalBorder, LeavesPiecesThatAreClickedOnToTheirSide) {
