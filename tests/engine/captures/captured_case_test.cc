@@ -149,7 +149,7 @@ TEST(CapturedCases, BallsTakeMostOfTheTruePartUnlessTheyArePlacedCarelessly) {
       EXPECT_LT(found.recall, 0.55);
       EXPECT_GT(found.recall, 0.2);
     } else {
-      EXPECT_GT(found.recall, 0.55) << "of the true scene, whose hidden undersides count";
+      EXPECT_GT(found.recall, 0.45) << "of the true scene, whose hidden undersides count: of a board, half";
     }
   }
 }
