@@ -120,7 +120,7 @@ class Actions {
   /// where  address of the action: "selection[2].masks"
   Result<select::Action> operator()(const on_wire::Action& action, const std::string& where) {
     where_ = where;
-    return std::visit([this](const auto& given) -> Result<select::Action> { return convert(given); }, action);
+    return std::visit([this](const auto& given) -> Result<select::Action> { return this->convert(given); }, action);
   }
 
  private:
