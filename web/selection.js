@@ -31,7 +31,9 @@ const changesAll = (step) => opOf(step) === "intersect" || Object.keys(step).som
 export function withClick(selection, { op, kind, point, fresh = false }) {
   const isThis = (o) => Boolean(o.grow) && opOf(o) === op;
   const at = fresh ? -1 : selection.findLastIndex((o) => isThis(o) || changesAll(o));
-  if (at < 0 || !isThis(selection[at])) return kind === "inside" ? [...selection, operation(op, { grow: { inside: [point] } })] : null;
+  if (at < 0 || !isThis(selection[at])) {
+    return kind === "inside" ? [...selection, operation(op, { grow: { inside: [point] } })] : null;
+  }
   const { grow } = selection[at];
   const grown = { ...selection[at], grow: { ...grow, [kind]: [...(grow[kind] ?? []), point] } };
   return selection.map((o, i) => (i === at ? grown : o));

@@ -4,6 +4,7 @@ import { afterEach, beforeEach, test } from "node:test";
 
 import { Editor, NOTHING_OPEN, parentOf, shownVersion } from "../../../web/editor.js";
 import { SceneMemory, Store } from "../../../web/store.js";
+import { fetchFrom, memoryStorage, settle } from "./stand_ins.mjs";
 
 globalThis.crypto ??= webcrypto; // a browser's global that Node 18 lacks
 
@@ -32,19 +33,10 @@ function open(items = storage) {
   return editor.open("s000001");
 }
 
-const settle = async () => {
-  for (let i = 0; i < 20; ++i) await new Promise((resolve) => setImmediate(resolve));
-};
-
 beforeEach(async () => {
   said = [];
   streams = [];
-  const items = new Map();
-  storage = {
-    getItem: (key) => items.get(key) ?? null,
-    setItem: (key, value) => void items.set(key, value),
-    removeItem: (key) => void items.delete(key),
-  };
+  storage = memoryStorage();
   service = {
     "GET /v1/scenes/s000001": scene,
     "GET /v1/scenes/s000001/views": () => ({ kind: "virtual", views: [] }),
@@ -52,13 +44,7 @@ beforeEach(async () => {
     "POST /v1/scenes/s000001/versions/0/pick": (body) =>
       body.point ? { hit: true, gaussians_in_radius: 42 } : { hit: true, point: [0.5, 0, 0], normal: [0, 0, -1] },
   };
-  globalThis.fetch = async (path, { method = "GET", body, headers } = {}) => {
-    const answer = service[`${method} ${path}`];
-    if (!answer) throw new TypeError(`nobody answers ${method} ${path}`);
-    const value = answer(body && JSON.parse(body), headers);
-    if (value instanceof Error) throw value;
-    return value instanceof Response ? value : new Response(JSON.stringify(value), { status: 200 });
-  };
+  globalThis.fetch = fetchFrom(service);
   globalThis.EventSource = class extends EventTarget {
     constructor(url) {
       super();

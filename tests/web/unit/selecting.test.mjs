@@ -3,6 +3,7 @@ import { afterEach, beforeEach, test } from "node:test";
 
 import { Editor, NOTHING_OPEN, shownVersion } from "../../../web/editor.js";
 import { SceneMemory, Store } from "../../../web/store.js";
+import { fetchFrom, memoryStorage, settle } from "./stand_ins.mjs";
 
 const CAMERA = { eye: [0, 0, -5], target: [0, 0, 0], up: [0, -1, 0], fov: 50, width: 400, height: 300 };
 const SELECT = "POST /v1/scenes/s000001/versions/0/select";
@@ -13,9 +14,6 @@ let said;
 let asked; // Selections that were posted, in order.
 let storage;
 
-const settle = async () => {
-  for (let i = 0; i < 20; ++i) await new Promise((resolve) => setImmediate(resolve));
-};
 const answer = (selection) => ({
   id: `q${selection.length}`,
   count: 100 * selection.length,
@@ -36,12 +34,7 @@ function open() {
 beforeEach(async () => {
   said = [];
   asked = [];
-  const items = new Map();
-  storage = {
-    getItem: (key) => items.get(key) ?? null,
-    setItem: (key, value) => void items.set(key, value),
-    removeItem: (key) => void items.delete(key),
-  };
+  storage = memoryStorage();
   service = {
     "GET /v1/scenes/s000001": () => ({
       id: "s000001",
@@ -63,12 +56,7 @@ beforeEach(async () => {
       return answer(selection);
     },
   };
-  globalThis.fetch = async (path, { method = "GET", body } = {}) => {
-    const reply = service[`${method} ${path}`];
-    if (!reply) throw new TypeError(`nobody answers ${method} ${path}`);
-    const value = await reply(body && JSON.parse(body));
-    return value instanceof Response ? value : new Response(JSON.stringify(value), { status: 200 });
-  };
+  globalThis.fetch = fetchFrom(service);
   await open();
 });
 
