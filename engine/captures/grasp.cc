@@ -11,7 +11,6 @@
 #include "engine/core/rows.h"
 #include "engine/edit/drag.h"
 #include "engine/mask/mask.h"
-#include "engine/render/forward.h"
 #include "engine/select/select.h"
 
 namespace engine::captures {
@@ -86,10 +85,11 @@ std::vector<scene::Camera> three_photos(const CapturedCase& the_case) {
 
 Result<Grasp> grasp_by_outlines(std::string by, int beyond_px, const CapturedCase& the_case,
                                 const scene::GaussianCloud& scene) {
+  const std::vector<scene::Camera> photos = three_photos(the_case);
+  const std::vector<scene::Mask> outlines = true_outlines(the_case, photos);
   select::Masks masks;
-  render::Workspace workspace;
-  for (const scene::Camera& camera : three_photos(the_case))
-    masks.views.push_back({camera, mask::dilate(true_outline(the_case, camera, workspace), beyond_px)});
+  for (std::size_t i = 0; i < photos.size(); ++i)
+    masks.views.push_back({photos[i], mask::dilate(outlines[i], beyond_px)});
   return grasp_by_selection(std::move(by), {{select::Op::add, std::move(masks)}}, the_case, scene);
 }
 

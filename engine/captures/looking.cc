@@ -8,9 +8,12 @@
 
 #include "engine/captures/outlines.h"
 #include "engine/core/rng.h"
+#include "engine/core/rows.h"
+#include "engine/mask/mask.h"
 #include "engine/render/forward.h"
 #include "engine/render/pick.h"
 #include "engine/select/select.h"
+#include "engine/working/footprint.h"
 
 namespace engine::captures {
 namespace {
@@ -77,10 +80,8 @@ void find_patches(const scene::Mask& wrong, std::size_t view, bool is_missed, st
 class Looking {
  public:
   Looking(const CapturedCase& the_case, const scene::GaussianCloud& scene) : scene_(scene) {
-    for (std::size_t i = 0; i < the_case.cameras.size(); i += every_photo) {
-      cameras_.push_back(the_case.cameras[i]);
-      meant_.push_back(true_outline(the_case, cameras_.back(), workspace_));
-    }
+    for (std::size_t i = 0; i < the_case.cameras.size(); i += every_photo) cameras_.push_back(the_case.cameras[i]);
+    meant_ = true_outlines(the_case, cameras_);
   }
 
   struct Seen {
@@ -89,8 +90,9 @@ class Looking {
   };
   Seen look_at(const std::vector<std::uint8_t>& selected) {
     Seen seen;
+    const std::vector<std::uint32_t> rows = marked_rows(selected);
     for (std::size_t view = 0; view < cameras_.size(); ++view) {
-      const scene::Mask tinted = shown(scene_, selected, cameras_[view], workspace_);
+      const scene::Mask tinted = mask::mask2d(working::footprint(scene_, rows, cameras_[view], workspace_));
       scene::Mask missed = meant_[view], extra = tinted;
       for (std::size_t i = 0; i < tinted.data.size(); ++i) {
         missed.data[i] &= std::uint8_t(1 - tinted.data[i]);

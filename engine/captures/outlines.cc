@@ -1,21 +1,21 @@
 #include "engine/captures/outlines.h"
 
-#include <vector>
+#include <cstdint>
 
+#include "engine/core/rows.h"
 #include "engine/mask/mask.h"
+#include "engine/render/forward.h"
+#include "engine/working/footprint.h"
 
 namespace engine::captures {
 
-scene::Mask shown(const scene::GaussianCloud& cloud, std::span<const std::uint8_t> marks, const scene::Camera& camera,
-                  render::Workspace& workspace) {
-  const std::vector<float> weight(marks.begin(), marks.end());
-  render::Rendering rendering;
-  render::forward(cloud, camera, {.color = false}, weight, workspace, rendering);
-  return mask::mask2d(rendering.weight);
-}
-
-scene::Mask true_outline(const CapturedCase& the_case, const scene::Camera& camera, render::Workspace& workspace) {
-  return shown(the_case.before, the_case.moving.holds(the_case.before.mean), camera, workspace);
+std::vector<scene::Mask> true_outlines(const CapturedCase& the_case, std::span<const scene::Camera> cameras) {
+  const std::vector<std::uint32_t> rows = marked_rows(the_case.moving.holds(the_case.before.mean));
+  std::vector<scene::Mask> out;
+  render::Workspace workspace;
+  for (const scene::Camera& camera : cameras)
+    out.push_back(mask::mask2d(working::footprint(the_case.before, rows, camera, workspace)));
+  return out;
 }
 
 }  // namespace engine::captures

@@ -88,8 +88,8 @@ class Neighbourhood {
   /// Claims the nodes that a point lies on; returns the one that covers it most.
   std::uint32_t claim(const scene::GaussianCloud& cloud, DVec3 point, Given side,
                       std::map<std::uint32_t, Claim>& claims) const;
-  [[nodiscard]] std::vector<std::uint32_t> rows_where_marked(
-      std::span<const std::uint8_t> nodes) const;  ///< Ascending.
+  /// The rows of marked nodes, ascending.
+  [[nodiscard]] std::vector<std::uint32_t> rows_where_marked(std::span<const std::uint8_t> nodes) const;
   /// Gives what lies at the reach to the outside.
   void take_far_nodes(std::vector<Given>& given) const;
 

@@ -133,11 +133,10 @@ constexpr std::size_t max_operations = 256;
 constexpr std::size_t max_points = 4'096;     ///< Of polygons, strokes and growing.
 constexpr std::size_t max_views = 64;         ///< That are rendered: of masks, and of what is `visible`.
 constexpr std::size_t max_pixels = 1u << 24;  ///< Of one such view.
-constexpr std::size_t max_searches =
-    32;  ///< Operations that look for neighbours: grow, masks, expand, shrink, largest.
-constexpr std::size_t max_ranges = 100'000;  ///< Of rows.
-constexpr double max_pixel_position = 1e6;   ///< Pixels: a point farther from a picture is a mistake.
-constexpr double max_world_number = 1e38;    ///< World units: no mean, a float, lies farther.
+constexpr std::size_t max_searches = 32;      ///< Of neighbours: grow, masks, expand, shrink, largest.
+constexpr std::size_t max_ranges = 100'000;   ///< Of rows.
+constexpr double max_pixel_position = 1e6;    ///< Pixels: a point farther from a picture is a mistake.
+constexpr double max_world_number = 1e38;     ///< World units: no mean, a float, lies farther.
 
 /// Can the selection be carried out on a scene of so many rows?
 ///   errors  invalid_argument, too_large (a limit above) or unprocessable (a row that the scene does not have); `where`
