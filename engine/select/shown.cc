@@ -127,4 +127,12 @@ double shown_share(const scene::GaussianCloud& cloud, std::span<const std::uint8
   return all > 0 ? std::min(of_rows / all, 1.0) : 0.0;
 }
 
+std::vector<double> shown_shares(const scene::GaussianCloud& cloud, std::span<const std::uint8_t> rows,
+                                 std::span<const scene::Camera> cameras) {
+  render::Workspace workspace;
+  std::vector<double> shares;
+  for (const scene::Camera& camera : cameras) shares.push_back(shown_share(cloud, rows, camera, workspace));
+  return shares;
+}
+
 }  // namespace engine::select

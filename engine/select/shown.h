@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <span>
+#include <vector>
 
 #include "engine/render/forward.h"
 #include "engine/scene/gaussian_cloud.h"
@@ -42,5 +43,8 @@ struct MaskedRows {
 /// Precondition: validate(camera) holds.
 [[nodiscard]] double shown_share(const scene::GaussianCloud& cloud, std::span<const std::uint8_t> rows,
                                  const scene::Camera& camera, render::Workspace& workspace);
+/// The same of each view.
+[[nodiscard]] std::vector<double> shown_shares(const scene::GaussianCloud& cloud, std::span<const std::uint8_t> rows,
+                                               std::span<const scene::Camera> cameras);
 
 }  // namespace engine::select

@@ -47,9 +47,7 @@ Result<Selected> carry_out(const SelectOptions& options, const proto::Selection&
                            const scene::GaussianCloud& cloud, const std::vector<scene::Camera>& cameras) {
   const auto with_cameras = edits::with_cameras(asked, {.views = cameras});
   if (!with_cameras) return tl::make_unexpected(in_file(with_cameras.error(), options));
-  const auto selection = edits::to_engine(*with_cameras);
-  if (!selection) return tl::make_unexpected(in_file(selection.error(), options));
-  auto selected = engine::select::select(cloud, *selection);
+  auto selected = edits::carry_out(cloud, *with_cameras);
   if (!selected) return tl::make_unexpected(in_file(selected.error(), options));
   return selected;
 }

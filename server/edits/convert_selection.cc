@@ -258,6 +258,12 @@ Result<select::Selection> to_engine(const proto::Selection& selection) {
   return out;
 }
 
+Result<select::Selected> carry_out(const scene::GaussianCloud& cloud, const proto::Selection& selection) {
+  const auto operations = to_engine(selection);
+  if (!operations) return propagate(operations);
+  return select::select(cloud, *operations);
+}
+
 std::vector<std::string> warnings_of(const select::Selected& selected) {
   std::vector<std::string> sentences;
   for (const auto& [message, where] : selected.warnings)
@@ -298,17 +304,9 @@ Result<std::vector<std::string>> select_rows(const scene::GaussianCloud& cloud, 
                                              const Viewpoints& viewpoints, engine::edit::Request& request) {
   const auto resolved = with_cameras(selection, viewpoints);
   if (!resolved) return propagate(resolved);
-  const auto operations = to_engine(*resolved);
-  if (!operations) return propagate(operations);
-  const auto selected = select::select(cloud, *operations);
+  const auto selected = carry_out(cloud, *resolved);
   if (!selected) return propagate(selected);
-  const auto shown_shares = [&](const std::vector<scene::Camera>& views) {
-    engine::render::Workspace workspace;
-    std::vector<double> shares;
-    for (const scene::Camera& view : views)
-      shares.push_back(select::shown_share(cloud, selected->rows, view, workspace));
-    return shares;
-  };
+  const auto shown_shares = [&](const auto& views) { return select::shown_shares(cloud, selected->rows, views); };
   if (!viewpoints.views.empty()) return hand_over(*selected, viewpoints.views, shown_shares, request);
   return hand_over(*selected, cameras_in(*resolved), shown_shares, request);
 }

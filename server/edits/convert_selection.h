@@ -26,8 +26,7 @@ struct Viewpoints {
 
 /// The same selection with a pinhole camera in place of each view and camera: it says all there is to say.
 ///   errors  not_found: no such view, or no dataset to have views; invalid_argument: a camera without direction.
-///   `where`
-///           is such as "selection[2].polygon.view"
+///           `where` is such as "selection[2].polygon.view"
 [[nodiscard]] engine::Result<proto::Selection> with_cameras(proto::Selection selection, const Viewpoints& viewpoints);
 
 /// The engine's selection, its masks decoded.
@@ -35,6 +34,12 @@ struct Viewpoints {
 ///   errors     invalid_argument: a mask of another size than its camera's; too_large: more pixels of masks than are
 ///              held at a time; those of io::decode_image(). `where` is such as "selection[2].masks[0].image"
 [[nodiscard]] engine::Result<engine::select::Selection> to_engine(const proto::Selection& selection);
+
+/// What it selects of a scene.
+///   selection  as with_cameras() gives it
+///   errors     those of to_engine() and of select::select()
+[[nodiscard]] engine::Result<engine::select::Selected> carry_out(const engine::scene::GaussianCloud& cloud,
+                                                                 const proto::Selection& selection);
 
 /// Pixels of all masks of a selection together: 128 MB. A choice.
 constexpr std::size_t max_mask_pixels = std::size_t{1} << 27;
@@ -46,15 +51,14 @@ constexpr std::size_t max_mask_pixels = std::size_t{1} << 27;
 ///   selection  as with_cameras() gives it
 [[nodiscard]] std::vector<engine::scene::Camera> cameras_in(const proto::Selection& selection);
 
-/// select::shown_share() in each view.
+/// select::shown_shares() of what is selected.
 using ShownShares = std::function<std::vector<double>(const std::vector<engine::scene::Camera>& views)>;
 
 /// Says in a request what moves: the rows, and how far handles grip that say nothing of it (half of the longest edge of
 /// the selected rows' box).
 ///   cameras  from which it may be looked at
 ///   returns  warnings, one sentence each: those of the selection; and that it takes more than most_of_a_view of what
-///   is
-///            seen where a handle is
+///            is seen where a handle is
 [[nodiscard]] std::vector<std::string> hand_over(const engine::select::Selected& selected,
                                                  std::span<const engine::scene::Camera> cameras,
                                                  const ShownShares& shown_shares, engine::edit::Request& request);

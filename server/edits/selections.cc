@@ -106,10 +106,7 @@ Result<std::shared_ptr<const MadeSelection>> Selections::find(const scenes::Load
 std::vector<double> Selections::shown_shares(const scenes::LoadedVersion& version, const MadeSelection& made,
                                              const std::vector<scene::Camera>& views) {
   auto desk = take_desk(version);
-  engine::render::Workspace workspace;
-  std::vector<double> shares;
-  for (const scene::Camera& view : views)
-    shares.push_back(engine::select::shown_share(desk->cloud, made.selected.rows, view, workspace));
+  std::vector<double> shares = engine::select::shown_shares(desk->cloud, made.selected.rows, views);
   put_back(std::move(desk));
   return shares;
 }

@@ -68,7 +68,7 @@ class Selections {
   [[nodiscard]] Result<std::shared_ptr<const MadeSelection>> find(const scenes::LoadedVersion& version,
                                                                   const std::string& id);
 
-  /// select::shown_share() of what is selected in each view.
+  /// select::shown_shares() of what is selected.
   ///   made  on this version
   [[nodiscard]] std::vector<double> shown_shares(const scenes::LoadedVersion& version, const MadeSelection& made,
                                                  const std::vector<engine::scene::Camera>& views);
