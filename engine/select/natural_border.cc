@@ -25,7 +25,8 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 class GrowingPieces {
  public:
   ///   clicked  nodes; one that is clicked twice counts twice
-  GrowingPieces(const NeighbourGraph& graph, std::span<const float> weight, std::span<const std::uint32_t> clicked)
+  GrowingPieces(const neighbours::NeighbourGraph& graph, std::span<const float> weight,
+                std::span<const std::uint32_t> clicked)
       : graph_(graph), weight_(weight), pieces_(graph.size()), is_in_(graph.size(), 0), of_(graph.size()) {
     for (const float one : weight) all_ += double(one);
     for (const std::uint32_t node : clicked) ++of_[node].clicks;
@@ -74,17 +75,17 @@ class GrowingPieces {
     return lesser > 0 ? double(piece.clicks) * (least_border + std::max(piece.leaving, 0.0)) / std::sqrt(lesser) : 0.0;
   }
 
-  const NeighbourGraph& graph_;
+  const neighbours::NeighbourGraph& graph_;
   std::span<const float> weight_;
-  Pieces pieces_;
+  neighbours::Pieces pieces_;
   std::vector<std::uint8_t> is_in_;
-  std::vector<Piece> of_;  ///< By the node that Pieces names a piece by; before, a node's clicks.
+  std::vector<Piece> of_;  ///< By the node that neighbours::Pieces names a piece by; before, a node's clicks.
   std::size_t clicks_to_come_ = 0, pieces_clicked_ = 0;
   double all_ = 0, sum_ = 0;
 };
 
 /// [n + 1] After so many nodes of the order, what the borders of the pieces that clicks are on cost.
-std::vector<double> border_costs(const NeighbourGraph& graph, std::span<const float> weight,
+std::vector<double> border_costs(const neighbours::NeighbourGraph& graph, std::span<const float> weight,
                                  std::span<const std::uint32_t> order, std::span<const std::uint32_t> clicked) {
   std::vector<double> out(order.size() + 1, clicked.empty() ? 0.0 : infinity);
   if (clicked.empty()) return out;
@@ -119,7 +120,7 @@ std::vector<std::uint32_t> by_potential(std::span<const double> potential, std::
 
 }  // namespace
 
-std::vector<std::uint8_t> natural_border(const NeighbourGraph& graph, std::span<const float> weight,
+std::vector<std::uint8_t> natural_border(const neighbours::NeighbourGraph& graph, std::span<const float> weight,
                                          std::span<const double> potential, std::span<const Given> given,
                                          const ClickedNodes& clicked) {
   const std::size_t n = graph.size();

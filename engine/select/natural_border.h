@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "engine/select/neighbour_graph.h"
+#include "engine/neighbours/neighbour_graph.h"
 #include "engine/select/random_walk.h"
 
 namespace engine::select {
@@ -29,8 +29,8 @@ struct ClickedNodes {
 ///   returns    [nodes] 1: inside
 /// Source: sweeps over level sets, Andersen, Chung and Lang 2006, "Local graph partitioning using PageRank vectors";
 /// the ratio, and that outside pieces count alike, are ours.
-[[nodiscard]] std::vector<std::uint8_t> natural_border(const NeighbourGraph& graph, std::span<const float> weight,
-                                                       std::span<const double> potential, std::span<const Given> given,
-                                                       const ClickedNodes& clicked);
+[[nodiscard]] std::vector<std::uint8_t> natural_border(const neighbours::NeighbourGraph& graph,
+                                                       std::span<const float> weight, std::span<const double> potential,
+                                                       std::span<const Given> given, const ClickedNodes& clicked);
 
 }  // namespace engine::select

@@ -116,11 +116,12 @@ Neighbourhood::Neighbourhood(const scene::GaussianCloud& cloud, const Surroundin
     rows_.resize(max_neighbourhood);
     std::sort(rows_.begin(), rows_.end());
   }
-  const std::vector<std::uint32_t> order = neighbours::morton_order(points_of(cloud.mean, rows_, surroundings.middle));
+  const std::vector<std::uint32_t> order =
+      neighbours::morton_order(neighbours::points_of(cloud.mean, rows_, surroundings.middle));
   rows_ = in_order(rows_, order);
-  points_ = points_of(cloud.mean, rows_, surroundings.middle);
+  points_ = neighbours::points_of(cloud.mean, rows_, surroundings.middle);
   index_ = neighbours::PointIndex(points_, 3);
-  graph_ = join_nearest(points_, index_, neighbours_joined);
+  graph_ = neighbours::join_nearest(points_, index_, neighbours_joined);
   weight_ = similarity_of_edges(cloud, rows_, graph_);
   for (float& one : weight_) one = std::max(one, least_weight);
 }
@@ -164,7 +165,8 @@ std::uint32_t Neighbourhood::claim(const scene::GaussianCloud& cloud, DVec3 poin
     std::uint32_t node;
   };
   std::vector<Covering> near;
-  for (const neighbours::Neighbour& one : index_.nearest(point_of(point, surroundings_.middle), rows_near_click))
+  for (const neighbours::Neighbour& one :
+       index_.nearest(neighbours::point_of(point, surroundings_.middle), rows_near_click))
     near.push_back(
         {cover(cloud, rows_[one.index], double(graph_.spacing[one.index]), point), one.squared_distance, one.index});
   // Where nothing covers the point, the nearest count, which come first.

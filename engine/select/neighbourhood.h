@@ -13,10 +13,10 @@
 
 #include "engine/core/result.h"
 #include "engine/core/vec.h"
+#include "engine/neighbours/neighbour_graph.h"
 #include "engine/neighbours/point_index.h"
 #include "engine/scene/gaussian_cloud.h"
 #include "engine/select/natural_border.h"
-#include "engine/select/neighbour_graph.h"
 #include "engine/select/operation.h"
 #include "engine/select/random_walk.h"
 
@@ -99,7 +99,7 @@ class Neighbourhood {
   double farthest_ = 0;              ///< Of the rows, from the middle, if the reach was cut short; else the reach.
   std::vector<float> points_;        ///< [rows][3] relative to the middle.
   neighbours::PointIndex index_;     ///< Of these.
-  NeighbourGraph graph_;
+  neighbours::NeighbourGraph graph_;
   std::vector<float> weight_;  ///< [edges] 1: the same surface goes on; near 0: a border.
 };
 

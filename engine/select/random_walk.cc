@@ -29,7 +29,7 @@ constexpr auto nobody = std::numeric_limits<std::uint32_t>::max();
 
 /// A graph as the solver sees it. All spans live elsewhere.
 struct Network {
-  std::span<const std::uint32_t> begin, to;  ///< As those of NeighbourGraph.
+  std::span<const std::uint32_t> begin, to;  ///< As those of neighbours::NeighbourGraph.
   std::span<const float> weight;
   std::span<const Given> given;
   [[nodiscard]] std::size_t size() const { return given.size(); }
@@ -276,7 +276,7 @@ class Solver {
 
 }  // namespace
 
-std::vector<double> random_walk(const NeighbourGraph& graph, std::span<const float> weight,
+std::vector<double> random_walk(const neighbours::NeighbourGraph& graph, std::span<const float> weight,
                                 std::span<const Given> given) {
   std::vector<double> x = Solver({graph.begin, graph.to, weight, given}).solve();
   for (double& value : x) value = std::clamp(value, 0.0, 1.0);  // of rounding and of steps not taken

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "engine/select/neighbour_graph.h"
+#include "engine/neighbours/neighbour_graph.h"
 
 namespace engine::select {
 
@@ -21,7 +21,7 @@ enum class Given : std::uint8_t { no, inside, outside };
 /// Source: Grady 2006, "Random walks for image segmentation", section III: the combinatorial Dirichlet problem. Solved
 /// by conjugate gradients, preconditioned by graphs of merged nodes (Notay 2010, "An aggregation-based algebraic
 /// multigrid method"), in about as many steps for any graph.
-[[nodiscard]] std::vector<double> random_walk(const NeighbourGraph& graph, std::span<const float> weight,
+[[nodiscard]] std::vector<double> random_walk(const neighbours::NeighbourGraph& graph, std::span<const float> weight,
                                               std::span<const Given> given);
 
 }  // namespace engine::select

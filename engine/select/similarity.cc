@@ -98,7 +98,7 @@ double overlap(const Look& a, const Look& b, DVec3 between) {
 
 /// Calls use(node, edge) for each edge from a node to a higher one: each pair once.
 template <class Use>
-void each_pair(const NeighbourGraph& graph, Use&& use) {
+void each_pair(const neighbours::NeighbourGraph& graph, Use&& use) {
   parallel_for(graph.size(), grain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t node = begin; node < end; ++node)
       for (std::uint32_t edge = graph.begin[node]; edge < graph.begin[node + 1]; ++edge)
@@ -109,8 +109,8 @@ void each_pair(const NeighbourGraph& graph, Use&& use) {
 float squared(Vec3 v) { return glm::dot(v, v); }
 
 /// Colours evened out once.
-std::vector<Vec3> smoothed(const NeighbourGraph& graph, std::span<const Look> looks, std::span<const float> overlaps,
-                           std::span<const Vec3> colors) {
+std::vector<Vec3> smoothed(const neighbours::NeighbourGraph& graph, std::span<const Look> looks,
+                           std::span<const float> overlaps, std::span<const Vec3> colors) {
   std::vector<Vec3> out(colors.size());
   parallel_for(graph.size(), grain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t node = begin; node < end; ++node) {
@@ -132,7 +132,7 @@ std::vector<Vec3> smoothed(const NeighbourGraph& graph, std::span<const Look> lo
 }  // namespace
 
 std::vector<float> similarity_of_edges(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
-                                       const NeighbourGraph& graph) {
+                                       const neighbours::NeighbourGraph& graph) {
   std::vector<Look> looks(rows.size());
   std::vector<Vec3> colors(rows.size());
   parallel_for(rows.size(), grain, [&](std::size_t begin, std::size_t end) {

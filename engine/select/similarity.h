@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "engine/core/vec.h"
+#include "engine/neighbours/neighbour_graph.h"
 #include "engine/scene/gaussian_cloud.h"
-#include "engine/select/neighbour_graph.h"
 
 namespace engine::select {
 
@@ -18,7 +18,8 @@ namespace engine::select {
 ///   rows     [n] of the cloud, one per node
 ///   returns  [edges], in [0, 1]
 [[nodiscard]] std::vector<float> similarity_of_edges(const scene::GaussianCloud& cloud,
-                                                     std::span<const std::uint32_t> rows, const NeighbourGraph& graph);
+                                                     std::span<const std::uint32_t> rows,
+                                                     const neighbours::NeighbourGraph& graph);
 
 /// How much a Gaussian covers a point: its opacity times its falloff there, 0 to 1.
 ///   spacing  of its node, world units: none counts as thinner than half of that

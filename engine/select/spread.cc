@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "engine/core/rows.h"
+#include "engine/neighbours/neighbour_graph.h"
 #include "engine/neighbours/point_index.h"
-#include "engine/select/neighbour_graph.h"
 
 namespace engine::select {
 namespace {
@@ -42,19 +42,19 @@ void each_within(const Array3& mean, const std::vector<std::uint32_t>& rows, con
   const std::vector<std::uint32_t> asked = rows_near_box(mean, others, near, distance);
   if (asked.empty()) return;
   const DVec3 origin(mean.get(asked[0]));
-  const neighbours::PointIndex index(points_of(mean, asked, origin), 3);
-  const auto nearest = index.nearest(points_of(mean, near, origin), 1);
+  const neighbours::PointIndex index(neighbours::points_of(mean, asked, origin), 3);
+  const auto nearest = index.nearest(neighbours::points_of(mean, near, origin), 1);
   for (std::size_t i = 0; i < near.size(); ++i)
     if (std::sqrt(double(nearest[i].squared_distance)) <= distance) use(near[i]);
 }
 
 /// What hangs together.
-Pieces pieces_of(const NeighbourGraph& graph) {
-  Pieces pieces(graph.size());
+neighbours::Pieces pieces_of(const neighbours::NeighbourGraph& graph) {
+  neighbours::Pieces pieces(graph.size());
   for (std::uint32_t node = 0; node < graph.size(); ++node)
     for (std::uint32_t edge = graph.begin[node]; edge < graph.begin[node + 1]; ++edge) {
       const std::uint32_t other = graph.to[edge];
-      if (graph.length[edge] <= joining_spacings * std::min(graph.spacing[node], graph.spacing[other]))
+      if (graph.length[edge] <= neighbours::joining_spacings * std::min(graph.spacing[node], graph.spacing[other]))
         pieces.join(node, other);
     }
   return pieces;
@@ -77,8 +77,9 @@ RowSet shrunk(const Array3& mean, const RowSet& selected, double distance) {
 RowSet largest_pieces(const Array3& mean, const RowSet& selected, std::size_t n) {
   const std::vector<std::uint32_t> rows = marked_rows(selected);
   if (rows.empty()) return selected;
-  const std::vector<float> points = points_of(mean, rows, DVec3(mean.get(rows[0])));
-  Pieces pieces = pieces_of(join_nearest(points, neighbours::PointIndex(points, 3), neighbours_joined));
+  const std::vector<float> points = neighbours::points_of(mean, rows, DVec3(mean.get(rows[0])));
+  neighbours::Pieces pieces =
+      pieces_of(neighbours::join_nearest(points, neighbours::PointIndex(points, 3), neighbours_joined));
   const std::vector<std::uint32_t> rows_of_piece = pieces.sizes();
   std::vector<std::uint32_t> by_size;  // pieces, by their lowest node
   for (std::uint32_t node = 0; node < rows.size(); ++node)

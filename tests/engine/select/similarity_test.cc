@@ -11,11 +11,11 @@
 namespace engine::select {
 namespace {
 
-NeighbourGraph joined(const scene::GaussianCloud& cloud, std::vector<std::uint32_t>& rows) {
+neighbours::NeighbourGraph joined(const scene::GaussianCloud& cloud, std::vector<std::uint32_t>& rows) {
   rows.resize(cloud.size());
   std::iota(rows.begin(), rows.end(), 0u);
-  const std::vector<float> points = points_of(cloud.mean, rows, DVec3(0.0));
-  return join_nearest(points, neighbours::PointIndex(points, 3), 4);
+  const std::vector<float> points = neighbours::points_of(cloud.mean, rows, DVec3(0.0));
+  return neighbours::join_nearest(points, neighbours::PointIndex(points, 3), 4);
 }
 
 /// Of the only edge of two discs in the plane z = 0, 0.1 apart, after the second one was changed.
@@ -26,7 +26,7 @@ float similarity_after(Change&& change) {
   cloud = scene::select(cloud, std::vector<std::uint8_t>{1, 1, 0, 0});
   change(cloud);
   std::vector<std::uint32_t> rows;
-  const NeighbourGraph graph = joined(cloud, rows);
+  const neighbours::NeighbourGraph graph = joined(cloud, rows);
   const std::vector<float> found = similarity_of_edges(cloud, rows, graph);
   EXPECT_EQ(found.size(), 2u);
   EXPECT_EQ(found[0], found[1]) << "the same both ways";

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "engine/select/neighbour_graph.h"
+#include "engine/neighbours/neighbour_graph.h"
 
 namespace engine::select {
 
@@ -15,7 +15,7 @@ struct WeightedEdge {
 };
 
 struct WeightedGraph {
-  NeighbourGraph graph;  ///< Without lengths.
+  neighbours::NeighbourGraph graph;  ///< Without lengths.
   std::vector<float> weight;
 };
 

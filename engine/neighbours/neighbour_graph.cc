@@ -1,4 +1,4 @@
-#include "engine/select/neighbour_graph.h"
+#include "engine/neighbours/neighbour_graph.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 #include "engine/core/parallel.h"
 
-namespace engine::select {
+namespace engine::neighbours {
 namespace {
 
 constexpr std::size_t grain = 4'096;  // nodes of a parallel task: a choice
@@ -71,8 +71,8 @@ void measure_edges(std::span<const float> points, NeighbourGraph& graph) {
 
 /// Pairs of nodes of different pieces that hang together nevertheless: where a piece is dense, or thin as the handle of
 /// a mug, the nearest nodes of each are all its own. Found from all pieces but the largest.
-std::vector<Pair> bridges(std::span<const float> points, const neighbours::PointIndex& index,
-                          std::span<const float> spacing, Pieces& pieces) {
+std::vector<Pair> bridges(std::span<const float> points, const PointIndex& index, std::span<const float> spacing,
+                          Pieces& pieces) {
   const std::vector<std::uint32_t> sizes = pieces.sizes();
   const auto largest = std::uint32_t(std::max_element(sizes.begin(), sizes.end()) - sizes.begin());
   std::vector<std::uint32_t> nodes;
@@ -87,7 +87,7 @@ std::vector<Pair> bridges(std::span<const float> points, const neighbours::Point
   std::vector<Pair> out;
   for (std::size_t i = 0; i < nodes.size(); ++i)
     for (std::size_t j = 0; j < each; ++j) {
-      const neighbours::Neighbour& other = found[i * each + j];
+      const Neighbour& other = found[i * each + j];
       const float limit = joining_spacings * std::min(spacing[nodes[i]], spacing[other.index]);
       if (pieces.of(other.index) != pieces.of(nodes[i]) && other.squared_distance <= limit * limit)
         out.push_back({nodes[i], other.index});
@@ -113,7 +113,7 @@ std::vector<float> points_of(const Array3& mean, std::span<const std::uint32_t> 
   return points;
 }
 
-NeighbourGraph join_nearest(std::span<const float> points, const neighbours::PointIndex& index, std::size_t k) {
+NeighbourGraph join_nearest(std::span<const float> points, const PointIndex& index, std::size_t k, bool bridged) {
   const std::size_t n = index.size();
   const std::size_t each = std::min(k, n > 0 ? n - 1 : 0);
   std::vector<Pair> pairs(n * each);
@@ -126,7 +126,7 @@ NeighbourGraph join_nearest(std::span<const float> points, const neighbours::Poi
         double sum = 0;
         // Among points at the very same place, a node need not be the first of those found, nor be found at all.
         for (std::size_t j = 0; j <= each && taken < each; ++j) {
-          const neighbours::Neighbour& other = found[node * (each + 1) + j];
+          const Neighbour& other = found[node * (each + 1) + j];
           if (other.index == node) continue;
           pairs[node * each + taken++] = {std::uint32_t(node), other.index};
           sum += std::sqrt(double(other.squared_distance));
@@ -136,7 +136,8 @@ NeighbourGraph join_nearest(std::span<const float> points, const neighbours::Poi
     });
   Pieces pieces(n);
   for (const auto [a, b] : pairs) pieces.join(a, b);
-  for (const Pair bridge : bridges(points, index, spacing, pieces)) pairs.push_back(bridge);
+  if (bridged)
+    for (const Pair bridge : bridges(points, index, spacing, pieces)) pairs.push_back(bridge);
   NeighbourGraph graph = undirected(pairs, n);
   graph.spacing = std::move(spacing);
   measure_edges(points, graph);
@@ -149,4 +150,4 @@ std::vector<std::uint32_t> Pieces::sizes() {
   return sizes;
 }
 
-}  // namespace engine::select
+}  // namespace engine::neighbours

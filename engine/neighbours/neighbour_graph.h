@@ -13,7 +13,7 @@
 #include "engine/core/vec.h"
 #include "engine/neighbours/point_index.h"
 
-namespace engine::select {
+namespace engine::neighbours {
 
 /// An undirected graph of n nodes: of each edge, both directions, side by side with the rest of its node.
 struct NeighbourGraph {
@@ -35,12 +35,12 @@ struct NeighbourGraph {
 constexpr float joining_spacings = 3.0f;
 
 /// Joins each point to the k nearest other ones (fewer where there are not as many): an edge where one of the two is
-/// among the nearest of the other. Then joins what is not connected so, but hangs together. Node i is point i. The same
-/// for any number of threads.
+/// among the nearest of the other. Then, if asked to, joins what is not connected so, but hangs together. Node i is
+/// point i. The same for any number of threads.
 ///   points  [n][3], n below 2^31 / (2 k)
 ///   index   of these points
-[[nodiscard]] NeighbourGraph join_nearest(std::span<const float> points, const neighbours::PointIndex& index,
-                                          std::size_t k);
+[[nodiscard]] NeighbourGraph join_nearest(std::span<const float> points, const PointIndex& index, std::size_t k,
+                                          bool bridged = true);
 
 /// Which piece each of n nodes belongs to, while they are joined one by one. A piece goes by its lowest node.
 class Pieces {
@@ -61,4 +61,4 @@ class Pieces {
   std::vector<std::uint32_t> parent_;
 };
 
-}  // namespace engine::select
+}  // namespace engine::neighbours

@@ -1,4 +1,4 @@
-#include "engine/select/neighbour_graph.h"
+#include "engine/neighbours/neighbour_graph.h"
 
 #include <gtest/gtest.h>
 
@@ -10,11 +10,11 @@
 
 #include "engine/core/rng.h"
 
-namespace engine::select {
+namespace engine::neighbours {
 namespace {
 
 NeighbourGraph joined(const std::vector<float>& points, std::size_t k) {
-  return join_nearest(points, neighbours::PointIndex(points, 3), k);
+  return join_nearest(points, PointIndex(points, 3), k);
 }
 
 double distance_of(const std::vector<float>& points, std::size_t a, std::size_t b) {
@@ -101,4 +101,4 @@ TEST(PointsOf, KeepTheDigitsFarFromTheOriginAndAnEnd) {
 }
 
 }  // namespace
-}  // namespace engine::select
+}  // namespace engine::neighbours
