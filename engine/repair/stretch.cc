@@ -4,11 +4,12 @@
 #include <array>
 #include <cmath>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "engine/core/parallel.h"
+#include "engine/core/svd.h"
 #include "engine/neighbours/point_index.h"
+#include "engine/scene/stretch.h"
 
 namespace engine::repair {
 namespace {
@@ -25,38 +26,6 @@ constexpr double torn = 0.05;
 // neighbours say nothing, and quiets what little they say. Of 0.001 to 0.3, a drag and the one that undoes it leave
 // most of the fox's ear at 0.1, and of the made-up bush little less than at 0.01.
 constexpr double ridge = 0.1;
-
-/// m = u diag(s) v^T, s descending and not negative but for its last entry; u and v are rotations.
-/// Where m is flat, u goes on as a rotation does.
-struct Svd {
-  DMat3 u, v;
-  DVec3 s;
-};
-
-/// One-sided Jacobi (Hestenes 1958): turns pairs of columns until all are at right angles.
-Svd decompose(DMat3 m) {
-  DMat3 v(1.0);
-  constexpr int enough = 6;  // sweeps: 3 x 3 settles within as many
-  for (int sweep = 0; sweep < enough; ++sweep)
-    for (const auto& [p, q] : {std::pair{0, 1}, {0, 2}, {1, 2}}) {
-      const double angle = 0.5 * std::atan2(2 * glm::dot(m[p], m[q]), glm::dot(m[p], m[p]) - glm::dot(m[q], m[q]));
-      const double c = std::cos(angle), s = std::sin(angle);
-      for (DMat3* matrix : {&m, &v}) {  // the longer column comes first: the angle is in [-pi/2, pi/2]
-        const DVec3 first = c * (*matrix)[p] + s * (*matrix)[q];
-        (*matrix)[q] = c * (*matrix)[q] - s * (*matrix)[p];
-        (*matrix)[p] = first;
-      }
-    }
-  const auto unit = [](DVec3 a, DVec3 otherwise) {
-    const double length = glm::length(a);
-    return length > 0 ? a / length : otherwise;
-  };
-  const DVec3 x = unit(m[0], {1, 0, 0});
-  const DVec3 across = std::abs(x.x) < 0.9 ? DVec3(1, 0, 0) : DVec3(0, 1, 0);
-  const DVec3 y = unit(m[1] - glm::dot(m[1], x) * x, glm::normalize(across - glm::dot(across, x) * x));
-  const DMat3 u(x, y, glm::cross(x, y));
-  return {u, v, DVec3(glm::dot(m[0], u[0]), glm::dot(m[1], u[1]), glm::dot(m[2], u[2]))};
-}
 
 /// Where a copy's neighbours are from it, before and after the deformation.
 struct Surroundings {
@@ -94,22 +63,6 @@ DMat3 stretch_of(const Surroundings& around) {
   return map;
 }
 
-void stretch_row(scene::GaussianCloud& cloud, std::size_t row, const DMat3& stretch) {
-  DMat3 axes = glm::mat3_cast(glm::normalize(DQuat(cloud.rotation.get(row))));
-  const DVec3 log_scale(cloud.log_scale.get(row));
-  // Relative to the largest extent, so that squares of extents far from 1 stay within doubles.
-  const double unit = std::max({log_scale.x, log_scale.y, log_scale.z});
-  for (int axis = 0; axis < 3; ++axis) axes[axis] *= std::exp(log_scale[axis] - unit);
-  const Svd drawn = decompose(stretch * axes);
-  DVec3 drawn_log;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double length = std::max(std::abs(drawn.s[axis]), 1e-30);  // a flat disc has no logarithm across
-    drawn_log[axis] = unit + std::log(length);
-  }
-  cloud.rotation.set(row, Quat(glm::quat_cast(drawn.u)));
-  cloud.log_scale.set(row, Vec3(drawn_log));
-}
-
 }  // namespace
 
 std::size_t draw_out(WorkingScene& working) {
@@ -131,7 +84,7 @@ std::size_t draw_out(WorkingScene& working) {
       }
       const DMat3 stretch = stretch_of(around);
       if (stretch == DMat3(1.0)) continue;
-      stretch_row(working.gaussians(), row, stretch);
+      scene::stretch(working.gaussians(), row, stretch);
       changed[k] = 1;
     }
   });
