@@ -11,6 +11,7 @@ packages=(
   libopenimageio-dev openimageio-tools libopenexr-dev  # pictures
   libglm-dev libexpected-dev libtbb-dev libhwy-dev     # mathematics, results, threads, SIMD
   libflann-dev liblz4-dev                              # nearest neighbours
+  libeigen3-dev                                        # sparse equations
   nlohmann-json3-dev libtomlplusplus-dev libcli11-dev
   zlib1g-dev libzstd-dev                               # compressed scenes
   libsqlite3-dev libzip-dev                            # job records, datasets as zip files
