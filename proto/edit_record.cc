@@ -60,6 +60,9 @@ EditRecord decode(const ordered_json& object) {
   for (const ordered_json& finished : object.at("finished_intervals"))
     record.finished_intervals.push_back(decode_interval(finished));
   for (const ordered_json& count : object.at("handles")) record.handles.push_back({count.get<std::size_t>()});
+  if (const auto parts = object.find("parts"); parts != object.end())  // records of earlier versions have none
+    for (const ordered_json& part : *parts)
+      record.parts.push_back({part.at(0).get<int>(), part.at(1).get<std::string>(), part.at(2).get<std::string>()});
   if (const ordered_json& request = object.at("request"); !request.is_null())
     record.request = parse_edit_request(request.dump()).value();
   for (const ordered_json& timing : object.at("timings"))
@@ -75,9 +78,11 @@ EditRecord decode(const ordered_json& object) {
 }  // namespace
 
 std::string to_json(const EditRecord& record) {
-  ordered_json finished = ordered_json::array(), handles = ordered_json::array(), timings = ordered_json::array();
+  ordered_json finished = ordered_json::array(), handles = ordered_json::array(), timings = ordered_json::array(),
+               parts = ordered_json::array();
   for (const FinishedInterval& interval : record.finished_intervals) finished.push_back(encode(interval));
   for (const HandleCount& handle : record.handles) handles.push_back(handle.gaussians);
+  for (const Part& part : record.parts) parts.push_back({part.group, part.how, part.why});
   for (const StageSeconds& timing : record.timings) timings.push_back({timing.stage, timing.seconds});
   ordered_json out{{"stage", record.stage},
                    {"progress", record.progress},
@@ -88,6 +93,7 @@ std::string to_json(const EditRecord& record) {
                    {"loss", or_null(record.loss)},
                    {"finished_intervals", std::move(finished)},
                    {"handles", std::move(handles)},
+                   {"parts", std::move(parts)},
                    {"request", nullptr},
                    {"timings", std::move(timings)},
                    {"gaussians", encode(record.gaussians)},

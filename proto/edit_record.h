@@ -21,6 +21,7 @@ struct EditRecord {
   std::optional<double> loss;
   std::vector<FinishedInterval> finished_intervals;
   std::vector<HandleCount> handles;
+  std::vector<Part> parts;
   std::optional<EditRequest> request;
   std::vector<StageSeconds> timings;
   std::optional<GaussianCounts> gaussians;

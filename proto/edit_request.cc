@@ -24,13 +24,18 @@ constexpr int no_limit = std::numeric_limits<int>::max();
 
 /// selected  a selection says what moves: the radius may be left out
 Handle read_handle(const JsonField& field, bool selected) {
-  const Members members(field, {"source", "target", "radius", "group"});
+  const Members members(field, {"source", "target", "radius", "group", "rotation", "scale"});
   Handle handle;
   if (const auto source = members.required("source")) handle.source = source->point();
   if (const auto target = members.optional("target")) handle.target = target->point();
   if (const auto radius = selected ? members.optional("radius") : members.required("radius"))
     handle.radius = radius->length();
   if (const auto group = members.optional("group")) handle.group = group->whole(0, no_limit);
+  if (const auto rotation = members.optional("rotation")) {
+    handle.rotation = rotation->numbers<4>(-max_coordinate, max_coordinate);
+    if (handle.rotation == std::array<double, 4>{}) rotation->refuse("expected a quaternion that is not zero");
+  }
+  if (const auto scale = members.optional("scale")) handle.scale = scale->number(min_scale, max_scale);
   return handle;
 }
 
@@ -43,8 +48,8 @@ Region read_region(const JsonField& field, std::string_view size_name) {
 }
 
 EditRequest read_edit_request(const JsonField& field) {
-  const Members members(field,
-                        {"scene", "version", "mode", "preset", "prompt", "handles", "selection", "region", "params"});
+  const Members members(
+      field, {"scene", "version", "mode", "preset", "prompt", "handles", "selection", "attach", "region", "params"});
   EditRequest request;
   if (const auto f = members.optional("scene")) request.scene = f->text();
   if (const auto f = members.optional("version")) request.version = f->whole(0, no_limit);
@@ -56,6 +61,7 @@ EditRequest read_edit_request(const JsonField& field) {
     for (const JsonField& handle : handles->elements(1, max_handles, "handles"))
       request.handles.push_back(read_handle(handle, selection.has_value()));
   if (selection) request.selection = read_selection(*selection);
+  if (const auto f = members.optional("attach")) request.attach = f->one_of(engine::names<Attach>);
   if (const auto f = members.optional("region")) request.region = read_region(*f, "size");
   if (const auto f = members.optional("params")) request.params = read_params(*f);
   return request;
@@ -146,6 +152,8 @@ ordered_json encode(const Handle& handle) {
   if (handle.target) out["target"] = *handle.target;
   if (handle.radius) out["radius"] = *handle.radius;
   out["group"] = handle.group;
+  if (handle.rotation) out["rotation"] = *handle.rotation;
+  if (handle.scale) out["scale"] = *handle.scale;
   return out;
 }
 
@@ -210,6 +218,7 @@ std::string to_json(const EditRequest& request) {
   ordered_json& handles = out["handles"] = ordered_json::array();
   for (const Handle& handle : request.handles) handles.push_back(encode(handle));
   if (request.selection) out["selection"] = encode(*request.selection);
+  if (request.attach) out["attach"] = name_of(*request.attach);
   if (request.region) out["region"] = {{"center", request.region->center}, {"size", request.region->size}};
   out["params"] = encode(request.params);
   return pretty(out);

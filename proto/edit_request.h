@@ -1,6 +1,7 @@
 // The edit request as it travels: JSON in, a plain struct, JSON out. The names are the contract with clients.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -16,6 +17,7 @@ namespace proto {
 
 using engine::name_of;  // of an enumerator, such as "shortest_arc"
 using engine::params::Annealing;
+using engine::params::Attach;
 using engine::params::Background;
 using engine::params::Corrector;
 using engine::params::Interpolation;
@@ -29,13 +31,17 @@ using Params = engine::params::GivenParams;
 
 constexpr std::size_t max_handles = 256;  ///< A choice: far above what people send, far below what would hurt.
 
+constexpr double max_scale = 1000, min_scale = 1 / max_scale;  ///< A choice: far beyond use.
+
 /// A point on the part that is dragged, and where it is to go.
 struct Handle {
   Point source{};
-  std::optional<Point> target;        ///< Where the handle is to go; without one it is an anchor.
+  std::optional<Point> target;        ///< Where the handle is to go; without one, and without the two below, an anchor.
   std::optional<double> radius = {};  ///< World units, above 0. Left out only with a selection: how far it then grips
                                       ///< is found from what is selected.
   int group = 0;                      ///< Its group, from 0 up.
+  std::optional<std::array<double, 4>> rotation = {};  ///< How it turns what it grips: w, x, y, z, not all 0.
+  std::optional<double> scale = {};                    ///< How much larger that becomes: min_scale to max_scale.
   bool operator==(const Handle&) const = default;
 };
 
@@ -54,6 +60,7 @@ struct EditRequest {
   std::optional<std::string> prompt;   ///< For a corrector that reads one.
   std::vector<Handle> handles;         ///< 1 to max_handles
   std::optional<Selection> selection;  ///< What moves. None: the handles' spheres.
+  std::optional<Attach> attach = {};   ///< What holds it. None: auto.
   std::optional<Region> region;
   Params params;
   bool operator==(const EditRequest&) const = default;

@@ -68,6 +68,8 @@ ordered_json encode(const FinishedInterval& finished, const std::string& id) {
           {"renders", std::move(renders)}};
 }
 
+ordered_json encode(const Part& part) { return {{"group", part.group}, {"how", part.how}, {"why", part.why}}; }
+
 ordered_json links_of(const EditStatus& status) {
   const std::string self = link_of_edit(status.id);
   ordered_json links{{"self", self},
@@ -103,6 +105,7 @@ ordered_json encode(const EditStatus& status) {
                    {"finished_intervals", list_of(status.finished_intervals,
                                                   [&](const auto& finished) { return encode(finished, status.id); })},
                    {"handles", list_of(status.handles, [](const auto& handle) { return encode(handle); })},
+                   {"parts", list_of(status.parts, [](const auto& part) { return encode(part); })},
                    {"request", encode(status.request)},
                    {"timings", list_of(status.timings,
                                        [](const auto& timing) {
@@ -135,6 +138,7 @@ std::string to_json(const EditEstimate& estimate) {
                   {"handles", list_of(estimate.handles, [](const auto& handle) { return encode(handle); })},
                   {"views", estimate.views},
                   {"intervals", estimate.intervals},
+                  {"parts", list_of(estimate.parts, [](const auto& part) { return encode(part); })},
                   {"estimate", {{"seconds", estimate.seconds}, {"memory_bytes", estimate.memory_bytes}}},
                   {"request", encode(estimate.request)},
                   {"warnings", estimate.warnings}});
@@ -152,6 +156,7 @@ std::string to_json(const Preview& preview) {
        {"expires", preview.expires},
        {"handles", std::move(handles)},
        {"intervals", preview.intervals},
+       {"parts", list_of(preview.parts, [](const auto& part) { return encode(part); })},
        {"gaussians", encode(preview.gaussians)},
        {"seconds", preview.seconds},
        {"warnings", preview.warnings},

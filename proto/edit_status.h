@@ -12,6 +12,13 @@
 
 namespace proto {
 
+/// How a group of handles moves what is theirs, where that is as an elastic body.
+struct Part {
+  int group = 0;
+  std::string how;  ///< "one_piece", "free" or "held".
+  std::string why;  ///< For people.
+};
+
 /// One picture of an interval, under /v1/edits/{id}/intervals/{u}/renders/{k}.
 struct IntervalRender {
   std::string view;
@@ -61,6 +68,7 @@ struct EditStatus {
   std::optional<double> loss;         ///< Loss of the last iteration reported, while it optimises.
   std::vector<FinishedInterval> finished_intervals;
   std::vector<HandleCount> handles;
+  std::vector<Part> parts;
   EditRequest request;  ///< As the client sent it; with every parameter filled in once the edit has started.
   std::vector<StageSeconds> timings;
   std::optional<GaussianCounts> gaussians;  ///< Only of an edit that succeeded.
@@ -77,6 +85,7 @@ struct EditEstimate {
   std::vector<HandleCount> handles;
   std::size_t views = 0;
   int intervals = 0;
+  std::vector<Part> parts;
   double seconds = 0;              ///< Estimated time.
   std::uint64_t memory_bytes = 0;  ///< Estimated peak beside the scene itself.
   EditRequest request;             ///< The request with every parameter filled in.
@@ -92,6 +101,7 @@ struct Preview {
   std::vector<HandleCount> handles;
   std::vector<Point> positions;  ///< Where the handles are after the whole drag, world units.
   int intervals = 0;
+  std::vector<Part> parts;
   GaussianCounts gaussians;
   double seconds = 0;  ///< Time that the preview took.
   std::vector<std::string> warnings;

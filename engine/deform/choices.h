@@ -23,10 +23,21 @@ enum class Interpolation {
   paper,   ///< Weighted sum over the K nearest handles. Jumps where the set of nearest handles changes.
   smooth,  ///< The same with weights that are continuous in space.
   rigid,   ///< The weights of `smooth`, and each handle also turns the space around it (see rigid.h, too).
+  arap,    ///< As an elastic body that stays as rigid as possible between its handles (see body.h).
 };
 constexpr auto names_of(Interpolation) {
   return std::array{Name{Interpolation::paper, "paper"}, Name{Interpolation::smooth, "smooth"},
-                    Name{Interpolation::rigid, "rigid"}};
+                    Name{Interpolation::rigid, "rigid"}, Name{Interpolation::arap, "arap"}};
+}
+
+/// What holds a part that moves as an elastic body, where it meets the rest of the scene.
+enum class Attach {
+  automatic,  ///< As handles and contact suggest: see attach.h.
+  held,       ///< Its rim stays, and the motion fades towards it.
+  free,       ///< It is a body of its own.
+};
+constexpr auto names_of(Attach) {
+  return std::array{Name{Attach::automatic, "auto"}, Name{Attach::held, "held"}, Name{Attach::free, "free"}};
 }
 
 }  // namespace engine::deform

@@ -4,6 +4,7 @@
 
 #include "engine/core/parallel.h"
 #include "engine/deform/rotate_sh.h"
+#include "engine/scene/stretch.h"
 
 namespace engine::deform {
 
@@ -35,11 +36,57 @@ Deformation deformation(const scene::GaussianCloud& cloud, std::span<const std::
   return result;
 }
 
+Deformation at_rest(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows) {
+  Deformation out;
+  out.mean.resize(rows.size());
+  out.rotation.resize(rows.size());
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    out.mean.set(k, cloud.mean.get(rows[k]));
+    out.rotation.set(k, cloud.rotation.get(rows[k]));
+  }
+  out.turn.assign(rows.size(), DQuat(1, 0, 0, 0));
+  out.moves.assign(rows.size(), 0);
+  out.stretches.assign(rows.size(), 0);
+  out.map.assign(rows.size(), DMat3(1.0));
+  return out;
+}
+
+Deformation deformation(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
+                        const RigidMotion& motion) {
+  Deformation out = at_rest(cloud, rows);
+  const DMat3 map = motion.scale * glm::mat3_cast(motion.turn);
+  const bool turns = motion.turn != DQuat(1, 0, 0, 0) || motion.scale != 1;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const DVec3 old_mean(out.mean.get(k));
+    const Quat old_rotation = out.rotation.get(k);
+    // The motion, written so that a shift alone is one, and none is exactly none.
+    const DVec3 arm = old_mean - motion.centre;
+    const Vec3 mean(old_mean + (turns ? motion.shift + (map * arm - arm) : motion.shift));
+    const Quat rotation(motion.turn * DQuat(old_rotation));
+    out.moves[k] = mean != out.mean.get(k) || rotation != old_rotation || motion.scale != 1;
+    out.mean.set(k, mean), out.rotation.set(k, rotation);
+    out.turn[k] = motion.turn;
+    out.stretches[k] = motion.scale != 1;
+    out.map[k] = map;
+  }
+  return out;
+}
+
+void scatter(const Deformation& from, std::span<const std::size_t> at, Deformation& into) {
+  for (std::size_t k = 0; k < at.size(); ++k) {
+    into.mean.set(at[k], from.mean.get(k)), into.rotation.set(at[k], from.rotation.get(k));
+    into.turn[at[k]] = from.turn[k], into.moves[at[k]] = from.moves[k];
+    into.stretches[at[k]] = from.stretches[k], into.map[at[k]] = from.map[k];
+  }
+}
+
 void apply(const Deformation& deformation, std::size_t k, bool with_sh, scene::GaussianCloud& cloud, std::size_t row) {
   cloud.mean.set(row, deformation.mean.get(k));
   const DQuat& turn = deformation.turn[k];
+  const bool stretches = !deformation.stretches.empty() && deformation.stretches[k] != 0;
+  if (stretches) scene::stretch(cloud, row, deformation.map[k]);
   if (turn.w == 1 && turn.x == 0 && turn.y == 0 && turn.z == 0) return;  // also -0.0 in the quaternion stays
-  cloud.rotation.set(row, deformation.rotation.get(k));
+  if (!stretches) cloud.rotation.set(row, deformation.rotation.get(k));
   if (!with_sh || cloud.sh_degree == 0) return;
   const ShRotation rotation = sh_rotation(turn);
   const std::size_t count = scene::sh_coefficients(cloud.sh_degree);

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -26,6 +27,11 @@ struct Drag {
   DVec3 source{0.0}, target{0.0};
   int group = 0;
   bool anchor = false;  ///< Holds its surroundings: does not move or turn; its target is not read.
+  /// Unit. None: as the others suggest. With w < 0 it turns the long way, by more than half a turn. Read by
+  /// Interpolation::arap, like those below.
+  std::optional<DQuat> turn = {};
+  double scale = 1;  ///< Of what it grips, above 0.
+  double grip = 0;   ///< What is within, along the body, goes with it as one piece. World units.
 };
 
 /// A drag with its motion worked out.

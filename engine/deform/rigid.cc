@@ -122,6 +122,21 @@ RigidMotion fit_rigid(std::span<const DVec3> from, std::span<const DVec3> to, do
   return motion;
 }
 
+RigidMotion fit_similarity(std::span<const DVec3> from, std::span<const DVec3> to, double slack) {
+  RigidMotion motion = fit_rigid(from, to, slack);
+  const DVec3 after = motion.centre + motion.shift;
+  double along = 0, spread = 0;
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    const DVec3 arm = motion.turn * (from[i] - motion.centre);
+    along += glm::dot(to[i] - after, arm), spread += glm::dot(arm, arm);
+  }
+  if (along > 0 && spread > 0) motion.scale = along / spread;
+  motion.residual = 0;
+  for (std::size_t i = 0; i < from.size(); ++i)
+    motion.residual = std::max(motion.residual, glm::distance(motion(from[i]), to[i]));
+  return motion;
+}
+
 bool moves_as_one_piece(std::span<const Drag> drags, int group) { return motion_of_piece(drags, group).has_value(); }
 
 void turn_whole_groups(std::span<const Drag> drags, std::span<HandleMotion> motions) {

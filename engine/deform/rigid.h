@@ -9,14 +9,15 @@
 
 namespace engine::deform {
 
-/// A turn about `centre`, and the shift after it.
+/// A turn about `centre`, a growth from there, and the shift after it.
 struct RigidMotion {
   DVec3 centre{0.0};
   DQuat turn{1.0, 0.0, 0.0, 0.0};  ///< Unit.
   DVec3 shift{0.0};
+  double scale = 1;     ///< Above 0; 1 but for fit_similarity().
   double residual = 0;  ///< Farthest that a point is from where the motion takes it, units of the points.
 
-  [[nodiscard]] DVec3 operator()(DVec3 point) const { return centre + turn * (point - centre) + shift; }
+  [[nodiscard]] DVec3 operator()(DVec3 point) const { return centre + scale * (turn * (point - centre)) + shift; }
 };
 
 /// The motion that takes `from` to `to` with the least squares, and of equally good ones the one that turns least.
@@ -25,6 +26,10 @@ struct RigidMotion {
 ///   slack  motions whose residuals differ by no more are equally good, about: points in a row, but for that much, say
 ///          nothing of a turn about the row. Units of the points.
 [[nodiscard]] RigidMotion fit_rigid(std::span<const DVec3> from, std::span<const DVec3> to, double slack = 0);
+
+/// The same with the scale of least squares. Points in one place do not scale.
+/// Source: Horn 1987, section 2.D.
+[[nodiscard]] RigidMotion fit_similarity(std::span<const DVec3> from, std::span<const DVec3> to, double slack = 0);
 
 /// Do the handles of the group move as one piece, to a hundredth of the longest way? Anchors count as points that stay.
 /// A group without handles does.

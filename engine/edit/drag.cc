@@ -1,10 +1,13 @@
 #include "engine/edit/drag.h"
 
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <utility>
 
 #include "engine/core/rows.h"
+#include "engine/deform/attach.h"
+#include "engine/deform/body.h"
 #include "engine/deform/rigid.h"
 #include "engine/edit/handles.h"
 #include "engine/edit/messages.h"
@@ -27,7 +30,8 @@ Result<deform::Assignment> assign(const Array3& mean, const Request& request) {
   for (const Handle& handle : request.handles) centers.push_back(handle.source);
   auto assignment = deform::assign_selected(mean, *request.selected, centers, region);
   for (std::size_t h = 0; assignment && h < request.handles.size(); ++h)
-    if (request.handles[h].target && assignment->count[h] == 0)  // an anchor may hold what is beside the selection
+    if (!request.handles[h].is_anchor() &&
+        assignment->count[h] == 0)  // an anchor may hold what is beside the selection
       return fail(ErrorCode::unprocessable,
                   "every selected Gaussian is nearer to another handle than to handle " + std::to_string(h + 1) +
                       ": move this handle or leave it out",
@@ -35,16 +39,60 @@ Result<deform::Assignment> assign(const Array3& mean, const Request& request) {
   return assignment;
 }
 
-PlannedMotion plan_motion(const WorkingScene& working, const Request& request, std::span<const DVec3> positions, int u,
-                          int intervals) {
-  const auto drags = interval_drags(working.frame(), request, positions, u, intervals);
-  auto motions = deform::handle_motions(drags, request.params.rotation);
-  if (request.params.interpolation == Interpolation::rigid && request.params.rotation == Rotation::shortest_arc)
+namespace {
+
+/// Each group of the rows as a body by itself.
+deform::Deformation follow_as_bodies(const WorkingScene& working, std::span<const std::uint32_t> rows,
+                                     std::span<const deform::Drag> drags, const Parts& parts) {
+  deform::Deformation out = deform::at_rest(working.cloud(), rows);
+  for (const deform::Attachment& attachment : parts.attachments) {
+    std::vector<deform::Drag> own_drags;
+    for (const deform::Drag& drag : drags)
+      if (drag.group == attachment.group) own_drags.push_back(drag);
+    std::vector<std::uint32_t> own_rows;
+    std::vector<std::size_t> at;
+    std::vector<std::uint8_t> held;
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      if (drags[working.handle()[rows[k]] - 1u].group != attachment.group) continue;
+      own_rows.push_back(rows[k]), at.push_back(k);
+      held.push_back(std::ranges::binary_search(parts.rim, working.parent()[rows[k]]));
+    }
+    if (own_rows.empty()) continue;
+    const bool is_one_piece = attachment.how == deform::Attachment::How::one_piece;
+    const deform::Deformation own =
+        is_one_piece ? deform::deformation(working.cloud(), own_rows,
+                                           deform::nearest_motion(own_drags, attachment.group, attachment.scales))
+                     : deform::Body(working.cloud(), own_rows, own_drags, held).follow(working.cloud(), own_drags);
+    deform::scatter(own, at, out);
+  }
+  return out;
+}
+
+bool is_at_rest(const deform::Drag& drag) {
+  return drag.anchor || (drag.source == drag.target && drag.scale == 1 &&
+                         (!drag.turn || DVec3(drag.turn->x, drag.turn->y, drag.turn->z) == DVec3(0.0)));
+}
+
+deform::Deformation follow_handles(const WorkingScene& working, std::span<const std::uint32_t> rows,
+                                   std::span<const deform::Drag> drags, const Request& request, const Parts& parts) {
+  const Params& params = request.params;
+  if (params.interpolation == Interpolation::arap)
+    return std::ranges::all_of(drags, is_at_rest) ? deform::at_rest(working.cloud(), rows)
+                                                  : follow_as_bodies(working, rows, drags, parts);
+  auto motions = deform::handle_motions(drags, params.rotation);
+  if (params.interpolation == Interpolation::rigid && params.rotation == Rotation::shortest_arc)
     deform::turn_whole_groups(drags, motions);
+  return deform::deformation(working.cloud(), rows, working.handle(), motions, params.interpolation);
+}
+
+}  // namespace
+
+PlannedMotion plan_motion(const WorkingScene& working, const Request& request, const Parts& parts,
+                          std::span<const DVec3> positions, int u, int intervals) {
+  const auto drags = interval_drags(working.frame(), request, positions, u, intervals);
   PlannedMotion motion;
   motion.rows = working.dragged_rows();
-  motion.deformation =
-      deform::deformation(working.cloud(), motion.rows, working.handle(), motions, request.params.interpolation);
+  motion.deformation = follow_handles(working, motion.rows, drags, request, parts);
   for (std::size_t k = 0; k < motion.rows.size(); ++k)
     if (motion.deformation.moves[k]) motion.moving.push_back(motion.rows[k]);
   return motion;
@@ -55,14 +103,16 @@ std::vector<std::uint32_t> dragged_rows(std::span<const std::uint16_t> handle) {
 }
 
 DraggedAlone drag_alone(std::vector<std::uint32_t> rows, const scene::GaussianCloud& gaussians,
-                        std::span<const std::uint16_t> handle, const Request& request, int intervals, bool rotate_sh) {
+                        std::span<const std::uint16_t> handle, const Request& request, const Parts& parts,
+                        int intervals, bool rotate_sh) {
   working::HandleColumn own_handle;
   for (const std::uint32_t row : rows) own_handle.push_back(handle[row]);
   const working::Frame frame = frame_of(request);
+  const Parts own_parts = among(parts, rows);
   DraggedAlone drag{
       std::move(rows), WorkingScene(gaussians, frame, std::move(own_handle)), handle_sources(frame, request), {}};
   for (int u = 1; u <= intervals; ++u) {
-    const PlannedMotion motion = plan_motion(drag.working, request, drag.positions, u, intervals);
+    const PlannedMotion motion = plan_motion(drag.working, request, own_parts, drag.positions, u, intervals);
     copy_and_paste(drag.working, motion, request.mode, rotate_sh);
     for (const std::size_t lost : relocate(drag.working, request, drag.positions))
       drag.warnings.push_back(handle_lost(lost, u));

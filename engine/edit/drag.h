@@ -10,6 +10,7 @@
 
 #include "engine/deform/assign.h"
 #include "engine/deform/deform.h"
+#include "engine/edit/parts.h"
 #include "engine/edit/request.h"
 #include "engine/scene/gaussian_cloud.h"
 #include "engine/working/working_scene.h"
@@ -30,7 +31,8 @@ struct PlannedMotion {
 };
 
 /// The deformation of interval u = 1..intervals, from the handles' present positions (in the frame of `working`).
-[[nodiscard]] PlannedMotion plan_motion(const WorkingScene& working, const Request& request,
+///   parts  of the input of `working`
+[[nodiscard]] PlannedMotion plan_motion(const WorkingScene& working, const Request& request, const Parts& parts,
                                         std::span<const DVec3> positions, int u, int intervals);
 
 /// The Gaussians of a drag alone, after it: no step of a drag looks at any other row, and their order stays.
@@ -48,9 +50,10 @@ struct DraggedAlone {
 ///   rows       of the scene that have a handle: dragged_rows(handle)
 ///   gaussians  those rows, of the world
 ///   handle     [N], of assign()
+///   parts      of the scene
 ///   rotate_sh  false where only shapes matter
 [[nodiscard]] DraggedAlone drag_alone(std::vector<std::uint32_t> rows, const scene::GaussianCloud& gaussians,
-                                      std::span<const std::uint16_t> handle, const Request& request, int intervals,
-                                      bool rotate_sh);
+                                      std::span<const std::uint16_t> handle, const Request& request, const Parts& parts,
+                                      int intervals, bool rotate_sh);
 
 }  // namespace engine::edit

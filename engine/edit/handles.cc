@@ -1,8 +1,10 @@
 #include "engine/edit/handles.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "engine/deform/intervals.h"
+#include "engine/deform/path.h"
 #include "engine/deform/rigid.h"
 #include "engine/render/project.h"
 
@@ -17,21 +19,24 @@ constexpr double far_away = 16;
 
 int resolved_intervals(const Request& request) {
   if (request.params.intervals > 0) return request.params.intervals;
+  // A body finds its whole way at once; what is drawn out leaves its trail step by step.
+  if (request.params.interpolation == Interpolation::arap && request.mode == Mode::move) return 1;
   // What an extend leaves along its way is as long as the part is: its sphere's diameter. More intervals than close the
   // gap only lay half-transparent layers of it over each other.
   const double step = request.mode == Mode::extend ? 2 : 1;
   std::vector<deform::DragLength> drags;
   for (const Handle& handle : request.handles)
-    drags.push_back({glm::distance(handle.target.value_or(handle.source), handle.source), step * handle.radius});
+    drags.push_back({glm::distance(handle.end(), handle.source), step * handle.radius});
   return deform::default_intervals(drags);
 }
 
 bool one_interval_is_exact(const Request& request) {
   const Params& params = request.params;
+  if (params.interpolation == Interpolation::arap) return request.mode == Mode::move;
   if (params.interpolation != Interpolation::rigid || params.rotation != Rotation::shortest_arc) return false;
   std::vector<deform::Drag> drags;
   for (const Handle& handle : request.handles)
-    drags.push_back({handle.source, handle.target.value_or(handle.source), handle.group, !handle.target});
+    drags.push_back({handle.source, handle.end(), handle.group, handle.is_anchor()});
   const auto goes_whole = [&](const deform::Drag& drag) {
     const bool is_held = std::any_of(drags.begin(), drags.end(), [&](const deform::Drag& other) {
       return other.anchor && other.group == drag.group;
@@ -45,8 +50,7 @@ working::Frame frame_of(const Request& request) {
   DVec3 low(request.handles.front().source), high(low);
   double reach = 0;
   for (const Handle& handle : request.handles) {
-    for (const DVec3& point : {handle.source, handle.target.value_or(handle.source)})
-      low = glm::min(low, point), high = glm::max(high, point);
+    for (const DVec3& point : {handle.source, handle.end()}) low = glm::min(low, point), high = glm::max(high, point);
     reach = std::max(reach, handle.radius);
   }
   const DVec3 middle = (low + high) / 2.0;
@@ -60,27 +64,88 @@ std::vector<DVec3> handle_sources(const working::Frame& frame, const Request& re
   return positions;
 }
 
-std::vector<deform::Drag> interval_drags(const working::Frame& frame, const Request& request,
-                                         std::span<const DVec3> positions, int u, int intervals) {
+void give_radii(const scene::Bounds& selected, Request& request) {
+  const DVec3 size = DVec3(selected.high) - DVec3(selected.low);
+  const double longest = std::max({size.x, size.y, size.z});
+  const bool is_body = request.params.interpolation == Interpolation::arap;
+  double way = 0;
+  for (const Handle& handle : request.handles) way = std::max(way, glm::distance(handle.end(), handle.source));
+  for (Handle& handle : request.handles) {
+    if (handle.radius != 0) continue;
+    const double share = !is_body ? 0.5 : handle.rotation || handle.scale ? 0.25 : 0.05;
+    handle.radius = share * longest;
+    if (!(handle.radius > 0)) handle.radius = way > 0 ? way : 1;  // a single Gaussian: it goes all the way in one step
+  }
+}
+
+double grip_of(const Request& request, const Handle& handle) {
+  // Without a selection the radius says what moves: were all of that gripped, nothing of it would bend.
+  constexpr double of_a_sphere = 0.25;
+  return request.selected ? handle.radius : of_a_sphere * handle.radius;
+}
+
+std::vector<deform::Drag> whole_drags(const Request& request, const working::Frame& frame) {
   std::vector<deform::Drag> drags;
-  for (std::size_t i = 0; i < request.handles.size(); ++i) {
-    const Handle& handle = request.handles[i];
-    deform::Drag drag{positions[i], positions[i], handle.group, !handle.target};
-    if (handle.target)
-      drag.target = deform::interval_target(frame.edit_from_world(handle.source), frame.edit_from_world(*handle.target),
-                                            u, intervals);
+  for (const Handle& handle : request.handles) {
+    deform::Drag drag{frame.edit_from_world(handle.source), frame.edit_from_world(handle.end()), handle.group,
+                      handle.is_anchor()};
+    if (handle.rotation) drag.turn = *handle.rotation / glm::length(*handle.rotation);
+    drag.scale = handle.scale.value_or(1);
+    drag.grip = grip_of(request, handle);
     drags.push_back(drag);
   }
   return drags;
 }
 
+std::vector<deform::Drag> interval_drags(const working::Frame& frame, const Request& request,
+                                         std::span<const DVec3> positions, int u, int intervals) {
+  std::vector<deform::Drag> drags = whole_drags(request, frame);
+  const deform::Path path(drags);
+  const double before = double(u - 1) / intervals, now = double(u) / intervals;
+  for (std::size_t i = 0; i < drags.size(); ++i) {
+    deform::Drag& drag = drags[i];
+    if (!drag.anchor)
+      drag.target = request.params.interpolation == Interpolation::arap
+                        ? path.position(i, now)
+                        : deform::interval_target(drag.source, drag.target, u, intervals);
+    drag.source = positions[i];
+    if (drag.anchor) drag.target = drag.source;
+    if (drag.turn && intervals > 1) drag.turn = *path.turn(i, now) * glm::conjugate(*path.turn(i, before));
+    if (intervals > 1) drag.scale = path.scale(i, now) / path.scale(i, before);
+  }
+  return drags;
+}
+
+namespace {
+
+/// How far from a handle rows tell where it went. An elastic body goes its own way everywhere, so that only those tell
+/// that the handle grips, or else the nearest one; a handle of other interpolations goes with all that are its own.
+std::vector<double> telling_distances(const working::WorkingScene& working, const Request& request,
+                                      std::span<const DVec3> positions) {
+  if (request.params.interpolation != Interpolation::arap)
+    return std::vector<double>(positions.size(), std::numeric_limits<double>::infinity());
+  std::vector<double> nearest(positions.size(), std::numeric_limits<double>::infinity());
+  for (std::size_t row = 0; row < working.size(); ++row) {
+    if (working.handle()[row] == 0) continue;
+    const std::size_t i = working.handle()[row] - 1u;
+    nearest[i] = std::min(nearest[i], glm::distance(DVec3(working.mean_at_deform().get(row)), positions[i]));
+  }
+  for (std::size_t i = 0; i < positions.size(); ++i)
+    nearest[i] = std::max(nearest[i], grip_of(request, request.handles[i]));
+  return nearest;
+}
+
+}  // namespace
+
 std::vector<std::size_t> relocate(const working::WorkingScene& working, const Request& request,
                                   std::vector<DVec3>& positions) {
+  const std::vector<double> telling = telling_distances(working, request, positions);
   std::vector<DVec3> moved(positions.size(), DVec3(0.0));  // weighted sums
   std::vector<double> weight(positions.size(), 0.0);
   for (std::size_t row = 0; row < working.size(); ++row) {
     if (working.handle()[row] == 0) continue;
     const std::size_t i = working.handle()[row] - 1u;
+    if (!(glm::distance(DVec3(working.mean_at_deform().get(row)), positions[i]) <= telling[i])) continue;
     const double alpha = render::opacity<double>(working.cloud().opacity_logit[row]);
     moved[i] += alpha * (DVec3(working.cloud().mean.get(row)) - DVec3(working.mean_at_deform().get(row)));
     weight[i] += alpha;
@@ -89,7 +154,7 @@ std::vector<std::size_t> relocate(const working::WorkingScene& working, const Re
   for (std::size_t i = 0; i < positions.size(); ++i) {
     if (weight[i] == 0)
       lost.push_back(i);
-    else if (request.handles[i].target)
+    else if (!request.handles[i].is_anchor())
       positions[i] += moved[i] / weight[i];
   }
   return lost;

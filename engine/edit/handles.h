@@ -28,16 +28,29 @@ namespace engine::edit {
 /// Where the handles are before the first interval.
 [[nodiscard]] std::vector<DVec3> handle_sources(const working::Frame& frame, const Request& request);
 
-/// The drags of interval u = 1..T: from where the handles are now to p_t'(u), which is measured from where the user
-/// placed them. The last one ends on the targets exactly.
+/// What the request asks of its handles, from where they are to where they go: in the world's own frame, or another.
+[[nodiscard]] std::vector<deform::Drag> whole_drags(const Request& request, const working::Frame& frame = {});
+
+/// The drags of interval u = 1..T: from where the handles are now to where they shall be then, which is measured from
+/// where the user placed them: on the line to the target, or, for an elastic body, on the way that deform::Path
+/// takes. The last one ends on the targets exactly.
 ///   positions  of the handles, in `frame`, as the drags are
 [[nodiscard]] std::vector<deform::Drag> interval_drags(const working::Frame& frame, const Request& request,
                                                        std::span<const DVec3> positions, int u, int intervals);
 
+/// Gives a radius to handles that have none. For an elastic body, of the longest edge of the box around what is
+/// selected, a twentieth, or a quarter for handles that turn or scale what they grip; else half of that edge.
+///   request  with a selection
+void give_radii(const scene::Bounds& selected, Request& request);
+
+/// How far the handle grips a part that moves as an elastic body. World units.
+[[nodiscard]] double grip_of(const Request& request, const Handle& handle);
+
 /// p_h^i += opacity-weighted mean over the Gaussians of P_h^i of (mean - mean_at_deform): the way they went in this
 /// interval, deformation and optimisation together. That may be less than the handle's own dp, because its Gaussians
-/// follow its neighbours too; the next interval starts from where the part really is.
-/// An anchor marks a place, so it stays. A handle none of whose Gaussians is left stays too.
+/// follow its neighbours too; the next interval starts from where the part really is. Of an elastic body only those
+/// near the handle count: what it grips, or the nearest one. An anchor marks a place, so it stays. A handle none of
+/// whose Gaussians is left stays too.
 ///   returns  the handles that have lost all their Gaussians
 std::vector<std::size_t> relocate(const working::WorkingScene& working, const Request& request,
                                   std::vector<DVec3>& positions);

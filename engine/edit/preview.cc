@@ -17,10 +17,12 @@ Result<PreviewOutcome> preview(const scene::LayeredCloud& scene, const Request& 
   outcome.counts = std::move(assignment->count);
   outcome.intervals = resolved_intervals(request);
 
+  const Parts parts = parts_of(scene, assignment->handle, request);
+  outcome.parts = parts.attachments;
   std::vector<std::uint32_t> rows = dragged_rows(assignment->handle);
   const scene::GaussianCloud dragged = scene::gather(scene, rows);
-  DraggedAlone drag =
-      drag_alone(std::move(rows), dragged, assignment->handle, request, outcome.intervals, request.params.rotate_sh);
+  DraggedAlone drag = drag_alone(std::move(rows), dragged, assignment->handle, request, parts, outcome.intervals,
+                                 request.params.rotate_sh);
   Published published = publish(drag.working, dragged, request.mode);
 
   outcome.overlay = std::move(published.overlay);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/deform/attach.h"
 #include "engine/edit/request.h"
 #include "engine/scene/overlay.h"
 
@@ -15,7 +16,8 @@ struct PreviewOutcome {
   std::vector<std::size_t> counts;  ///< |P_h^i| per handle.
   std::vector<DVec3> positions;     ///< Of the handles after the whole drag, world units.
   int intervals = 0;                ///< T
-  std::size_t changeable = 0;       ///< Size of M at the end.
+  std::vector<deform::Attachment> parts;  ///< Of Interpolation::arap: how each group moves, and why.
+  std::size_t changeable = 0;             ///< Size of M at the end.
   std::vector<std::string> warnings;
 };
 

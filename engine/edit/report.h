@@ -6,10 +6,13 @@
 #include <vector>
 
 #include "engine/core/vec.h"
+#include "engine/deform/attach.h"
 #include "engine/edit/plan.h"
 #include "engine/edit/request.h"
 
 namespace engine::edit {
+
+using deform::Attachment;
 
 /// What is known about one handle once the edit has looked at the scene.
 struct HandleReport {
@@ -33,6 +36,7 @@ struct StageTime {
 struct Report {
   Params resolved;  ///< With every default filled in (intervals is never 0 here).
   std::vector<HandleReport> handles;
+  std::vector<Attachment> parts;  ///< Of Interpolation::arap: how each group moves, and why.
   std::vector<ViewReport> views;
   std::size_t input_gaussians = 0;
   std::size_t output_gaussians = 0;

@@ -24,6 +24,13 @@ Result<void> validate(const Handle& handle, const std::string& where) {
   if (!(handle.radius > 0 && handle.radius <= max_coordinate))
     return invalid("the radius of a handle is a length above 0, in the scene's units", where + ".radius");
   if (handle.group < 0) return invalid("a group is a number from 0 up", where + ".group");
+  if (handle.rotation) {
+    const double length = glm::length(*handle.rotation);
+    if (!(length > 0 && std::isfinite(length)))
+      return invalid("a rotation is a quaternion w, x, y, z of finite numbers that are not all 0", where + ".rotation");
+  }
+  if (handle.scale && !(*handle.scale >= 1 / max_scale && *handle.scale <= max_scale))
+    return invalid("a scale is a number from 0.001 to 1000", where + ".scale");
   return {};
 }
 
@@ -32,6 +39,20 @@ Result<void> validate(const Region& region) {
     return invalid("the centre has three finite coordinates between -1e12 and 1e12", "region.center");
   if (!within_limits(region.size) || !(region.size.x > 0 && region.size.y > 0 && region.size.z > 0))
     return invalid("the three edge lengths of the region are above 0 and at most 1e12", "region.size");
+  return {};
+}
+
+/// What only an elastic body does.
+Result<void> validate_motion(const Request& request) {
+  if (request.params.interpolation == Interpolation::arap) return {};
+  const std::string only = std::string(" only with params.interpolation \"arap\", not with \"") +
+                           std::string(name_of(request.params.interpolation)) + "\"";
+  for (std::size_t i = 0; i < request.handles.size(); ++i) {
+    const std::string where = "handles[" + std::to_string(i) + "]";
+    if (request.handles[i].rotation) return invalid("a handle turns what it grips" + only, where + ".rotation");
+    if (request.handles[i].scale) return invalid("a handle scales what it grips" + only, where + ".scale");
+  }
+  if (request.attach != Attach::automatic) return invalid("what holds a part can be chosen" + only, "attach");
   return {};
 }
 
@@ -59,6 +80,7 @@ Result<void> validate(const Request& request) {
     if (auto valid = validate(request.handles[i], "handles[" + std::to_string(i) + "]"); !valid) return valid;
   if (request.selected)
     if (auto valid = validate_selected(*request.selected); !valid) return valid;
+  if (auto valid = validate_motion(request); !valid) return valid;
   if (request.region)
     if (auto valid = validate(*request.region); !valid) return valid;
   return params::validate(request.params);

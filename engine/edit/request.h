@@ -14,20 +14,30 @@
 namespace engine::edit {
 
 using params::Annealing;
+using params::Attach;
 using params::Interpolation;
 using params::Mode;
 using params::Params;
 using params::Rotation;
 
 constexpr std::size_t max_handles = 256;
+constexpr double max_scale = 1000;       ///< A choice: far beyond use. Its inverse is the least.
 constexpr double max_coordinate = 1e12;  ///< World units; float means would have no digits left for a scene out there.
 
 /// A point of the scene and where it should go.
 struct Handle {
   DVec3 source{0.0};            ///< World units, the file's own frame.
-  std::optional<DVec3> target;  ///< Nothing: an anchor, which holds its surroundings in place.
-  double radius = 0;            ///< World units: Gaussians closer to `source` than this are dragged.
-  int group = 0;                ///< Handles and Gaussians interpolate within a group only.
+  std::optional<DVec3> target;  ///< Nothing, without turn and scale either: an anchor, which holds what is around it.
+  /// World units: Gaussians closer to `source` than this are dragged. With a selection: how far the handle grips, which
+  /// takes that along as one piece (Interpolation::arap).
+  double radius = 0;
+  int group = 0;  ///< Handles and Gaussians interpolate within a group only.
+  /// How its surroundings turn, about it; w < 0: the long way. None: as suits the part. Any length but 0.
+  std::optional<DQuat> rotation = {};
+  std::optional<double> scale = {};  ///< How much larger they become. None: 1.
+
+  [[nodiscard]] bool is_anchor() const { return !target && !rotation && !scale; }
+  [[nodiscard]] DVec3 end() const { return target.value_or(source); }  ///< Where it is in the end.
 };
 
 /// Axis-aligned box that limits what may be dragged.
@@ -42,6 +52,7 @@ struct Request {
   /// handle says nothing of what moves. None: the spheres of the handles say it.
   std::optional<std::vector<std::uint32_t>> selected;
   std::optional<Region> region;
+  Attach attach = Attach::automatic;  ///< What holds the part (Interpolation::arap).
   Params params;
   DVec3 up{0.0, -1.0, 0.0};  ///< World direction that virtual cameras take for up, any length but 0. Default: COLMAP's
                              ///< habit, y down.

@@ -71,7 +71,9 @@ Result<State> assign_and_divide(Edit& edit) {
   if (auto going = edit.progress.enter(Stage::assign, 0); !going) return propagate(going);
   auto assignment = assign(edit.input.mean, edit.request);
   if (!assignment) return propagate(assignment);
+  edit.parts = parts_of(edit.input, assignment->handle, edit.request);
   State state;
+  state.report.parts = edit.parts.attachments;
   state.scene = WorkingScene(edit.input, frame_of(edit.request), std::move(assignment->handle));
   state.positions = handle_sources(state.scene.frame(), edit.request);
   state.report.resolved = edit.params();
@@ -89,8 +91,8 @@ Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Cam
   for (const std::string& name : edit.params().exclude_views)
     if (std::ranges::none_of(edit.candidates, [&](const scene::Camera& c) { return c.name == name; }))
       warnings.push_back(no_view_to_exclude(name));
-  auto choice = choose_views(state.scene, edit.input, edit.candidates, edit.request, state.report.resolved.intervals,
-                             [&](double part) { return edit.progress.advance(part); });
+  auto choice = choose_views(state.scene, edit.input, edit.candidates, edit.request, edit.parts,
+                             state.report.resolved.intervals, [&](double part) { return edit.progress.advance(part); });
   if (!choice) return propagate(choice);
   if (!choice->moves)
     warnings.push_back(nothing_moves());
@@ -107,13 +109,15 @@ Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Cam
 
 Result<PlannedMotion> deform(const State& state, Edit& edit, int u) {
   if (auto going = edit.progress.enter(Stage::deform, u); !going) return propagate(going);
-  return plan_motion(state.scene, edit.request, state.positions, u, state.report.resolved.intervals);
+  return plan_motion(state.scene, edit.request, edit.parts, state.positions, u, state.report.resolved.intervals);
 }
 
 Result<Rows> paste(State& state, Edit& edit, int u, const PlannedMotion& motion) {
   if (auto going = edit.progress.enter(Stage::deform, u); !going) return propagate(going);
   Rows copies = copy_and_paste(state.scene, motion, edit.request.mode, edit.params().rotate_sh);
-  if (edit.corrector != nullptr && edit.optimises()) repair::draw_out(state.scene);
+  // An elastic body has drawn its Gaussians out already.
+  if (edit.corrector != nullptr && edit.optimises() && edit.params().interpolation != Interpolation::arap)
+    repair::draw_out(state.scene);
   if (edit.params().optimise_unmoved) copies = state.scene.dragged_rows();
   return copies;
 }

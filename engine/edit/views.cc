@@ -15,7 +15,7 @@ namespace {
 /// Middle of all sources and targets, world units.
 DVec3 middle_of(const Request& request) {
   DVec3 sum(0.0);
-  for (const Handle& handle : request.handles) sum += handle.source + handle.target.value_or(handle.source);
+  for (const Handle& handle : request.handles) sum += handle.source + handle.end();
   return sum / (2.0 * double(request.handles.size()));
 }
 
@@ -34,11 +34,12 @@ struct DryRun {
 };
 
 /// Where the whole drag would take the dragged rows: a function of what moves alone.
-DryRun dry_run(const WorkingScene& begun, const scene::GaussianCloud& input, const Request& request, int intervals) {
+DryRun dry_run(const WorkingScene& begun, const scene::GaussianCloud& input, const Request& request, const Parts& parts,
+               int intervals) {
   std::vector<std::uint32_t> rows = begun.dragged_rows();
   const scene::GaussianCloud gaussians = scene::gather(input, rows);
   const DraggedAlone drag =
-      drag_alone(std::move(rows), gaussians, begun.handle(), request, intervals, /*rotate_sh=*/false);
+      drag_alone(std::move(rows), gaussians, begun.handle(), request, parts, intervals, /*rotate_sh=*/false);
   const WorkingScene& alone = drag.working;
 
   const std::vector<std::uint32_t> originals = alone.rows_of(working::Role::original);
@@ -98,9 +99,9 @@ std::size_t views_at_most(std::span<const scene::Camera> candidates, const Param
 }
 
 Result<ViewChoice> choose_views(const WorkingScene& begun, const scene::GaussianCloud& input,
-                                std::span<const scene::Camera> candidates, const Request& request, int intervals,
-                                const std::function<Result<void>(double)>& advance) {
-  DryRun dry = dry_run(begun, input, request, intervals);
+                                std::span<const scene::Camera> candidates, const Request& request, const Parts& parts,
+                                int intervals, const std::function<Result<void>(double)>& advance) {
+  DryRun dry = dry_run(begun, input, request, parts, intervals);
   ViewChoice choice;
   choice.moves = !dry.copies.empty();
   if (!choice.moves && request.params.optimise_unmoved) dry.copies = dry.parents = begun.dragged_rows();

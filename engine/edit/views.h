@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/edit/parts.h"
 #include "engine/edit/request.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/gaussian_cloud.h"
@@ -41,6 +42,7 @@ struct ViewChoice {
 ///   advance    called after each small picture with the part that is done, 0 to 1; its error ends the choice
 [[nodiscard]] Result<ViewChoice> choose_views(const working::WorkingScene& begun, const scene::GaussianCloud& input,
                                               std::span<const scene::Camera> candidates, const Request& request,
-                                              int intervals, const std::function<Result<void>(double)>& advance);
+                                              const Parts& parts, int intervals,
+                                              const std::function<Result<void>(double)>& advance);
 
 }  // namespace engine::edit

@@ -63,8 +63,12 @@ std::string result_key(const ResultOf& of, const edit::Request& request) {
     fields.add(handle.group);
     fields.add(handle.target.has_value());
     fields.add(handle.source);
-    fields.add(handle.target.value_or(handle.source));
+    fields.add(handle.end());
+    fields.add(handle.rotation.has_value());
+    const DQuat turn = handle.rotation.value_or(DQuat(1, 0, 0, 0));
+    for (const double value : {turn.w, turn.x, turn.y, turn.z, handle.scale.value_or(1)}) fields.add(value);
   }
+  fields.add(int(request.attach));
   fields.add(request.selected.has_value());
   if (request.selected)
     for (const std::uint32_t row : *request.selected) fields.add(row);

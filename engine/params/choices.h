@@ -8,6 +8,7 @@
 
 namespace engine::params {
 
+using deform::Attach;
 using deform::Interpolation;
 using deform::Rotation;
 

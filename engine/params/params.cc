@@ -68,6 +68,12 @@ int preset_intervals(Preset preset, const DragKind& drag) {
   return filled_in({}, preset).intervals;
 }
 
+Interpolation preset_interpolation(Preset preset, const DragKind& drag) {
+  const Interpolation usual = filled_in({}, preset).interpolation;
+  if (preset == Preset::paper) return usual;
+  return drag.turns || (drag.selected && !drag.extends) ? Interpolation::arap : usual;
+}
+
 Result<void> validate(const Values& values) {
   std::string message, where;
   for_each_parameter([&](const auto& parameter) {

@@ -120,7 +120,8 @@ constexpr std::tuple table{
                            .draft = Interpolation::rigid,
                            .standard = Interpolation::rigid},
               .meaning = "How a Gaussian follows the handles near it: `paper` as printed, `smooth` without jumps, "
-                         "`rigid` so that what moves as one piece stays one."},
+                         "`rigid` so that what moves as one piece stays one, `arap` as an elastic body, as rigid as "
+                         "possible."},
     Parameter{SPLATDRAG_FIELD(rotate_sh), .part = Part::motion, .defaults = {.usual = true},
               .meaning = "Colours that depend on direction turn with their Gaussian."},
     Parameter{SPLATDRAG_FIELD(background), .part = Part::optimisation, .defaults = {.usual = Background::render},
@@ -192,10 +193,16 @@ struct Params : Values {
 struct DragKind {
   bool extends = false;    ///< Mode::extend
   bool one_piece = false;  ///< One interval carries every group to its place exactly.
+  bool selected = false;   ///< A selection says what moves.
+  bool turns = false;      ///< Handles turn or scale by themselves, or the part is held or free: what only a body does.
 };
 
-/// The intervals of a preset; 0: from the length of the drag. The one default that the table cannot state.
+/// The intervals of a preset; 0: from the length of the drag. One of two defaults that the table cannot
+/// state.
 [[nodiscard]] int preset_intervals(Preset preset, const DragKind& drag);
+
+/// The interpolation of a preset: what is selected is a thing, and moves as an elastic body.
+[[nodiscard]] Interpolation preset_interpolation(Preset preset, const DragKind& drag);
 
 /// Ranges of all parameters.
 ///   errors  invalid_argument: `where` is the address, such as "params.views"

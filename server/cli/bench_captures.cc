@@ -49,7 +49,10 @@ Result<captures::CaptureTrial> trial_of(const captures::ReadyCase& ready, const 
   edit::Request request = ready.judged.request;
   apply(options, request);
   edit::Request preview = ready.judged.request;
-  preview.params = edits::preset_params(proto::Preset::preview, preview);
+  proto::Params motion;  // what is given of it
+  motion.interpolation = options.given.interpolation;
+  motion.rotation = options.given.rotation;
+  preview.params = edits::filled_in(motion, proto::Preset::preview, preview, preview.selected.has_value());
   const path file = cache_file(options, machine, ready.judged.name, corrector, hexadecimal(ready.key_before),
                                hexadecimal(ready.key_after), request);
   auto trial = cached_or_new<captures::CaptureTrial>(file, [&]() -> Result<captures::CaptureTrial> {

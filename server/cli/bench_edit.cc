@@ -25,7 +25,7 @@ ordered_json encode_params(const edit::Params& params) {
 }  // namespace
 
 void apply(const BenchOptions& options, edit::Request& request) {
-  request.params = edits::filled_in(options.given, options.preset, request);
+  request.params = edits::filled_in(options.given, options.preset, request, request.selected.has_value());
   request.params.local_mask = !options.whole_picture;
 }
 

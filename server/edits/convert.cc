@@ -13,18 +13,21 @@ namespace edit = engine::edit;
 
 static_assert(proto::max_handles == edit::max_handles && proto::max_coordinate == edit::max_coordinate);
 
-edit::Params filled_in(const proto::Params& given, proto::Preset preset, const edit::Request& drag) {
+edit::Params filled_in(const proto::Params& given, proto::Preset preset, const edit::Request& drag, bool is_selection) {
   edit::Request settled = drag;
   settled.params = engine::params::filled_in(given, preset);
-  if (!given.intervals) {
-    const bool extends = drag.mode == edit::Mode::extend;
-    settled.params.intervals = engine::params::preset_intervals(
-        preset, {.extends = extends, .one_piece = edit::one_interval_is_exact(settled)});
-  }
+  engine::params::DragKind kind{.extends = drag.mode == edit::Mode::extend, .selected = is_selection};
+  kind.turns = drag.attach != edit::Attach::automatic ||
+               std::ranges::any_of(drag.handles, [](const auto& handle) { return handle.rotation || handle.scale; });
+  if (!given.interpolation) settled.params.interpolation = engine::params::preset_interpolation(preset, kind);
+  kind.one_piece = edit::one_interval_is_exact(settled);
+  if (!given.intervals) settled.params.intervals = engine::params::preset_intervals(preset, kind);
   return settled.params;
 }
 
-edit::Params preset_params(proto::Preset preset, const edit::Request& drag) { return filled_in({}, preset, drag); }
+edit::Params preset_params(proto::Preset preset, const edit::Request& drag) {
+  return filled_in({}, preset, drag, drag.selected.has_value());
+}
 
 proto::Preset preset_of(const proto::EditRequest& request) { return request.preset.value_or(proto::Preset::standard); }
 
@@ -66,9 +69,15 @@ engine::Result<edit::Request> to_engine(const proto::EditRequest& request) {
     if (handle.target) to.target = to_vec(*handle.target);
     to.radius = handle.radius.value_or(0);
     to.group = handle.group;
+    if (handle.rotation) {
+      const auto& [w, x, y, z] = *handle.rotation;
+      to.rotation = engine::DQuat(w, x, y, z);
+    }
+    to.scale = handle.scale;
   }
+  out.attach = request.attach.value_or(edit::Attach::automatic);
   if (request.region) out.region = {to_vec(request.region->center), to_vec(request.region->size)};
-  out.params = filled_in(request.params, preset_of(request), out);
+  out.params = filled_in(request.params, preset_of(request), out, request.selection.has_value());
   if (auto all = available(out.params); !all) return engine::propagate(all);
   return out;
 }
@@ -81,6 +90,13 @@ proto::EditRequest resolved(const proto::EditRequest& request, const edit::Param
   for (std::size_t h = 0; h < std::min(out.handles.size(), handles.size()); ++h)
     if (handles[h].radius > 0) out.handles[h].radius = handles[h].radius;
   return out;
+}
+
+std::vector<proto::Part> to_parts(const std::vector<edit::Attachment>& attachments) {
+  std::vector<proto::Part> parts;
+  for (const edit::Attachment& one : attachments)
+    parts.push_back({one.group, std::string(engine::name_of(one.how)), one.why});
+  return parts;
 }
 
 std::vector<std::string> fields_without_effect(const proto::EditRequest& request) {

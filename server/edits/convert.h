@@ -8,15 +8,18 @@
 
 #include "engine/core/result.h"
 #include "engine/correct/corrector.h"
+#include "engine/edit/report.h"
 #include "engine/edit/request.h"
 #include "proto/edit_request.h"
+#include "proto/edit_status.h"
 
 namespace server::edits {
 
 /// Every parameter: what is given, else what the preset says (engine/params/params.h).
-///   drag  its mode and handles, on which the intervals depend; its own parameters do not count
+///   drag          its mode and handles, on which intervals and interpolation depend; its own parameters do not count
+///   is_selection  a selection says what moves, whether or not the drag has its rows already
 [[nodiscard]] engine::edit::Params filled_in(const proto::Params& given, proto::Preset preset,
-                                             const engine::edit::Request& drag);
+                                             const engine::edit::Request& drag, bool is_selection);
 /// The parameters that a preset alone stands for.
 [[nodiscard]] engine::edit::Params preset_params(proto::Preset preset, const engine::edit::Request& drag = {});
 
@@ -46,6 +49,9 @@ namespace server::edits {
 ///   handles  those used, if they are known; a radius of 0 is not
 [[nodiscard]] proto::EditRequest resolved(const proto::EditRequest& request, const engine::edit::Params& used,
                                           const std::vector<engine::edit::Handle>& handles = {});
+
+/// How each group moves, for clients.
+[[nodiscard]] std::vector<proto::Part> to_parts(const std::vector<engine::edit::Attachment>& attachments);
 
 /// Fields of the request that are given, but without effect on this edit.
 [[nodiscard]] std::vector<std::string> fields_without_effect(const proto::EditRequest& request);

@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "engine/core/rows.h"
+#include "engine/edit/handles.h"
 #include "engine/io/image_file.h"
 #include "engine/render/forward.h"
 #include "engine/select/shown.h"
@@ -179,17 +180,6 @@ std::string address_of(const proto::Selection& selection, std::size_t operation)
   return select::address(operation) + "." + std::string(on_wire::name_of(selection[operation].action));
 }
 
-/// Gives a radius to handles that have none.
-void grip(const scene::Bounds& bounds, std::vector<engine::edit::Handle>& handles) {
-  const DVec3 size = DVec3(bounds.high) - DVec3(bounds.low);
-  double radius = std::max({size.x, size.y, size.z}) / 2;
-  if (!(radius > 0))  // a single Gaussian: it goes all the way in one step
-    for (const auto& handle : handles)
-      radius = std::max(radius, glm::distance(handle.target.value_or(handle.source), handle.source));
-  for (auto& handle : handles)
-    if (handle.radius == 0) handle.radius = radius > 0 ? radius : 1;
-}
-
 /// The camera in whose picture the point lies nearest to the middle. Null: none shows it.
 const scene::Camera* camera_on(DVec3 point, std::span<const scene::Camera> cameras) {
   const scene::Camera* best = nullptr;
@@ -287,7 +277,7 @@ std::vector<scene::Camera> cameras_in(const proto::Selection& selection) {
 std::vector<std::string> hand_over(const select::Selected& selected, std::span<const scene::Camera> cameras,
                                    const ShownShares& shown_shares, engine::edit::Request& request) {
   request.selected = engine::marked_rows(selected.rows);
-  grip(selected.bounds, request.handles);
+  engine::edit::give_radii(selected.bounds, request);
   std::vector<std::string> sentences = warnings_of(selected);
   const auto [views, handles] = handle_views(request.handles, cameras);
   if (views.empty() || selected.count == 0) return sentences;

@@ -127,6 +127,7 @@ class Run {
     record.simd = engine::render::simd_target();
     record.handles.clear();
     for (const edit::HandleReport& handle : report.handles) record.handles.push_back({handle.gaussians});
+    record.parts = to_parts(report.parts);
     for (const std::string& warning : warnings_about(asked_)) keeper_.warn(warning);
     keeper_.publish();
   }

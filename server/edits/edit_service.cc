@@ -227,6 +227,7 @@ Result<proto::EditEstimate> EditService::estimate(const proto::EditRequest& requ
   estimate.handles = checked->handles();
   estimate.views = work.edit.views;
   estimate.intervals = work.edit.intervals;
+  estimate.parts = to_parts(checked->preview.parts);
   estimate.seconds = std::round(100 * estimated_seconds(work)) / 100;
   estimate.memory_bytes = estimated_bytes(work);
   estimate.request = checked->resolved_for(*asked);
@@ -252,6 +253,7 @@ Result<proto::Preview> EditService::preview(const proto::EditRequest& request) {
   preview.handles = checked->handles();
   for (const engine::DVec3& p : outcome.positions) preview.positions.push_back({p.x, p.y, p.z});
   preview.intervals = outcome.intervals;
+  preview.parts = to_parts(outcome.parts);
   const std::size_t input = checked->version.cloud.size();
   const std::size_t removed = outcome.overlay.removed.size(), copies = outcome.overlay.added();
   preview.gaussians = {input, input - removed + copies, removed, copies, outcome.changeable};

@@ -45,6 +45,7 @@ void fill_in(proto::EditStatus& status, proto::EditRecord record, const jobs::Jo
     if (finished.interval <= job.finished_intervals && job.state != jobs::JobState::cancelled)
       status.finished_intervals.push_back(std::move(finished));
   status.handles = std::move(record.handles);
+  status.parts = std::move(record.parts);
   if (record.request) {
     record.request->selection = std::move(status.request.selection);  // it is kept once, in the payload
     status.request = std::move(*record.request);

@@ -38,6 +38,25 @@ void expect_refused(const std::string& text, const std::string& where, ErrorCode
   EXPECT_FALSE(request.error().message.empty());
 }
 
+TEST(EditRequest, ReadsHowAHandleTurnsAndScales) {
+  json asked = smallest();
+  asked["handles"][0]["rotation"] = {0.5, 0, 0.5, -1};
+  asked["handles"][0]["scale"] = 1.5;
+  asked["attach"] = "held";
+  const auto request = parse_edit_request(asked.dump());
+  ASSERT_TRUE(request) << request.error().message;
+  EXPECT_EQ(request->handles[0].rotation, (std::array<double, 4>{0.5, 0, 0.5, -1}));
+  EXPECT_EQ(request->handles[0].scale, 1.5);
+  EXPECT_EQ(request->attach, Attach::held);
+  EXPECT_EQ(*parse_edit_request(to_json(*request)), *request);
+
+  expect_refused(with("/handles/0/rotation", {0, 0, 0, 0}), "handles[0].rotation");
+  expect_refused(with("/handles/0/rotation", {1, 0, 0}), "handles[0].rotation");
+  expect_refused(with("/handles/0/scale", 0), "handles[0].scale");
+  expect_refused(with("/handles/0/scale", 1001), "handles[0].scale");
+  expect_refused(with("/attach", "glued"), "attach");
+}
+
 TEST(EditRequest, ReadsEveryField) {
   const auto request = parse_edit_request(example("move_ball.json"));
   ASSERT_TRUE(request) << request.error().message << request.error().where;

@@ -66,7 +66,7 @@ TEST(EditStatus, OfAWaitingEditHasEveryFieldAndNullsWhereNothingIsKnown) {
   for (const char* name :
        {"stage", "eta_seconds", "loss", "gaussians", "result_version", "error", "started", "ended", "simd"})
     EXPECT_TRUE(edit.at(name).is_null()) << name;
-  for (const char* name : {"finished_intervals", "handles", "timings", "warnings"})
+  for (const char* name : {"finished_intervals", "handles", "parts", "timings", "warnings"})
     EXPECT_EQ(edit.at(name), json::array()) << name;
   EXPECT_EQ(edit.at("created"), "2026-11-21T11:09:38.123Z");
   EXPECT_EQ(edit.at("links"), json::parse(R"({"self": "/v1/edits/e000001", "events": "/v1/edits/e000001/events",
@@ -138,6 +138,7 @@ TEST(EditEstimate, SaysWhatTheEditWouldCost) {
   const EditEstimate estimate{.handles = {{3}, {4}},
                               .views = 40,
                               .intervals = 2,
+                              .parts = {{1, "held", "it grows there"}},
                               .seconds = 1.5,
                               .memory_bytes = std::uint64_t{5} << 32,
                               .request = some_request(),
@@ -147,6 +148,7 @@ TEST(EditEstimate, SaysWhatTheEditWouldCost) {
   EXPECT_EQ(out.at("handles"), json::parse(R"([{"gaussians": 3}, {"gaussians": 4}])"));
   EXPECT_EQ(out.at("views"), 40);
   EXPECT_EQ(out.at("intervals"), 2);
+  EXPECT_EQ(out.at("parts"), json::parse(R"([{"group": 1, "how": "held", "why": "it grows there"}])"));
   EXPECT_EQ(out.at("estimate"), json::parse(R"({"seconds": 1.5, "memory_bytes": 21474836480})"));
   EXPECT_EQ(*parse_edit_request(out.at("request").dump()), some_request());
   EXPECT_EQ(out.at("warnings"), json::parse(R"(["careful"])"));
@@ -160,12 +162,13 @@ TEST(Preview, LinksTheVersionThatShowsIt) {
                         .handles = {{12}},
                         .positions = {{1, 2, 3}},
                         .intervals = 4,
+                        .parts = {},
                         .gaussians = {10, 11, 1, 2, 3},
                         .seconds = 0.01,
                         .warnings = {}};
   EXPECT_EQ(json::parse(to_json(preview)), json::parse(R"({
     "scene": "s000001", "version": "p000003", "parent": 1, "expires": "2026-11-21T11:19:38.123Z",
-    "handles": [{"gaussians": 12, "position": [1, 2, 3]}], "intervals": 4,
+    "handles": [{"gaussians": 12, "position": [1, 2, 3]}], "intervals": 4, "parts": [],
     "gaussians": {"input": 10, "output": 11, "removed": 1, "copies": 2, "changeable": 3},
     "seconds": 0.01, "warnings": [],
     "links": {"render": "/v1/scenes/s000001/versions/p000003/render",

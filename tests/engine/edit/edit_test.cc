@@ -146,7 +146,7 @@ TEST(ChooseViews, LeavesTheSceneAsItWasAndChoosesTheSameAgain) {
     const working::Members before = working::members_of(working);
     std::vector<double> told;
     const auto choose = [&] {
-      return choose_views(working, scene, arc_of_cameras(5, 64), request, 3, [&](double part) {
+      return choose_views(working, scene, arc_of_cameras(5, 64), request, {}, 3, [&](double part) {
         told.push_back(part);
         return Result<void>{};
       });

@@ -58,6 +58,24 @@ std::vector<std::uint32_t> in_spheres(const scene::GaussianCloud& cloud, const R
   return rows;
 }
 
+TEST(Preview, OfAnElasticBodyIsTheEditsDeformation) {
+  const auto scene = plain(ball_before_wall(400));
+  for (const Mode mode : {Mode::move, Mode::extend})
+    for (const int intervals : {0, 3})
+      for (const Attach attach : {Attach::automatic, Attach::held, Attach::free}) {
+        SCOPED_TRACE(std::string(name_of(attach)) + " " + std::to_string(intervals));
+        Request request = four_handles(mode);
+        request.params.interpolation = Interpolation::arap;
+        request.params.intervals = intervals;
+        request.attach = attach;
+        request.handles[2].rotation = DQuat(0.3, 0, 1, 0);
+        request.handles[1].scale = 1.3;
+        expect_as_run(scene, request);
+        request.selected = in_spheres(*scene.base, request);
+        expect_as_run(scene, request);
+      }
+}
+
 TEST(Preview, WithASelectionIsWhatTheEditWillBe) {
   const scene::GaussianCloud cloud = ball_before_wall(200, Vec3(0), 3);
   Request request = four_handles(Mode::move);

@@ -123,6 +123,18 @@ TEST(Parameters, TheIntervalsOfAPresetDependOnTheDrag) {
     }
 }
 
+TEST(Parameters, WhatIsSelectedMovesAsABody) {
+  for (const auto& preset : names<Preset>) {
+    SCOPED_TRACE(preset.text);
+    const Interpolation usual = filled_in({}, preset.value).interpolation;
+    const Interpolation body = preset.value == Preset::paper ? usual : Interpolation::arap;
+    EXPECT_EQ(preset_interpolation(preset.value, {}), usual);
+    EXPECT_EQ(preset_interpolation(preset.value, {.selected = true}), body);
+    EXPECT_EQ(preset_interpolation(preset.value, {.extends = true, .selected = true}), usual);
+    EXPECT_EQ(preset_interpolation(preset.value, {.turns = true}), body);
+  }
+}
+
 TEST(Parameters, TheirNamesOnTheWireAreThoseOfThePaper) {
   EXPECT_EQ(name_of(Rotation::shortest_arc), "shortest_arc");
   EXPECT_EQ(name_of(Interpolation::rigid), "rigid");

@@ -76,6 +76,21 @@ TEST(Convert, OnlyThePaperPresetInterpolatesAsPrinted) {
               preset == proto::Preset::paper ? edit::Interpolation::paper : edit::Interpolation::rigid);
 }
 
+TEST(Convert, WhatIsSelectedOrTurnsMovesAsABodyAtOnce) {
+  const auto params = [](const char* more) {
+    const auto request = proto::parse_edit_request(
+        std::string(R"({"handles": [{"source": [0, 0, 0], "target": [5, 0, 0], "radius": 0.1 )") + more + "}");
+    EXPECT_TRUE(request) << request.error().message;
+    return value(to_engine(*request)).params;
+  };
+  EXPECT_EQ(params("}]").interpolation, edit::Interpolation::rigid);
+  EXPECT_EQ(params(R"(}], "selection": [{"sphere": {"center": [0, 0, 0], "radius": 1}}])").interpolation,
+            edit::Interpolation::arap);
+  EXPECT_EQ(params(R"(, "scale": 2}])").interpolation, edit::Interpolation::arap);
+  EXPECT_EQ(params(R"(, "scale": 2}])").intervals, 1);
+  EXPECT_EQ(params(R"(}], "attach": "held")").interpolation, edit::Interpolation::arap);
+}
+
 TEST(Convert, NoPresetIsStandard) {
   const proto::EditRequest none = proto::parse_edit_request(proto::example("stretch_apple.json")).value();
   ASSERT_EQ(none.preset, std::nullopt);

@@ -169,6 +169,7 @@ TEST_F(ServiceTest, MovesWhatIsSelected) {
   proto::EditRequest request = move_selected_ball(scene);
   request.preset = proto::Preset::preview;
   request.params = move_ball(scene).params;
+  request.params.interpolation = proto::Interpolation::rigid;
   const auto by_ball = wait_for_end(*service, submit(move_ball(scene)));
   const auto accepted = value(service->submit(request, ""));
   EXPECT_EQ(accepted.status.request.selection, request.selection);
@@ -179,6 +180,12 @@ TEST_F(ServiceTest, MovesWhatIsSelected) {
   ASSERT_TRUE(done.request.handles[0].radius) << "what was used is said";
   EXPECT_NEAR(*done.request.handles[0].radius, 0.175, 0.001) << "that of the ball";
   EXPECT_EQ(version_bytes(*store, scene, *done.result_version), version_bytes(*store, scene, *by_ball.result_version));
+
+  request.params.interpolation.reset();
+  const auto body = value(service->preview(request));
+  ASSERT_EQ(body.parts.size(), 1u) << "what is selected moves as a body";
+  EXPECT_EQ(body.parts[0].how, "one_piece");
+  EXPECT_EQ(body.handles.at(0).gaussians, 200u);
 
   request.selection->push_back(
       {.op = proto::selection::Op::subtract, .action = proto::selection::Plane{{0, 0, 0}, {0, 1, 0}}});

@@ -1,0 +1,116 @@
+#include "engine/deform/attach.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace engine::deform {
+namespace {
+
+using How = Attachment::How;
+
+// Of the longest way: people place handles no better, and nobody sees the difference. Handles in a row say no more than
+// how far apart they go, which is the more exact for it.
+constexpr double tolerance = 0.05, tolerance_in_a_row = 0.03;
+// Share of a part's border from which on it grows out of what stays. A cup, a block, a board have less than a twelfth
+// (its shadow, its foot); a jaw, whose border is half lips, two fifths.
+constexpr double grown = 0.2;
+
+DVec3 target_of(const Drag& drag) { return drag.anchor ? drag.source : drag.target; }
+
+/// Do three of the points span a plane? Then only one rigid motion takes them to their targets.
+bool span_a_plane(std::span<const DVec3> points) {
+  double largest = 0, longest = 0;
+  for (const DVec3& a : points)
+    for (const DVec3& b : points) {
+      longest = std::max(longest, glm::distance(a, b));
+      for (const DVec3& c : points) largest = std::max(largest, glm::length(glm::cross(b - a, c - a)));
+    }
+  constexpr double collinear = 0.05;  // height of a triangle over its longest side: below, noise decides on the plane
+  return largest > collinear * longest * longest;
+}
+
+struct Places {
+  std::vector<DVec3> from, to;
+  double longest = 0;
+  std::size_t anchors = 0;
+};
+
+Places places_of(std::span<const Drag> drags, int group) {
+  Places out;
+  for (const Drag& drag : drags) {
+    if (drag.group != group) continue;
+    out.from.push_back(drag.source), out.to.push_back(target_of(drag));
+    out.longest = std::max(out.longest, glm::distance(out.from.back(), out.to.back()));
+    out.anchors += drag.anchor;
+  }
+  return out;
+}
+
+/// Does each handle turn and grow as it asks for?
+bool turns_as_asked(std::span<const Drag> drags, int group, const RigidMotion& motion) {
+  constexpr double least_cosine = 0.999;  // of half the angle: 5 degrees
+  return std::ranges::all_of(drags, [&](const Drag& drag) {
+    if (drag.group != group || drag.anchor) return true;
+    const bool turns = !drag.turn || std::abs(glm::dot(*drag.turn, motion.turn)) > least_cosine;
+    return turns && std::abs(std::log(drag.scale / motion.scale)) < tolerance;
+  });
+}
+
+}  // namespace
+
+RigidMotion nearest_motion(std::span<const Drag> drags, int group, bool scales) {
+  const Places places = places_of(drags, group);
+  if (places.from.size() > 1)
+    return scales ? fit_similarity(places.from, places.to) : fit_rigid(places.from, places.to);
+  const auto drag = std::ranges::find(drags, group, &Drag::group);
+  RigidMotion motion;
+  motion.centre = drag->source, motion.shift = target_of(*drag) - drag->source;
+  motion.turn = drag->turn.value_or(motion.turn);
+  motion.scale = drag->scale;
+  return motion;
+}
+
+std::optional<RigidMotion> motion_as_one_piece(std::span<const Drag> drags, int group) {
+  const Places places = places_of(drags, group);
+  const bool is_row = !span_a_plane(places.from);
+  const double slack = (is_row ? tolerance_in_a_row : tolerance) * places.longest;
+  const auto suits = [&](const RigidMotion& motion, std::span<const Drag> asked) {
+    return motion.residual <= slack && turns_as_asked(asked, group, motion);
+  };
+  const RigidMotion rigid = nearest_motion(drags, group, false);
+  if (suits(rigid, drags)) return rigid;
+  // Two handles drawn apart may as well mean to stretch, and anchors do not grow.
+  if (is_row || places.anchors > 0) return std::nullopt;
+  const RigidMotion similar = nearest_motion(drags, group, true);
+  std::vector<Drag> scaled(drags.begin(), drags.end());  // handles that give no scale leave it open
+  for (Drag& drag : scaled)
+    if (drag.scale == 1) drag.scale = similar.scale;
+  if (suits(similar, scaled)) return similar;
+  return std::nullopt;
+}
+
+Attachment attach(std::span<const Drag> drags, int group, const Contact& contact, Attach asked) {
+  const Places places = places_of(drags, group);
+  const auto motion = motion_as_one_piece(drags, group);
+  const bool is_one_piece = motion.has_value(), scales = is_one_piece && motion->scale != 1;
+  const bool touches = contact.touches > 0;
+  const bool grows_out = touches && double(contact.grows_out) >= grown * double(contact.touches);
+  if (asked == Attach::held)
+    return {
+        group, touches ? How::held : How::free, false, grows_out,
+        touches ? "the request asks for it" : "the request asks for it to be held, but it touches nothing that stays"};
+  if (asked == Attach::free)
+    return {group, is_one_piece ? How::one_piece : How::free, scales, grows_out, "the request asks for it to be free"};
+
+  if (is_one_piece && places.from.size() > 2 && span_a_plane(places.from))
+    return {group, How::one_piece, scales, grows_out, "one motion takes all its handles to their targets"};
+  if (grows_out) return {group, How::held, false, grows_out, "its surface goes on into what stays"};
+  if (is_one_piece)
+    return {group, How::one_piece, scales, grows_out,
+            touches ? "it only stands next to what stays" : "it touches nothing that stays"};
+  if (places.anchors > 0) return {group, How::free, false, grows_out, "its anchors hold it"};
+  if (touches) return {group, How::held, false, grows_out, "its handles bend it, and it stands on what stays"};
+  return {group, How::free, false, grows_out, "its handles bend it, and it touches nothing that stays"};
+}
+
+}  // namespace engine::deform

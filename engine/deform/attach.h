@@ -1,0 +1,54 @@
+// Whether a part moves as one piece, as an elastic body of its own, or as one that grows out of what stays.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/deform/choices.h"
+#include "engine/deform/motion.h"
+#include "engine/deform/rigid.h"
+
+namespace engine::deform {
+
+/// How much of a part touches what stays. Numbers of rows.
+struct Contact {
+  std::size_t touches = 0;    ///< Rows next to a row that stays.
+  std::size_t grows_out = 0;  ///< Those of them where the surface goes on there.
+};
+
+/// How a group moves.
+struct Attachment {
+  enum class How {
+    one_piece,  ///< By one motion that takes every handle to its target.
+    free,       ///< As an elastic body between its handles.
+    held,       ///< The same, and where it touches what stays it stays.
+  };
+  int group = 0;
+  How how = How::one_piece;
+  bool scales = false;     ///< One piece that grows or shrinks as its handles do.
+  bool grows_out = false;  ///< Its surface goes on into what stays: that is where it is held, if it is.
+  std::string why;         ///< For people, as the end of "it moves as one piece, because ...".
+};
+constexpr auto names_of(Attachment::How) {
+  using How = Attachment::How;
+  return std::array{Name{How::one_piece, "one_piece"}, Name{How::free, "free"}, Name{How::held, "held"}};
+}
+
+/// The motion of a group, if one takes each of its handles to within a twentieth of the longest way of its target
+/// (people place handles no better; handles in a row, which say less, to within 3 %), and turns and scales them as they
+/// ask for. An anchor is a handle that stays. Turning and shifting alone come first; that all of it grows or shrinks
+/// takes three handles that are not in a row, or one that says so.
+[[nodiscard]] std::optional<RigidMotion> motion_as_one_piece(std::span<const Drag> drags, int group);
+
+/// The motion that comes nearest to what the handles ask for.
+[[nodiscard]] RigidMotion nearest_motion(std::span<const Drag> drags, int group, bool scales);
+
+/// Decides for a group; with `asked` other than automatic, as asked.
+///   contact  of the group's rows
+[[nodiscard]] Attachment attach(std::span<const Drag> drags, int group, const Contact& contact, Attach asked);
+
+}  // namespace engine::deform

@@ -1,0 +1,53 @@
+#include "engine/edit/parts.h"
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <utility>
+
+#include "engine/edit/handles.h"
+#include "engine/select/contact.h"
+
+namespace engine::edit {
+
+Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> handle, const Request& request) {
+  Parts parts;
+  if (request.params.interpolation != Interpolation::arap) return parts;
+  std::vector<std::uint32_t> dragged;
+  std::map<int, std::vector<std::uint32_t>> rows_of_group;
+  for (std::uint32_t row = 0; row < handle.size(); ++row) {
+    if (handle[row] == 0) continue;
+    dragged.push_back(row);
+    rows_of_group[request.handles[handle[row] - 1u].group].push_back(row);
+  }
+  const std::vector<deform::Drag> drags = whole_drags(request);
+  for (const auto& [group, rows] : rows_of_group) {
+    const std::vector<select::Touch> touches = select::contact_of(scene, rows, dragged);
+    const auto count = [&](select::Touch touch) { return std::size_t(std::ranges::count(touches, touch)); };
+    const std::size_t grows_out = count(select::Touch::grows_out);
+    deform::Attachment attachment =
+        deform::attach(drags, group, {grows_out + count(select::Touch::stands), grows_out}, request.attach);
+    // Where it grows out of what stays, or, if nowhere, where it stands. What it merely lies against may come apart.
+    const select::Touch holds = attachment.grows_out ? select::Touch::grows_out : select::Touch::stands;
+    if (attachment.how == deform::Attachment::How::held)
+      for (std::size_t k = 0; k < rows.size(); ++k)
+        if (touches[k] >= holds && touches[k] != select::Touch::nothing) parts.rim.push_back(rows[k]);
+    parts.attachments.push_back(std::move(attachment));
+  }
+  std::sort(parts.rim.begin(), parts.rim.end());
+  return parts;
+}
+
+Parts parts_of(const scene::GaussianCloud& scene, std::span<const std::uint16_t> handle, const Request& request) {
+  const std::shared_ptr<const scene::GaussianCloud> borrowed(std::shared_ptr<const void>(), &scene);
+  return parts_of(scene::LayeredCloud{borrowed, nullptr}, handle, request);
+}
+
+Parts among(const Parts& parts, std::span<const std::uint32_t> rows) {
+  Parts out{parts.attachments, {}};
+  for (std::uint32_t k = 0; k < rows.size(); ++k)
+    if (std::ranges::binary_search(parts.rim, rows[k])) out.rim.push_back(k);
+  return out;
+}
+
+}  // namespace engine::edit

@@ -1,0 +1,78 @@
+#include "engine/select/contact.h"
+
+#include <algorithm>
+#include <cassert>
+#include <numeric>
+
+#include "engine/neighbours/neighbour_graph.h"
+#include "engine/neighbours/point_index.h"
+#include "engine/select/similarity.h"
+
+namespace engine::select {
+namespace {
+
+constexpr std::size_t neighbours_joined = 8;  // the next ring of a surface
+// A surface goes on where neighbours across the border are this much as alike as those within usually are: those of a
+// cup and its table have 0.02 to 0.05, those of a cheek cut in two 0.3 to 1.
+constexpr float goes_on = 0.3f;
+// Of the box's longest side: what lies within has its own neighbours around it.
+constexpr float beyond = 0.15f;
+
+/// Rows in the box around these, and a little beyond it; ascending.
+std::vector<std::uint32_t> rows_around(const Array3& means, std::span<const std::uint32_t> rows) {
+  Vec3 low = means.get(rows[0]), high = low;
+  for (const std::uint32_t row : rows) low = glm::min(low, means.get(row)), high = glm::max(high, means.get(row));
+  const Vec3 size = high - low, margin(beyond * std::max({size.x, size.y, size.z}));
+  std::vector<std::uint32_t> out;
+  low -= margin, high += margin;
+  for (std::uint32_t row = 0; row < means.size(); ++row) {
+    const Vec3 mean = means.get(row);
+    if (glm::clamp(mean, low, high) == mean) out.push_back(row);
+  }
+  return out;
+}
+
+float median(std::vector<float> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace
+
+std::vector<Touch> contact_of(const scene::LayeredCloud& scene, std::span<const std::uint32_t> part,
+                              std::span<const std::uint32_t> selected) {
+  assert(!part.empty());
+  const std::vector<std::uint32_t> around = rows_around(scene::means(scene), part);
+  const scene::GaussianCloud cloud = scene::gather(scene, around);
+  std::vector<std::uint32_t> all(around.size());
+  std::iota(all.begin(), all.end(), 0u);
+  const std::vector<float> points = neighbours::points_of(cloud.mean, all, DVec3(cloud.mean.get(0)));
+  const neighbours::NeighbourGraph graph =
+      neighbours::join_nearest(points, neighbours::PointIndex(points, 3), neighbours_joined);
+  const std::vector<float> alike = similarity_of_edges(cloud, all, graph);
+
+  constexpr float none = -1;
+  std::vector<float> across(part.size(), none),
+      within;  // how alike the likest neighbour is: not selected, and selected
+  std::size_t k = 0;
+  for (std::uint32_t node = 0; node < around.size() && k < part.size(); ++node) {
+    if (around[node] != part[k]) continue;
+    float inside = none;
+    for (std::uint32_t edge = graph.begin[node]; edge < graph.begin[node + 1]; ++edge) {
+      if (graph.length[edge] > neighbours::joining_spacings * graph.spacing[node]) continue;
+      float& best = std::ranges::binary_search(selected, around[graph.to[edge]]) ? inside : across[k];
+      best = std::max(best, alike[edge]);
+    }
+    if (inside > none) within.push_back(inside);
+    ++k;
+  }
+  const float usual = median(std::move(within));
+  std::vector<Touch> out;
+  for (const float likest : across)
+    out.push_back(likest == none ? Touch::nothing : likest >= goes_on * usual ? Touch::grows_out : Touch::stands);
+  return out;
+}
+
+}  // namespace engine::select

@@ -1,0 +1,104 @@
+#include "engine/deform/attach.h"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+#include <vector>
+
+namespace engine::deform {
+namespace {
+
+using How = Attachment::How;
+
+const Contact nothing{}, stands_there{100, 5}, grows_there{100, 40};
+
+const std::vector<DVec3> corners{DVec3(0, 0, 0), DVec3(1, 0, 0), DVec3(0, 1, 0)};
+
+template <class Motion>
+std::vector<Drag> drags_of(const std::vector<DVec3>& points, Motion motion) {
+  std::vector<Drag> drags;
+  for (const DVec3& point : points) drags.push_back({point, motion(point)});
+  return drags;
+}
+
+DVec3 turned(DVec3 point) { return glm::angleAxis(0.9, DVec3(0, 0, 1)) * point + DVec3(0.2, 0, 0); }
+DVec3 grown(DVec3 point) { return 1.5 * point; }
+DVec3 bent(DVec3 point) { return point + DVec3(0, 0, point.x * point.x + 0.5 * point.y); }
+
+How how(const std::vector<Drag>& drags, const Contact& contact, Attach asked = Attach::automatic) {
+  return attach(drags, 0, contact, asked).how;
+}
+
+TEST(Attach, ACupGoesAsItIsAndAnEarIsHeld) {
+  const auto one = drags_of({DVec3(0.0)}, [](DVec3 p) { return p + DVec3(1, 0, 0); });
+  EXPECT_EQ(how(one, nothing), How::one_piece);
+  EXPECT_EQ(how(one, stands_there), How::one_piece);
+  EXPECT_EQ(how(one, grows_there), How::held);
+}
+
+TEST(Attach, ThreeHandlesThatTurnOutweighWhatTheBorderLooksLike) {
+  EXPECT_EQ(how(drags_of(corners, turned), grows_there), How::one_piece);
+  EXPECT_EQ(how(drags_of({corners[0], corners[1]}, turned), grows_there), How::held) << "two say less";
+}
+
+TEST(Attach, WhatBendsIsHeldWhereItStands) {
+  EXPECT_EQ(how(drags_of(corners, bent), stands_there), How::held);
+  EXPECT_EQ(how(drags_of(corners, bent), nothing), How::free);
+  auto anchored = drags_of(corners, bent);
+  anchored[0].anchor = true;
+  EXPECT_EQ(how(anchored, stands_there), How::free) << "its anchors hold it";
+}
+
+TEST(Attach, AsAskedComesFirst) {
+  const auto one = drags_of({DVec3(0.0)}, [](DVec3 p) { return p + DVec3(1, 0, 0); });
+  EXPECT_EQ(how(one, stands_there, Attach::held), How::held);
+  EXPECT_EQ(how(one, grows_there, Attach::free), How::one_piece);
+  EXPECT_EQ(how(drags_of(corners, bent), grows_there, Attach::free), How::free);
+  EXPECT_EQ(how(one, nothing, Attach::held), How::free) << "there is nothing to hold it";
+}
+
+TEST(MotionAsOnePiece, AllowsForHandsThatAreNotExact) {
+  auto drags = drags_of(corners, turned);
+  drags[1].target += DVec3(0.02, -0.01, 0.01);
+  EXPECT_TRUE(motion_as_one_piece(drags, 0));
+  drags[1].target += DVec3(0.3, 0, 0);
+  EXPECT_FALSE(motion_as_one_piece(drags, 0));
+}
+
+TEST(MotionAsOnePiece, GrowsWhereThreeHandlesDo) {
+  const auto motion = motion_as_one_piece(drags_of(corners, grown), 0);
+  ASSERT_TRUE(motion);
+  EXPECT_NEAR(motion->scale, 1.5, 1e-9);
+  EXPECT_FALSE(motion_as_one_piece(drags_of({corners[0], corners[1]}, grown), 0)) << "or are they to stretch it?";
+  auto anchored = drags_of(corners, grown);
+  anchored[0].anchor = true;
+  EXPECT_FALSE(motion_as_one_piece(anchored, 0));
+}
+
+TEST(MotionAsOnePiece, OfOneHandleIsWhatItAsksFor) {
+  Drag drag{DVec3(1, 0, 0), DVec3(1, 2, 0)};
+  drag.turn = glm::angleAxis(0.5 * std::numbers::pi, DVec3(0, 0, 1));
+  drag.scale = 2;
+  const auto motion = motion_as_one_piece(std::vector<Drag>{drag}, 0);
+  ASSERT_TRUE(motion);
+  const DVec3 found = (*motion)(DVec3(2, 0, 0));
+  EXPECT_NEAR(glm::distance(found, DVec3(1, 4, 0)), 0, 1e-12);
+}
+
+TEST(MotionAsOnePiece, TurnsNoHandleOtherwiseThanItAsksFor) {
+  auto drags = drags_of(corners, turned);
+  drags[0].turn = glm::angleAxis(0.9, DVec3(0, 0, 1));
+  EXPECT_TRUE(motion_as_one_piece(drags, 0));
+  drags[0].turn = glm::angleAxis(0.4, DVec3(0, 0, 1));
+  EXPECT_FALSE(motion_as_one_piece(drags, 0));
+}
+
+TEST(Attach, LooksAtItsGroupAlone) {
+  auto drags = drags_of(corners, turned);
+  for (Drag other : drags_of(corners, bent)) other.group = 1, drags.push_back(other);
+  EXPECT_EQ(attach(drags, 0, stands_there, Attach::automatic).how, How::one_piece);
+  EXPECT_EQ(attach(drags, 1, stands_there, Attach::automatic).how, How::held);
+}
+
+}  // namespace
+}  // namespace engine::deform

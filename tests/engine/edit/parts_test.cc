@@ -1,0 +1,133 @@
+#include "engine/edit/parts.h"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+#include <vector>
+
+#include "engine/edit/drag.h"
+#include "engine/edit/edit.h"
+#include "engine/edit/handles.h"
+#include "engine/edit/preview.h"
+#include "tests/engine/edit/samples.h"
+
+namespace engine::edit {
+namespace {
+
+using How = deform::Attachment::How;
+
+/// A wall of Gaussians; what is right of the middle is selected, and dragged at its far end.
+scene::GaussianCloud wall() {
+  scene::GaussianCloud cloud;
+  for (int y = 0; y < 20; ++y)
+    for (int x = 0; x < 40; ++x) {
+      const std::size_t row = cloud.size();
+      cloud.resize(row + 1);
+      cloud.mean.set(row, {0.1f * float(x), 0.1f * float(y), 0});
+      cloud.log_scale.set(row, {-2.7f, -2.7f, -5.0f});
+      cloud.rotation.set(row, {1, 0, 0, 0});
+      cloud.opacity_logit[row] = 4;
+    }
+  return cloud;
+}
+
+Request pulled(const scene::GaussianCloud& cloud, DVec3 by) {
+  Request request;
+  request.selected.emplace();
+  for (std::uint32_t row = 0; row < cloud.size(); ++row)
+    if (cloud.mean.get(row).x > 1.95f) request.selected->push_back(row);
+  const DVec3 end(3.9, 0.95, 0);
+  request.handles = {{end, end + by, 0.1}};
+  request.params.interpolation = Interpolation::arap;
+  return request;
+}
+
+TEST(PartsOf, HoldWhatGrowsOutOfTheRest) {
+  const auto cloud = wall();
+  const Request request = pulled(cloud, {0, 0, 1});
+  const Parts parts = parts_of(cloud, assign(cloud.mean, request)->handle, request);
+  ASSERT_EQ(parts.attachments.size(), 1u);
+  EXPECT_EQ(parts.attachments[0].how, How::held);
+  EXPECT_FALSE(parts.attachments[0].why.empty());
+  EXPECT_GE(parts.rim.size(), 20u);
+  for (const std::uint32_t row : parts.rim) EXPECT_LT(cloud.mean.get(row).x, 2.2f);
+}
+
+TEST(PartsOf, AreNoneForOtherInterpolations) {
+  const auto cloud = wall();
+  Request request = pulled(cloud, {0, 0, 1});
+  request.params.interpolation = Interpolation::rigid;
+  EXPECT_TRUE(parts_of(cloud, assign(cloud.mean, request)->handle, request).attachments.empty());
+}
+
+TEST(Among, NumbersRowsAsASceneOfTheseAloneDoes) {
+  EXPECT_EQ(among({{}, {3, 5, 9}}, std::vector<std::uint32_t>{1, 3, 4, 9}).rim, (std::vector<std::uint32_t>{1, 3}));
+}
+
+TEST(ElasticBody, LeavesItsRimAndComesToItsTarget) {
+  const auto cloud = wall();
+  const Request request = pulled(cloud, {-0.3, 0, 1});
+  const auto done = run(cloud, arc_of_cameras(2, 32), request);
+  ASSERT_TRUE(done) << done.error().message;
+  EXPECT_EQ(done->report.resolved.intervals, 1);
+  ASSERT_EQ(done->report.parts.size(), 1u);
+  EXPECT_EQ(done->report.parts[0].how, How::held);
+  EXPECT_LT(glm::distance(done->report.handles[0].relocated.back(), *request.handles[0].target), 0.1);
+  for (const std::uint32_t row : done->overlay.removed) EXPECT_GT(cloud.mean.get(row).x, 1.9f) << "the rim stays";
+}
+
+TEST(ElasticBody, ThatGoesNowhereIsTheInput) {
+  const auto cloud = wall();
+  for (const int intervals : {0, 4}) {
+    Request request = pulled(cloud, DVec3(0.0));
+    request.params.intervals = intervals;
+    request.handles[0].rotation = DQuat(2, 0, 0, 0);
+    const auto done = run(cloud, arc_of_cameras(2, 32), request);
+    ASSERT_TRUE(done) << done.error().message;
+    EXPECT_EQ(done->overlay, scene::no_change(cloud));
+  }
+}
+
+TEST(ElasticBody, TurnsAboutAHandleThatStays) {
+  const auto cloud = wall();
+  Request request = pulled(cloud, DVec3(0.0));
+  request.handles[0].target.reset();
+  request.handles[0].rotation = glm::angleAxis(0.5, DVec3(1, 0, 0));
+  request.handles[0].radius = 0.4;
+  const auto seen = preview({std::make_shared<const scene::GaussianCloud>(cloud), nullptr}, request);
+  ASSERT_TRUE(seen) << seen.error().message;
+  EXPECT_GT(seen->overlay.added(), 100u);
+}
+
+TEST(ElasticBody, TakesAsManyIntervalsAsAsked) {
+  const auto cloud = wall();
+  Request request = pulled(cloud, {-0.3, 0, 1});
+  const auto at_once = run(cloud, arc_of_cameras(2, 32), request);
+  request.params.intervals = 4;
+  const auto in_four = run(cloud, arc_of_cameras(2, 32), request);
+  ASSERT_TRUE(at_once && in_four);
+  EXPECT_EQ(in_four->report.handles[0].relocated.size(), 4u);
+  EXPECT_LT(glm::distance(in_four->report.handles[0].relocated.back(), at_once->report.handles[0].relocated.back()),
+            0.1);
+}
+
+TEST(Validate, TurnsAndScalesBodiesAlone) {
+  const auto cloud = wall();
+  const auto where = [&](auto change) {
+    Request request = pulled(cloud, {0, 0, 1});
+    change(request);
+    const auto valid = validate(request);
+    return valid ? std::string() : valid.error().where;
+  };
+  EXPECT_EQ(where([](Request& r) { r.handles[0].rotation = DQuat(0, 0, 0, 0); }), "handles[0].rotation");
+  EXPECT_EQ(where([](Request& r) { r.handles[0].scale = 0; }), "handles[0].scale");
+  EXPECT_EQ(where([](Request& r) { r.handles[0].scale = 1e4; }), "handles[0].scale");
+  const auto rigid = [](Request& r) { r.params.interpolation = Interpolation::rigid; };
+  EXPECT_EQ(where([&](Request& r) { rigid(r), r.handles[0].scale = 2; }), "handles[0].scale");
+  EXPECT_EQ(where([&](Request& r) { rigid(r), r.handles[0].rotation = DQuat(1, 0, 0, 0); }), "handles[0].rotation");
+  EXPECT_EQ(where([&](Request& r) { rigid(r), r.attach = Attach::free; }), "attach");
+  EXPECT_EQ(where([](Request& r) { r.handles[0].scale = 2; }), "");
+}
+
+}  // namespace
+}  // namespace engine::edit
