@@ -72,10 +72,11 @@ Result<Grasp> grasp_by_selection(std::string by, select::Selection selection, co
   const auto selected = select::select(scene, selection);
   if (!selected) return propagate(selected);
   request.selected = marked_rows(selected->rows);
-  // Nobody who has said what moves says how far a handle grips, too.
-  request.params.interpolation = edit::Interpolation::arap;
-  for (edit::Handle& handle : request.handles) handle.radius = 0;
-  edit::give_radii(selected->bounds, request);
+  if (request.mode == edit::Mode::move) {  // nobody who has said what moves says how far a handle grips, too
+    request.params.interpolation = edit::Interpolation::arap;
+    for (edit::Handle& handle : request.handles) handle.radius = 0;
+    edit::give_radii(selected->bounds, request);
+  }
   if (auto valid = edit::validate(request); !valid) return propagate(valid);
   return grasp_of(std::move(by), std::move(request), scene);
 }

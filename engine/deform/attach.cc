@@ -104,6 +104,9 @@ Attachment attach(std::span<const Drag> drags, int group, const Contact& contact
 
   if (is_one_piece && places.from.size() > 2 && span_a_plane(places.from))
     return {group, How::one_piece, scales, grows_out, "one motion takes all its handles to their targets"};
+  // Held, it would be drawn out to more than twice its size: it is half of a thing that somebody means to take away.
+  if (is_one_piece && grows_out && places.longest > contact.size)
+    return {group, How::one_piece, scales, grows_out, "it goes farther than it is long"};
   if (grows_out) return {group, How::held, false, grows_out, "its surface goes on into what stays"};
   if (is_one_piece)
     return {group, How::one_piece, scales, grows_out,

@@ -14,10 +14,11 @@
 
 namespace engine::deform {
 
-/// How much of a part touches what stays. Numbers of rows.
+/// How a part hangs on to what stays.
 struct Contact {
   std::size_t touches = 0;    ///< Rows next to a row that stays.
   std::size_t grows_out = 0;  ///< Those of them where the surface goes on there.
+  double size = 0;            ///< Longest edge of the box around the part, world units.
 };
 
 /// How a group moves.

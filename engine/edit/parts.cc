@@ -9,6 +9,18 @@
 #include "engine/select/contact.h"
 
 namespace engine::edit {
+namespace {
+
+/// Of the box around the means.
+double longest_edge(const Array3& means, std::span<const std::uint32_t> rows) {
+  DVec3 low(means.get(rows[0])), high(low);
+  for (const std::uint32_t row : rows)
+    low = glm::min(low, DVec3(means.get(row))), high = glm::max(high, DVec3(means.get(row)));
+  const DVec3 size = high - low;
+  return std::max({size.x, size.y, size.z});
+}
+
+}  // namespace
 
 Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> handle, const Request& request) {
   Parts parts;
@@ -21,12 +33,13 @@ Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> 
     rows_of_group[request.handles[handle[row] - 1u].group].push_back(row);
   }
   const std::vector<deform::Drag> drags = whole_drags(request);
+  const Array3 means = scene::means(scene);
   for (const auto& [group, rows] : rows_of_group) {
     const std::vector<select::Touch> touches = select::contact_of(scene, rows, dragged);
     const auto count = [&](select::Touch touch) { return std::size_t(std::ranges::count(touches, touch)); };
     const std::size_t grows_out = count(select::Touch::grows_out);
-    deform::Attachment attachment =
-        deform::attach(drags, group, {grows_out + count(select::Touch::stands), grows_out}, request.attach);
+    deform::Attachment attachment = deform::attach(
+        drags, group, {grows_out + count(select::Touch::stands), grows_out, longest_edge(means, rows)}, request.attach);
     // Where it grows out of what stays, or, if nowhere, where it stands. What it merely lies against may come apart.
     const select::Touch holds = attachment.grows_out ? select::Touch::grows_out : select::Touch::stands;
     if (attachment.how == deform::Attachment::How::held)

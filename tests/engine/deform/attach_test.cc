@@ -10,7 +10,7 @@ namespace {
 
 using How = Attachment::How;
 
-const Contact nothing{}, stands_there{100, 5}, grows_there{100, 40};
+const Contact nothing{0, 0, 2}, stands_there{100, 5, 2}, grows_there{100, 40, 2};
 
 const std::vector<DVec3> corners{DVec3(0, 0, 0), DVec3(1, 0, 0), DVec3(0, 1, 0)};
 
@@ -34,6 +34,12 @@ TEST(Attach, ACupGoesAsItIsAndAnEarIsHeld) {
   EXPECT_EQ(how(one, nothing), How::one_piece);
   EXPECT_EQ(how(one, stands_there), How::one_piece);
   EXPECT_EQ(how(one, grows_there), How::held);
+}
+
+TEST(Attach, WhatGoesFartherThanItIsLongIsTakenAway) {
+  const auto one = drags_of({DVec3(0.0)}, [](DVec3 p) { return p + DVec3(2.5, 0, 0); });
+  EXPECT_EQ(how(one, grows_there), How::one_piece);
+  EXPECT_EQ(how(one, grows_there, Attach::held), How::held);
 }
 
 TEST(Attach, ThreeHandlesThatTurnOutweighWhatTheBorderLooksLike) {
