@@ -44,6 +44,7 @@ export const NOTHING_OPEN = {
   mode: "move",
   preset: "",
   prompt: null,
+  attach: null,
   params: {},
   autoPreview: true,
   preview: null, // What the service answered, and `key`: of what it is a preview.
@@ -531,9 +532,12 @@ export class Editor {
       radius: handle.radius ?? this.#defaultRadius(),
       grip: selection.length ? (handle.grip ?? handle.radius ?? null) : null,
       group: handle.group ?? 0,
+      rotation: handle.rotation ?? null, // a request may have these; the page has no field for them yet
+      scale: handle.scale ?? null,
     }));
     this.#place({ handles, selection });
     this.store.set({
+      attach: request.attach ?? null,
       selectMode: false,
       selected: null,
       mode: request.mode ?? "move",

@@ -11,7 +11,7 @@ export class ImportError extends Error {
 }
 
 /** The request that the screen describes. What is left to the service's defaults is left out. */
-export function requestOf({ scene, version, mode, preset, prompt, handles, selection = [], region, params }) {
+export function requestOf({ scene, version, mode, preset, prompt, handles, selection = [], attach, region, params }) {
   const given = Object.entries(params ?? {}).filter(
     ([, value]) => value !== null && value !== undefined && value !== "",
   );
@@ -26,8 +26,11 @@ export function requestOf({ scene, version, mode, preset, prompt, handles, selec
       ...(handle.target ? { target: handle.target } : {}),
       ...radiusGiven(handle, selection),
       group: handle.group,
+      ...(handle.rotation ? { rotation: handle.rotation } : {}),
+      ...(handle.scale ? { scale: handle.scale } : {}),
     })),
     ...(selection.length ? { selection } : {}),
+    ...(attach ? { attach } : {}),
     ...(region ? { region } : {}),
     ...(given.length ? { params: Object.fromEntries(given) } : {}),
   };
@@ -42,11 +45,11 @@ function radiusGiven({ radius, grip = null }, selection) {
 /** What of the screen decides how a preview looks: two equal texts, the same preview. It shows where Gaussians go, so of
  *  the `parameters` that the service describes those of the motion count, and any that it does not describe. */
 export function previewKey(request, parameters = []) {
-  const { handles, selection, mode, region, params = {}, preset, scene, version } = request;
+  const { handles, selection, attach, mode, region, params = {}, preset, scene, version } = request;
   const others = new Set(parameters.filter(({ part }) => part !== "motion").map(({ name }) => name));
   const motion = Object.entries(params).filter(([name]) => !others.has(name));
   motion.sort(([a], [b]) => (a < b ? -1 : 1));
-  return JSON.stringify({ scene, version, handles, selection, mode, region, preset, motion });
+  return JSON.stringify({ scene, version, handles, selection, attach, mode, region, preset, motion });
 }
 
 /** "max_image_side" as a person reads it. */

@@ -53,7 +53,7 @@ Result<Grasp> grasp_of(std::string by, edit::Request request, const scene::Gauss
   Grasp out{std::move(by), std::move(request), {}};
   // An anchor holds what its ball holds; what is selected is meant to move, and does, however near to an anchor it is.
   out.rows = rows_where(assigned->handle, [&](std::uint16_t handle) {
-    return handle > 0 && (out.request.selected || out.request.handles[handle - 1].target);
+    return handle > 0 && (out.request.selected || !out.request.handles[handle - 1].is_anchor());
   });
   return out;
 }

@@ -17,21 +17,10 @@ constexpr double grown = 0.2;
 
 DVec3 target_of(const Drag& drag) { return drag.anchor ? drag.source : drag.target; }
 
-/// Do three of the points span a plane? Then only one rigid motion takes them to their targets.
-bool span_a_plane(std::span<const DVec3> points) {
-  double largest = 0, longest = 0;
-  for (const DVec3& a : points)
-    for (const DVec3& b : points) {
-      longest = std::max(longest, glm::distance(a, b));
-      for (const DVec3& c : points) largest = std::max(largest, glm::length(glm::cross(b - a, c - a)));
-    }
-  constexpr double collinear = 0.05;  // height of a triangle over its longest side: below, noise decides on the plane
-  return largest > collinear * longest * longest;
-}
-
 struct Places {
   std::vector<DVec3> from, to;
-  double longest = 0;
+  double longest = 0;  ///< Way.
+  double extent = 0;   ///< Farthest from the origin.
   std::size_t anchors = 0;
 };
 
@@ -41,6 +30,7 @@ Places places_of(std::span<const Drag> drags, int group) {
     if (drag.group != group) continue;
     out.from.push_back(drag.source), out.to.push_back(target_of(drag));
     out.longest = std::max(out.longest, glm::distance(out.from.back(), out.to.back()));
+    out.extent = std::max({out.extent, glm::length(out.from.back()), glm::length(out.to.back())});
     out.anchors += drag.anchor;
   }
   return out;
@@ -61,7 +51,7 @@ bool turns_as_asked(std::span<const Drag> drags, int group, const RigidMotion& m
 RigidMotion nearest_motion(std::span<const Drag> drags, int group, bool scales) {
   const Places places = places_of(drags, group);
   if (places.from.size() > 1)
-    return scales ? fit_similarity(places.from, places.to) : fit_rigid(places.from, places.to);
+    return scales ? fit_similarity(places.from, places.to) : fit_any_turn(places.from, places.to);
   const auto drag = std::ranges::find(drags, group, &Drag::group);
   RigidMotion motion;
   motion.centre = drag->source, motion.shift = target_of(*drag) - drag->source;
@@ -73,7 +63,8 @@ RigidMotion nearest_motion(std::span<const Drag> drags, int group, bool scales) 
 std::optional<RigidMotion> motion_as_one_piece(std::span<const Drag> drags, int group) {
   const Places places = places_of(drags, group);
   const bool is_row = !span_a_plane(places.from);
-  const double slack = (is_row ? tolerance_in_a_row : tolerance) * places.longest;
+  constexpr double rounding = 1e-12;  // of coordinates: handles that all stay are one piece, too
+  const double slack = (is_row ? tolerance_in_a_row : tolerance) * places.longest + rounding * places.extent;
   const auto suits = [&](const RigidMotion& motion, std::span<const Drag> asked) {
     return motion.residual <= slack && turns_as_asked(asked, group, motion);
   };
@@ -106,7 +97,7 @@ Attachment attach(std::span<const Drag> drags, int group, const Contact& contact
     return {group, How::one_piece, scales, grows_out, "one motion takes all its handles to their targets"};
   // Held, it would be drawn out to more than twice its size: it is half of a thing that somebody means to take away.
   if (is_one_piece && grows_out && places.longest > contact.size)
-    return {group, How::one_piece, scales, grows_out, "it goes farther than it is long"};
+    return {group, How::one_piece, scales, grows_out, "it goes farther than it is long (attach \"held\" keeps it)"};
   if (grows_out) return {group, How::held, false, grows_out, "its surface goes on into what stays"};
   if (is_one_piece)
     return {group, How::one_piece, scales, grows_out,

@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 #include <numbers>
+#include <tuple>
 #include <utility>
 
 #include "engine/core/parallel.h"
@@ -87,48 +88,61 @@ Body::Body(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> row
     nearest.push_back(index.nearest(neighbours::point_of(drag.source, origin_), 1)[0].index);
   embedding_ = elastic::embed(points, joined, nearest);
 
+  grip(joined, nearest, drags);
+  hold(joined, nearest, drags, held);
+  solver_ = std::make_unique<elastic::Solver>(embedding_.graph, grips_);
+}
+
+void Body::grip(const neighbours::NeighbourGraph& joined, std::span<const std::uint32_t> nearest,
+                std::span<const Drag> drags) {
   const std::size_t nodes = embedding_.graph.size();
   std::vector<std::uint32_t> node_at(rows_.size(), std::uint32_t(nodes));  // node that sits on a row
   for (std::uint32_t node = 0; node < nodes; ++node) node_at[embedding_.point_of[node]] = node;
-  std::vector<std::uint8_t> taken(nodes, 0), released(rows_.size(), 0);
-  const auto nodes_gripped = [&](std::size_t d) {
-    std::vector<std::uint32_t> out;
-    const auto take = [&](std::uint32_t node) {
-      if (!std::exchange(taken[node], std::uint8_t{1})) out.push_back(node);
-    };
-    take(embedding_.cell[nearest[d]]);
-    for (const std::uint32_t row : elastic::points_within(joined, nearest[d], drags[d].grip))
-      if (node_at[row] < nodes) take(node_at[row]);
-    return out;
-  };
+  // Each node goes with the handle nearest to it along the body; the one under a handle is its own.
+  std::vector<std::tuple<double, std::size_t, std::uint32_t>> reached;
   for (std::size_t d = 0; d < drags.size(); ++d) {
-    if (drags[d].anchor) continue;
-    const double near = std::max(drags[d].grip, near_handle * size_);
-    for (const std::uint32_t row : elastic::points_within(joined, nearest[d], near)) released[row] = 1;
-    std::vector<std::uint32_t> gripped = nodes_gripped(d);
-    if (gripped.empty()) continue;  // its node is another handle's
-    grips_.push_back({std::move(gripped), drags[d].source - origin_});
-    drag_of_grip_.push_back(int(d));
+    reached.emplace_back(-1, d, embedding_.cell[nearest[d]]);
+    for (const auto& [row, distance] : elastic::points_within(joined, nearest[d], drags[d].grip))
+      if (node_at[row] < nodes) reached.emplace_back(distance, d, node_at[row]);
   }
-  const auto hold = [&](std::uint32_t node, int drag) {
-    grips_.push_back({{node}, embedding_.graph.rest[node]});
-    drag_of_grip_.push_back(drag);
-  };
+  std::sort(reached.begin(), reached.end());
+  gripped_.assign(nodes, 0);
+  std::vector<std::vector<std::uint32_t>> nodes_of(drags.size());
+  for (const auto& [distance, d, node] : reached)
+    if (!std::exchange(gripped_[node], std::uint8_t{1})) nodes_of[d].push_back(node);
+  for (std::size_t d = 0; d < drags.size(); ++d) {
+    if (nodes_of[d].empty()) continue;  // its node is another handle's: two in one place
+    if (!drags[d].anchor) add_grip(std::move(nodes_of[d]), drags[d].source - origin_, int(d));
+    // Of an anchor each node for itself: a body may turn about a single point, as on a hinge.
+    for (const std::uint32_t node : drags[d].anchor ? nodes_of[d] : std::vector<std::uint32_t>())
+      add_grip({node}, embedding_.graph.rest[node], int(d));
+  }
+}
+
+void Body::hold(const neighbours::NeighbourGraph& joined, std::span<const std::uint32_t> nearest,
+                std::span<const Drag> drags, std::span<const std::uint8_t> held) {
+  if (std::ranges::find(held, 1) == held.end()) return;
+  std::vector<std::uint8_t> released(rows_.size(), 0);
   for (std::size_t d = 0; d < drags.size(); ++d)
-    if (drags[d].anchor)
-      for (const std::uint32_t node : nodes_gripped(d)) hold(node, int(d));
-  std::vector<std::uint8_t> holds(nodes, 0);
+    if (!drags[d].anchor)
+      for (const auto& [row, distance] :
+           elastic::points_within(joined, nearest[d], std::max(drags[d].grip, near_handle * size_)))
+        released[row] = 1;
   std::vector<std::uint32_t> rim;
   for (std::uint32_t k = 0; k < rows_.size(); ++k)
-    if (held[k] && !released[k]) holds[embedding_.cell[k]] = 1, rim.push_back(k);
-  if (!rim.empty()) {
-    const std::vector<double> distance = elastic::distances_to(joined, rim);
-    for (const double d : distance)
-      freedom_.push_back(float(d < embedding_.spacing ? smoothstep(d / embedding_.spacing) : 1));
-  }
-  for (std::uint32_t node = 0; node < nodes; ++node)
-    if (holds[node] && !std::exchange(taken[node], std::uint8_t{1})) hold(node, -1);
-  solver_ = std::make_unique<elastic::Solver>(embedding_.graph, grips_);
+    if (held[k] && !released[k]) rim.push_back(k);
+  if (rim.empty()) return;
+  for (const double distance : elastic::distances_to(joined, rim))
+    freedom_.push_back(distance < embedding_.spacing ? float(smoothstep(distance / embedding_.spacing))
+                                                     : float(distance > 0));
+  for (const std::uint32_t k : rim)
+    if (const std::uint32_t node = embedding_.cell[k]; !std::exchange(gripped_[node], std::uint8_t{1}))
+      add_grip({node}, embedding_.graph.rest[node], -1);
+}
+
+void Body::add_grip(std::vector<std::uint32_t> nodes, DVec3 source, int drag) {
+  grips_.push_back({std::move(nodes), source});
+  drag_of_grip_.push_back(drag);
 }
 
 std::vector<std::vector<elastic::GripPose>> Body::way_of(std::span<const Drag> drags) const {
@@ -148,7 +162,7 @@ std::vector<std::vector<elastic::GripPose>> Body::way_of(std::span<const Drag> d
       if (d < 0)
         poses.push_back({grips_[k].source, DQuat(1, 0, 0, 0), 1});
       else if (const auto drag = std::size_t(d); drags[drag].anchor)
-        poses.push_back({grips_[k].source, std::nullopt, 1});  // a body may turn about a single point, as on a hinge
+        poses.push_back({grips_[k].source, std::nullopt, 1});
       else
         poses.push_back({path.position(drag, part) - origin_, path.turn(drag, part), path.scale(drag, part)});
     }

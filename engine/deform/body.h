@@ -21,12 +21,13 @@ namespace engine::deform {
 class Body {
  public:
   /// A handle grips what is within its `grip` of the row nearest to it, along the body, and takes that along as one
-  /// piece; an anchor holds all of that where it is, and so is every row that is held. Where a handle grips or is
-  /// near, compared with the size of the body, nothing is held: its rim is what shall move.
+  /// piece; an anchor holds all of that where it is, and so is every row that is held. What several could grip goes
+  /// with the nearest of them; of handles in one place only the first grips anything. Where a handle grips or is near,
+  /// compared with the size of the body, no row is held: that is the rim that shall move.
   ///   rows   of the cloud, at least one
   ///   drags  of the group, in the frame of the cloud: at least one; where they go does not matter yet
   ///   held   [rows] 1: stays where it is
-  /// About 0.2 s for 30,000 rows.
+  /// About 0.2 s for 30,000 rows that hang together.
   Body(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows, std::span<const Drag> drags,
        std::span<const std::uint8_t> held);
 
@@ -35,6 +36,11 @@ class Body {
   [[nodiscard]] Deformation follow(const scene::GaussianCloud& cloud, std::span<const Drag> drags) const;
 
  private:
+  void grip(const neighbours::NeighbourGraph& joined, std::span<const std::uint32_t> nearest,
+            std::span<const Drag> drags);
+  void hold(const neighbours::NeighbourGraph& joined, std::span<const std::uint32_t> nearest,
+            std::span<const Drag> drags, std::span<const std::uint8_t> held);
+  void add_grip(std::vector<std::uint32_t> nodes, DVec3 source, int drag);
   [[nodiscard]] std::vector<std::vector<elastic::GripPose>> way_of(std::span<const Drag> drags) const;
 
   std::vector<std::uint32_t> rows_;
@@ -45,6 +51,7 @@ class Body {
   elastic::Embedding embedding_;
   std::vector<int> drag_of_grip_;  ///< Drag that a grip belongs to; -1: held.
   std::vector<elastic::Grip> grips_;
+  std::vector<std::uint8_t> gripped_;  ///< [nodes] 1: in a grip.
   std::unique_ptr<elastic::Solver> solver_;
 };
 

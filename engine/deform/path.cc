@@ -32,7 +32,9 @@ Path::Screw Path::screw_of(std::span<const Drag> drags, int group) {
   for (const Drag& drag : drags)
     if (drag.group == group && !drag.anchor) from.push_back(drag.source), to.push_back(drag.target);
   if (from.size() < 2) return {};
-  const RigidMotion motion = fit_rigid(from, to);
+  RigidMotion motion = fit_any_turn(from, to);
+  for (const Drag& drag : drags)  // handles that turn by themselves say which way round
+    if (drag.group == group && drag.turn && glm::dot(*drag.turn, motion.turn) < 0) motion.turn = -motion.turn;
   const double angle = angle_of(motion.turn);
   constexpr double least_turn = 1e-3;  // radians: below, the way is as good as straight, and the axis far away
   if (angle < least_turn) return {};

@@ -7,6 +7,8 @@
 #include <optional>
 #include <vector>
 
+#include "engine/core/svd.h"
+
 namespace engine::deform {
 namespace {
 
@@ -93,6 +95,12 @@ std::optional<RigidMotion> motion_of_piece(std::span<const Drag> drags, int grou
   return std::nullopt;
 }
 
+double farthest_off(const RigidMotion& motion, std::span<const DVec3> from, std::span<const DVec3> to) {
+  double farthest = 0;
+  for (std::size_t i = 0; i < from.size(); ++i) farthest = std::max(farthest, glm::distance(motion(from[i]), to[i]));
+  return farthest;
+}
+
 }  // namespace
 
 RigidMotion fit_rigid(std::span<const DVec3> from, std::span<const DVec3> to, double slack) {
@@ -117,13 +125,36 @@ RigidMotion fit_rigid(std::span<const DVec3> from, std::span<const DVec3> to, do
     if (length > half_turn && glm::length(DVec3(turn.x, turn.y, turn.z)) > no_turn * length)
       motion.turn = turn / length;
   }
-  for (std::size_t i = 0; i < from.size(); ++i)
-    motion.residual = std::max(motion.residual, glm::distance(motion(from[i]), to[i]));
+  motion.residual = farthest_off(motion, from, to);
   return motion;
 }
 
-RigidMotion fit_similarity(std::span<const DVec3> from, std::span<const DVec3> to, double slack) {
-  RigidMotion motion = fit_rigid(from, to, slack);
+bool span_a_plane(std::span<const DVec3> points) {
+  if (points.size() < 3) return false;
+  const auto farthest_from = [&](auto distance) {
+    return *std::ranges::max_element(points, {}, [&](DVec3 point) { return distance(point); });
+  };
+  const DVec3 a = farthest_from([&](DVec3 p) { return glm::distance(p, points[0]); });
+  const DVec3 b = farthest_from([&](DVec3 p) { return glm::distance(p, a); });
+  const DVec3 c = farthest_from([&](DVec3 p) { return glm::length(glm::cross(p - a, b - a)); });
+  constexpr double collinear = 0.05;  // height of a triangle over its base: below, noise decides on the plane
+  return glm::length(glm::cross(c - a, b - a)) > collinear * glm::dot(b - a, b - a);
+}
+
+RigidMotion fit_any_turn(std::span<const DVec3> from, std::span<const DVec3> to) {
+  RigidMotion motion = fit_rigid(from, to);
+  if (!span_a_plane(from) || motion.turn != DQuat(1, 0, 0, 0)) return motion;
+  DMat3 sum(0.0);
+  const DVec3 after = motion.centre + motion.shift;
+  for (std::size_t i = 0; i < from.size(); ++i) sum += glm::outerProduct(to[i] - after, from[i] - motion.centre);
+  RigidMotion turned = motion;
+  turned.turn = nearest_rotation(sum);
+  turned.residual = farthest_off(turned, from, to);
+  return turned.residual < motion.residual ? turned : motion;
+}
+
+RigidMotion fit_similarity(std::span<const DVec3> from, std::span<const DVec3> to) {
+  RigidMotion motion = fit_any_turn(from, to);
   const DVec3 after = motion.centre + motion.shift;
   double along = 0, spread = 0;
   for (std::size_t i = 0; i < from.size(); ++i) {
@@ -131,9 +162,7 @@ RigidMotion fit_similarity(std::span<const DVec3> from, std::span<const DVec3> t
     along += glm::dot(to[i] - after, arm), spread += glm::dot(arm, arm);
   }
   if (along > 0 && spread > 0) motion.scale = along / spread;
-  motion.residual = 0;
-  for (std::size_t i = 0; i < from.size(); ++i)
-    motion.residual = std::max(motion.residual, glm::distance(motion(from[i]), to[i]));
+  motion.residual = farthest_off(motion, from, to);
   return motion;
 }
 

@@ -27,9 +27,15 @@ struct RigidMotion {
 ///          nothing of a turn about the row. Units of the points.
 [[nodiscard]] RigidMotion fit_rigid(std::span<const DVec3> from, std::span<const DVec3> to, double slack = 0);
 
-/// The same with the scale of least squares. Points in one place do not scale.
+/// Do three of the points span a plane? Then only one rigid motion takes them to their targets.
+[[nodiscard]] bool span_a_plane(std::span<const DVec3> points);
+
+/// fit_rigid(), but of points that span a plane also a half-turn, which is then the only one.
+[[nodiscard]] RigidMotion fit_any_turn(std::span<const DVec3> from, std::span<const DVec3> to);
+
+/// fit_any_turn() with the scale of least squares. Points in one place do not scale.
 /// Source: Horn 1987, section 2.D.
-[[nodiscard]] RigidMotion fit_similarity(std::span<const DVec3> from, std::span<const DVec3> to, double slack = 0);
+[[nodiscard]] RigidMotion fit_similarity(std::span<const DVec3> from, std::span<const DVec3> to);
 
 /// Do the handles of the group move as one piece, to a hundredth of the longest way? Anchors count as points that stay.
 /// A group without handles does.

@@ -47,8 +47,9 @@ deform::Deformation follow_as_bodies(const WorkingScene& working, std::span<cons
   deform::Deformation out = deform::at_rest(working.cloud(), rows);
   for (const deform::Attachment& attachment : parts.attachments) {
     std::vector<deform::Drag> own_drags;
-    for (const deform::Drag& drag : drags)
-      if (drag.group == attachment.group) own_drags.push_back(drag);
+    for (std::size_t i = 0; i < drags.size(); ++i)
+      if (drags[i].group == attachment.group && !std::ranges::binary_search(parts.idle, i))
+        own_drags.push_back(drags[i]);
     std::vector<std::uint32_t> own_rows;
     std::vector<std::size_t> at;
     std::vector<std::uint8_t> held;

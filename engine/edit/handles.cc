@@ -140,22 +140,29 @@ std::vector<double> telling_distances(const working::WorkingScene& working, cons
 std::vector<std::size_t> relocate(const working::WorkingScene& working, const Request& request,
                                   std::vector<DVec3>& positions) {
   const std::vector<double> telling = telling_distances(working, request, positions);
-  std::vector<DVec3> moved(positions.size(), DVec3(0.0));  // weighted sums
-  std::vector<double> weight(positions.size(), 0.0);
+  struct Mean {
+    DVec3 moved{0.0};  ///< Weighted sum.
+    double weight = 0;
+  };
+  std::vector<Mean> near(positions.size()), all(positions.size());
   for (std::size_t row = 0; row < working.size(); ++row) {
     if (working.handle()[row] == 0) continue;
     const std::size_t i = working.handle()[row] - 1u;
-    if (!(glm::distance(DVec3(working.mean_at_deform().get(row)), positions[i]) <= telling[i])) continue;
+    const DVec3 before(working.mean_at_deform().get(row));
     const double alpha = render::opacity<double>(working.cloud().opacity_logit[row]);
-    moved[i] += alpha * (DVec3(working.cloud().mean.get(row)) - DVec3(working.mean_at_deform().get(row)));
-    weight[i] += alpha;
+    for (Mean* mean : {&near[i], &all[i]}) {
+      if (mean == &near[i] && !(glm::distance(before, positions[i]) <= telling[i])) continue;
+      mean->moved += alpha * (DVec3(working.cloud().mean.get(row)) - before);
+      mean->weight += alpha;
+    }
   }
   std::vector<std::size_t> lost;
   for (std::size_t i = 0; i < positions.size(); ++i) {
-    if (weight[i] == 0)
+    const Mean& mean = near[i].weight > 0 ? near[i] : all[i];
+    if (mean.weight == 0)
       lost.push_back(i);
     else if (!request.handles[i].is_anchor())
-      positions[i] += moved[i] / weight[i];
+      positions[i] += mean.moved / mean.weight;
   }
   return lost;
 }

@@ -13,11 +13,13 @@
 
 namespace engine::edit {
 
-/// T as the request sets it; or the longest drag over the radius of its handle, in an extend over the diameter.
+/// T as the request sets it; or 1 for an elastic body that is moved; or the longest drag over the radius of its handle,
+/// in an extend over the diameter.
 [[nodiscard]] int resolved_intervals(const Request& request);
 
-/// Every group is shifted and turned as one piece, no anchor holds a part of it back, and the parameters (`rigid`, by
-/// the shortest arc) keep it one piece: one step carries it there. Without handles: false.
+/// An elastic body is moved, which finds its whole way at once; or every group is shifted and turned as one piece, no
+/// anchor holds a part of it back, and the parameters (`rigid`, by the shortest arc) keep it one piece: one step
+/// carries it there. Without handles: false.
 [[nodiscard]] bool one_interval_is_exact(const Request& request);
 
 /// The frame in which a drag is carried out: the world's own, unless the handles lie far from its origin compared with
@@ -49,8 +51,8 @@ void give_radii(const scene::Bounds& selected, Request& request);
 /// p_h^i += opacity-weighted mean over the Gaussians of P_h^i of (mean - mean_at_deform): the way they went in this
 /// interval, deformation and optimisation together. That may be less than the handle's own dp, because its Gaussians
 /// follow its neighbours too; the next interval starts from where the part really is. Of an elastic body only those
-/// near the handle count: what it grips, or the nearest one. An anchor marks a place, so it stays. A handle none of
-/// whose Gaussians is left stays too.
+/// near the handle count: what it grips, or the nearest one; all of them, where these are invisible. An anchor marks a
+/// place, so it stays. A handle none of whose Gaussians is left stays too.
 ///   returns  the handles that have lost all their Gaussians
 std::vector<std::size_t> relocate(const working::WorkingScene& working, const Request& request,
                                   std::vector<DVec3>& positions);

@@ -13,6 +13,11 @@ std::string handle_lost(std::size_t handle, int interval) {
          std::to_string(interval) + " and stays where it is";
 }
 
+std::string anchor_is_idle(std::size_t handle) {
+  return "handle " + std::to_string(handle + 1) +
+         " is an anchor that holds nothing: nothing that moves is within its radius of it";
+}
+
 std::string faint_left_out(std::size_t copies) {
   return std::to_string(copies) + " dragged Gaussians have an opacity below 1/255 and are left out";
 }

@@ -17,4 +17,7 @@ namespace engine::edit {
 /// unprocessable, `where` is "handles".
 [[nodiscard]] Error leaves_nothing();
 
+/// An anchor of an elastic body that grips nothing of it.
+[[nodiscard]] std::string anchor_is_idle(std::size_t handle);
+
 }  // namespace engine::edit

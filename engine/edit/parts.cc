@@ -20,6 +20,12 @@ double longest_edge(const Array3& means, std::span<const std::uint32_t> rows) {
   return std::max({size.x, size.y, size.z});
 }
 
+/// Is nothing of the rows within the grip of the drag?
+bool grips_nothing(const Array3& means, std::span<const std::uint32_t> rows, const deform::Drag& drag) {
+  return std::ranges::none_of(
+      rows, [&](std::uint32_t row) { return glm::distance(DVec3(means.get(row)), drag.source) <= drag.grip; });
+}
+
 }  // namespace
 
 Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> handle, const Request& request) {
@@ -35,6 +41,15 @@ Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> 
   const std::vector<deform::Drag> drags = whole_drags(request);
   const Array3 means = scene::means(scene);
   for (const auto& [group, rows] : rows_of_group) {
+    std::vector<deform::Drag> own;
+    for (std::size_t i = 0; i < drags.size(); ++i) {
+      if (drags[i].group != group) continue;
+      if (drags[i].anchor && grips_nothing(means, rows, drags[i]))
+        parts.idle.push_back(i);
+      else
+        own.push_back(drags[i]);
+    }
+    if (own.empty()) continue;  // anchors alone, and none of them near: nothing moves
     const std::vector<select::Touch> touches = select::contact_of(scene, rows, dragged);
     const auto count = [&](select::Touch touch) { return std::size_t(std::ranges::count(touches, touch)); };
     const std::size_t grows_out = count(select::Touch::grows_out);
@@ -48,6 +63,7 @@ Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> 
     parts.attachments.push_back(std::move(attachment));
   }
   std::sort(parts.rim.begin(), parts.rim.end());
+  std::sort(parts.idle.begin(), parts.idle.end());
   return parts;
 }
 
@@ -57,7 +73,7 @@ Parts parts_of(const scene::GaussianCloud& scene, std::span<const std::uint16_t>
 }
 
 Parts among(const Parts& parts, std::span<const std::uint32_t> rows) {
-  Parts out{parts.attachments, {}};
+  Parts out{parts.attachments, {}, parts.idle};
   for (std::uint32_t k = 0; k < rows.size(); ++k)
     if (std::ranges::binary_search(parts.rim, rows[k])) out.rim.push_back(k);
   return out;

@@ -15,6 +15,7 @@ namespace engine::edit {
 struct Parts {
   std::vector<deform::Attachment> attachments;  ///< Of each group that has rows, by its number.
   std::vector<std::uint32_t> rim;               ///< Rows of the input that are held where they are, ascending.
+  std::vector<std::size_t> idle;  ///< Anchors that hold nothing, as nothing of their group is within their grip.
 };
 
 /// Looks where each group touches what stays, and decides how it moves.

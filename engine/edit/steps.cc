@@ -98,6 +98,7 @@ Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Cam
     warnings.push_back(nothing_moves());
   else if (choice->views.empty())
     warnings.push_back(no_view_sees_it());
+  for (const std::size_t anchor : edit.parts.idle) warnings.push_back(anchor_is_idle(anchor));
   state.views = std::move(choice->views);
   if (Workload work = edit.progress.workload(); work.views != state.views.size()) {
     work.views = state.views.size();

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <queue>
 #include <unordered_map>
 #include <utility>
@@ -58,16 +59,26 @@ std::vector<float> gathered(std::span<const float> points, std::span<const std::
   return out;
 }
 
-/// Each point of `from` and the nearest one of `to`.
-std::vector<std::pair<Link, float>> nearest_links(std::span<const float> points, std::span<const std::uint32_t> from,
-                                                  std::span<const std::uint32_t> to) {
-  const neighbours::PointIndex index(gathered(points, to), 3);
-  const auto found = index.nearest(gathered(points, from), 1);
-  std::vector<std::pair<Link, float>> out;
-  for (std::size_t k = 0; k < from.size(); ++k)
-    out.push_back({{from[k], to[found[k].index]}, found[k].squared_distance});
-  return out;
-}
+/// The nearest of some points.
+class Nearest {
+ public:
+  Nearest(std::span<const float> points, std::vector<std::uint32_t> among)
+      : points_(points), among_(std::move(among)), index_(gathered(points, among_), 3) {}
+
+  /// From each of `from`, and the squared distance.
+  [[nodiscard]] std::vector<std::pair<Link, float>> links_from(std::span<const std::uint32_t> from) const {
+    const auto found = index_.nearest(gathered(points_, from), 1);
+    std::vector<std::pair<Link, float>> out;
+    for (std::size_t k = 0; k < from.size(); ++k)
+      out.push_back({{from[k], among_[found[k].index]}, found[k].squared_distance});
+    return out;
+  }
+
+ private:
+  std::span<const float> points_;
+  std::vector<std::uint32_t> among_;
+  neighbours::PointIndex index_;
+};
 
 Parts find_parts(std::span<const float> points, const NeighbourGraph& joined) {
   const std::size_t n = joined.size();
@@ -93,17 +104,22 @@ Parts find_parts(std::span<const float> points, const NeighbourGraph& joined) {
     else
       strays.push_back(i);
   }
+  // A piece is joined to the nearest of the larger ones; of very many, to the nearest of the largest, as each of them
+  // would take an index of its own.
+  constexpr std::size_t most_indices = 16;
   std::vector<std::uint32_t> together = members[named.front()];
+  std::optional<Nearest> nearest;
   for (std::size_t k = 1; k < named.size(); ++k) {
     const std::vector<std::uint32_t>& piece = members[named[k]];
-    const auto links = nearest_links(points, piece, together);
+    if (k <= most_indices) nearest.emplace(points, together);
+    const auto links = nearest->links_from(piece);
     parts.links.push_back(std::min_element(links.begin(), links.end(), [](const auto& one, const auto& other) {
                             return one.second < other.second;
                           })->first);
     together.insert(together.end(), piece.begin(), piece.end());
   }
   if (!strays.empty())
-    for (const auto& [link, distance] : nearest_links(points, strays, together)) parts.followers.push_back(link);
+    for (const auto& [link, distance] : Nearest(points, together).links_from(strays)) parts.followers.push_back(link);
   return parts;
 }
 
@@ -219,6 +235,14 @@ Graph graph_of(std::span<const float> points, std::span<const std::uint32_t> nod
   return graph;
 }
 
+double mean_length(const Graph& graph) {
+  double sum = 0;
+  for (std::uint32_t i = 0; i < graph.size(); ++i)
+    for (std::uint32_t edge = graph.begin[i]; edge < graph.begin[i + 1]; ++edge)
+      sum += glm::distance(graph.rest[i], graph.rest[graph.to[edge]]);
+  return graph.to.empty() ? 0 : sum / double(graph.to.size());
+}
+
 /// The node itself, those joined to it, and those joined to these, ascending.
 std::vector<std::uint32_t> two_rings(const Graph& graph, std::uint32_t node) {
   std::vector<std::uint32_t> out{node};
@@ -233,7 +257,7 @@ std::vector<std::uint32_t> two_rings(const Graph& graph, std::uint32_t node) {
 }
 
 /// Which nodes each point follows, and how much.
-///   spacing  every point has a node that near
+///   spacing  every point that hangs together has a node this near; 0: each is one
 void let_points_follow(std::span<const float> points, double spacing, Embedding& out) {
   const std::size_t n = out.cell.size();
   std::vector<std::vector<std::uint32_t>> rings(out.graph.size());
@@ -256,8 +280,9 @@ void let_points_follow(std::span<const float> points, double spacing, Embedding&
       double sum = 0;
       found.clear();
       for (const std::uint32_t node : rings[out.cell[i]]) {
-        const double share = farthest > 0 ? glm::distance(point, out.graph.rest[node]) / farthest : 0;
-        if (!(share < 1)) continue;
+        const double distance = glm::distance(point, out.graph.rest[node]);
+        const double share = node == out.cell[i] ? own / std::max(farthest, 1e-300) : distance / farthest;
+        if (!(share < 1)) continue;  // also NaN: nothing but a point's own node, where it is one itself
         const double weight = (1 - share * share) * (1 - share * share);
         if (weight < 1e-6) continue;  // nobody would see it
         found.push_back({node, weight});
@@ -302,22 +327,21 @@ Embedding embed(std::span<const float> points, const neighbours::NeighbourGraph&
   for (const Link& link : parts.followers) cells.cell()[link.a] = cells.cell()[link.b];
   out.graph = graph_of(points, out.point_of, contacts_of(joined, parts, cells.cell()));
   out.cell = std::move(cells.cell());
-  out.spacing = farthest.first;
-  let_points_follow(points, out.spacing, out);
+  out.spacing = mean_length(out.graph);
+  let_points_follow(points, farthest.first, out);
   return out;
 }
 
-std::vector<std::uint32_t> points_within(const neighbours::NeighbourGraph& joined, std::uint32_t point,
-                                         double distance) {
+std::vector<Near> points_within(const neighbours::NeighbourGraph& joined, std::uint32_t point, double distance) {
   std::unordered_map<std::uint32_t, double> reached{{point, 0.0}};
-  std::vector<std::uint32_t> out;
+  std::vector<Near> out;
   Queue queue;
   queue.push({0, point});
   while (!queue.empty()) {
     const auto [so_far, i] = queue.top();
     queue.pop();
     if (so_far > reached[i]) continue;
-    out.push_back(i);
+    out.push_back({i, so_far});
     for (std::uint32_t edge = joined.begin[i]; edge < joined.begin[i + 1]; ++edge) {
       if (!holds(joined, i, edge)) continue;
       const double there = so_far + double(joined.length[edge]);

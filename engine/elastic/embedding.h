@@ -31,7 +31,7 @@ struct Embedding {
   std::vector<std::uint32_t> begin;     ///< [N + 1] into `node`: those that a point follows.
   std::vector<std::uint32_t> node;      ///< Each once per point.
   std::vector<float> weight;            ///< Above 0; those of a point sum to 1.
-  double spacing = 0;                   ///< Every point that hangs together has a node this near, along the body.
+  double spacing = 0;                   ///< How far nodes are from the ones they are joined to, about.
 };
 
 /// How finely a body is taken.
@@ -40,20 +40,26 @@ struct EmbeddingOptions {
 };
 
 /// Chooses nodes among the points, each as far as possible from those before it along the body; joins those whose cells
-/// touch, the more weight the broader the contact; and lets each point follow the nodes within a few of their spacings,
-/// with weights that fade to zero there. What does not hang together with anything near is joined to the nearest part
-/// of the rest by one edge: it goes along. The same for any number of threads.
+/// touch, the more weight the broader the contact; and lets each point follow those of its own node and the two rings
+/// around it that are near, with weights that fade to zero with the distance. What does not hang together with anything
+/// near is joined to the nearest part of the rest by one edge: it goes along. The same for any number of threads.
 ///   points   [n][3], finite, n at least 1
 ///   joined   these points, joined to the nearest ones and not bridged: an edge counts if it is not much longer than
 ///            both its ends' spacing
 ///   seeds    points that are to be nodes, the first ones; may name a point twice. At most options.nodes count.
-/// About 0.1 s for 30,000 points.
+/// About 0.1 s for 30,000 points that hang together.
 [[nodiscard]] Embedding embed(std::span<const float> points, const neighbours::NeighbourGraph& joined,
                               std::span<const std::uint32_t> seeds, const EmbeddingOptions& options = {});
 
+/// A point, and how far it is.
+struct Near {
+  std::uint32_t point = 0;
+  double distance = 0;
+};
+
 /// The points within `distance` of a point along the body, itself first; of equally far ones the lower index first.
-[[nodiscard]] std::vector<std::uint32_t> points_within(const neighbours::NeighbourGraph& joined, std::uint32_t point,
-                                                       double distance);
+[[nodiscard]] std::vector<Near> points_within(const neighbours::NeighbourGraph& joined, std::uint32_t point,
+                                              double distance);
 
 /// How far each point is from the nearest of some, along the body; infinity where there is no way to one.
 [[nodiscard]] std::vector<double> distances_to(const neighbours::NeighbourGraph& joined,

@@ -49,7 +49,9 @@ edit::Request reversed(const edit::Request& request, const edit::Report& report,
   for (std::size_t i = 0; i < back.handles.size(); ++i) {
     edit::Handle& handle = back.handles[i];
     std::sort(distances[i].begin(), distances[i].end());
-    if (!distances[i].empty())
+    if (handle.rotation) handle.rotation = glm::conjugate(*handle.rotation);
+    if (handle.scale) handle.scale = 1 / *handle.scale;
+    if (!distances[i].empty() && !request.selected)  // with a selection the radius is a grip
       handle.radius = std::max(handle.radius, distances[i][std::size_t(held_again * double(distances[i].size() - 1))]);
     if (handle.target) handle.target = std::exchange(handle.source, at[i]);
   }
@@ -125,7 +127,7 @@ Result<RegionQuality> zero_drag(const scene::GaussianCloud& scene, std::span<con
                                 const edit::Request& request, correct::Corrector* corrector) {
   edit::Request still = request;
   for (edit::Handle& handle : still.handles)
-    if (handle.target) handle.target = handle.source;
+    if (!handle.is_anchor()) handle.target = handle.source, handle.rotation.reset(), handle.scale.reset();
   still.params.intervals = 1;
   still.params.optimise_unmoved = true;
   const auto outcome = edit::run(scene, cameras, still, {.corrector = corrector});

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <numeric>
 
 #include "engine/neighbours/neighbour_graph.h"
@@ -18,11 +19,11 @@ constexpr float goes_on = 0.3f;
 // Of the box's longest side: what lies within has its own neighbours around it.
 constexpr float beyond = 0.15f;
 
-/// Rows in the box around these, and a little beyond it; ascending.
-std::vector<std::uint32_t> rows_around(const Array3& means, std::span<const std::uint32_t> rows) {
+/// Rows in the box around these, and a little beyond it, at least `reach`; ascending.
+std::vector<std::uint32_t> rows_around(const Array3& means, std::span<const std::uint32_t> rows, float reach) {
   Vec3 low = means.get(rows[0]), high = low;
   for (const std::uint32_t row : rows) low = glm::min(low, means.get(row)), high = glm::max(high, means.get(row));
-  const Vec3 size = high - low, margin(beyond * std::max({size.x, size.y, size.z}));
+  const Vec3 size = high - low, margin(std::max(beyond * std::max({size.x, size.y, size.z}), reach));
   std::vector<std::uint32_t> out;
   low -= margin, high += margin;
   for (std::uint32_t row = 0; row < means.size(); ++row) {
@@ -39,12 +40,24 @@ float median(std::vector<float> values) {
   return *middle;
 }
 
+/// How far the neighbours of a few rows may be: by their own extents, as a small box says nothing of it. World units.
+float reach_of(const scene::GaussianCloud& part) {
+  constexpr float extents = 8, most_log = 40;  // far beyond any neighbour; a square of it fits a float
+  std::vector<float> longest;
+  for (std::size_t row = 0; row < part.size(); ++row) {
+    const Vec3 log_scale = part.log_scale.get(row);
+    longest.push_back(std::max({log_scale.x, log_scale.y, log_scale.z}));
+  }
+  return extents * std::exp(std::min(median(std::move(longest)), most_log));
+}
+
 }  // namespace
 
 std::vector<Touch> contact_of(const scene::LayeredCloud& scene, std::span<const std::uint32_t> part,
                               std::span<const std::uint32_t> selected) {
   assert(!part.empty());
-  const std::vector<std::uint32_t> around = rows_around(scene::means(scene), part);
+  const std::vector<std::uint32_t> around =
+      rows_around(scene::means(scene), part, reach_of(scene::gather(scene, part)));
   const scene::GaussianCloud cloud = scene::gather(scene, around);
   std::vector<std::uint32_t> all(around.size());
   std::iota(all.begin(), all.end(), 0u);

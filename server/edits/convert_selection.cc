@@ -205,7 +205,7 @@ HandleViews handle_views(const std::vector<engine::edit::Handle>& handles, std::
   HandleViews out;
   std::vector<const scene::Camera*> seen;
   for (std::size_t h = 0; h < handles.size() && seen.size() < max_views; ++h) {
-    if (!handles[h].target) continue;
+    if (handles[h].is_anchor()) continue;
     const scene::Camera* const camera = camera_on(handles[h].source, cameras);
     if (camera == nullptr || std::ranges::find(seen, camera) != seen.end()) continue;
     seen.push_back(camera);

@@ -71,6 +71,17 @@ TEST(MotionAsOnePiece, AllowsForHandsThatAreNotExact) {
   EXPECT_FALSE(motion_as_one_piece(drags, 0));
 }
 
+TEST(MotionAsOnePiece, TakesHalfATurn) {
+  const auto half = [](DVec3 p) { return DQuat(0, 0, 0, 1) * p + DVec3(0.3, 0, 0); };
+  const auto motion = motion_as_one_piece(drags_of(corners, half), 0);
+  ASSERT_TRUE(motion);
+  EXPECT_LT(glm::distance((*motion)(DVec3(2, 3, 4)), half(DVec3(2, 3, 4))), 1e-9);
+}
+
+TEST(MotionAsOnePiece, OfHandlesThatAllStayIsOne) {
+  EXPECT_TRUE(motion_as_one_piece(drags_of({DVec3(1e3, 0.1, 7), DVec3(0.3, 2, 1)}, [](DVec3 p) { return p; }), 0));
+}
+
 TEST(MotionAsOnePiece, GrowsWhereThreeHandlesDo) {
   const auto motion = motion_as_one_piece(drags_of(corners, grown), 0);
   ASSERT_TRUE(motion);

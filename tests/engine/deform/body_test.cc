@@ -76,6 +76,38 @@ TEST(Body, HoldsWhatIsHeldToTheBitAndTakesTheHandleToItsTarget) {
   EXPECT_GT(near_tip, 0u);
 }
 
+TEST(Body, OfFewRowsHoldsThemToTheBit) {
+  scene::GaussianCloud cloud;
+  add_bar(cloud, DVec3(0.0), 20, 0.1, 0.25);
+  const Deformation found = bent(cloud, {.source = DVec3(1.9, 0.25, 0), .target = DVec3(1.4, 1, 0)});
+  std::size_t held = 0;
+  for (std::size_t row = 0; row < cloud.size(); ++row)
+    if (cloud.mean.get(row).x < 0.25f) {
+      ++held;
+      EXPECT_EQ(found.mean.get(row), cloud.mean.get(row)) << row;
+    }
+  EXPECT_GT(held, 30u);
+}
+
+TEST(Body, TakesEveryHandleToItsTargetHoweverFarAnotherGrips) {
+  const auto cloud = bar();
+  const auto rows = all_rows(cloud);
+  std::vector<Drag> drags{{.source = tip, .target = tip + DVec3(0, 1, 0), .grip = 2},
+                          {.source = tip - DVec3(0.6, 0, 0), .target = tip + DVec3(-0.6, -0.5, 0), .grip = 0.05}};
+  for (int order = 0; order < 2; ++order) {
+    const Deformation found = Body(cloud, rows, drags, held_left_of(cloud, 0.25)).follow(cloud, drags);
+    for (const Drag& drag : drags) {
+      double nearest = 1e9;
+      DVec3 went(0.0);
+      for (std::size_t row = 0; row < cloud.size(); ++row)
+        if (const double d = glm::distance(DVec3(cloud.mean.get(row)), drag.source); d < nearest)
+          nearest = d, went = DVec3(found.mean.get(row)) - DVec3(cloud.mean.get(row));
+      EXPECT_LT(glm::distance(went, drag.target - drag.source), 0.25) << order;
+    }
+    std::swap(drags[0], drags[1]);
+  }
+}
+
 TEST(Body, TearsNowhere) {
   const auto cloud = bar();
   const Deformation found = bent(cloud, {.source = tip, .target = DVec3(4.5, 3, 0)});
@@ -167,12 +199,14 @@ TEST(Body, HoldsAtAnySizeAndFarFromTheOrigin) {
     for (std::size_t row = 0; row < cloud.size(); row += 97)
       EXPECT_LT(glm::distance(DVec3(found.mean.get(row)), size * DVec3(one.mean.get(row))), 0.02 * size) << row;
   }
-  const DVec3 far(1e6, -1e6, 1e6);
-  const auto cloud = bar(far, 1e3);
-  const Deformation found =
-      bent(cloud, {.source = far + 1e3 * tip, .target = far + 1e3 * DVec3(4.5, 3, 0)}, far.x + 250);
-  for (std::size_t row = 0; row < cloud.size(); ++row)
-    EXPECT_LT(glm::distance(DVec3(found.mean.get(row)), far + DVec3(3e3, 1e3, 0)), 6e3) << row;
+  const DVec3 far(1e6, -1e6, 1e6);  // where floats are 0.06 apart
+  const auto cloud = bar(far, 1e3), near = bar(DVec3(0.0), 1e3);
+  const auto moved = [](const scene::GaussianCloud& of, DVec3 origin) {
+    return bent(of, {.source = origin + 1e3 * tip, .target = origin + 1e3 * DVec3(4.5, 3, 0)}, origin.x + 250);
+  };
+  const Deformation there = moved(cloud, far), here = moved(near, DVec3(0.0));
+  for (std::size_t row = 0; row < cloud.size(); row += 97)
+    EXPECT_LT(glm::distance(DVec3(there.mean.get(row)) - far, DVec3(here.mean.get(row))), 30) << row;
 }
 
 TEST(Body, GrowsAndShrinksByALot) {
@@ -202,6 +236,8 @@ TEST(Body, GivesTheSameBytesForAnyNumberOfThreads) {
   const Deformation one = with(1), three = with(3);
   EXPECT_EQ(one.mean, three.mean);
   EXPECT_EQ(one.rotation, three.rotation);
+  EXPECT_EQ(one.map, three.map);
+  EXPECT_EQ(one.moves, three.moves);
 }
 
 TEST(Body, TurnsAboutAnAnchorAsOnAHinge) {

@@ -35,6 +35,16 @@ TEST(Path, OfAPieceThatTurnsGoesRound) {
   EXPECT_NEAR(path.farthest_turn(), 0.5 * std::numbers::pi, 1e-9);
 }
 
+TEST(Path, GoesHalfRoundAndTheLongWayWhereHandlesSaySo) {
+  auto drags = turned(std::numbers::pi, DVec3(0.0));
+  EXPECT_NEAR(glm::length(Path(drags).position(1, 0.5)), 2, 1e-9) << "round, not through the middle";
+  const double angle = 1.5 * std::numbers::pi;
+  drags = turned(angle, DVec3(0.0));
+  for (Drag& drag : drags) drag.turn = DQuat(std::cos(angle / 2), 0, 0, std::sin(angle / 2));
+  const double half = std::sqrt(0.5);
+  expect_near(Path(drags).position(0, 0.5), DVec3(-half, half, 0));
+}
+
 TEST(Path, EndsWhereAskedExactly) {
   auto drags = turned(1.0, DVec3(0.3, -0.1, 0.2));
   drags[1].target += DVec3(0.05, 0, 0);

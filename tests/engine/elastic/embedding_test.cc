@@ -120,6 +120,19 @@ TEST(Embed, IsTheSameForAnyNumberOfThreads) {
   EXPECT_EQ(one.weight, four.weight);
 }
 
+TEST(Embed, OfFewPointsLetsEachFollowItself) {
+  std::vector<float> points;
+  add_sheet(points, 15, 15, 0.1f, 0);
+  const Embedding found = embed(points, joined(points), {}, {500});
+  expect_sound(found, 225);
+  ASSERT_EQ(found.graph.size(), 225u);
+  EXPECT_NEAR(found.spacing, 0.12, 0.03);
+  for (std::size_t i = 0; i < 225; ++i) {
+    ASSERT_EQ(found.begin[i + 1] - found.begin[i], 1u);
+    EXPECT_EQ(found.point_of[found.node[found.begin[i]]], i);
+  }
+}
+
 TEST(PointsWithin, GoAlongTheBody) {
   std::vector<float> points;
   add_sheet(points, 30, 30, 0.1f, 0);
@@ -127,12 +140,13 @@ TEST(PointsWithin, GoAlongTheBody) {
   add_sheet(points, 30, 30, 0.1f, 0.4f, 2);
   const auto near = points_within(joined(points), 0, 1.0);
   ASSERT_FALSE(near.empty());
-  EXPECT_EQ(near.front(), 0u);
-  for (const std::uint32_t point : near) {
+  EXPECT_EQ(near.front().point, 0u);
+  for (const auto& [point, distance] : near) {
     EXPECT_LT(point, lower);
     EXPECT_LE(glm::distance(point_at(points, point), point_at(points, 0)), 1.0 + 1e-6);
   }
-  EXPECT_EQ(points_within(joined(points), 5, 0), std::vector<std::uint32_t>{5});
+  ASSERT_EQ(points_within(joined(points), 5, 0).size(), 1u);
+  EXPECT_EQ(points_within(joined(points), 5, 0)[0].point, 5u);
 }
 
 }  // namespace
