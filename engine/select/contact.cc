@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "engine/neighbours/neighbour_graph.h"
 #include "engine/neighbours/point_index.h"
@@ -51,10 +52,42 @@ float reach_of(const scene::GaussianCloud& part) {
   return extents * std::exp(std::min(median(std::move(longest)), most_log));
 }
 
+/// Where the surface goes on to from the handles, over nodes of the part alone: a node belongs to it if two of its
+/// neighbours there look like it, as a single one may by chance. All of the part, where that is so little of it that
+/// a pattern must have stopped it.
+///   least    how alike neighbours on one surface are at least
+///   returns  [nodes of the graph] 1: it goes on to there
+std::vector<std::uint8_t> reached_from(std::span<const DVec3> handles, const Array3& mean,
+                                       const neighbours::NeighbourGraph& graph, std::span<const float> alike,
+                                       float least, std::span<const std::uint32_t> part) {
+  constexpr std::uint8_t needed = 2;
+  constexpr double least_share = 0.25;
+  std::vector<std::uint8_t> votes(graph.size(), needed), reached(graph.size(), 0);
+  for (const std::uint32_t node : part) votes[node] = 0;  // the others never get enough: they are not asked
+  std::vector<std::uint32_t> queue;
+  const auto reach = [&](std::uint32_t node) {
+    if (!std::exchange(reached[node], std::uint8_t{1})) queue.push_back(node);
+  };
+  for (const DVec3& handle : handles) {
+    const std::uint32_t nearest = *std::ranges::min_element(
+        part, {}, [&](std::uint32_t node) { return glm::distance(DVec3(mean.get(node)), handle); });
+    reach(nearest);
+    for (std::uint32_t edge = graph.begin[nearest]; edge < graph.begin[nearest + 1]; ++edge)
+      if (votes[graph.to[edge]] < needed && alike[edge] >= least) reach(graph.to[edge]);
+  }
+  std::size_t count = 0;
+  for (; count < queue.size(); ++count)
+    for (std::uint32_t edge = graph.begin[queue[count]]; edge < graph.begin[queue[count] + 1]; ++edge)
+      if (const std::uint32_t other = graph.to[edge]; votes[other] < needed && alike[edge] >= least)
+        if (++votes[other] == needed) reach(other);
+  if (double(count) < least_share * double(part.size())) reached.assign(graph.size(), 1);
+  return reached;
+}
+
 }  // namespace
 
 std::vector<Touch> contact_of(const scene::LayeredCloud& scene, std::span<const std::uint32_t> part,
-                              std::span<const std::uint32_t> selected) {
+                              std::span<const std::uint32_t> selected, std::span<const DVec3> handles) {
   assert(!part.empty());
   const std::vector<std::uint32_t> around =
       rows_around(scene::means(scene), part, reach_of(scene::gather(scene, part)));
@@ -67,24 +100,27 @@ std::vector<Touch> contact_of(const scene::LayeredCloud& scene, std::span<const 
   const std::vector<float> alike = similarity_of_edges(cloud, all, graph);
 
   constexpr float none = -1;
+  std::vector<std::uint32_t> nodes;  // [part] of the graph
   std::vector<float> across(part.size(), none),
       within;  // how alike the likest neighbour is: not selected, and selected
-  std::size_t k = 0;
-  for (std::uint32_t node = 0; node < around.size() && k < part.size(); ++node) {
-    if (around[node] != part[k]) continue;
+  for (std::uint32_t node = 0; node < around.size() && nodes.size() < part.size(); ++node) {
+    if (around[node] != part[nodes.size()]) continue;
     float inside = none;
     for (std::uint32_t edge = graph.begin[node]; edge < graph.begin[node + 1]; ++edge) {
       if (graph.length[edge] > neighbours::joining_spacings * graph.spacing[node]) continue;
-      float& best = std::ranges::binary_search(selected, around[graph.to[edge]]) ? inside : across[k];
+      float& best = std::ranges::binary_search(selected, around[graph.to[edge]]) ? inside : across[nodes.size()];
       best = std::max(best, alike[edge]);
     }
     if (inside > none) within.push_back(inside);
-    ++k;
+    nodes.push_back(node);
   }
-  const float usual = median(std::move(within));
+  const float least = goes_on * median(std::move(within));
+  const std::vector<std::uint8_t> reached = reached_from(handles, cloud.mean, graph, alike, least, nodes);
   std::vector<Touch> out;
-  for (const float likest : across)
-    out.push_back(likest == none ? Touch::nothing : likest >= goes_on * usual ? Touch::grows_out : Touch::stands);
+  for (std::size_t k = 0; k < part.size(); ++k)
+    out.push_back(across[k] == none                         ? Touch::nothing
+                  : across[k] >= least && reached[nodes[k]] ? Touch::grows_out
+                                                            : Touch::stands);
   return out;
 }
 
