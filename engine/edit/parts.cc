@@ -49,11 +49,8 @@ Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> 
       else
         own.push_back(drags[i]);
     }
-    std::vector<DVec3> handles;
-    for (const deform::Drag& drag : own)
-      if (!drag.anchor) handles.push_back(drag.source);
     if (own.empty()) continue;  // anchors alone, and none of them near: nothing moves
-    const std::vector<select::Touch> touches = select::contact_of(scene, rows, dragged, handles);
+    const std::vector<select::Touch> touches = select::contact_of(scene, rows, dragged);
     const auto count = [&](select::Touch touch) { return std::size_t(std::ranges::count(touches, touch)); };
     const std::size_t grows_out = count(select::Touch::grows_out);
     deform::Attachment attachment = deform::attach(

@@ -5,7 +5,6 @@
 #include <span>
 #include <vector>
 
-#include "engine/core/vec.h"
 #include "engine/scene/overlay.h"
 
 namespace engine::select {
@@ -14,19 +13,17 @@ namespace engine::select {
 enum class Touch : std::uint8_t {
   nothing,   ///< No row that is not selected is among those nearest to it, and no farther than these are.
   stands,    ///< One is, but looks otherwise: a cup on a table, a lip on the other.
-  grows_out  ///< The surface goes on there, all the way from the handles: an ear on a head.
+  grows_out  ///< The surface goes on there, and over half of the part: an ear on a head. Where what goes on is only a
+             ///< rim of table that is selected with a cup, the part stands.
 };
 
 /// Of a part of what is selected: where it meets what is not. Looks at the rows of the box around the part, and a
 /// little beyond.
 ///   part      rows of the scene, ascending, at least one (asserted), all of them selected
 ///   selected  ascending
-///   handles   places on the part that shall move. Where a border of its own lies between them and that of the
-///   selection,
-///             as between a cup and a rim of table that is selected with it, the part only stands.
 /// About a second for 250,000 rows in the box.
 ///   returns   [part]
 [[nodiscard]] std::vector<Touch> contact_of(const scene::LayeredCloud& scene, std::span<const std::uint32_t> part,
-                                            std::span<const std::uint32_t> selected, std::span<const DVec3> handles);
+                                            std::span<const std::uint32_t> selected);
 
 }  // namespace engine::select

@@ -23,8 +23,6 @@ std::vector<std::uint32_t> rows_where_x(const scene::GaussianCloud& cloud, float
   return rows;
 }
 
-const std::vector<DVec3> handles{DVec3(0.9, 0, 0)};
-
 std::size_t count(const std::vector<Touch>& touches, Touch touch) {
   return std::size_t(std::ranges::count(touches, touch));
 }
@@ -33,7 +31,7 @@ TEST(ContactOf, GrowsOutAcrossTheMiddleOfAWall) {
   scene::GaussianCloud cloud;
   add_sheet(cloud, {0, 0, 0}, 24, 0.1f, {0.5f, 0.4f, 0.3f});
   const auto rows = rows_where_x(cloud, 0);
-  const auto touches = contact_of(shared(cloud), rows, rows, handles);
+  const auto touches = contact_of(shared(cloud), rows, rows);
   ASSERT_EQ(touches.size(), rows.size());
   EXPECT_GE(count(touches, Touch::grows_out), 24u);  // and two at the wall's ends, whose neighbours are farther away
   EXPECT_LE(count(touches, Touch::grows_out), 26u);
@@ -47,7 +45,7 @@ TEST(ContactOf, StandsWhereTheRestLooksOtherwise) {
   add_sheet(cloud, {-1.2f, 0, 0}, 24, 0.1f, {0.9f, 0.9f, 0.9f});
   add_sheet(cloud, {1.2f, 0, 0}, 24, 0.1f, {0.1f, 0.2f, 0.5f});
   const auto rows = rows_where_x(cloud, 0);
-  const auto touches = contact_of(shared(cloud), rows, rows, handles);
+  const auto touches = contact_of(shared(cloud), rows, rows);
   EXPECT_EQ(count(touches, Touch::grows_out), 0u);
   EXPECT_GE(count(touches, Touch::stands), 24u);
 }
@@ -57,7 +55,7 @@ TEST(ContactOf, StandsWhereItsOwnBorderLiesWithinWhatIsSelected) {
   add_sheet(cloud, {-1.2f, 0, 0}, 24, 0.1f, {0.9f, 0.9f, 0.9f});
   add_sheet(cloud, {1.2f, 0, 0}, 24, 0.1f, {0.1f, 0.2f, 0.5f});
   const auto rows = rows_where_x(cloud, -0.4f);
-  const auto touches = contact_of(shared(cloud), rows, rows, handles);
+  const auto touches = contact_of(shared(cloud), rows, rows);
   EXPECT_EQ(count(touches, Touch::grows_out), 0u);
   EXPECT_GE(count(touches, Touch::stands), 24u);
 }
@@ -67,13 +65,13 @@ TEST(ContactOf, TouchesNothingAcrossAGapNorWhatIsSelectedToo) {
   add_sheet(cloud, {-3, 0, 0}, 24, 0.1f, {0.5f, 0.4f, 0.3f});
   add_sheet(cloud, {0, 0, 0}, 24, 0.1f, {0.5f, 0.4f, 0.3f});
   const auto right = rows_where_x(cloud, 0), both = rows_where_x(cloud, -1.5f);
-  EXPECT_EQ(count(contact_of(shared(cloud), both, both, {}), Touch::nothing), both.size());
-  EXPECT_EQ(count(contact_of(shared(cloud), right, both, {}), Touch::nothing), right.size());
+  EXPECT_EQ(count(contact_of(shared(cloud), both, both), Touch::nothing), both.size());
+  EXPECT_EQ(count(contact_of(shared(cloud), right, both), Touch::nothing), right.size());
 }
 
 TEST(ContactOf, OfASceneOfOneRowIsNone) {
   const auto touches =
-      contact_of(shared(cloud_at({{1, 2, 3}})), std::vector<std::uint32_t>{0}, std::vector<std::uint32_t>{0}, {});
+      contact_of(shared(cloud_at({{1, 2, 3}})), std::vector<std::uint32_t>{0}, std::vector<std::uint32_t>{0});
   EXPECT_EQ(touches, std::vector<Touch>{Touch::nothing});
 }
 
