@@ -8,19 +8,7 @@
 namespace engine {
 namespace {
 
-using Row = std::array<double, 4>;
-using Matrix4 = std::array<Row, 4>;
-
-/// Horn's matrix: the quaternion of the nearest rotation is the eigenvector of its largest eigenvalue.
-Matrix4 horn_matrix(const DMat3& m) {
-  // In his letters S_ab = sum from_a to_b, which is m[a][b]: GLM's columns come first.
-  Matrix4 n{Row{m[0][0] + m[1][1] + m[2][2], m[1][2] - m[2][1], m[2][0] - m[0][2], m[0][1] - m[1][0]},
-            Row{0, m[0][0] - m[1][1] - m[2][2], m[0][1] + m[1][0], m[2][0] + m[0][2]},
-            Row{0, 0, m[1][1] - m[0][0] - m[2][2], m[1][2] + m[2][1]}, Row{0, 0, 0, m[2][2] - m[0][0] - m[1][1]}};
-  for (std::size_t a = 0; a < 4; ++a)
-    for (std::size_t b = 0; b < a; ++b) n[a][b] = n[b][a];
-  return n;
-}
+using Row = Matrix4::value_type;
 
 /// The largest root of x^4 + c2 x^2 + c1 x + c0, whose roots are all real, from above: each of Newton's steps stays
 /// there.
@@ -49,6 +37,16 @@ double cofactor(const Matrix4& n, std::size_t row, std::size_t column) {
 }
 
 }  // namespace
+
+Matrix4 horn_matrix(const DMat3& m) {
+  // In his letters S_ab = sum from_a to_b, which is m[a][b]: GLM's columns come first.
+  Matrix4 n{Row{m[0][0] + m[1][1] + m[2][2], m[1][2] - m[2][1], m[2][0] - m[0][2], m[0][1] - m[1][0]},
+            Row{0, m[0][0] - m[1][1] - m[2][2], m[0][1] + m[1][0], m[2][0] + m[0][2]},
+            Row{0, 0, m[1][1] - m[0][0] - m[2][2], m[1][2] + m[2][1]}, Row{0, 0, 0, m[2][2] - m[0][0] - m[1][1]}};
+  for (std::size_t a = 0; a < 4; ++a)
+    for (std::size_t b = 0; b < a; ++b) n[a][b] = n[b][a];
+  return n;
+}
 
 Svd decompose(DMat3 m) {
   DMat3 v(1.0);

@@ -15,27 +15,6 @@ constexpr double tolerance = 0.05, tolerance_in_a_row = 0.03;
 // (its shadow, its foot); a jaw, whose border is half lips, two fifths.
 constexpr double grown = 0.2;
 
-DVec3 target_of(const Drag& drag) { return drag.anchor ? drag.source : drag.target; }
-
-struct Places {
-  std::vector<DVec3> from, to;
-  double longest = 0;  ///< Way.
-  double extent = 0;   ///< Farthest from the origin.
-  std::size_t anchors = 0;
-};
-
-Places places_of(std::span<const Drag> drags, int group) {
-  Places out;
-  for (const Drag& drag : drags) {
-    if (drag.group != group) continue;
-    out.from.push_back(drag.source), out.to.push_back(target_of(drag));
-    out.longest = std::max(out.longest, glm::distance(out.from.back(), out.to.back()));
-    out.extent = std::max({out.extent, glm::length(out.from.back()), glm::length(out.to.back())});
-    out.anchors += drag.anchor;
-  }
-  return out;
-}
-
 /// Does each handle turn and grow as it asks for?
 bool turns_as_asked(std::span<const Drag> drags, int group, const RigidMotion& motion) {
   constexpr double least_cosine = 0.999;  // of half the angle: 5 degrees
@@ -54,7 +33,7 @@ RigidMotion nearest_motion(std::span<const Drag> drags, int group, bool scales) 
     return scales ? fit_similarity(places.from, places.to) : fit_any_turn(places.from, places.to);
   const auto drag = std::ranges::find(drags, group, &Drag::group);
   RigidMotion motion;
-  motion.centre = drag->source, motion.shift = target_of(*drag) - drag->source;
+  motion.centre = places.from[0], motion.shift = places.to[0] - places.from[0];
   motion.turn = drag->turn.value_or(motion.turn);
   motion.scale = drag->scale;
   return motion;

@@ -1,7 +1,6 @@
 #include "engine/deform/rigid.h"
 
 #include <algorithm>
-#include <array>
 #include <cassert>
 #include <cmath>
 #include <optional>
@@ -14,25 +13,16 @@ namespace {
 
 constexpr double one_piece = 0.01;  // of the longest way; who places handles by hand is not more exact
 
-using Row = std::array<double, 4>;
-using Symmetric4 = std::array<Row, 4>;
-
-/// Horn's matrix: the quaternion of the best turn is the eigenvector of its largest eigenvalue.
-Symmetric4 horn_matrix(std::span<const DVec3> from, DVec3 from_middle, std::span<const DVec3> to, DVec3 to_middle) {
-  DMat3 s(0.0);  // s[a][b]: component a before times component b after
-  for (std::size_t i = 0; i < from.size(); ++i)
-    for (int a = 0; a < 3; ++a) s[a] += (from[i] - from_middle)[a] * (to[i] - to_middle);
-  Symmetric4 n{Row{s[0][0] + s[1][1] + s[2][2], s[1][2] - s[2][1], s[2][0] - s[0][2], s[0][1] - s[1][0]},
-               Row{0, s[0][0] - s[1][1] - s[2][2], s[0][1] + s[1][0], s[2][0] + s[0][2]},
-               Row{0, 0, s[1][1] - s[0][0] - s[2][2], s[1][2] + s[2][1]}, Row{0, 0, 0, s[2][2] - s[0][0] - s[1][1]}};
-  for (std::size_t a = 0; a < 4; ++a)
-    for (std::size_t b = 0; b < a; ++b) n[a][b] = n[b][a];
-  return n;
+/// Sum of to from^T, each from its middle.
+DMat3 cross_covariance(std::span<const DVec3> from, DVec3 from_middle, std::span<const DVec3> to, DVec3 to_middle) {
+  DMat3 sum(0.0);
+  for (std::size_t i = 0; i < from.size(); ++i) sum += glm::outerProduct(to[i] - to_middle, from[i] - from_middle);
+  return sum;
 }
 
-double largest_entry(const Symmetric4& n) {
+double largest_entry(const Matrix4& n) {
   double largest = 0;
-  for (const Row& row : n)
+  for (const auto& row : n)
     for (const double value : row) largest = std::max(largest, std::abs(value));
   return largest;
 }
@@ -40,16 +30,16 @@ double largest_entry(const Symmetric4& n) {
 /// Projection of the identity onto the eigenvectors of the largest eigenvalue, of any length: of the best turns, the
 /// least. The shorter it is the nearer to a half-turn. Found by squaring: eigenvalues whose relative difference is
 /// below 2^-squarings are one.
-DQuat least_of_best_turns(Symmetric4 n, int squarings) {
+DQuat least_of_best_turns(Matrix4 n, int squarings) {
   const double size = 4 * largest_entry(n);
   for (std::size_t a = 0; a < 4; ++a) n[a][a] += size;  // no eigenvalue is negative now
   for (int k = 0; k < squarings; ++k) {
-    Symmetric4 squared{};
+    Matrix4 squared{};
     for (std::size_t a = 0; a < 4; ++a)
       for (std::size_t b = 0; b < 4; ++b)
         for (std::size_t c = 0; c < 4; ++c) squared[a][b] += n[a][c] * n[c][b];
     const double largest = largest_entry(squared);
-    for (Row& row : squared)
+    for (auto& row : squared)
       for (double& value : row) value /= largest;
     n = squared;
   }
@@ -74,24 +64,14 @@ std::vector<int> groups_of(std::span<const Drag> drags) {
   return groups;
 }
 
-DVec3 target_of(const Drag& drag) { return drag.anchor ? drag.source : drag.target; }
-
 /// How the group moves, if it does so as one piece.
 std::optional<RigidMotion> motion_of_piece(std::span<const Drag> drags, int group) {
   // Handles that all stay, or go no farther than coordinates are exact, are one piece too.
   constexpr double rounding = 1e-12;
-  std::vector<DVec3> from, to;
-  double longest = 0, extent = 0;
-  for (const Drag& drag : drags) {
-    if (drag.group != group) continue;
-    const DVec3 target = target_of(drag);
-    from.push_back(drag.source), to.push_back(target);
-    longest = std::max(longest, glm::distance(drag.source, target));
-    extent = std::max({extent, glm::length(drag.source), glm::length(target)});
-  }
-  const double slack = one_piece * longest;
-  const RigidMotion motion = fit_rigid(from, to, slack);
-  if (motion.residual <= slack + rounding * extent) return motion;
+  const Places places = places_of(drags, group);
+  const double slack = one_piece * places.longest;
+  const RigidMotion motion = fit_rigid(places.from, places.to, slack);
+  if (motion.residual <= slack + rounding * places.extent) return motion;
   return std::nullopt;
 }
 
@@ -102,6 +82,18 @@ double farthest_off(const RigidMotion& motion, std::span<const DVec3> from, std:
 }
 
 }  // namespace
+
+Places places_of(std::span<const Drag> drags, int group) {
+  Places out;
+  for (const Drag& drag : drags) {
+    if (drag.group != group) continue;
+    out.from.push_back(drag.source), out.to.push_back(drag.anchor ? drag.source : drag.target);
+    out.longest = std::max(out.longest, glm::distance(out.from.back(), out.to.back()));
+    out.extent = std::max({out.extent, glm::length(out.from.back()), glm::length(out.to.back())});
+    out.anchors += drag.anchor;
+  }
+  return out;
+}
 
 RigidMotion fit_rigid(std::span<const DVec3> from, std::span<const DVec3> to, double slack) {
   assert(from.size() == to.size());
@@ -117,7 +109,7 @@ RigidMotion fit_rigid(std::span<const DVec3> from, std::span<const DVec3> to, do
     spread_to += glm::dot(to[i] - after, to[i] - after);
   }
   const int squarings = squarings_for(std::sqrt(spread_from * spread_to), from.size(), slack);
-  if (const Symmetric4 n = horn_matrix(from, motion.centre, to, after); largest_entry(n) > 0) {
+  if (const Matrix4 n = horn_matrix(cross_covariance(from, motion.centre, to, after)); largest_entry(n) > 0) {
     const DQuat turn = least_of_best_turns(n, squarings);
     const double length = std::sqrt(glm::dot(turn, turn));
     constexpr double half_turn = 1e-6;  // cosine of half the angle: below it the axis is rounding
@@ -144,11 +136,8 @@ bool span_a_plane(std::span<const DVec3> points) {
 RigidMotion fit_any_turn(std::span<const DVec3> from, std::span<const DVec3> to) {
   RigidMotion motion = fit_rigid(from, to);
   if (!span_a_plane(from) || motion.turn != DQuat(1, 0, 0, 0)) return motion;
-  DMat3 sum(0.0);
-  const DVec3 after = motion.centre + motion.shift;
-  for (std::size_t i = 0; i < from.size(); ++i) sum += glm::outerProduct(to[i] - after, from[i] - motion.centre);
   RigidMotion turned = motion;
-  turned.turn = nearest_rotation(sum);
+  turned.turn = nearest_rotation(cross_covariance(from, motion.centre, to, motion.centre + motion.shift));
   turned.residual = farthest_off(turned, from, to);
   return turned.residual < motion.residual ? turned : motion;
 }

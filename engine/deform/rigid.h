@@ -2,12 +2,23 @@
 // Source: Horn 1987, "Closed-form solution of absolute orientation using unit quaternions".
 #pragma once
 
+#include <cstddef>
 #include <span>
+#include <vector>
 
 #include "engine/core/vec.h"
 #include "engine/deform/motion.h"
 
 namespace engine::deform {
+
+/// Where the handles of a group are and go; an anchor goes nowhere. In the order of the drags.
+struct Places {
+  std::vector<DVec3> from, to;
+  double longest = 0;  ///< Way.
+  double extent = 0;   ///< Farthest of all from the origin.
+  std::size_t anchors = 0;
+};
+[[nodiscard]] Places places_of(std::span<const Drag> drags, int group);
 
 /// A turn about `centre`, a growth from there, and the shift after it.
 struct RigidMotion {

@@ -1,7 +1,6 @@
 #include "engine/elastic/embedding.h"
 
 #include <algorithm>
-#include <array>
 #include <cassert>
 #include <cmath>
 #include <functional>
@@ -11,6 +10,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "engine/core/median.h"
 #include "engine/core/parallel.h"
 #include "engine/neighbours/point_index.h"
 
@@ -127,6 +127,20 @@ Parts find_parts(std::span<const float> points, const NeighbourGraph& joined) {
 using Reached = std::pair<double, std::uint32_t>;
 using Queue = std::priority_queue<Reached, std::vector<Reached>, std::greater<>>;
 
+/// Goes on along the body from what is in the queue, nearest first (Dijkstra 1959).
+///   is_known  (point, distance): it is in the queue with a shorter way, too
+///   go_to     (point, distance): a way there; queues it if it is the shortest so far
+template <class IsKnown, class GoTo>
+void walk(const NeighbourGraph& joined, Queue& queue, IsKnown&& is_known, GoTo&& go_to) {
+  while (!queue.empty()) {
+    const auto [distance, i] = queue.top();
+    queue.pop();
+    if (is_known(i, distance)) continue;
+    for (std::uint32_t edge = joined.begin[i]; edge < joined.begin[i + 1]; ++edge)
+      if (holds(joined, i, edge)) go_to(joined.to[edge], distance + double(joined.length[edge]));
+  }
+}
+
 /// Distances along the body from the nodes chosen so far, and whose they are.
 class Cells {
  public:
@@ -142,13 +156,8 @@ class Cells {
       queue_.push({distance, i});
     };
     reach_for(point, 0);
-    while (!queue_.empty()) {
-      const auto [distance, i] = queue_.top();
-      queue_.pop();
-      if (distance > distance_[i]) continue;
-      for (std::uint32_t edge = joined_.begin[i]; edge < joined_.begin[i + 1]; ++edge)
-        if (holds(joined_, i, edge)) reach_for(joined_.to[edge], distance + double(joined_.length[edge]));
-    }
+    walk(
+        joined_, queue_, [&](std::uint32_t i, double distance) { return distance > distance_[i]; }, reach_for);
   }
   /// The point farthest from every node, the lowest of equally far ones; infinitely far if no node is on its piece.
   [[nodiscard]] Reached farthest() const {
@@ -208,12 +217,7 @@ Graph graph_of(std::span<const float> points, std::span<const std::uint32_t> nod
   std::vector<double> counts;
   for (const auto& [pair, count] : contacts)
     if (count > 0) counts.push_back(count);
-  double usual = 1;
-  if (!counts.empty()) {
-    const auto middle = counts.begin() + std::ptrdiff_t(counts.size() / 2);
-    std::nth_element(counts.begin(), middle, counts.end());
-    usual = *middle;
-  }
+  const double usual = counts.empty() ? 1 : median(std::move(counts));
   struct Edge {
     std::uint32_t from, to;
     double weight;
@@ -333,44 +337,36 @@ Embedding embed(std::span<const float> points, const neighbours::NeighbourGraph&
 }
 
 std::vector<Near> points_within(const neighbours::NeighbourGraph& joined, std::uint32_t point, double distance) {
-  std::unordered_map<std::uint32_t, double> reached{{point, 0.0}};
+  std::unordered_map<std::uint32_t, double> nearest;
   std::vector<Near> out;
   Queue queue;
-  queue.push({0, point});
-  while (!queue.empty()) {
-    const auto [so_far, i] = queue.top();
-    queue.pop();
-    if (so_far > reached[i]) continue;
-    out.push_back({i, so_far});
-    for (std::uint32_t edge = joined.begin[i]; edge < joined.begin[i + 1]; ++edge) {
-      if (!holds(joined, i, edge)) continue;
-      const double there = so_far + double(joined.length[edge]);
-      if (there > distance) continue;
-      const auto [known, is_new] = reached.try_emplace(joined.to[edge], there);
-      if (!is_new && !(there < known->second)) continue;
-      known->second = there;
-      queue.push({there, joined.to[edge]});
-    }
-  }
+  const auto reach_for = [&](std::uint32_t i, double there) {
+    if (there > distance) return;
+    const auto [known, is_new] = nearest.try_emplace(i, there);
+    if (!is_new && !(there < known->second)) return;
+    known->second = there;
+    queue.push({there, i});
+  };
+  const auto settle = [&](std::uint32_t i, double so_far) {
+    const bool is_known = so_far > nearest[i];
+    if (!is_known) out.push_back({i, so_far});
+    return is_known;
+  };
+  reach_for(point, 0);
+  walk(joined, queue, settle, reach_for);
   return out;
 }
 
 std::vector<double> distances_to(const NeighbourGraph& joined, std::span<const std::uint32_t> points) {
-  std::vector<double> distance(joined.size(), infinity);
+  std::vector<double> nearest(joined.size(), infinity);
   Queue queue;
-  for (const std::uint32_t point : points) distance[point] = 0, queue.push({0, point});
-  while (!queue.empty()) {
-    const auto [so_far, i] = queue.top();
-    queue.pop();
-    if (so_far > distance[i]) continue;
-    for (std::uint32_t edge = joined.begin[i]; edge < joined.begin[i + 1]; ++edge) {
-      const double there = so_far + double(joined.length[edge]);
-      if (!holds(joined, i, edge) || !(there < distance[joined.to[edge]])) continue;
-      distance[joined.to[edge]] = there;
-      queue.push({there, joined.to[edge]});
-    }
-  }
-  return distance;
+  const auto reach_for = [&](std::uint32_t i, double there) {
+    if (there < nearest[i]) nearest[i] = there, queue.push({there, i});
+  };
+  for (const std::uint32_t point : points) reach_for(point, 0);
+  walk(
+      joined, queue, [&](std::uint32_t i, double so_far) { return so_far > nearest[i]; }, reach_for);
+  return nearest;
 }
 
 }  // namespace engine::elastic

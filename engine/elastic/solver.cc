@@ -165,9 +165,6 @@ Solver::~Solver() = default;
 Solver::Solver(Solver&&) noexcept = default;
 Solver& Solver::operator=(Solver&&) noexcept = default;
 
-const Graph& Solver::graph() const { return impl_->graph; }
-const std::vector<Grip>& Solver::grips() const { return impl_->grips; }
-
 Pose Solver::solve(std::span<const std::vector<GripPose>> way,
                    const std::function<void(double, std::size_t)>& on_iteration) const {
   assert(!way.empty());

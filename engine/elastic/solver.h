@@ -67,9 +67,6 @@ class Solver {
   [[nodiscard]] Pose solve(std::span<const std::vector<GripPose>> way,
                            const std::function<void(double energy, std::size_t stop)>& on_iteration = {}) const;
 
-  [[nodiscard]] const Graph& graph() const;
-  [[nodiscard]] const std::vector<Grip>& grips() const;
-
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;

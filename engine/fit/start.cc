@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "engine/core/median.h"
 #include "engine/neighbours/point_index.h"
 #include "engine/scene/opacity.h"
 #include "engine/scene/sh.h"
@@ -35,20 +36,12 @@ std::vector<float> spacing(std::span<const float> positions) {
   return distance;
 }
 
-float median(std::vector<float> values) {
-  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 DVec3 median_position(std::span<const ColoredPoint> points) {
   DVec3 middle(0.0);
   std::vector<double> along(points.size());
   for (int axis = 0; axis < 3; ++axis) {
     for (std::size_t i = 0; i < points.size(); ++i) along[i] = points[i].position[axis];
-    const auto half = along.begin() + std::ptrdiff_t(along.size() / 2);
-    std::nth_element(along.begin(), half, along.end());
-    middle[axis] = *half;
+    middle[axis] = median(along);
   }
   return middle;
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "engine/core/median.h"
 #include "engine/neighbours/neighbour_graph.h"
 #include "engine/neighbours/point_index.h"
 #include "engine/select/similarity.h"
@@ -35,13 +36,6 @@ std::vector<std::uint32_t> rows_around(const Array3& means, std::span<const std:
     if (glm::clamp(mean, low, high) == mean) out.push_back(row);
   }
   return out;
-}
-
-float median(std::vector<float> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// How far the neighbours of a few rows may be: by their own extents, as a small box says nothing of it. World units.
@@ -106,7 +100,7 @@ std::vector<Touch> contact_of(const scene::LayeredCloud& scene, std::span<const 
     if (inside > none) within.push_back(inside);
     nodes.push_back(node);
   }
-  const float usual = median(std::move(within));
+  const float usual = within.empty() ? 0 : median(std::move(within));
   const bool grows_out = is_gone_on_into(graph, alike, goes_on_within * usual, nodes);
   std::vector<Touch> out;
   for (std::size_t k = 0; k < part.size(); ++k)

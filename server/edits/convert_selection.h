@@ -54,8 +54,8 @@ constexpr std::size_t max_mask_pixels = std::size_t{1} << 27;
 /// select::shown_shares() of what is selected.
 using ShownShares = std::function<std::vector<double>(const std::vector<engine::scene::Camera>& views)>;
 
-/// Says in a request what moves: the rows, and how far handles grip that say nothing of it (half of the longest edge of
-/// the selected rows' box).
+/// Says in a request what moves: the rows, and how far handles grip that say nothing of it (see
+/// edit::give_radii()).
 ///   cameras  from which it may be looked at
 ///   returns  warnings, one sentence each: those of the selection; and that it takes more than most_of_a_view of what
 ///            is seen where a handle is
