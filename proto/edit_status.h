@@ -15,7 +15,7 @@ namespace proto {
 /// How a group of handles moves what is theirs, where that is as an elastic body.
 struct Part {
   int group = 0;
-  std::string how;  ///< "one_piece", "free" or "held".
+  std::string how;  ///< "one_piece", "free", "held", "drawn_out" or "continued".
   std::string why;  ///< For people.
 };
 

@@ -38,7 +38,7 @@ export function buildRequestPanel(editor) {
     testid: "mode",
     options: [
       ["move", "Move", "What is dragged leaves its old place"],
-      ["extend", "Extend", "What is dragged is drawn out: the old place stays filled"],
+      ["extend", "Extend", "What is dragged is drawn out: what lies between is filled"],
     ],
     changed: (value) => store.set({ mode: value }),
   });

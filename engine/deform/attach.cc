@@ -59,7 +59,19 @@ std::optional<RigidMotion> motion_as_one_piece(std::span<const Drag> drags, int 
   return std::nullopt;
 }
 
-Attachment attach(std::span<const Drag> drags, int group, const Contact& contact, Attach asked) {
+std::optional<DVec3> pull_of(std::span<const Drag> drags, int group) {
+  const Places places = places_of(drags, group);
+  RigidMotion shift;
+  shift.shift = nearest_motion(drags, group, false).shift;
+  double off = 0;
+  for (std::size_t i = 0; i < places.from.size(); ++i)
+    off = std::max(off, glm::distance(shift(places.from[i]), places.to[i]));
+  const bool is_all = places.anchors == 0 && off <= tolerance * places.longest && turns_as_asked(drags, group, shift);
+  if (!is_all || shift.shift == DVec3(0.0)) return std::nullopt;
+  return shift.shift;
+}
+
+Attachment attach(std::span<const Drag> drags, int group, const Contact& contact, Attach asked, bool draws_out) {
   const Places places = places_of(drags, group);
   const auto motion = motion_as_one_piece(drags, group);
   const bool is_one_piece = motion.has_value(), scales = is_one_piece && motion->scale != 1;
@@ -72,6 +84,7 @@ Attachment attach(std::span<const Drag> drags, int group, const Contact& contact
   if (asked == Attach::free)
     return {group, is_one_piece ? How::one_piece : How::free, scales, grows_out, "the request asks for it to be free"};
 
+  if (draws_out && touches) return {group, How::held, false, grows_out, "it is drawn out of what it touches"};
   if (is_one_piece && places.from.size() > 2 && span_a_plane(places.from))
     return {group, How::one_piece, scales, grows_out, "one motion takes all its handles to their targets"};
   // Held, it would be drawn out to more than twice its size: it is half of a thing that somebody means to take away.

@@ -27,6 +27,8 @@ struct Attachment {
     one_piece,  ///< By one motion that takes every handle to its target.
     free,       ///< As an elastic body between its handles.
     held,       ///< The same, and where it touches what stays it stays.
+    drawn_out,  ///< Held, and stretched between there and its handles, which all go one way.
+    continued,  ///< As one piece; what it grows out of, which repeats along its way, goes on behind it.
   };
   int group = 0;
   How how = How::one_piece;
@@ -36,7 +38,8 @@ struct Attachment {
 };
 constexpr auto names_of(Attachment::How) {
   using How = Attachment::How;
-  return std::array{Name{How::one_piece, "one_piece"}, Name{How::free, "free"}, Name{How::held, "held"}};
+  return std::array{Name{How::one_piece, "one_piece"}, Name{How::free, "free"}, Name{How::held, "held"},
+                    Name{How::drawn_out, "drawn_out"}, Name{How::continued, "continued"}};
 }
 
 /// The motion of a group, if one takes each of its handles to within a twentieth of the longest way of its target
@@ -45,11 +48,16 @@ constexpr auto names_of(Attachment::How) {
 /// takes three handles that are not in a row, or one that says so.
 [[nodiscard]] std::optional<RigidMotion> motion_as_one_piece(std::span<const Drag> drags, int group);
 
+/// The shift that takes all handles of a group to their targets, if one does as exactly as one motion would have to,
+/// and none of them asks for more than that; nothing where it is zero, or where an anchor belongs to them.
+[[nodiscard]] std::optional<DVec3> pull_of(std::span<const Drag> drags, int group);
+
 /// The motion that comes nearest to what the handles ask for.
 [[nodiscard]] RigidMotion nearest_motion(std::span<const Drag> drags, int group, bool scales);
 
-/// Decides for a group; with `asked` other than automatic, as asked.
+/// Decides for a group; with `asked` other than automatic, as asked. What is drawn out is held by all that it touches.
 ///   contact  of the group's rows
-[[nodiscard]] Attachment attach(std::span<const Drag> drags, int group, const Contact& contact, Attach asked);
+[[nodiscard]] Attachment attach(std::span<const Drag> drags, int group, const Contact& contact, Attach asked,
+                                bool draws_out = false);
 
 }  // namespace engine::deform

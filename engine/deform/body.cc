@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <tuple>
 #include <utility>
@@ -171,7 +172,36 @@ std::vector<std::vector<elastic::GripPose>> Body::way_of(std::span<const Drag> d
 }
 
 Deformation Body::follow(const scene::GaussianCloud& cloud, std::span<const Drag> drags) const {
-  const elastic::Pose pose = solver_->solve(way_of(drags));
+  return carry(cloud, solver_->solve(way_of(drags)));
+}
+
+Deformation Body::draw_out(const scene::GaussianCloud& cloud, std::span<const Drag> drags, DVec3 pull) const {
+  const elastic::Graph& graph = embedding_.graph;
+  const DVec3 along = glm::normalize(pull);
+  double level = std::numeric_limits<double>::infinity();
+  for (const Drag& drag : drags)
+    if (!drag.anchor) level = std::min(level, glm::dot(drag.source - origin_, along));
+  std::vector<std::uint32_t> staying, going;
+  for (std::size_t k = 0; k < grips_.size(); ++k) {
+    const bool stays = drag_of_grip_[k] < 0 || drags[std::size_t(drag_of_grip_[k])].anchor;
+    std::vector<std::uint32_t>& nodes = stays ? staying : going;
+    nodes.insert(nodes.end(), grips_[k].nodes.begin(), grips_[k].nodes.end());
+  }
+  for (std::uint32_t i = 0; i < graph.size(); ++i)
+    if (!gripped_[i] && glm::dot(graph.rest[i], along) >= level) going.push_back(i);
+  const std::vector<double> behind = elastic::distances_to(graph, staying), ahead = elastic::distances_to(graph, going);
+  elastic::Pose pose{graph.rest, std::vector<DQuat>(graph.size(), DQuat(1, 0, 0, 0)),
+                     std::vector<double>(graph.size(), 1.0)};
+  for (std::size_t i = 0; i < graph.size(); ++i) {
+    // Nothing stays, or two nodes in one place: it goes, or it stays, whole.
+    const double way = behind[i] + ahead[i];
+    const double share = staying.empty() ? 1 : way > 0 ? behind[i] / way : 0;
+    pose.position[i] += share * pull;
+  }
+  return carry(cloud, pose);
+}
+
+Deformation Body::carry(const scene::GaussianCloud& cloud, const elastic::Pose& pose) const {
   const std::vector<NodeMotion> nodes = motions_of(embedding_.graph, pose, still * size_);
   Deformation out = at_rest(cloud, rows_);
   parallel_for(rows_.size(), grain, [&](std::size_t begin, std::size_t end) {

@@ -34,6 +34,11 @@ class Body {
   /// Where the rows go, with their extents: stretched as the body is.
   ///   drags  those of the constructor, with targets
   [[nodiscard]] Deformation follow(const scene::GaussianCloud& cloud, std::span<const Drag> drags) const;
+  /// Where they go if the body is drawn out: what is level with the handles or ahead of them is shifted by `pull`, what
+  /// is held or anchored stays, and between the two a row goes by its share of the way along the body. Nothing turns.
+  ///   drags  those of the constructor, at least one of them no anchor
+  ///   pull   not zero
+  [[nodiscard]] Deformation draw_out(const scene::GaussianCloud& cloud, std::span<const Drag> drags, DVec3 pull) const;
 
  private:
   void grip(const neighbours::NeighbourGraph& joined, std::span<const std::uint32_t> nearest,
@@ -41,6 +46,7 @@ class Body {
   void hold(const neighbours::NeighbourGraph& joined, std::span<const std::uint32_t> nearest,
             std::span<const Drag> drags, std::span<const std::uint8_t> held);
   void add_grip(std::vector<std::uint32_t> nodes, DVec3 source, int drag);
+  [[nodiscard]] Deformation carry(const scene::GaussianCloud& cloud, const elastic::Pose& pose) const;
   [[nodiscard]] std::vector<std::vector<elastic::GripPose>> way_of(std::span<const Drag> drags) const;
 
   std::vector<std::uint32_t> rows_;

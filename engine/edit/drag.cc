@@ -41,6 +41,35 @@ Result<deform::Assignment> assign(const Array3& mean, const Request& request) {
 
 namespace {
 
+/// Those entries of rows and places where `of` has that value.
+void keep(std::span<const std::uint8_t> of, std::uint8_t value, std::vector<std::uint32_t>& rows,
+          std::vector<std::size_t>& at) {
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < of.size(); ++k)
+    if (of[k] == value) rows[kept] = rows[k], at[kept++] = at[k];
+  rows.resize(kept), at.resize(kept);
+}
+
+/// The rows of one group.
+deform::Deformation follow(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
+                           std::span<const deform::Drag> drags, std::span<const std::uint8_t> held,
+                           const deform::Attachment& attachment) {
+  using How = deform::Attachment::How;
+  const deform::RigidMotion nearest = deform::nearest_motion(drags, attachment.group, attachment.scales);
+  switch (attachment.how) {
+    case How::one_piece:
+      return deform::deformation(cloud, rows, nearest);
+    case How::continued:
+      return deform::deformation(cloud, rows, {.shift = nearest.shift});
+    case How::drawn_out:
+      return deform::Body(cloud, rows, drags, held).draw_out(cloud, drags, nearest.shift);
+    case How::free:
+    case How::held:
+      break;
+  }
+  return deform::Body(cloud, rows, drags, held).follow(cloud, drags);
+}
+
 /// Each group of the rows as a body by itself.
 deform::Deformation follow_as_bodies(const WorkingScene& working, std::span<const std::uint32_t> rows,
                                      std::span<const deform::Drag> drags, const Parts& parts) {
@@ -59,12 +88,8 @@ deform::Deformation follow_as_bodies(const WorkingScene& working, std::span<cons
       held.push_back(std::ranges::binary_search(parts.rim, working.parent()[rows[k]]));
     }
     if (own_rows.empty()) continue;
-    const bool is_one_piece = attachment.how == deform::Attachment::How::one_piece;
-    const deform::Deformation own =
-        is_one_piece ? deform::deformation(working.cloud(), own_rows,
-                                           deform::nearest_motion(own_drags, attachment.group, attachment.scales))
-                     : deform::Body(working.cloud(), own_rows, own_drags, held).follow(working.cloud(), own_drags);
-    deform::scatter(own, at, out);
+    if (attachment.how == deform::Attachment::How::continued) keep(held, 0, own_rows, at);
+    deform::scatter(follow(working.cloud(), own_rows, own_drags, held, attachment), at, out);
   }
   return out;
 }
@@ -86,6 +111,18 @@ deform::Deformation follow_handles(const WorkingScene& working, std::span<const 
   return deform::deformation(working.cloud(), rows, working.handle(), motions, params.interpolation);
 }
 
+/// What of a continuation appears in interval u: each row as soon as the part has made room for it.
+void go_on(const Continuation& continuation, int u, int intervals, PlannedMotion& motion) {
+  const double period = glm::length(continuation.step);
+  const double before = continuation.way * double(u - 1) / intervals, now = continuation.way * double(u) / intervals;
+  for (std::size_t k = 0; k < continuation.tile.size(); ++k)
+    for (int n = 1; n * period - continuation.depth[k] < now; ++n) {
+      if (n * period - continuation.depth[k] < before) continue;
+      motion.continued.push_back(continuation.tile[k]);
+      motion.shift.push_back(double(n) * continuation.step);
+    }
+}
+
 }  // namespace
 
 PlannedMotion plan_motion(const WorkingScene& working, const Request& request, const Parts& parts,
@@ -96,11 +133,8 @@ PlannedMotion plan_motion(const WorkingScene& working, const Request& request, c
   motion.deformation = follow_handles(working, motion.rows, drags, request, parts);
   for (std::size_t k = 0; k < motion.rows.size(); ++k)
     if (motion.deformation.moves[k]) motion.moving.push_back(motion.rows[k]);
+  for (const Continuation& continuation : parts.continuations) go_on(continuation, u, intervals, motion);
   return motion;
-}
-
-std::vector<std::uint32_t> dragged_rows(std::span<const std::uint16_t> handle) {
-  return rows_where(handle, [](std::uint16_t number) { return number != 0; });
 }
 
 DraggedAlone drag_alone(std::vector<std::uint32_t> rows, const scene::GaussianCloud& gaussians,
@@ -114,7 +148,7 @@ DraggedAlone drag_alone(std::vector<std::uint32_t> rows, const scene::GaussianCl
       std::move(rows), WorkingScene(gaussians, frame, std::move(own_handle)), handle_sources(frame, request), {}};
   for (int u = 1; u <= intervals; ++u) {
     const PlannedMotion motion = plan_motion(drag.working, request, own_parts, drag.positions, u, intervals);
-    copy_and_paste(drag.working, motion, request.mode, rotate_sh);
+    copy_and_paste(drag.working, motion, departure_of(request), rotate_sh);
     for (const std::size_t lost : relocate(drag.working, request, drag.positions))
       drag.warnings.push_back(handle_lost(lost, u));
   }

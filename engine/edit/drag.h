@@ -28,6 +28,9 @@ struct PlannedMotion {
   std::vector<std::uint32_t> rows;    ///< P_h, ascending.
   deform::Deformation deformation;    ///< Of `rows`.
   std::vector<std::uint32_t> moving;  ///< Those of `rows` that move, ascending.
+  /// What goes on behind them: copies of rows of the input as they are, shifted.
+  std::vector<std::uint32_t> continued;
+  std::vector<DVec3> shift;  ///< [continued] world units.
 };
 
 /// The deformation of interval u = 1..intervals, from the handles' present positions (in the frame of `working`).
@@ -43,11 +46,8 @@ struct DraggedAlone {
   std::vector<std::string> warnings;
 };
 
-/// The rows that have a handle, ascending.
-[[nodiscard]] std::vector<std::uint32_t> dragged_rows(std::span<const std::uint16_t> handle);
-
 /// All intervals one after the other: deform, copy and paste, relocate. Costs what is dragged, not what there is.
-///   rows       of the scene that have a handle: dragged_rows(handle)
+///   rows       of the scene: rows_in_use()
 ///   gaussians  those rows, of the world
 ///   handle     [N], of assign()
 ///   parts      of the scene

@@ -96,7 +96,7 @@ Result<State> begin(Edit& edit, std::span<const scene::Camera> cameras, std::opt
 
 Result<Outcome> finish(State state, Edit& edit) {
   if (auto going = edit.progress.enter(Stage::finish, state.interval); !going) return propagate(going);
-  Published published = publish(state.scene, edit.input, edit.request.mode);
+  Published published = publish(state.scene, edit.input, departure_of(edit.request));
   const scene::Overlay& overlay = published.overlay;
   Report& report = state.report;
   report.output_gaussians = edit.input.size() - overlay.removed.size() + overlay.added();

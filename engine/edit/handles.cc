@@ -19,8 +19,8 @@ constexpr double far_away = 16;
 
 int resolved_intervals(const Request& request) {
   if (request.params.intervals > 0) return request.params.intervals;
-  // A body finds its whole way at once; what is drawn out leaves its trail step by step.
-  if (request.params.interpolation == Interpolation::arap && request.mode == Mode::move) return 1;
+  // A body finds its whole way at once.
+  if (request.params.interpolation == Interpolation::arap) return 1;
   // What an extend leaves along its way is as long as the part is: its sphere's diameter. More intervals than close the
   // gap only lay half-transparent layers of it over each other.
   const double step = request.mode == Mode::extend ? 2 : 1;
@@ -32,7 +32,7 @@ int resolved_intervals(const Request& request) {
 
 bool one_interval_is_exact(const Request& request) {
   const Params& params = request.params;
-  if (params.interpolation == Interpolation::arap) return request.mode == Mode::move;
+  if (params.interpolation == Interpolation::arap) return true;
   if (params.interpolation != Interpolation::rigid || params.rotation != Rotation::shortest_arc) return false;
   std::vector<deform::Drag> drags;
   for (const Handle& handle : request.handles)

@@ -37,7 +37,7 @@ void take_over(const train::Trainer& trainer, std::span<const std::uint32_t> mem
     const std::uint32_t ancestor = members[trainer.ancestors()[child]];
     const Role role = working.role()[ancestor];
     ancestors.push_back(ancestor);
-    roles.push_back(role == Role::seed ? Role::seed : working::is_dragged(role) ? Role::copy : Role::trail);
+    roles.push_back(working::is_new(role) ? role : working::is_dragged(role) ? Role::copy : Role::trail);
   }
   working.append(trainer.cloud(), children, roles, ancestors);
 }

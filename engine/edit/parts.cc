@@ -1,15 +1,22 @@
 #include "engine/edit/parts.h"
 
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <memory>
+#include <optional>
 #include <utility>
 
+#include "engine/core/rows.h"
+#include "engine/deform/attach.h"
 #include "engine/edit/handles.h"
 #include "engine/select/contact.h"
+#include "engine/select/repeat.h"
 
 namespace engine::edit {
 namespace {
+
+using How = deform::Attachment::How;
 
 /// Of the box around the means.
 double longest_edge(const Array3& means, std::span<const std::uint32_t> rows) {
@@ -24,6 +31,28 @@ double longest_edge(const Array3& means, std::span<const std::uint32_t> rows) {
 bool grips_nothing(const Array3& means, std::span<const std::uint32_t> rows, const deform::Drag& drag) {
   return std::ranges::none_of(
       rows, [&](std::uint32_t row) { return glm::distance(DVec3(means.get(row)), drag.source) <= drag.grip; });
+}
+
+/// Of a part that is drawn out and held, and that all its handles take one way: what it grows out of goes on behind it,
+/// if that repeats on this way; else it is stretched.
+void draw_out(const scene::LayeredCloud& scene, std::span<const std::uint32_t> rows,
+              std::span<const select::Touch> touches, std::span<const deform::Drag> drags, Attach asked,
+              deform::Attachment& attachment, Parts& parts) {
+  const std::optional<DVec3> pull = deform::pull_of(drags, attachment.group);
+  if (attachment.how != How::held || !pull) return;
+  attachment.how = How::drawn_out;
+  if (asked != Attach::automatic) return;
+  double limit = std::numeric_limits<double>::infinity();  // handles go with the part
+  for (const deform::Drag& drag : drags) limit = std::min(limit, glm::dot(drag.source, glm::normalize(*pull)));
+  auto repeat = select::find_repeat(scene, rows, touches, *pull, limit);
+  constexpr double most_pieces = 100;  // each has its Gaussians: what goes on and on is better stretched
+  const double way = glm::length(*pull);
+  if (!repeat || way > most_pieces * glm::length(repeat->step)) return;
+  attachment.how = How::continued;
+  attachment.why = "what it grows out of repeats along the way, and goes on";
+  parts.rim.insert(parts.rim.end(), repeat->stays.begin(), repeat->stays.end());
+  parts.continuations.push_back(
+      {attachment.group, way, repeat->step, std::move(repeat->tile), std::move(repeat->depth)});
 }
 
 }  // namespace
@@ -53,11 +82,13 @@ Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> 
     const std::vector<select::Touch> touches = select::contact_of(scene, rows, dragged);
     const auto count = [&](select::Touch touch) { return std::size_t(std::ranges::count(touches, touch)); };
     const std::size_t grows_out = count(select::Touch::grows_out);
-    deform::Attachment attachment = deform::attach(
-        drags, group, {grows_out + count(select::Touch::stands), grows_out, longest_edge(means, rows)}, request.attach);
+    deform::Attachment attachment =
+        deform::attach(drags, group, {grows_out + count(select::Touch::stands), grows_out, longest_edge(means, rows)},
+                       request.attach, request.mode == Mode::extend);
+    if (request.mode == Mode::extend) draw_out(scene, rows, touches, own, request.attach, attachment, parts);
     // Where it grows out of what stays, or, if nowhere, where it stands. What it merely lies against may come apart.
     const select::Touch holds = attachment.grows_out ? select::Touch::grows_out : select::Touch::stands;
-    if (attachment.how == deform::Attachment::How::held)
+    if (attachment.how == How::held || attachment.how == How::drawn_out)
       for (std::size_t k = 0; k < rows.size(); ++k)
         if (touches[k] >= holds && touches[k] != select::Touch::nothing) parts.rim.push_back(rows[k]);
     parts.attachments.push_back(std::move(attachment));
@@ -72,10 +103,22 @@ Parts parts_of(const scene::GaussianCloud& scene, std::span<const std::uint16_t>
   return parts_of(scene::LayeredCloud{borrowed, nullptr}, handle, request);
 }
 
+std::vector<std::uint32_t> rows_in_use(std::span<const std::uint16_t> handle, const Parts& parts) {
+  std::vector<std::uint32_t> rows = rows_where(handle, [](std::uint16_t number) { return number != 0; });
+  for (const Continuation& continuation : parts.continuations)
+    rows.insert(rows.end(), continuation.tile.begin(), continuation.tile.end());
+  std::sort(rows.begin(), rows.end());
+  rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
+  return rows;
+}
+
 Parts among(const Parts& parts, std::span<const std::uint32_t> rows) {
-  Parts out{parts.attachments, {}, parts.idle};
-  for (std::uint32_t k = 0; k < rows.size(); ++k)
-    if (std::ranges::binary_search(parts.rim, rows[k])) out.rim.push_back(k);
+  Parts out = parts;
+  const auto renumber = [&](std::vector<std::uint32_t>& of) {
+    for (std::uint32_t& row : of) row = std::uint32_t(std::ranges::lower_bound(rows, row) - rows.begin());
+  };
+  renumber(out.rim);
+  for (Continuation& continuation : out.continuations) renumber(continuation.tile);
   return out;
 }
 

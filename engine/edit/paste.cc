@@ -37,6 +37,13 @@ std::vector<std::uint32_t> copy_and_paste(WorkingScene& working, const PlannedMo
     for (std::size_t k = begin; k < end; ++k)
       deform::apply(motion.deformation, entries[k], rotate_sh, working.gaussians(), copies[k]);
   });
+  const std::uint32_t first =
+      working.append(working.cloud(), motion.continued,
+                     std::vector<working::Role>(motion.continued.size(), working::Role::continued), motion.continued);
+  for (std::uint32_t k = 0; k < motion.continued.size(); ++k) {
+    working.gaussians().mean.set(first + k, Vec3(DVec3(working.cloud().mean.get(first + k)) + motion.shift[k]));
+    copies.push_back(first + k);
+  }
   std::sort(copies.begin(), copies.end());
   return copies;
 }

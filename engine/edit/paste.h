@@ -18,8 +18,9 @@ namespace engine::edit {
 ///   min(alpha, keep); if alpha is below keep its bytes stay as they are;
 /// - a copy that moves again: in a move its successor replaces it (same row); in an extend it stays as the trail, at
 ///   min(alpha, keep), and its successor is a new row.
+/// - what goes on behind a part that is drawn out becomes rows of its own.
 /// mean_at_deform of all of P_h becomes the mean before the motion.
-///   returns  the rows that hold the deformed copies now, ascending
+///   returns  the rows that hold the deformed copies now, and what goes on behind them, ascending
 std::vector<std::uint32_t> copy_and_paste(WorkingScene& working, const PlannedMotion& motion, Mode mode,
                                           bool rotate_sh);
 

@@ -19,11 +19,11 @@ Result<PreviewOutcome> preview(const scene::LayeredCloud& scene, const Request& 
 
   const Parts parts = parts_of(scene, assignment->handle, request);
   outcome.parts = parts.attachments;
-  std::vector<std::uint32_t> rows = dragged_rows(assignment->handle);
+  std::vector<std::uint32_t> rows = rows_in_use(assignment->handle, parts);
   const scene::GaussianCloud dragged = scene::gather(scene, rows);
   DraggedAlone drag = drag_alone(std::move(rows), dragged, assignment->handle, request, parts, outcome.intervals,
                                  request.params.rotate_sh);
-  Published published = publish(drag.working, dragged, request.mode);
+  Published published = publish(drag.working, dragged, departure_of(request));
 
   outcome.overlay = std::move(published.overlay);
   for (auto* list : {&outcome.overlay.removed, &outcome.overlay.changed})

@@ -58,6 +58,12 @@ struct Request {
                              ///< habit, y down.
 };
 
+/// What becomes of the place that the part comes from. A body that is drawn out leaves nothing behind, as in a move: it
+/// is what lies between. A ball that is drawn out leaves its trail.
+[[nodiscard]] constexpr Mode departure_of(const Request& request) {
+  return request.params.interpolation == Interpolation::arap ? Mode::move : request.mode;
+}
+
 /// Ranges and finiteness of every field.
 ///   errors  invalid_argument: `where` is the address, such as "handles[2].radius" or "params.views"
 [[nodiscard]] Result<void> validate(const Request& request);

@@ -28,12 +28,8 @@ repair::Repair make_repair(const State& state, const Edit& edit) {
       out.push_back(scene::fit_within(frame.edit_from_world(camera), edit.params().max_image_side));
     return out;
   };
-  return {frame.edit_from_world(edit.input),
-          in_frame(edit.candidates),
-          in_frame(state.views),
-          edit.request.mode,
-          edit.params().seed,
-          *edit.corrector};
+  return {frame.edit_from_world(edit.input), in_frame(edit.candidates), in_frame(state.views),
+          departure_of(edit.request),        edit.params().seed,        *edit.corrector};
 }
 
 /// Without a corrector I_e is what the scene shows before the optimisation. In a move that is without what has left: a
@@ -115,7 +111,7 @@ Result<PlannedMotion> deform(const State& state, Edit& edit, int u) {
 
 Result<Rows> paste(State& state, Edit& edit, int u, const PlannedMotion& motion) {
   if (auto going = edit.progress.enter(Stage::deform, u); !going) return propagate(going);
-  Rows copies = copy_and_paste(state.scene, motion, edit.request.mode, edit.params().rotate_sh);
+  Rows copies = copy_and_paste(state.scene, motion, departure_of(edit.request), edit.params().rotate_sh);
   // An elastic body has drawn its Gaussians out already.
   if (edit.corrector != nullptr && edit.optimises() && edit.params().interpolation != Interpolation::arap)
     repair::draw_out(state.scene);
@@ -155,7 +151,7 @@ Result<double> optimise(State& state, Edit& edit, std::span<const scene::Mask> m
                         const repair::Round& round) {
   if (auto going = edit.progress.enter(Stage::set_up, round.interval); !going) return propagate(going);
   std::optional<Uncorrected> uncorrected;
-  if (edit.corrector == nullptr) uncorrected.emplace(state, edit.request.mode);
+  if (edit.corrector == nullptr) uncorrected.emplace(state, departure_of(edit.request));
   const auto picture = [&](std::size_t v) {
     return uncorrected ? uncorrected->picture(v) : std::optional(std::move(corrected.pictures[v]));
   };
@@ -181,7 +177,7 @@ Result<void> relocate_handles(State& state, Edit& edit, int u) {
 Result<void> show(const State& state, Edit& edit, int u, const char* moment, std::span<const scene::Image> pictures) {
   if (!edit.observer.moment) return {};
   if (auto going = edit.progress.enter(Stage::pictures, u); !going) return going;
-  const Published published = publish(state.scene, edit.input, edit.request.mode);
+  const Published published = publish(state.scene, edit.input, departure_of(edit.request));
   return edit.observer.moment({u, state.report.resolved.intervals, moment, published.overlay, state.views, pictures});
 }
 

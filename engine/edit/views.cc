@@ -36,7 +36,7 @@ struct DryRun {
 /// Where the whole drag would take the dragged rows: a function of what moves alone.
 DryRun dry_run(const WorkingScene& begun, const scene::GaussianCloud& input, const Request& request, const Parts& parts,
                int intervals) {
-  std::vector<std::uint32_t> rows = begun.dragged_rows();
+  std::vector<std::uint32_t> rows = rows_in_use(begun.handle(), parts);
   const scene::GaussianCloud gaussians = scene::gather(input, rows);
   const DraggedAlone drag =
       drag_alone(std::move(rows), gaussians, begun.handle(), request, parts, intervals, /*rotate_sh=*/false);
@@ -48,9 +48,9 @@ DryRun dry_run(const WorkingScene& begun, const scene::GaussianCloud& input, con
   const std::uint32_t added_from = std::uint32_t(begun.size() + originals.size() - alone.input_rows());
   std::vector<std::uint32_t> taken = originals;
   for (auto row = std::uint32_t(alone.input_rows()); row < alone.size(); ++row) taken.push_back(row);
-  for (const std::uint32_t row : alone.rows_of(working::Role::copy)) {
-    out.copies.push_back(added_from + row);
-    out.parents.push_back(drag.rows[alone.parent()[row]]);
+  for (auto row = std::uint32_t(alone.input_rows()); row < alone.size(); ++row) {
+    if (working::has_arrived(alone.role()[row])) out.copies.push_back(added_from + row);
+    if (alone.role()[row] == working::Role::copy) out.parents.push_back(drag.rows[alone.parent()[row]]);
   }
   out.top = scene::gather(alone.cloud(), taken);
   std::sort(out.parents.begin(), out.parents.end());

@@ -106,7 +106,7 @@ Workload workload_of(std::size_t gaussians, const Request& request, bool correct
   work.corrections = request.params.annealing_steps;
   work.iterations = request.params.iterations;
   work.corrected = corrected;
-  work.vacates = request.mode == Mode::move;
+  work.vacates = departure_of(request) == Mode::move;
   return work;
 }
 

@@ -369,4 +369,21 @@ std::vector<double> distances_to(const NeighbourGraph& joined, std::span<const s
   return nearest;
 }
 
+std::vector<double> distances_to(const Graph& graph, std::span<const std::uint32_t> nodes) {
+  std::vector<double> nearest(graph.size(), infinity);
+  Queue queue;
+  for (const std::uint32_t node : nodes) nearest[node] = 0, queue.push({0, node});
+  while (!queue.empty()) {
+    const auto [so_far, i] = queue.top();
+    queue.pop();
+    if (so_far > nearest[i]) continue;
+    for (std::uint32_t edge = graph.begin[i]; edge < graph.begin[i + 1]; ++edge) {
+      const std::uint32_t j = graph.to[edge];
+      const double there = so_far + glm::distance(graph.rest[i], graph.rest[j]);
+      if (there < nearest[j]) nearest[j] = there, queue.push({there, j});
+    }
+  }
+  return nearest;
+}
+
 }  // namespace engine::elastic

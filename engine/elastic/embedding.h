@@ -64,5 +64,7 @@ struct Near {
 /// How far each point is from the nearest of some, along the body; infinity where there is no way to one.
 [[nodiscard]] std::vector<double> distances_to(const neighbours::NeighbourGraph& joined,
                                                std::span<const std::uint32_t> points);
+/// The same for nodes, from node to node.
+[[nodiscard]] std::vector<double> distances_to(const Graph& graph, std::span<const std::uint32_t> nodes);
 
 }  // namespace engine::elastic

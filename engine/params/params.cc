@@ -71,7 +71,7 @@ int preset_intervals(Preset preset, const DragKind& drag) {
 Interpolation preset_interpolation(Preset preset, const DragKind& drag) {
   const Interpolation usual = filled_in({}, preset).interpolation;
   if (preset == Preset::paper) return usual;
-  return drag.turns || (drag.selected && !drag.extends) ? Interpolation::arap : usual;
+  return drag.turns || drag.selected ? Interpolation::arap : usual;
 }
 
 Result<void> validate(const Values& values) {

@@ -203,7 +203,7 @@ Result<Corrected> Repair::correct(WorkingScene& working, std::span<const scene::
   }
   corrected.trust = std::move(trust_);  // seeds, trails and originals are what the optimisation is to change
   for (std::size_t i = 0; i < working.size(); ++i)
-    if (!working::is_dragged(working.role()[i])) corrected.trust[i] = 0;
+    if (!working::is_dragged(working.role()[i]) && working.role()[i] != Role::continued) corrected.trust[i] = 0;
   return corrected;
 }
 
@@ -211,7 +211,7 @@ Repair::Rows Repair::rows_of(const WorkingScene& working) const {
   Rows rows;
   for (std::uint32_t i = 0; i < working.size(); ++i) {
     const bool is_gone = working::has_left(working.role()[i]) && mode_ == Mode::move;
-    const bool is_moved = working.role()[i] == Role::copy;
+    const bool is_moved = working::has_arrived(working.role()[i]);
     if (is_gone) rows.gone.push_back(i);
     if (is_gone && i < working.input_rows()) rows.vacating.push_back(i);
     if (is_moved) rows.moved.push_back(i);

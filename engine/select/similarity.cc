@@ -55,14 +55,6 @@ DMat3 covariance_of(const DMat3& rotation, DVec3 variance) {
   return scaled * glm::transpose(rotation);
 }
 
-Vec3 color_of(const scene::GaussianCloud& cloud, std::size_t row) {
-  const std::size_t stride = scene::sh_coefficients(cloud.sh_degree);
-  Vec3 color;
-  for (int c = 0; c < 3; ++c)
-    color[c] = std::clamp(0.5f + float(scene::sh_c0) * cloud.sh_row(row)[std::size_t(c) * stride], 0.0f, 1.0f);
-  return color;
-}
-
 Look look_of(const scene::GaussianCloud& cloud, std::size_t row, double spacing) {
   const DMat3 rotation = rotation_of_row(cloud, row);
   const DVec3 extent = extent_of(cloud, row), variance = thickened(extent, spacing);
@@ -130,6 +122,14 @@ std::vector<Vec3> smoothed(const neighbours::NeighbourGraph& graph, std::span<co
 }
 
 }  // namespace
+
+Vec3 color_of(const scene::GaussianCloud& cloud, std::size_t row) {
+  const std::size_t stride = scene::sh_coefficients(cloud.sh_degree);
+  Vec3 color;
+  for (int c = 0; c < 3; ++c)
+    color[c] = std::clamp(0.5f + float(scene::sh_c0) * cloud.sh_row(row)[std::size_t(c) * stride], 0.0f, 1.0f);
+  return color;
+}
 
 std::vector<float> similarity_of_edges(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
                                        const neighbours::NeighbourGraph& graph) {

@@ -21,6 +21,9 @@ namespace engine::select {
                                                      std::span<const std::uint32_t> rows,
                                                      const neighbours::NeighbourGraph& graph);
 
+/// Of SH band 0, 0 to 1 per channel.
+[[nodiscard]] Vec3 color_of(const scene::GaussianCloud& cloud, std::size_t row);
+
 /// How much a Gaussian covers a point: its opacity times its falloff there, 0 to 1.
 ///   spacing  of its node, world units: none counts as thinner than half of that
 [[nodiscard]] double cover(const scene::GaussianCloud& cloud, std::size_t row, double spacing, DVec3 point);

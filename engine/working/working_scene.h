@@ -24,12 +24,17 @@ enum class Role : std::uint8_t {
   trail,     ///< Not the input's and not in P_h: a copy that was copied in turn, in an extend, its opacity lowered; or
              ///< a child that the optimisation gave an original.
   seed,      ///< New, of the repair: a surface that nobody has seen goes on there. So are its children.
+  continued  ///< New, of the deformation: what a part was drawn out of goes on there. So are its children.
 };
 
 /// Are rows of this role members of P_h?
 [[nodiscard]] constexpr bool is_dragged(Role role) { return role == Role::held || role == Role::copy; }
 /// Have rows of this role left their place, in a move? Originals have, and children that the optimisation gave them.
 [[nodiscard]] constexpr bool has_left(Role role) { return role == Role::original || role == Role::trail; }
+/// Are rows of this role neither the input's nor copies of what is dragged?
+[[nodiscard]] constexpr bool is_new(Role role) { return role == Role::seed || role == Role::continued; }
+/// Are rows of this role where the drag brought something?
+[[nodiscard]] constexpr bool has_arrived(Role role) { return role == Role::copy || role == Role::continued; }
 /// May rows of this role be the input's?
 [[nodiscard]] constexpr bool is_of_input(Role role) {
   return role == Role::frozen || role == Role::held || role == Role::original;
@@ -41,7 +46,7 @@ using HandleColumn = std::vector<std::uint16_t>;
 /// A Gaussian and what the edit knows of it, N rows of one kind. Invariants, which check() states as code:
 /// - every column has a value for each Gaussian of the cloud;
 /// - rows [0, input_rows()) are the input's, in its order, each its own parent, frozen, held or original; the rest were
-///   appended, in the order they were made, and are copies, trails or seeds, with an input row for a parent;
+///   appended, in the order they were made, and are copies, trails, seeds or continued, with an input row for a parent;
 /// - a row has a handle exactly if it belongs to P_h: if it is held or a copy;
 /// - frozen rows are the input's bytes, in the frame of the edit.
 class WorkingScene {
@@ -71,7 +76,7 @@ class WorkingScene {
   [[nodiscard]] scene::GaussianCloud& gaussians() { return cloud_; }
   /// Row k of the new ones is row rows[k] of `from` (which may be cloud() itself), of role[k], and comes from row
   /// ancestor[k] of this scene: it has its parent and, where its role has one, its handle and its mean_at_deform.
-  ///   role     copy, trail or seed; a copy's ancestor belongs to P_h
+  ///   role     copy, trail, seed or continued; a copy's ancestor belongs to P_h
   ///   returns  the first new row
   std::uint32_t append(const scene::GaussianCloud& from, std::span<const std::uint32_t> rows,
                        std::span<const Role> role, std::span<const std::uint32_t> ancestor);

@@ -226,6 +226,54 @@ TEST(Body, GrowsAndShrinksByALot) {
   }
 }
 
+/// The bar with its left end held, its right end pulled.
+Deformation drawn_out(const scene::GaussianCloud& cloud, DVec3 pull, double held_to = 0.25) {
+  const std::vector<Drag> drags{{.source = tip, .target = tip + pull}};
+  return Body(cloud, all_rows(cloud), drags, held_left_of(cloud, held_to)).draw_out(cloud, drags, pull);
+}
+
+TEST(DrawOut, StretchesBetweenWhatIsHeldAndTheHandle) {
+  const auto cloud = bar();
+  const DVec3 pull(3, 0, 0);
+  const Deformation found = drawn_out(cloud, pull);
+  scene::GaussianCloud moved = cloud;
+  std::size_t stretched = 0;
+  for (std::size_t row = 0; row < cloud.size(); ++row) {
+    const DVec3 before(cloud.mean.get(row)), after(found.mean.get(row));
+    EXPECT_NEAR(after.y, before.y, 0.02) << row;
+    EXPECT_NEAR(after.z, before.z, 0.02) << row;
+    if (before.x < 0.25) {
+      EXPECT_EQ(after, before) << row;
+    } else if (before.x > 5.9) {
+      EXPECT_NEAR(after.x, before.x + pull.x, 0.06) << row;
+    } else {  // by its share of the way, as nodes see it
+      EXPECT_NEAR(after.x - before.x, pull.x * (before.x - 0.25) / 5.65, 0.25) << row;
+    }
+    if (before.x < 1 || before.x > 5) continue;
+    apply(found, row, true, moved, row);
+    const Vec3 grown = moved.log_scale.get(row) - cloud.log_scale.get(row);
+    const float most = std::max({grown.x, grown.y, grown.z});
+    EXPECT_GT(most, 0.2f) << row;
+    EXPECT_LT(most, 0.7f) << row;
+    ++stretched;
+  }
+  EXPECT_GT(stretched, 500u);
+}
+
+TEST(DrawOut, TakesAllAlongIfNothingIsHeld) {
+  const auto cloud = bar();
+  const Deformation found = drawn_out(cloud, {3, 1, 0}, -1);
+  for (std::size_t row = 0; row < cloud.size(); ++row)
+    EXPECT_LT(glm::distance(DVec3(found.mean.get(row)), DVec3(cloud.mean.get(row)) + DVec3(3, 1, 0)), 1e-5) << row;
+}
+
+TEST(DrawOut, OfRowsInOnePlaceIsFinite) {
+  scene::GaussianCloud cloud;
+  add_bar(cloud, tip, 2, 0, 0);
+  const auto found = drawn_out(cloud, {1e6, 0, 0}, 100);
+  for (std::size_t row = 0; row < cloud.size(); ++row) EXPECT_TRUE(std::isfinite(found.mean.get(row).x)) << row;
+}
+
 TEST(Body, GivesTheSameBytesForAnyNumberOfThreads) {
   const auto cloud = bar();
   const auto with = [&](int threads) {

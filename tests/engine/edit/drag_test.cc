@@ -206,7 +206,7 @@ TEST(DragAlone, IsTheDragOfTheWholeSceneWithoutItsOtherRows) {
       WorkingScene whole = begun;
       const CarriedOut carried = carry_out(whole, request, 3);
 
-      const std::vector<std::uint32_t> rows = dragged_rows(begun.handle());
+      const std::vector<std::uint32_t> rows = rows_in_use(begun.handle(), {});
       EXPECT_EQ(rows, begun.dragged_rows());
       scene::GaussianCloud gaussians;
       gaussians.sh_degree = scene.sh_degree, gaussians.extra_stride = scene.extra_stride;

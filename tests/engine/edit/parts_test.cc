@@ -62,7 +62,19 @@ TEST(PartsOf, AreNoneForOtherInterpolations) {
 }
 
 TEST(Among, NumbersRowsAsASceneOfTheseAloneDoes) {
-  EXPECT_EQ(among({{}, {3, 5, 9}, {}}, std::vector<std::uint32_t>{1, 3, 4, 9}).rim, (std::vector<std::uint32_t>{1, 3}));
+  const Parts all{
+      .attachments = {}, .rim = {3, 9}, .continuations = {{0, 1, DVec3(1, 0, 0), {1, 4}, {0.5, 1}}}, .idle = {}};
+  const Parts few = among(all, std::vector<std::uint32_t>{1, 3, 4, 9});
+  EXPECT_EQ(few.rim, (std::vector<std::uint32_t>{1, 3}));
+  EXPECT_EQ(few.continuations[0].tile, (std::vector<std::uint32_t>{0, 2}));
+}
+
+TEST(RowsInUse, AreTheDraggedOnesAndThoseThatGoOn) {
+  const std::vector<std::uint16_t> handle{0, 1, 0, 2, 0};
+  EXPECT_EQ(rows_in_use(handle, {}), (std::vector<std::uint32_t>{1, 3}));
+  Parts parts;
+  parts.continuations.push_back({0, 1, DVec3(1, 0, 0), {0, 3}, {1, 0.5}});
+  EXPECT_EQ(rows_in_use(handle, parts), (std::vector<std::uint32_t>{0, 1, 3}));
 }
 
 TEST(ElasticBody, LeavesItsRimAndComesToItsTarget) {

@@ -124,6 +124,10 @@ TEST(WorkingScene, TrailsAndSeedsHaveAParentButNoHandle) {
   EXPECT_EQ(working.dragged_rows(), (Rows{0, 2, 4, 6, 8}));
   EXPECT_EQ(working.member_rows(), (Rows{0, 2, 4, 6, 8, trail, seed}));
   EXPECT_EQ(working.rows_of(Role::seed), Rows{seed});
+  const std::uint32_t continued = begun.append(Role::continued, 3);
+  EXPECT_TRUE(working.check());
+  EXPECT_EQ(working.parent()[continued], 3u);
+  EXPECT_EQ(working.handle()[continued], 0);
 }
 
 TEST(WorkingScene, AppendsSeveralRowsOfAnotherCloudInTheirOrder) {
@@ -292,9 +296,14 @@ TEST(Members, OfAnotherSceneAreRefused) {
 
 TEST(Roles, AreTheInputsOrTheEditsAndDraggedOrNot) {
   for (const Role role : {Role::frozen, Role::held, Role::original}) EXPECT_TRUE(is_of_input(role));
-  for (const Role role : {Role::copy, Role::trail, Role::seed}) EXPECT_FALSE(is_of_input(role));
+  for (const Role role : {Role::copy, Role::trail, Role::seed, Role::continued}) EXPECT_FALSE(is_of_input(role));
   for (const Role role : {Role::held, Role::copy}) EXPECT_TRUE(is_dragged(role));
-  for (const Role role : {Role::frozen, Role::original, Role::trail, Role::seed}) EXPECT_FALSE(is_dragged(role));
+  for (const Role role : {Role::frozen, Role::original, Role::trail, Role::seed, Role::continued})
+    EXPECT_FALSE(is_dragged(role));
+  for (const Role role : {Role::copy, Role::continued}) EXPECT_TRUE(has_arrived(role));
+  for (const Role role : {Role::held, Role::original, Role::trail, Role::seed}) EXPECT_FALSE(has_arrived(role));
+  for (const Role role : {Role::seed, Role::continued}) EXPECT_TRUE(is_new(role));
+  for (const Role role : {Role::held, Role::original, Role::trail, Role::copy}) EXPECT_FALSE(is_new(role));
 }
 
 TEST(KeepLogit, IsOneHundredthInAMoveAndOneHalfInAnExtend) {
