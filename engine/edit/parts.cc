@@ -33,6 +33,27 @@ bool grips_nothing(const Array3& means, std::span<const std::uint32_t> rows, con
       rows, [&](std::uint32_t row) { return glm::distance(DVec3(means.get(row)), drag.source) <= drag.grip; });
 }
 
+/// Where a part is held: where it grows out of what stays, or, if nowhere, where it stands. What it merely lies against
+/// may come apart. Anchors say which of it is meant: of an arm whose shoulder is anchored not the helmet that it holds
+/// against a leg.
+void hold(const Array3& means, std::span<const std::uint32_t> rows, std::span<const select::Touch> touches,
+          std::span<const deform::Drag> drags, deform::Attachment& attachment, Parts& parts) {
+  constexpr double near_anchor = 0.5;  // of the part's longest edge
+  const double near = near_anchor * longest_edge(means, rows);
+  const bool has_anchors = std::ranges::any_of(drags, &deform::Drag::anchor);
+  const auto is_meant = [&](std::uint32_t row) {
+    return !has_anchors || std::ranges::any_of(drags, [&](const deform::Drag& drag) {
+      return drag.anchor && glm::distance(DVec3(means.get(row)), drag.source) <= near;
+    });
+  };
+  const select::Touch holds = attachment.grows_out ? select::Touch::grows_out : select::Touch::stands;
+  const std::size_t before = parts.rim.size();
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    if (touches[k] >= holds && touches[k] != select::Touch::nothing && is_meant(rows[k])) parts.rim.push_back(rows[k]);
+  if (parts.rim.size() == before)
+    attachment.how = How::free, attachment.why = "its anchors hold it, where nothing else does";
+}
+
 /// Of a part that is drawn out and held, and that all its handles take one way: what it grows out of goes on behind it,
 /// if that repeats on this way; else it is stretched.
 void draw_out(const scene::LayeredCloud& scene, std::span<const std::uint32_t> rows,
@@ -86,11 +107,8 @@ Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> 
         deform::attach(drags, group, {grows_out + count(select::Touch::stands), grows_out, longest_edge(means, rows)},
                        request.attach, request.mode == Mode::extend);
     if (request.mode == Mode::extend) draw_out(scene, rows, touches, own, request.attach, attachment, parts);
-    // Where it grows out of what stays, or, if nowhere, where it stands. What it merely lies against may come apart.
-    const select::Touch holds = attachment.grows_out ? select::Touch::grows_out : select::Touch::stands;
     if (attachment.how == How::held || attachment.how == How::drawn_out)
-      for (std::size_t k = 0; k < rows.size(); ++k)
-        if (touches[k] >= holds && touches[k] != select::Touch::nothing) parts.rim.push_back(rows[k]);
+      hold(means, rows, touches, own, attachment, parts);
     parts.attachments.push_back(std::move(attachment));
   }
   std::sort(parts.rim.begin(), parts.rim.end());

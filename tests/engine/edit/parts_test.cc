@@ -54,6 +54,27 @@ TEST(PartsOf, HoldWhatGrowsOutOfTheRest) {
   for (const std::uint32_t row : parts.rim) EXPECT_LT(cloud.mean.get(row).x, 2.2f);
 }
 
+TEST(PartsOf, HoldWhatGrowsOutOfTheRestNearTheirAnchors) {
+  const auto cloud = wall();
+  Request request = pulled(cloud, {0, 0, 1});
+  std::erase_if(*request.selected, [&](std::uint32_t row) { return cloud.mean.get(row).x > 3.05f; });
+  request.handles[0].source = DVec3(2.5, 1.9, 0);
+  request.handles[0].target = DVec3(2.5, 1.9, 0.4);
+  const auto rims = [&] {
+    std::pair<std::size_t, std::size_t> at{0, 0};
+    for (const std::uint32_t row : parts_of(cloud, assign(cloud.mean, request)->handle, request).rim)
+      ++(cloud.mean.get(row).x < 2.5f ? at.first : at.second);
+    return at;
+  };
+  const auto all = rims();
+  EXPECT_GE(all.first, 20u);
+  EXPECT_GE(all.second, 20u);
+  request.handles.push_back({DVec3(2.0, 0.5, 0), std::nullopt, 0.15});
+  const auto anchored = rims();
+  EXPECT_GE(anchored.first, 12u);
+  EXPECT_LE(anchored.second, 8u) << "as far from the anchor as from half of the part";
+}
+
 TEST(PartsOf, AreNoneForOtherInterpolations) {
   const auto cloud = wall();
   Request request = pulled(cloud, {0, 0, 1});
