@@ -70,8 +70,9 @@ bool only_turns(const DMat3& map, const DQuat& turn) {
 
 Body::Body(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows, std::span<const Drag> drags,
            std::span<const std::uint8_t> held)
-    : rows_(rows.begin(), rows.end()) {
+    : rows_(rows.begin(), rows.end()), drags_(drags.begin(), drags.end()), held_(held.begin(), held.end()) {
   assert(!rows.empty() && held.size() == rows.size());
+  for (const std::uint32_t row : rows_) means_.push_back(cloud.mean.get(row));
   DVec3 low(cloud.mean.get(rows[0])), high(low);
   for (const std::uint32_t row : rows_) {
     const DVec3 mean(cloud.mean.get(row));
@@ -92,6 +93,19 @@ Body::Body(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> row
   grip(joined, nearest, drags);
   hold(joined, nearest, drags, held);
   solver_ = std::make_unique<elastic::Solver>(embedding_.graph, grips_);
+}
+
+bool Body::is_of(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows, std::span<const Drag> drags,
+                 std::span<const std::uint8_t> held) const {
+  const auto is_same_drag = [](const Drag& a, const Drag& b) {
+    return a.source == b.source && a.anchor == b.anchor && a.grip == b.grip;
+  };
+  if (!std::ranges::equal(rows, rows_) || !std::ranges::equal(held, held_) ||
+      !std::ranges::equal(drags, drags_, is_same_drag))
+    return false;
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    if (cloud.mean.get(rows[k]) != means_.get(k)) return false;
+  return true;
 }
 
 void Body::grip(const neighbours::NeighbourGraph& joined, std::span<const std::uint32_t> nearest,

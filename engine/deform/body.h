@@ -31,6 +31,10 @@ class Body {
   Body(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows, std::span<const Drag> drags,
        std::span<const std::uint8_t> held);
 
+  /// Would the constructor make the same of these?
+  [[nodiscard]] bool is_of(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
+                           std::span<const Drag> drags, std::span<const std::uint8_t> held) const;
+
   /// Where the rows go, with their extents: stretched as the body is.
   ///   drags  those of the constructor, with targets
   [[nodiscard]] Deformation follow(const scene::GaussianCloud& cloud, std::span<const Drag> drags) const;
@@ -50,8 +54,11 @@ class Body {
   [[nodiscard]] std::vector<std::vector<elastic::GripPose>> way_of(std::span<const Drag> drags) const;
 
   std::vector<std::uint32_t> rows_;
-  DVec3 origin_{0.0};  ///< Of the nodes' coordinates, in the frame of the cloud.
-  double size_ = 0;    ///< Longest side of the box around the rows.
+  std::vector<Drag> drags_;         ///< Where they go does not matter.
+  std::vector<std::uint8_t> held_;  ///< [rows]
+  Array3 means_;                    ///< [rows] in the frame of the cloud.
+  DVec3 origin_{0.0};               ///< Of the nodes' coordinates, in the frame of the cloud.
+  double size_ = 0;                 ///< Longest side of the box around the rows.
   /// [rows] how much of the body's motion a row takes: 0 where it is held, 1 a node's spacing away. Empty: all of it.
   std::vector<float> freedom_;
   elastic::Embedding embedding_;

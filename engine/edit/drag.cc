@@ -7,7 +7,6 @@
 
 #include "engine/core/rows.h"
 #include "engine/deform/attach.h"
-#include "engine/deform/body.h"
 #include "engine/deform/rigid.h"
 #include "engine/edit/handles.h"
 #include "engine/edit/messages.h"
@@ -53,7 +52,7 @@ void keep(std::span<const std::uint8_t> of, std::uint8_t value, std::vector<std:
 /// The rows of one group.
 deform::Deformation follow(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
                            std::span<const deform::Drag> drags, std::span<const std::uint8_t> held,
-                           const deform::Attachment& attachment) {
+                           const deform::Attachment& attachment, Memory& memory) {
   using How = deform::Attachment::How;
   const deform::RigidMotion nearest = deform::nearest_motion(drags, attachment.group, attachment.scales);
   switch (attachment.how) {
@@ -62,17 +61,17 @@ deform::Deformation follow(const scene::GaussianCloud& cloud, std::span<const st
     case How::continued:
       return deform::deformation(cloud, rows, {.shift = nearest.shift});
     case How::drawn_out:
-      return deform::Body(cloud, rows, drags, held).draw_out(cloud, drags, nearest.shift);
+      return memory.body_of(cloud, rows, drags, held).draw_out(cloud, drags, nearest.shift);
     case How::free:
     case How::held:
       break;
   }
-  return deform::Body(cloud, rows, drags, held).follow(cloud, drags);
+  return memory.body_of(cloud, rows, drags, held).follow(cloud, drags);
 }
 
 /// Each group of the rows as a body by itself.
 deform::Deformation follow_as_bodies(const WorkingScene& working, std::span<const std::uint32_t> rows,
-                                     std::span<const deform::Drag> drags, const Parts& parts) {
+                                     std::span<const deform::Drag> drags, const Parts& parts, Memory& memory) {
   deform::Deformation out = deform::at_rest(working.cloud(), rows);
   for (const deform::Attachment& attachment : parts.attachments) {
     std::vector<deform::Drag> own_drags;
@@ -89,7 +88,7 @@ deform::Deformation follow_as_bodies(const WorkingScene& working, std::span<cons
     }
     if (own_rows.empty()) continue;
     if (attachment.how == deform::Attachment::How::continued) keep(held, 0, own_rows, at);
-    deform::scatter(follow(working.cloud(), own_rows, own_drags, held, attachment), at, out);
+    deform::scatter(follow(working.cloud(), own_rows, own_drags, held, attachment, memory), at, out);
   }
   return out;
 }
@@ -100,11 +99,12 @@ bool is_at_rest(const deform::Drag& drag) {
 }
 
 deform::Deformation follow_handles(const WorkingScene& working, std::span<const std::uint32_t> rows,
-                                   std::span<const deform::Drag> drags, const Request& request, const Parts& parts) {
+                                   std::span<const deform::Drag> drags, const Request& request, const Parts& parts,
+                                   Memory& memory) {
   const Params& params = request.params;
   if (params.interpolation == Interpolation::arap)
     return std::ranges::all_of(drags, is_at_rest) ? deform::at_rest(working.cloud(), rows)
-                                                  : follow_as_bodies(working, rows, drags, parts);
+                                                  : follow_as_bodies(working, rows, drags, parts, memory);
   auto motions = deform::handle_motions(drags, params.rotation);
   if (params.interpolation == Interpolation::rigid && params.rotation == Rotation::shortest_arc)
     deform::turn_whole_groups(drags, motions);
@@ -126,11 +126,11 @@ void go_on(const Continuation& continuation, int u, int intervals, PlannedMotion
 }  // namespace
 
 PlannedMotion plan_motion(const WorkingScene& working, const Request& request, const Parts& parts,
-                          std::span<const DVec3> positions, int u, int intervals) {
+                          std::span<const DVec3> positions, int u, int intervals, Memory& memory) {
   const auto drags = interval_drags(working.frame(), request, positions, u, intervals);
   PlannedMotion motion;
   motion.rows = working.dragged_rows();
-  motion.deformation = follow_handles(working, motion.rows, drags, request, parts);
+  motion.deformation = follow_handles(working, motion.rows, drags, request, parts, memory);
   for (std::size_t k = 0; k < motion.rows.size(); ++k)
     if (motion.deformation.moves[k]) motion.moving.push_back(motion.rows[k]);
   for (const Continuation& continuation : parts.continuations) go_on(continuation, u, intervals, motion);
@@ -139,7 +139,7 @@ PlannedMotion plan_motion(const WorkingScene& working, const Request& request, c
 
 DraggedAlone drag_alone(std::vector<std::uint32_t> rows, const scene::GaussianCloud& gaussians,
                         std::span<const std::uint16_t> handle, const Request& request, const Parts& parts,
-                        int intervals, bool rotate_sh) {
+                        int intervals, bool rotate_sh, Memory& memory) {
   working::HandleColumn own_handle;
   for (const std::uint32_t row : rows) own_handle.push_back(handle[row]);
   const working::Frame frame = frame_of(request);
@@ -147,7 +147,7 @@ DraggedAlone drag_alone(std::vector<std::uint32_t> rows, const scene::GaussianCl
   DraggedAlone drag{
       std::move(rows), WorkingScene(gaussians, frame, std::move(own_handle)), handle_sources(frame, request), {}};
   for (int u = 1; u <= intervals; ++u) {
-    const PlannedMotion motion = plan_motion(drag.working, request, own_parts, drag.positions, u, intervals);
+    const PlannedMotion motion = plan_motion(drag.working, request, own_parts, drag.positions, u, intervals, memory);
     copy_and_paste(drag.working, motion, departure_of(request), rotate_sh);
     for (const std::size_t lost : relocate(drag.working, request, drag.positions))
       drag.warnings.push_back(handle_lost(lost, u));

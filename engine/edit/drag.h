@@ -34,9 +34,10 @@ struct PlannedMotion {
 };
 
 /// The deformation of interval u = 1..intervals, from the handles' present positions (in the frame of `working`).
-///   parts  of the input of `working`
+///   parts   of the input of `working`
+///   memory  of that input
 [[nodiscard]] PlannedMotion plan_motion(const WorkingScene& working, const Request& request, const Parts& parts,
-                                        std::span<const DVec3> positions, int u, int intervals);
+                                        std::span<const DVec3> positions, int u, int intervals, Memory& memory);
 
 /// The Gaussians of a drag alone, after it: no step of a drag looks at any other row, and their order stays.
 struct DraggedAlone {
@@ -52,8 +53,9 @@ struct DraggedAlone {
 ///   handle     [N], of assign()
 ///   parts      of the scene
 ///   rotate_sh  false where only shapes matter
+///   memory     of the scene
 [[nodiscard]] DraggedAlone drag_alone(std::vector<std::uint32_t> rows, const scene::GaussianCloud& gaussians,
                                       std::span<const std::uint16_t> handle, const Request& request, const Parts& parts,
-                                      int intervals, bool rotate_sh);
+                                      int intervals, bool rotate_sh, Memory& memory);
 
 }  // namespace engine::edit

@@ -78,7 +78,8 @@ void draw_out(const scene::LayeredCloud& scene, std::span<const std::uint32_t> r
 
 }  // namespace
 
-Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> handle, const Request& request) {
+Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> handle, const Request& request,
+               Memory& memory) {
   Parts parts;
   if (request.params.interpolation != Interpolation::arap) return parts;
   std::vector<std::uint32_t> dragged;
@@ -100,7 +101,7 @@ Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> 
         own.push_back(drags[i]);
     }
     if (own.empty()) continue;  // anchors alone, and none of them near: nothing moves
-    const std::vector<select::Touch> touches = select::contact_of(scene, rows, dragged);
+    const std::vector<select::Touch>& touches = memory.contact_of(scene, rows, dragged);
     const auto count = [&](select::Touch touch) { return std::size_t(std::ranges::count(touches, touch)); };
     const std::size_t grows_out = count(select::Touch::grows_out);
     deform::Attachment attachment =
@@ -118,7 +119,8 @@ Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> 
 
 Parts parts_of(const scene::GaussianCloud& scene, std::span<const std::uint16_t> handle, const Request& request) {
   const std::shared_ptr<const scene::GaussianCloud> borrowed(std::shared_ptr<const void>(), &scene);
-  return parts_of(scene::LayeredCloud{borrowed, nullptr}, handle, request);
+  Memory memory;
+  return parts_of(scene::LayeredCloud{borrowed, nullptr}, handle, request, memory);
 }
 
 std::vector<std::uint32_t> rows_in_use(std::span<const std::uint16_t> handle, const Parts& parts) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "engine/deform/attach.h"
+#include "engine/edit/memory.h"
 #include "engine/edit/request.h"
 #include "engine/scene/overlay.h"
 
@@ -30,8 +31,9 @@ struct Parts {
 
 /// Looks where each group touches what stays, and decides how it moves.
 ///   handle  [N] of assign()
+///   memory  of this scene
 [[nodiscard]] Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> handle,
-                             const Request& request);
+                             const Request& request, Memory& memory);
 [[nodiscard]] Parts parts_of(const scene::GaussianCloud& scene, std::span<const std::uint16_t> handle,
                              const Request& request);
 

@@ -10,6 +10,11 @@
 namespace engine::edit {
 
 Result<PreviewOutcome> preview(const scene::LayeredCloud& scene, const Request& request) {
+  Memory memory;
+  return preview(scene, request, memory);
+}
+
+Result<PreviewOutcome> preview(const scene::LayeredCloud& scene, const Request& request, Memory& memory) {
   if (const auto valid = validate(request); !valid) return propagate(valid);
   PreviewOutcome outcome;
   auto assignment = assign(scene::means(scene), request);
@@ -17,12 +22,12 @@ Result<PreviewOutcome> preview(const scene::LayeredCloud& scene, const Request& 
   outcome.counts = std::move(assignment->count);
   outcome.intervals = resolved_intervals(request);
 
-  const Parts parts = parts_of(scene, assignment->handle, request);
+  const Parts parts = parts_of(scene, assignment->handle, request, memory);
   outcome.parts = parts.attachments;
   std::vector<std::uint32_t> rows = rows_in_use(assignment->handle, parts);
   const scene::GaussianCloud dragged = scene::gather(scene, rows);
   DraggedAlone drag = drag_alone(std::move(rows), dragged, assignment->handle, request, parts, outcome.intervals,
-                                 request.params.rotate_sh);
+                                 request.params.rotate_sh, memory);
   Published published = publish(drag.working, dragged, departure_of(request));
 
   outcome.overlay = std::move(published.overlay);

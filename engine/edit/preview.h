@@ -6,6 +6,7 @@
 
 #include "engine/core/result.h"
 #include "engine/deform/attach.h"
+#include "engine/edit/memory.h"
 #include "engine/edit/request.h"
 #include "engine/scene/overlay.h"
 
@@ -23,7 +24,9 @@ struct PreviewOutcome {
 
 /// Carries out steps 1 to 4 and 9 of an edit on the dragged Gaussians only: its cost follows P_h, but for one pass over
 /// the means. The result equals that of run() with the same request.
+///   memory  of this scene: what former previews of the same drag have found out is not computed again
 ///   errors  those of run()
+[[nodiscard]] Result<PreviewOutcome> preview(const scene::LayeredCloud& scene, const Request& request, Memory& memory);
 [[nodiscard]] Result<PreviewOutcome> preview(const scene::LayeredCloud& scene, const Request& request);
 
 }  // namespace engine::edit

@@ -106,7 +106,9 @@ Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Cam
 
 Result<PlannedMotion> deform(const State& state, Edit& edit, int u) {
   if (auto going = edit.progress.enter(Stage::deform, u); !going) return propagate(going);
-  return plan_motion(state.scene, edit.request, edit.parts, state.positions, u, state.report.resolved.intervals);
+  Memory memory;  // each interval has bodies of its own
+  return plan_motion(state.scene, edit.request, edit.parts, state.positions, u, state.report.resolved.intervals,
+                     memory);
 }
 
 Result<Rows> paste(State& state, Edit& edit, int u, const PlannedMotion& motion) {

@@ -38,8 +38,9 @@ DryRun dry_run(const WorkingScene& begun, const scene::GaussianCloud& input, con
                int intervals) {
   std::vector<std::uint32_t> rows = rows_in_use(begun.handle(), parts);
   const scene::GaussianCloud gaussians = scene::gather(input, rows);
+  Memory memory;
   const DraggedAlone drag =
-      drag_alone(std::move(rows), gaussians, begun.handle(), request, parts, intervals, /*rotate_sh=*/false);
+      drag_alone(std::move(rows), gaussians, begun.handle(), request, parts, intervals, /*rotate_sh=*/false, memory);
   const WorkingScene& alone = drag.working;
 
   const std::vector<std::uint32_t> originals = alone.rows_of(working::Role::original);

@@ -117,7 +117,7 @@ Result<Checked> check(scenes::SceneStore& scenes, Selections& selections, const 
   if (!version) return propagate(version);
   auto warnings = select_rows(selections, asked, *version, *request);
   if (!warnings) return propagate(warnings);
-  auto preview = edit::preview(version->cloud, *request);
+  auto preview = asked.selection ? selections.preview(*version, *request) : edit::preview(version->cloud, *request);
   if (!preview) return propagate(preview);
   return Checked{std::move(*request), std::move(*version), std::move(*preview), std::move(*warnings)};
 }

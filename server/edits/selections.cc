@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <optional>
 #include <span>
+#include <tuple>
 #include <utility>
 
 #include "engine/core/checksum.h"
@@ -31,6 +33,11 @@ std::string id_of(const std::string& version, const proto::Selection& selection)
   return id.data();
 }
 
+bool is_same_view(const scene::Camera& a, const scene::Camera& b) {
+  const auto values = [](const scene::Camera& c) { return std::tuple(c.fx, c.fy, c.cx, c.cy, c.width, c.height); };
+  return a.rotation == b.rotation && a.translation == b.translation && values(a) == values(b);
+}
+
 }  // namespace
 
 /// What is kept to select in one version. While nobody works at it, it does not hold the scene's memory: if that goes,
@@ -54,6 +61,13 @@ struct Selections::Desk {
   std::shared_ptr<const scene::GaussianCloud> merged;  ///< Null: the version is its base.
   const scene::GaussianCloud& cloud;                   ///< Either of the two.
   engine::select::Selector selector;
+  engine::edit::Memory drags;
+  struct Shown {
+    std::string selection;  ///< MadeSelection::id
+    std::vector<scene::Camera> views;
+    std::vector<double> shares;
+  };
+  std::optional<Shown> shown;  ///< Asked for last.
   TimePoint used{};
 };
 
@@ -106,9 +120,20 @@ Result<std::shared_ptr<const MadeSelection>> Selections::find(const scenes::Load
 std::vector<double> Selections::shown_shares(const scenes::LoadedVersion& version, const MadeSelection& made,
                                              const std::vector<scene::Camera>& views) {
   auto desk = take_desk(version);
-  std::vector<double> shares = engine::select::shown_shares(desk->cloud, made.selected.rows, views);
+  auto& shown = desk->shown;
+  if (!shown || shown->selection != made.id || !std::ranges::equal(shown->views, views, is_same_view))
+    shown = Desk::Shown{made.id, views, engine::select::shown_shares(desk->cloud, made.selected.rows, views)};
+  std::vector<double> shares = shown->shares;
   put_back(std::move(desk));
   return shares;
+}
+
+Result<engine::edit::PreviewOutcome> Selections::preview(const scenes::LoadedVersion& version,
+                                                         const engine::edit::Request& request) {
+  auto desk = take_desk(version);
+  auto outcome = engine::edit::preview(version.cloud, request, desk->drags);
+  put_back(std::move(desk));
+  return outcome;
 }
 
 std::unique_ptr<Selections::Desk> Selections::take_desk(const scenes::LoadedVersion& version) {

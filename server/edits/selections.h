@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/edit/preview.h"
 #include "engine/scene/camera.h"
 #include "engine/select/select.h"
 #include "proto/selection.h"
@@ -67,6 +68,11 @@ class Selections {
   ///   errors  not_found: it was made on another one, or is no longer kept (`where` is "selection")
   [[nodiscard]] Result<std::shared_ptr<const MadeSelection>> find(const scenes::LoadedVersion& version,
                                                                   const std::string& id);
+
+  /// The drag of such a selection, at once: what is found out stays for the next position of its handles.
+  ///   errors  those of edit::preview()
+  [[nodiscard]] Result<engine::edit::PreviewOutcome> preview(const scenes::LoadedVersion& version,
+                                                             const engine::edit::Request& request);
 
   /// select::shown_shares() of what is selected.
   ///   made  on this version

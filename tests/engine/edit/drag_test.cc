@@ -181,7 +181,8 @@ TEST(CopyAndPaste, WhatDoesNotMoveIsNotCopiedAndMayMoveLater) {
   request.handles = {{DVec3(0), std::nullopt, 0.2, 0}, {DVec3(1, 0, 0), DVec3(1, 1, 0), 0.2, 0}};
   WorkingScene working = begun(scene, request);
   const std::vector<DVec3> positions = handle_sources(working.frame(), request);
-  const PlannedMotion motion = plan_motion(working, request, {}, positions, 1, 2);
+  Memory memory;
+  const PlannedMotion motion = plan_motion(working, request, {}, positions, 1, 2, memory);
   EXPECT_EQ(motion.rows, (std::vector<std::uint32_t>{std::uint32_t(still), std::uint32_t(pulled)}));
   EXPECT_EQ(motion.moving, (std::vector<std::uint32_t>{std::uint32_t(pulled)}));
   const auto copies = copy_and_paste(working, motion, request.mode, true);
@@ -211,7 +212,8 @@ TEST(DragAlone, IsTheDragOfTheWholeSceneWithoutItsOtherRows) {
       scene::GaussianCloud gaussians;
       gaussians.sh_degree = scene.sh_degree, gaussians.extra_stride = scene.extra_stride;
       scene::append_rows(gaussians, scene, rows);
-      const auto alone = [&] { return drag_alone(rows, gaussians, begun.handle(), request, {}, 3, true); };
+      Memory memory;
+      const auto alone = [&] { return drag_alone(rows, gaussians, begun.handle(), request, {}, 3, true, memory); };
       const DraggedAlone first = alone(), again = alone();
       EXPECT_TRUE(first.working.check());
       EXPECT_EQ(first.positions, carried.positions);
@@ -233,8 +235,9 @@ TEST(DragAlone, IsTheDragOfTheWholeSceneWithoutItsOtherRows) {
 TEST(DragAlone, TellsWhichHandlesHaveLostTheirGaussians) {
   const scene::GaussianCloud scene = ball_before_wall(2);
   const Request request = drag(DVec3(1, 0, 0), 2);
+  Memory memory;
   const DraggedAlone alone = drag_alone({}, scene::select(scene, std::vector<std::uint8_t>(scene.size(), 0)),
-                                        working::HandleColumn(scene.size(), 0), request, {}, 2, true);
+                                        working::HandleColumn(scene.size(), 0), request, {}, 2, true, memory);
   EXPECT_EQ(alone.warnings, (std::vector<std::string>{handle_lost(0, 1), handle_lost(0, 2)}));
   EXPECT_EQ(alone.positions, (std::vector<DVec3>{DVec3(0)}));
 }
@@ -267,8 +270,9 @@ TEST(Relocate, WithOneHandleItIsWhereItsTargetWas) {
   const Request request = drag(DVec3(0.7, -0.4, 0.2), 2);
   WorkingScene working = begun(scene, request);
   std::vector<DVec3> positions = handle_sources(working.frame(), request);
+  Memory memory;
   for (int u = 1; u <= 2; ++u) {
-    copy_and_paste(working, plan_motion(working, request, {}, positions, u, 2), request.mode, true);
+    copy_and_paste(working, plan_motion(working, request, {}, positions, u, 2, memory), request.mode, true);
     relocate(working, request, positions);
     EXPECT_LT(glm::distance(positions[0], (u / 2.0) * DVec3(0.7, -0.4, 0.2)), 1e-7) << u;
   }

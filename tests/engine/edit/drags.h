@@ -32,9 +32,10 @@ struct CarriedOut {
 /// A drag of so many intervals: deform, copy and paste, relocate.
 inline CarriedOut carry_out(WorkingScene& working, const Request& request, int intervals) {
   CarriedOut out;
+  Memory memory;
   out.positions = handle_sources(working.frame(), request);
   for (int u = 1; u <= intervals; ++u) {
-    copy_and_paste(working, plan_motion(working, request, {}, out.positions, u, intervals), request.mode,
+    copy_and_paste(working, plan_motion(working, request, {}, out.positions, u, intervals, memory), request.mode,
                    request.params.rotate_sh);
     EXPECT_TRUE(working.check()) << u;
     relocate(working, request, out.positions);

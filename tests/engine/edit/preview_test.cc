@@ -76,6 +76,28 @@ TEST(Preview, OfAnElasticBodyIsTheEditsDeformation) {
       }
 }
 
+TEST(Preview, WithAMemoryIsTheSame) {
+  const auto scene = plain(ball_before_wall(400));
+  Memory memory;
+  for (const Mode mode : {Mode::move, Mode::extend})
+    for (const double way : {0.0, 0.1, 0.4, 0.1})
+      for (const Attach attach : {Attach::automatic, Attach::held, Attach::free})
+        for (const bool without_last : {false, true}) {
+          Request request = four_handles(mode);
+          request.params.interpolation = Interpolation::arap;
+          request.attach = attach;
+          request.handles[0].target = request.handles[0].source + DVec3(way, way, 0);
+          request.selected = in_spheres(*scene.base, request);
+          // As many rows, but others: nothing that is kept of one selection may be taken for another one's.
+          request.selected->erase(without_last ? request.selected->end() - 1 : request.selected->begin());
+          const auto fresh = preview(scene, request), again = preview(scene, request, memory);
+          ASSERT_TRUE(fresh && again);
+          EXPECT_EQ(again->overlay, fresh->overlay);
+          EXPECT_EQ(again->positions, fresh->positions);
+          EXPECT_EQ(again->warnings, fresh->warnings);
+        }
+}
+
 TEST(Preview, WithASelectionIsWhatTheEditWillBe) {
   const scene::GaussianCloud cloud = ball_before_wall(200, Vec3(0), 3);
   Request request = four_handles(Mode::move);
