@@ -45,6 +45,16 @@ double energy(const Graph& graph, const Pose& pose, double smoothness) {
   return sum;
 }
 
+/// Where the nodes are in between, with their energy.
+struct Iterate {
+  explicit Iterate(const Graph& graph)
+      : pose{graph.rest, std::vector<DQuat>(graph.size(), DQuat(1, 0, 0, 0)), std::vector<double>(graph.size(), 1.0)},
+        maps(graph.size(), DMat3(1.0)) {}
+  Pose pose;
+  std::vector<DMat3> maps;  ///< [M] scale * turn
+  double energy = 0;
+};
+
 struct Solver::Impl {
   Graph graph;
   std::vector<Grip> grips;
@@ -60,6 +70,8 @@ struct Solver::Impl {
   void turn_node(std::uint32_t i, std::span<DMat3> maps, Pose& pose) const;
   void turn_grip(std::size_t grip, const GripPose& at, std::span<DMat3> maps, Pose& pose) const;
   void place_free_nodes(std::span<const DMat3> maps, Pose& pose) const;
+  void iterate(const std::vector<GripPose>& grip_poses, Iterate& now) const;
+  void go_on(const Pose& before, double momentum, Iterate& now) const;
 
   /// Calls visit(j, weight) for the edges of node i.
   template <class Visit>
@@ -153,6 +165,26 @@ void Solver::Impl::place_free_nodes(std::span<const DMat3> maps, Pose& pose) con
     for (int axis = 0; axis < 3; ++axis) pose.position[unknowns[row]][axis] = found(Eigen::Index(row), axis);
 }
 
+/// Turns each node as suits it best, then places them all.
+void Solver::Impl::iterate(const std::vector<GripPose>& grip_poses, Iterate& now) const {
+  for (std::size_t k = 0; k < grips.size(); ++k)
+    if (!grip_poses[k].turn) turn_grip(k, grip_poses[k], now.maps, now.pose);
+  for (const std::uint32_t i : unknowns) turn_node(i, now.maps, now.pose);
+  place_free_nodes(now.maps, now.pose);
+  now.energy = energy(graph, now.pose, options.smoothness);
+}
+
+/// As far again as since `before`, times `momentum`: positions and turns of free nodes.
+void Solver::Impl::go_on(const Pose& before, double momentum, Iterate& now) const {
+  for (const std::uint32_t i : unknowns) {
+    now.pose.position[i] += momentum * (now.pose.position[i] - before.position[i]);
+    DQuat& turn = now.pose.turn[i];
+    const DQuat last = glm::dot(turn, before.turn[i]) < 0 ? -before.turn[i] : before.turn[i];
+    turn = glm::normalize(turn + momentum * (turn - last));
+    now.maps[i] = glm::mat3_cast(turn);
+  }
+}
+
 Solver::Solver(Graph graph, std::vector<Grip> grips, const SolverOptions& options) : impl_(std::make_unique<Impl>()) {
   assert(!grips.empty());
   impl_->graph = std::move(graph);
@@ -169,31 +201,35 @@ Pose Solver::solve(std::span<const std::vector<GripPose>> way,
                    const std::function<void(double, std::size_t)>& on_iteration) const {
   assert(!way.empty());
   const Impl& at = *impl_;
-  const std::size_t n = at.graph.size();
-  Pose pose{at.graph.rest, std::vector<DQuat>(n, DQuat(1, 0, 0, 0)), std::vector<double>(n, 1.0)};
-  std::vector<DMat3> maps(n, DMat3(1.0));
+  Iterate now(at.graph);
   constexpr int on_the_way = 4;  // iterations at a stop that is not the last: enough to know which way to turn
   for (std::size_t stop = 0; stop < way.size(); ++stop) {
     assert(way[stop].size() == at.grips.size());
     for (std::size_t k = 0; k < at.grips.size(); ++k) {
-      at.place(k, way[stop][k], pose);
-      for (const std::uint32_t i : at.grips[k].nodes) maps[i] = pose.scale[i] * glm::mat3_cast(pose.turn[i]);
+      at.place(k, way[stop][k], now.pose);
+      for (const std::uint32_t i : at.grips[k].nodes)
+        now.maps[i] = now.pose.scale[i] * glm::mat3_cast(now.pose.turn[i]);
     }
-    at.place_free_nodes(maps, pose);
-    const bool is_last = stop + 1 == way.size();
-    double before = energy(at.graph, pose, at.options.smoothness);
-    for (int iteration = 0; iteration < (is_last ? at.options.most_iterations : on_the_way); ++iteration) {
-      for (std::size_t k = 0; k < at.grips.size(); ++k)
-        if (!way[stop][k].turn) at.turn_grip(k, way[stop][k], maps, pose);
-      for (const std::uint32_t i : at.unknowns) at.turn_node(i, maps, pose);
-      at.place_free_nodes(maps, pose);
-      const double now = energy(at.graph, pose, at.options.smoothness);
-      if (on_iteration) on_iteration(now, stop);
-      if (!(before - now > at.options.settled * before)) break;
-      before = now;
+    at.place_free_nodes(now.maps, now.pose);
+    now.energy = energy(at.graph, now.pose, at.options.smoothness);
+    Pose before = now.pose;
+    int going = 0;  // iterations since momentum was lost
+    for (int iteration = 0; iteration < (stop + 1 == way.size() ? at.options.most_iterations : on_the_way);) {
+      // Where it is heading; from there its surroundings tell each node how to turn.
+      Iterate next = now;
+      const double momentum = double(going) / double(going + 3);
+      if (going > 0) at.go_on(before, momentum, next);
+      at.iterate(way[stop], next);
+      ++iteration;
+      if (on_iteration && !(next.energy > now.energy)) on_iteration(next.energy, stop);
+      const double fall = now.energy - next.energy;
+      const bool has_settled = !(fall > at.options.settled * now.energy);
+      if (fall >= 0) before = std::exchange(now, std::move(next)).pose;
+      if (has_settled && going == 0) break;
+      going = has_settled ? 0 : going + 1;  // too far: the next one is without momentum, and never rises
     }
   }
-  return pose;
+  return now.pose;
 }
 
 std::vector<DMat3> linear_maps(const Graph& graph, const Pose& pose) {
