@@ -436,7 +436,7 @@ export class Editor {
   }
 
   #requestChanged() {
-    const { scene, handles, preview, problem, autoPreview, dragging, selectMode } = this.state;
+    const { scene, handles, selection, preview, problem, autoPreview, dragging, selectMode } = this.state;
     if (!scene) return;
     const request = this.request();
     const key = previewKey(request, this.state.info?.parameters);
@@ -448,8 +448,10 @@ export class Editor {
       return;
     }
     // While somebody selects, a preview is not on the screen: it can wait.
-    if (autoPreview && !dragging && !selectMode && preview?.key !== key && this.state.problem === null)
-      this.#later("preview", PREVIEW_DELAY_MS, () => !this.state.selectMode && this.preview());
+    if (!autoPreview || selectMode || preview?.key === key || this.state.problem !== null) return;
+    if (!dragging) this.#later("preview", PREVIEW_DELAY_MS, () => !this.state.selectMode && this.preview());
+    // What is selected follows the mouse, a preview at a time: the service keeps all of it that stays the same.
+    else if (selection.length > 0 && !this.#previewing) this.preview();
   }
 
   /** Whether the preview on the screen shows what is asked for now. */
@@ -477,6 +479,7 @@ export class Editor {
     if (this.#previewing === abort) {
       this.#previewing = null;
       this.store.set({ previewing: false });
+      if (this.state.dragging) this.#requestChanged();
     }
   }
 

@@ -130,7 +130,7 @@ TEST(Parameters, WhatIsSelectedMovesAsABody) {
     const Interpolation body = preset.value == Preset::paper ? usual : Interpolation::arap;
     EXPECT_EQ(preset_interpolation(preset.value, {}), usual);
     EXPECT_EQ(preset_interpolation(preset.value, {.selected = true}), body);
-    EXPECT_EQ(preset_interpolation(preset.value, {.extends = true, .selected = true}), usual);
+    EXPECT_EQ(preset_interpolation(preset.value, {.extends = true, .selected = true}), body);
     EXPECT_EQ(preset_interpolation(preset.value, {.turns = true}), body);
   }
 }

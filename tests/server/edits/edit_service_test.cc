@@ -202,6 +202,7 @@ TEST_F(ServiceTest, LeavesTheNumberOfIntervalsToWhatIsSelected) {
   request.params.intervals.reset();
   request.handles[0].target = proto::Point{1, 0, 0};
   request.mode = proto::Mode::extend;
+  request.params.interpolation = proto::Interpolation::rigid;
   submit(move_ball_slowly(scene));
   const auto waiting = value(service->submit(request, "")).status;
   EXPECT_EQ(waiting.request.params.intervals, std::nullopt) << "not known before it begins";

@@ -214,6 +214,50 @@ test("a preview that is gone is taken off the screen, and said to be", async () 
   assert.match(said.at(-1), /expired/);
 });
 
+test("what is selected follows the mouse, a preview at a time", async () => {
+  const asked = [];
+  let answer;
+  service["POST /v1/previews"] = (body) => {
+    asked.push(body.handles[0].target[0]);
+    return new Promise((resolve) => {
+      answer = () => resolve({ version: `p00000${asked.length}`, parent: 0, handles: [], gaussians: {} });
+    });
+  };
+  const settled = () => new Promise((resolve) => setTimeout(resolve, 5));
+  await editor.place(CAMERA, 200, 150);
+  const { id } = editor.state.handles[0];
+  editor.store.set({ selection: [{ id: 1, action: { rows: [[0, 9]] } }], autoPreview: true });
+  const dragTo = (x) => {
+    editor.store.set({ dragging: true });
+    editor.change(id, { target: [x, 0, 0] }, false);
+  };
+  dragTo(1);
+  await settled();
+  dragTo(2);
+  await settled();
+  dragTo(3);
+  await settled();
+  assert.deepEqual(asked, [1], "the others wait for the first one");
+  answer();
+  await settled();
+  assert.equal(editor.state.preview.version, "p000001", "seen while the mouse goes on");
+  assert.deepEqual(asked, [1, 3], "then where the mouse is now");
+  answer();
+  await settled();
+  assert.deepEqual(asked, [1, 3], "and no more of what is on the screen already");
+  assert.ok(editor.previewIsCurrent);
+});
+
+test("what spheres hold waits for the mouse to be let go", async () => {
+  let asked = 0;
+  service["POST /v1/previews"] = () => ({ version: `p00000${++asked}`, parent: 0, handles: [], gaussians: {} });
+  await editor.place(CAMERA, 200, 150);
+  editor.store.set({ dragging: true, autoPreview: true });
+  editor.change(editor.state.handles[0].id, { target: [1, 0, 0] }, false);
+  await new Promise((resolve) => setTimeout(resolve, 5));
+  assert.equal(asked, 0);
+});
+
 test("handles, version and camera survive a reload, and a running edit is followed again", async () => {
   await editor.place(CAMERA, 200, 150);
   editor.setPose({ eye: [1, 2, 3], target: [0, 0, 0], up: [0, -1, 0], fov: 40 });
