@@ -34,6 +34,21 @@ std::vector<DVec3> new_means(const scene::Overlay& overlay) {
   return out;
 }
 
+/// Rows of what came out of `there`: those of the selected ones that stayed, and the copies of the others, which are
+/// the first of all that is new.
+///   copies  so many, at most
+std::vector<std::uint32_t> selected_again(std::span<const std::uint32_t> selected, std::size_t input_rows,
+                                          const scene::Overlay& there, std::size_t copies) {
+  std::vector<std::uint32_t> out;
+  for (const std::uint32_t row : selected) {
+    const auto gone = std::ranges::lower_bound(there.removed, row);
+    if (gone == there.removed.end() || *gone != row) out.push_back(row - std::uint32_t(gone - there.removed.begin()));
+  }
+  const auto first = std::uint32_t(input_rows - there.removed.size());
+  for (std::uint32_t k = 0; k < std::min(copies, there.added()); ++k) out.push_back(first + k);
+  return out;
+}
+
 /// From where the handles have come to, back to where they were, with radii that hold what they have dragged, which
 /// may have been drawn apart.
 ///   moved  by the deformation alone: what an optimisation adds besides was not dragged
@@ -162,8 +177,10 @@ Result<RoundTrip> there_and_back(const scene::GaussianCloud& scene, std::span<co
   for (const edit::StageTime& time : there->report.times) trip.seconds += time.seconds;
   trip.arrived = arrived(scene, request, there->overlay);
   trip.halfway = scene::flatten(scene, there->overlay);
-  const auto back =
-      edit::run(trip.halfway, cameras, reversed(request, there->report, dry->overlay), {.corrector = corrector});
+  edit::Request again = reversed(request, there->report, dry->overlay);
+  if (again.selected)
+    again.selected = selected_again(*again.selected, scene.size(), there->overlay, dry->overlay.added());
+  const auto back = edit::run(trip.halfway, cameras, again, {.corrector = corrector});
   if (!back) return propagate(back);
   trip.back = scene::flatten(trip.halfway, back->overlay);
 

@@ -27,6 +27,7 @@
 #include "server/cli/folders.h"
 #include "server/cli/request_file.h"
 #include "server/edits/convert.h"
+#include "server/edits/convert_selection.h"
 
 namespace server::cli {
 namespace {
@@ -93,12 +94,20 @@ Result<Capture> load_capture(const BenchOptions& options) {
   if (!file) return propagate(file);
   auto request = edits::to_engine(file->request);
   if (!request) return propagate(request);
+  const auto& selection = file->request.selection;
+  if (selection) request->selected.emplace();  // parameters depend on whether there is one
   apply(options, *request);
   auto input = io::read_scene(options.scene);
   if (!input) return propagate(input);
   const auto dataset = io::read_dataset(options.dataset, {.points = false});
   if (!dataset) return propagate(dataset);
-  return Capture{std::move(input->cloud), io::cameras_of(*dataset), std::move(*request)};
+  Capture capture{std::move(input->cloud), io::cameras_of(*dataset), std::move(*request)};
+  if (selection) {
+    const auto selected = edits::select_rows(capture.cloud, *selection,
+                                             {.views = capture.cameras, .up = capture.request.up}, capture.request);
+    if (!selected) return propagate(selected);
+  }
+  return capture;
 }
 
 /// There and back on a capture, with each corrector.

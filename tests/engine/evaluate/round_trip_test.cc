@@ -32,6 +32,23 @@ TEST(RoundTrip, WhatIsOnlyDeformedComesBackAsItWas) {
   EXPECT_LT(judge(slide(), trip->halfway).miss, 0.01) << "half-way it was elsewhere";
 }
 
+TEST(RoundTrip, WhatIsSelectedComesBackAsItWas) {
+  edit::Request request = quick_request();
+  request.params.interpolation = edit::Interpolation::arap;
+  request.selected.emplace();
+  const edit::Handle& handle = request.handles[0];
+  for (std::uint32_t row = 0; row < slide().before.size(); ++row) {
+    const DVec3 mean(slide().before.mean.get(row));
+    const DVec3 off = glm::abs(mean - request.region->center) - request.region->size / 2.0;
+    if (glm::distance(mean, handle.source) < handle.radius && std::max({off.x, off.y, off.z}) < 0)
+      request.selected->push_back(row);
+  }
+  const auto trip = there_and_back(slide().before, slide().cameras, request, nullptr);
+  ASSERT_TRUE(trip) << trip.error().message;
+  EXPECT_GT(trip->arrived, 0.9);
+  EXPECT_GT(trip->inside.psnr_db, 60);
+}
+
 TEST(RoundTrip, WhatIsRepairedHalfWayIsCoveredAgain) {
   edit::Request request = quick_request();
   request.params.iterations = 30;
