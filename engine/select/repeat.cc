@@ -251,7 +251,6 @@ std::optional<Period> period_of(const Way& way, double radius, double spacing) {
   const double first = std::max(shortest * radius, 2 * spacing);
   const double last = std::min(longest * radius, longest_part * way.length());
   const double step = std::max(spacing, last / double(most_periods));
-  if (!(step > 0)) return std::nullopt;
   std::vector<Period> periods;
   std::vector<double> shorter_unlike;  // [periods] the most unlike after any shorter length
   double most_unlike = 0;
@@ -309,6 +308,7 @@ std::optional<Repeat> find_repeat(const scene::LayeredCloud& scene, std::span<co
   std::vector<std::uint32_t> behind = rows_behind(means, *mouth, along);
   if (behind.empty()) return std::nullopt;
   const Surface surface(scene, Surface(scene, std::move(behind)).largest_piece());
+  if (!(surface.spacing() > 0)) return std::nullopt;  // most rows are in one place: there is no surface
   const auto period = period_of(Way(surface, along, mouth->level), mouth->radius, surface.spacing());
   if (!period) return std::nullopt;
 

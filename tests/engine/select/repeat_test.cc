@@ -135,6 +135,9 @@ TEST(FindRepeat, RowsInOnePlaceAreNoSurface) {
   for (int k = 0; k < 40; ++k) add_at(cloud, {0, 0, 0});
   add_at(cloud, {0.01f, 0, 0});
   EXPECT_FALSE(find_beyond(cloud, 0.005f).repeat);
+  scene::GaussianCloud doubled = tube(60, straight, grey);  // and others all along
+  for (int k = 0; k < 60 * 24 + 40; ++k) add_at(doubled, {1, 0.2f, 0});
+  find_beyond(doubled, 2.02f);  // ends
 }
 
 }  // namespace
