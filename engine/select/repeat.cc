@@ -296,6 +296,24 @@ double cut_of(const scene::LayeredCloud& scene, const Array3& means, std::span<c
   return cut;
 }
 
+/// How far before the cut what is there is not what comes back: a rim, a nut at the end of a neck. At most half a
+/// period.
+double irregular_before(const Surface& surface, double cut, Period period, DVec3 along) {
+  const double thickness = 2 * surface.spacing();
+  for (double depth = 0; depth <= period.length / 2; depth += thickness) {
+    std::vector<DVec3> here, earlier;
+    for (std::size_t k = 0; k < surface.size(); ++k) {
+      const DVec3 mean = surface.mean(k);
+      const double at = cut - glm::dot(mean, along);
+      if (at > depth && at <= depth + thickness) here.push_back(mean), earlier.push_back(mean - period.length * along);
+    }
+    if (here.empty()) continue;
+    const Match found = match(surface.look(here), surface.look(earlier));
+    if (found.missing <= most_missing && found.unlike <= period.unlike + going_on) return depth;
+  }
+  return 0;
+}
+
 }  // namespace
 
 std::optional<Repeat> find_repeat(const scene::LayeredCloud& scene, std::span<const std::uint32_t> part,
@@ -320,8 +338,9 @@ std::optional<Repeat> find_repeat(const scene::LayeredCloud& scene, std::span<co
     if (depth_of(row) > 0) repeat.stays.push_back(row);
   std::vector<std::uint32_t> before;
   std::ranges::set_union(surface.rows(), repeat.stays, std::back_inserter(before));
+  const double skipped = irregular_before(surface, cut, *period, along);
   for (const std::uint32_t row : before)
-    if (const double depth = depth_of(row); depth > 0 && depth <= period->length)
+    if (const double depth = depth_of(row); depth > skipped && depth <= skipped + period->length)
       repeat.tile.push_back(row), repeat.depth.push_back(depth);
   if (repeat.tile.empty()) return std::nullopt;
   return repeat;

@@ -15,8 +15,8 @@ namespace engine::select {
 /// One piece of what repeats; all of it shifted by `step` once, twice and so on is what goes on.
 struct Repeat {
   DVec3 step{0.0};                  ///< One period along the pull, world units.
-  std::vector<std::uint32_t> tile;  ///< Rows of the scene within the last period before the cut, ascending.
-  std::vector<double> depth;        ///< [tile] how far before the cut they are, along the pull: (0, period].
+  std::vector<std::uint32_t> tile;  ///< Rows of the scene within the last period of it, ascending.
+  std::vector<double> depth;        ///< [tile] how far before the cut they are, along the pull; above 0.
   std::vector<std::uint32_t>
       stays;  ///< Rows of the part before the cut: what repeats belongs to what stays. Ascending.
 };

@@ -65,10 +65,9 @@ TEST(FindRepeat, FindsThePatternOfAPole) {
   EXPECT_EQ(repeat->step.y, 0);
   EXPECT_TRUE(std::ranges::is_sorted(repeat->tile));
   ASSERT_EQ(repeat->tile.size(), repeat->depth.size());
-  for (const double depth : repeat->depth) {
-    EXPECT_GT(depth, 0);
-    EXPECT_LE(depth, glm::length(repeat->step));
-  }
+  const auto [least, most] = std::ranges::minmax(repeat->depth);
+  EXPECT_GT(least, 0);
+  EXPECT_LE(most - least, glm::length(repeat->step));
   // As many rings as the period has room for, whole.
   EXPECT_NEAR(double(repeat->tile.size()), 24 * glm::length(repeat->step) / double(ring), 24.5);
 }
@@ -87,6 +86,21 @@ TEST(FindRepeat, ACutBeyondTheBorderLeavesToTheRestWhatGoesOn) {
   for (const std::uint32_t row : repeat->stays) {
     EXPECT_TRUE(std::ranges::binary_search(part, row));
     EXPECT_TRUE(knob(cloud.mean.get(row).x)) << row;
+  }
+}
+
+TEST(FindRepeat, WhatEndsThePoleIsNotRepeated) {
+  // A black ring before the knob, of two rings of Gaussians.
+  const auto cloud = tube(56, straight, [&](float x) {
+    return x < 2.08f ? stripes(x) : x < 2.18f ? Vec3(0) : Vec3(0, 0.6f, 0);
+  });
+  const auto [part, repeat] = find_beyond(cloud, 2.18f);
+  ASSERT_TRUE(repeat);
+  EXPECT_TRUE(repeat->stays.empty());
+  EXPECT_GE(repeat->tile.size(), 24u * 4);
+  for (std::size_t k = 0; k < repeat->tile.size(); ++k) {
+    EXPECT_LT(cloud.mean.get(repeat->tile[k]).x, 2.08f + 0.5f * ring) << repeat->tile[k];
+    EXPECT_GT(repeat->depth[k], ring);
   }
 }
 
