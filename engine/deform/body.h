@@ -31,6 +31,8 @@ class Body {
   Body(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows, std::span<const Drag> drags,
        std::span<const std::uint8_t> held);
 
+  [[nodiscard]] std::size_t size() const { return rows_.size(); }
+
   /// Would the constructor make the same of these?
   [[nodiscard]] bool is_of(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
                            std::span<const Drag> drags, std::span<const std::uint8_t> held) const;

@@ -5,17 +5,25 @@
 namespace engine::edit {
 namespace {
 
-constexpr std::size_t most_kept = 8;  // a choice: groups of a drag; a body of 30,000 rows takes some 10 MB
+// Choices: the groups of a drag; and rows of what is kept besides what was asked for last, some 50 MB of bodies.
+constexpr std::size_t most_kept = 8, most_rows = 400'000;
 
-/// The one that fits, made last of all; else one that is made now, in place of the one that was used longest ago.
-template <class Kept, class Fits, class Make>
-const Kept& find_or_make(std::list<Kept>& kept, Fits&& fits, Make&& make) {
+/// The one that fits, which then is the last one; else one that is made now, in place of those that were used longest
+/// ago.
+///   rows_of  how many rows one of them is about
+template <class Kept, class Fits, class Make, class RowsOf>
+const Kept& find_or_make(std::list<Kept>& kept, Fits&& fits, Make&& make, RowsOf&& rows_of) {
   const auto found = std::ranges::find_if(kept, fits);
   if (found != kept.end()) {
     kept.splice(kept.end(), kept, found);
   } else {
-    if (kept.size() == most_kept) kept.pop_front();
     kept.push_back(make());
+    std::size_t rows = 0;
+    for (const Kept& one : kept) rows += rows_of(one);
+    while (kept.size() > 1 && (kept.size() > most_kept || rows > most_rows)) {
+      rows -= rows_of(kept.front());
+      kept.pop_front();
+    }
   }
   return kept.back();
 }
@@ -32,14 +40,14 @@ const std::vector<select::Touch>& Memory::contact_of(const scene::LayeredCloud& 
     return Contact{
         {part.begin(), part.end()}, {selected.begin(), selected.end()}, select::contact_of(scene, part, selected)};
   };
-  return find_or_make(contacts_, fits, make).touches;
+  return find_or_make(contacts_, fits, make, [](const Contact& known) { return known.part.size(); }).touches;
 }
 
 const deform::Body& Memory::body_of(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
                                     std::span<const deform::Drag> drags, std::span<const std::uint8_t> held) {
   return find_or_make(
       bodies_, [&](const deform::Body& body) { return body.is_of(cloud, rows, drags, held); },
-      [&] { return deform::Body(cloud, rows, drags, held); });
+      [&] { return deform::Body(cloud, rows, drags, held); }, [](const deform::Body& body) { return body.size(); });
 }
 
 }  // namespace engine::edit
