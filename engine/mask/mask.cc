@@ -84,6 +84,14 @@ scene::Mask dilate(const scene::Mask& mask, int radius_px) {
   return wide;
 }
 
+scene::Mask opened(const scene::Mask& mask, int radius_px) {
+  const auto complement = [](scene::Mask of) {
+    for (std::uint8_t& flag : of.data) flag = flag == 0;
+    return of;
+  };
+  return dilate(complement(dilate(complement(mask), radius_px)), radius_px);
+}
+
 void unite(scene::Mask& into, const scene::Mask& other) {
   assert(into.width == other.width && into.height == other.height);
   for (std::size_t i = 0; i < into.data.size(); ++i) into.data[i] |= other.data[i];

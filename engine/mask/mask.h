@@ -18,6 +18,10 @@ namespace engine::mask {
 /// Exact, O(pixels) for any radius; a radius of 0 or less changes nothing.
 [[nodiscard]] scene::Mask dilate(const scene::Mask& mask, int radius_px);
 
+/// The union of the discs of `radius_px` that lie within the mask (and may reach beyond the picture): what is thinner
+/// is lost, what is thicker stays as it is but for its corners. A radius of 0 or less changes nothing.
+[[nodiscard]] scene::Mask opened(const scene::Mask& mask, int radius_px);
+
 /// into |= other. Both have the same size (asserted).
 void unite(scene::Mask& into, const scene::Mask& other);
 

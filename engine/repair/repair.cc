@@ -4,12 +4,14 @@
 #include <string>
 #include <utility>
 
+#include "engine/core/parallel.h"
 #include "engine/core/rng.h"
 #include "engine/mask/mask.h"
 #include "engine/render/forward.h"
 #include "engine/repair/seed.h"
 #include "engine/repair/surfaces.h"
 #include "engine/repair/trust.h"
+#include "engine/repair/vacated.h"
 #include "engine/repair/view_order.h"
 #include "engine/train/densify.h"
 #include "engine/working/footprint.h"
@@ -24,6 +26,15 @@ constexpr float half_seen = 0.5f;
 // Share of the dragged part in a pixel from which on it is no longer background, and from which on it no longer shows
 // what is behind.
 constexpr float covering = 0.1f, trace = 0.02f;
+// Part of its light from which on a Gaussian was seen, wherever it lies: what is under a thing shines through its
+// blurred rim with up to a sixth, and in the layers of a surface a Gaussian shows a third (the captured mug).
+constexpr float shows = 0.2f;
+// Share of seeds in a pixel from which on it shows what the repair has decided.
+constexpr float decided = 0.5f;
+// Pixels. What is thinner than twice this was not hidden: outlines are blurred by as much.
+constexpr int blur = 1;
+// By so much farther away than a completed surface a row is behind it.
+constexpr double behind = 0.03;
 constexpr std::size_t most_examples = 6;  // of the buffer, for each view: its neighbours on either side
 
 /// While it lives, what a drawn-out part leaves along its way is as opaque as the part: it was only made half
@@ -79,11 +90,16 @@ Repair::Repair(scene::GaussianCloud original, std::span<const scene::Camera> obs
       mode_(mode),
       seed_(seed),
       corrector_(corrector),
-      observed_(observed_rows(original_, observers)),
+      witnesses_(original_, observers),
       unedited_(render_unedited(original_, views_)) {
   for (std::size_t v = 0; v < views_.size(); ++v)
     buffer_.push_back({std::move(unedited_.color[v]), scene::Mask(views_[v].width, views_[v].height), {}});
   unedited_.color.clear();
+  std::vector<float> shown = shown_rows(original_, observers);
+  if (mode == Mode::move)
+    for (std::uint32_t row = 0; row < original_.size(); ++row)
+      if (shown[row] < shows && !witnesses_.saw(original_.mean.get(row))) unseen_.push_back(row);
+  observed_ = observed_rows(std::move(shown));
   if (mode == Mode::move) originals_.emplace(interleaved(original_.mean), 3);
 }
 
@@ -138,10 +154,50 @@ scene::Image Repair::surfaces_behind(const ViewNow& now, std::size_t v, const Ro
   return continued_surfaces(surface_view, is_free_at, seed_for(Purpose::surfaces, v, round));
 }
 
-Result<Repair::Background> Repair::complete_background(WorkingScene& working, const Rows& rows, std::size_t v,
+void Repair::doubt_unseen(const WorkingScene& working, const Rows& rows, std::size_t v, ViewNow& now) {
+  const scene::Camera& view = views_[v];
+  render::Layers layers(working.cloud());
+  layers.hidden = rows.dragged;
+  const std::vector<std::uint32_t> seeds = working.rows_of(Role::seed);
+  const scene::Image share = working::footprint(layers, seeds, view, workspace_);
+  scene::Mask unseen(view.width, view.height);
+  parallel_for(std::size_t(view.height), 4, [&](std::size_t begin, std::size_t end) {
+    for (int y = int(begin); y < int(end); ++y)
+      for (int x = 0; x < view.width; ++x) {
+        const double depth = double(now.inverse_depth.at(x, y));
+        if (vacated_[v].at(x, y) == 0 || !(depth > 0) || share.at(x, y) >= decided) continue;
+        unseen.at(x, y) = !witnesses_.saw(point_at(view, {x + 0.5, y + 0.5}, depth));
+      }
+  });
+  unseen = mask::opened(unseen, blur);
+  for (std::size_t i = 0; i < unseen.data.size(); ++i)
+    if (unseen.data[i] != 0) now.trust.data[i] = 0, now.reliable.data[i] = 0;
+}
+
+void Repair::clear_unseen(WorkingScene& working, Rows& rows, std::size_t v, const scene::Image& surface) {
+  const scene::Camera& view = views_[v];
+  const std::size_t before = rows.gone.size();
+  for (const std::uint32_t row : unseen_) {
+    if (working.role()[row] != Role::frozen) continue;
+    const DVec3 p = view.cam_from_world(working.cloud().mean.get(row));
+    if (!(p.z > 0)) continue;
+    const DVec2 pixel = view.pixel_from_cam(p);
+    if (!(pixel.x >= 0 && pixel.y >= 0 && pixel.x < view.width && pixel.y < view.height)) continue;
+    const double inverse_depth = double(surface.at(int(pixel.x), int(pixel.y)));
+    if (!(inverse_depth > 0) || p.z * inverse_depth > 1 + behind) continue;
+    working.give_up(row);
+    rows.gone.push_back(row), rows.dragged.push_back(row);
+  }
+  if (rows.gone.size() == before) return;
+  std::sort(rows.gone.begin(), rows.gone.end());
+  std::sort(rows.dragged.begin(), rows.dragged.end());
+}
+
+Result<Repair::Background> Repair::complete_background(WorkingScene& working, Rows& rows, std::size_t v,
                                                        const Round& round) {
   const scene::Camera& view = views_[v];
   ViewNow now = look(working, rows.dragged, v);
+  doubt_unseen(working, rows, v, now);
   const scene::Image surface = surfaces_behind(now, v, round);
   Background background{{}, scene::Mask(view.width, view.height), 0};
   bool goes_on = false;
@@ -152,7 +208,10 @@ Result<Repair::Background> Repair::complete_background(WorkingScene& working, co
   auto picture = ask_corrector(std::move(now.color), vacated_[v], std::move(now.trust), v, round, Purpose::background);
   if (!picture) return propagate(picture);
   background.picture = std::move(*picture);
-  if (goes_on) background.seeds = add_seeds(working, view, surface, background.picture, *originals_);
+  if (goes_on) {
+    background.seeds = add_seeds(working, view, surface, background.picture, *originals_);
+    clear_unseen(working, rows, v, surface);
+  }
   trust_.resize(working.size(), 1.0f);  // what has been decided stays
   return background;
 }
@@ -181,8 +240,8 @@ Result<Corrected> Repair::correct(WorkingScene& working, std::span<const scene::
                                   const std::function<Result<void>(double)>& advance) {
   Corrected corrected;
   corrected.pictures.resize(views_.size());
-  const Rows rows = rows_of(working);
-  note_vacated(rows, masks);
+  Rows rows = rows_of(working);
+  note_vacated(working, rows, masks);
   if (auto tuned = corrector_.fine_tune(buffer_, 0); !tuned) return propagate(tuned);
   const std::vector<std::size_t> order = outward(views_);
   trust_ = trust_of_rows(working, observed_, mode_);
@@ -220,11 +279,13 @@ Repair::Rows Repair::rows_of(const WorkingScene& working) const {
   return rows;
 }
 
-void Repair::note_vacated(const Rows& rows, std::span<const scene::Mask> masks) {
+void Repair::note_vacated(const WorkingScene& working, const Rows& rows, std::span<const scene::Mask> masks) {
   vacated_.resize(views_.size());
+  const std::vector<std::uint32_t> open = rows_left_open(original_, rows.vacating, working, rows.moved);
   for (std::size_t v = 0; v < views_.size(); ++v) {
     const scene::Image share = working::footprint(original_, rows.vacating, views_[v], workspace_);
-    vacated_[v] = mask::dilate(mask::mask2d(share), std::max(1, views_[v].height / 128));
+    const scene::Image open_share = working::footprint(original_, open, views_[v], workspace_);
+    vacated_[v] = mask::dilate(mask::mask2d(open_share), std::max(1, views_[v].height / 128));
     buffer_[v].excluded = mask::mask2d(share, trace);
     buffer_[v].box = scene::bounding_box(masks[v]);
   }

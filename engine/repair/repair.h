@@ -16,6 +16,7 @@
 #include "engine/neighbours/point_index.h"
 #include "engine/render/forward.h"
 #include "engine/repair/unedited_views.h"
+#include "engine/repair/witnesses.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/gaussian_cloud.h"
 #include "engine/scene/image.h"
@@ -79,7 +80,7 @@ class Repair {
 
   [[nodiscard]] Rows rows_of(const WorkingScene& working) const;
   /// Notes in each view what has been left so far, and keeps it from being learned from.
-  void note_vacated(const Rows& rows, std::span<const scene::Mask> masks);
+  void note_vacated(const WorkingScene& working, const Rows& rows, std::span<const scene::Mask> masks);
   [[nodiscard]] ViewNow look(const WorkingScene& working, std::span<const std::uint32_t> hidden, std::size_t v);
   /// I_e of view v: what it shows now, what was filled in as it was filled in, and the rest corrected as well.
   [[nodiscard]] Result<scene::Image> correct_view(const WorkingScene& working, const Rows& rows,
@@ -92,8 +93,12 @@ class Repair {
   /// Inverse depth of the surfaces that go on behind the dragged part in view v; 0 where none does.
   [[nodiscard]] scene::Image surfaces_behind(const ViewNow& now, std::size_t v, const Round& round) const;
   /// Lays what goes on behind the dragged part into the working scene as seeds.
-  [[nodiscard]] Result<Background> complete_background(WorkingScene& working, const Rows& rows, std::size_t v,
+  [[nodiscard]] Result<Background> complete_background(WorkingScene& working, Rows& rows, std::size_t v,
                                                        const Round& round);
+  /// Takes the trust of what view v shows in vacated pixels and no camera has seen.
+  void doubt_unseen(const WorkingScene& working, const Rows& rows, std::size_t v, ViewNow& now);
+  /// Rows that nobody has seen leave where a surface was completed in view v, if they would hide it.
+  void clear_unseen(WorkingScene& working, Rows& rows, std::size_t v, const scene::Image& surface);
 
   scene::GaussianCloud original_;
   std::vector<scene::Camera> views_;
@@ -101,6 +106,8 @@ class Repair {
   std::uint64_t seed_;
   correct::Corrector& corrector_;
   std::vector<float> observed_;  ///< Of observed_rows().
+  Witnesses witnesses_;
+  std::vector<std::uint32_t> unseen_;  ///< Rows of the input that no camera has seen, ascending.
   UneditedViews unedited_;
   std::vector<correct::Example> buffer_;
   std::vector<scene::Mask> vacated_;  ///< Per view: what the part has left.

@@ -8,6 +8,7 @@
 
 #include "engine/core/parallel.h"
 #include "engine/core/rng.h"
+#include "engine/mask/mask.h"
 
 namespace engine::repair {
 namespace {
@@ -19,8 +20,9 @@ constexpr double on_plane = 0.006;  // relative difference of depths
 constexpr double in_front = 0.02;   // by so much nearer a surface hides what is behind it
 constexpr int directions_needed = 7;  // of eight in which the surface is met again
 
-constexpr float same_surface = 0.05f;      // relative difference of depths between neighbouring pixels
-constexpr std::size_t least_together = 8;  // pixels
+constexpr int least_surroundings = 24;  // pixels around the vacated ones, or half of their extent
+
+constexpr float same_surface = 0.05f;  // relative difference of depths between neighbouring pixels
 
 /// Inverse depth as an affine function of the pixel.
 struct Plane {
@@ -93,11 +95,21 @@ std::vector<Plane> find_planes(std::vector<Point> points, std::uint64_t seed) {
   return planes;
 }
 
+/// The surroundings of what was vacated: what goes on there must show here.
+scene::Rect surroundings(const scene::Mask& vacated) {
+  const scene::Rect box = scene::bounding_box(vacated);
+  const int by = std::max(least_surroundings, std::max(box.width(), box.height()) / 2);
+  return {std::max(box.x0 - by, 0), std::max(box.y0 - by, 0), std::min(box.x1 + by, vacated.width),
+          std::min(box.y1 + by, vacated.height)};
+}
+
 std::vector<Point> points_of(const SurfaceView& view) {
   const std::size_t width = std::size_t(view.inverse_depth.width);
+  const scene::Rect near = surroundings(view.vacated);
   std::vector<std::size_t> shown;
-  for (std::size_t i = 0; i < view.shows_surface.data.size(); ++i)
-    if (view.shows_surface.data[i] != 0) shown.push_back(i);
+  for (int y = near.y0; y < near.y1; ++y)
+    for (int x = near.x0; x < near.x1; ++x)
+      if (view.shows_surface.at(x, y) != 0) shown.push_back(std::size_t(y) * width + std::size_t(x));
   std::vector<Point> points;
   const std::size_t count = std::min(shown.size(), most_points);
   for (std::size_t k = 0; k < count; ++k) {
@@ -132,9 +144,13 @@ std::vector<std::uint8_t> directions_met(const SurfaceView& view, const Plane& p
   return met;
 }
 
-/// Without crumbs: a few pixels that hang together with nothing else are an error of the depth, not a surface.
+/// Without crumbs: what hangs together and is nowhere three pixels wide is an error of the depth, as at the blurred
+/// outlines of things, and not a surface.
 scene::Image without_crumbs(const scene::Image& found) {
   scene::Image out = found;
+  scene::Mask filled(found.width, found.height);
+  for (std::size_t i = 0; i < found.data.size(); ++i) filled.data[i] = found.data[i] > 0;
+  const scene::Mask wide = mask::opened(filled, 1);
   std::vector<std::uint8_t> seen(found.data.size(), 0);
   std::vector<std::size_t> together;
   const int width = found.width, height = found.height;
@@ -153,7 +169,7 @@ scene::Image without_crumbs(const scene::Image& found) {
           if (joined && seen[next] == 0) seen[next] = 1, together.push_back(next);
         }
     }
-    if (together.size() < least_together)
+    if (std::none_of(together.begin(), together.end(), [&](std::size_t at) { return wide.data[at] != 0; }))
       for (const std::size_t at : together) out.data[at] = 0;
   }
   return out;

@@ -55,13 +55,16 @@ std::vector<float> stretch_by_parent(const WorkingScene& working, std::span<cons
 
 }  // namespace
 
-std::vector<float> observed_rows(const scene::GaussianCloud& scene, std::span<const scene::Camera> cameras) {
+std::vector<float> shown_rows(const scene::GaussianCloud& scene, std::span<const scene::Camera> cameras) {
   std::vector<float> weight = render::largest_weights(scene, cameras);
-  for (std::size_t i = 0; i < weight.size(); ++i) {
-    const float opacity = std::max(render::opacity<float>(scene.opacity_logit[i]), least_opacity);
-    weight[i] = std::min(weight[i] / (observed_transmittance * opacity), 1.0f);
-  }
+  for (std::size_t i = 0; i < weight.size(); ++i)
+    weight[i] /= std::max(render::opacity<float>(scene.opacity_logit[i]), least_opacity);
   return weight;
+}
+
+std::vector<float> observed_rows(std::vector<float> shown) {
+  for (float& part : shown) part = std::min(part / observed_transmittance, 1.0f);
+  return shown;
 }
 
 std::vector<float> trust_of_rows(const WorkingScene& working, std::span<const float> observed, Mode mode) {

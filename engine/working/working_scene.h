@@ -19,7 +19,7 @@ struct Members;
 enum class Role : std::uint8_t {
   frozen,    ///< Outside M: is never changed.
   held,      ///< An input row of P_h that has not moved yet.
-  original,  ///< An input row whose copy has left; its opacity was lowered.
+  original,  ///< An input row whose copy has left, or that was given up; its opacity was lowered.
   copy,      ///< A deformed copy at its latest place, in P_h.
   trail,     ///< Not the input's and not in P_h: a copy that was copied in turn, in an extend, its opacity lowered; or
              ///< a child that the optimisation gave an original.
@@ -82,6 +82,8 @@ class WorkingScene {
                        std::span<const Role> role, std::span<const std::uint32_t> ancestor);
   /// The row leaves P_h and stays where it is: as an original if it is the input's, else as a trail.
   void leave_behind(std::uint32_t row);
+  /// A frozen row is to go, though nothing of it moves: it becomes an original, its opacity lowered as in a move.
+  void give_up(std::uint32_t row);
   /// A deformation begins: mean_at_deform of this row is where it is now.
   void note_mean(std::uint32_t row) { mean_at_deform_.set(row, cloud_.mean.get(row)); }
 

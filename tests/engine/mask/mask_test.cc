@@ -88,6 +88,30 @@ TEST(Dilate, IsTheSameForAnyNumberOfThreads) {
   EXPECT_EQ(one, four);
 }
 
+TEST(Opened, LosesWhatIsThinAndKeepsTheRest) {
+  Mask mask(20, 12);
+  for (int y = 2; y < 9; ++y)
+    for (int x = 2; x < 9; ++x) mask.at(x, y) = 1;
+  const Mask square = mask;
+  for (int x = 9; x < 18; ++x) mask.at(x, 5) = mask.at(x, 6) = 1;  // two pixels wide
+  mask.at(18, 10) = 1;
+  const Mask out = opened(mask, 1);
+  for (int y = 0; y < 12; ++y)
+    for (int x = 0; x < 20; ++x) {
+      const bool corner = (x == 2 || x == 8) && (y == 2 || y == 8);
+      const bool joint = x == 9 && (y == 5 || y == 6);  // of a disc whose centre is in the square
+      EXPECT_EQ(out.at(x, y) != 0, (square.at(x, y) != 0 && !corner) || joint) << x << ", " << y;
+    }
+}
+
+TEST(Opened, KeepsWhatReachesTheRimOfThePicture) {
+  Mask mask(9, 9);
+  for (int y = 0; y < 9; ++y) mask.at(0, y) = mask.at(1, y) = 1;
+  EXPECT_EQ(opened(mask, 1), mask);
+  EXPECT_EQ(opened(mask, 0), mask);
+  EXPECT_EQ(opened(Mask(5, 5), 2), Mask(5, 5));
+}
+
 TEST(Unite, KeepsWhatEitherHolds) {
   Mask a(2, 2), b(2, 2);
   a.at(0, 0) = b.at(0, 0) = b.at(1, 1) = 1;

@@ -10,13 +10,14 @@
 
 #include "engine/edit/masks.h"
 #include "engine/render/forward.h"
+#include "engine/render/largest_weight.h"
 #include "tests/engine/edit/block.h"
 #include "tests/engine/edit/drags.h"
 
 namespace engine::repair {
 namespace {
 
-using edit::add_gaussian, edit::BlockScene, edit::floor_color;
+using edit::add_gaussian, edit::block_side, edit::BlockScene, edit::floor_color;
 using working::Role;
 
 /// Notes what it is asked and gives back what it gets, or something else.
@@ -205,6 +206,37 @@ TEST(Repair, SeedsNothingWhereAllIsKnown) {
   const auto outcome = moved.correct();
   ASSERT_TRUE(outcome);
   EXPECT_EQ(outcome->seeds, 0u);
+}
+
+TEST(Repair, WhatNobodySawUnderAThingGoesWhereTheFloorGoesOn) {
+  // A trainer leaves such grey crumbs under a thing; one on the floor in full view is no crumb.
+  BlockScene block;
+  const std::size_t first = block.cloud.size();
+  for (int i = -2; i <= 2; ++i)
+    for (int k = -2; k <= 2; ++k)
+      add_gaussian(block.cloud, {0.05f * float(i), -0.01f, 0.05f * float(k)}, Vec3(0.03f), 3, Vec3(0.5f));
+  const std::size_t seen = block.cloud.size();
+  add_gaussian(block.cloud, {-0.5f, -0.01f, 0}, Vec3(0.03f), 3, Vec3(0.5f));
+  const std::size_t crumbs = seen - first;
+  block.request.region->size.y = double(block_side) - 0.06;  // the crumbs stay
+  block.request.region->center.y = block.middle.y - 0.04;
+  Moved moved(std::move(block));
+  moved.corrector.answer = [](const correct::CorrectionTask& flawed) { return painted(flawed, floor_color); };
+  const auto outcome = moved.correct();
+  ASSERT_TRUE(outcome);
+  EXPECT_GT(outcome->seeds, 0u);
+  std::size_t gone = 0;
+  for (std::size_t row = first; row < seen; ++row)
+    if (moved.working.role()[row] == Role::original) {
+      ++gone;
+      EXPECT_LE(moved.working.cloud().opacity_logit[row], working::keep_logit(Mode::move));
+    }
+  EXPECT_GE(gone, crumbs * 9 / 10);
+  EXPECT_EQ(moved.working.role()[seen], Role::frozen);
+  const std::vector<float> weight = render::largest_weights(moved.original, moved.block.cameras);
+  for (std::size_t row = 0; row < moved.block.floor_rows; ++row)
+    EXPECT_TRUE(weight[row] <= 0.3f || moved.working.role()[row] == Role::frozen) << row;
+  EXPECT_TRUE(moved.working.check());
 }
 
 TEST(Repair, LeavesAPitOpenThatViewsHaveLookedInto) {

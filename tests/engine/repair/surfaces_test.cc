@@ -86,6 +86,23 @@ TEST(ContinuedSurfaces, StopsWhereSomebodyHasLookedThrough) {
     for (int x = hole.x0; x < hole.x1; ++x) ASSERT_EQ(surface.at(x, y) != 0, x >= 40) << x << ", " << y;
 }
 
+TEST(ContinuedSurfaces, AThingThatCoversLittleOfThePictureGoesOnAsWell) {
+  // A small table in a large room: a thirtieth of what is seen, and most of what is near the hole.
+  constexpr int wide = 400, high = 300;
+  const scene::Rect table{180, 130, 240, 190}, gap{200, 150, 220, 170};
+  SurfaceView view{scene::Image(wide, high, 1), scene::Mask(wide, high), scene::Mask(wide, high),
+                   scene::Mask(wide, high)};
+  for (int y = 0; y < high; ++y)
+    for (int x = 0; x < wide; ++x) {
+      view.inverse_depth.at(x, y) = float(inside(table, x, y) && !inside(gap, x, y) ? tilted(x, y) : far_behind);
+      view.shows_surface.at(x, y) = !inside(gap, x, y);
+      view.vacated.at(x, y) = inside(gap, x, y);
+    }
+  const scene::Image surface = continued_surfaces(view, nowhere_free, 1);
+  EXPECT_EQ(count(surface), 400u);
+  EXPECT_NEAR(surface.at(210, 160), tilted(210, 160), 0.01 * tilted(210, 160));
+}
+
 TEST(ContinuedSurfaces, ItDoesNotGoOnBeyondItsEnd) {
   // The surface is in one half only: what is missing beside it, or below it, is not amid it.
   EXPECT_EQ(count(continued_surfaces(plane_with({36, 0, width, height}), nowhere_free, 1)), 0u);
@@ -101,10 +118,11 @@ TEST(ContinuedSurfaces, CrumbsAreNoSurface) {
   SurfaceView view = plane_with(hole);
   view.vacated = scene::Mask(width, height);
   const int x = (hole.x0 + hole.x1) / 2, y = (hole.y0 + hole.y1) / 2;
-  for (int i = 0; i < 7; ++i) view.vacated.at(x + i - 3, y) = 1;
-  EXPECT_EQ(count(continued_surfaces(view, nowhere_free, 1)), 0u);
-  for (int i = 0; i < 7; ++i) view.vacated.at(x + i - 3, y + 1) = 1;
-  EXPECT_EQ(count(continued_surfaces(view, nowhere_free, 1)), 14u);
+  for (int row = 0; row < 3; ++row) {
+    EXPECT_EQ(count(continued_surfaces(view, nowhere_free, 1)), 0u) << row << " pixels wide";
+    for (int i = 0; i < 7; ++i) view.vacated.at(x + i - 3, y + row) = 1;
+  }
+  EXPECT_EQ(count(continued_surfaces(view, nowhere_free, 1)), 21u);
 }
 
 TEST(ContinuedSurfaces, WhatIsSeenInFrontHidesIt) {

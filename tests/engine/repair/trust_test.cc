@@ -37,7 +37,7 @@ struct Wall {
 
 TEST(ObservedRows, CountWhatIsSeenAndNotWhatIsHiddenOrOutside) {
   const Wall wall;
-  const auto observed = observed_rows(wall.cloud, arc_of_cameras(3, 64));
+  const auto observed = observed_rows(shown_rows(wall.cloud, arc_of_cameras(3, 64)));
   ASSERT_EQ(observed.size(), wall.cloud.size());
   EXPECT_EQ(observed[wall.before], 1);
   EXPECT_LT(observed[wall.behind], 0.05f);
@@ -49,20 +49,20 @@ TEST(ObservedRows, OneCameraThatSeesItIsEnough) {
   const Wall wall;
   auto cameras = arc_of_cameras(3, 64);
   cameras.push_back(scene::look_at(DVec3(0, 0, 3), DVec3(0), DVec3(0, -1, 0), 0.9, 64, 64));
-  const auto observed = observed_rows(wall.cloud, cameras);
+  const auto observed = observed_rows(shown_rows(wall.cloud, cameras));
   EXPECT_EQ(observed[wall.before], 1);
   EXPECT_EQ(observed[wall.behind], 1);
 }
 
 TEST(ObservedRows, WithoutCamerasNothingIs) {
   const Wall wall;
-  EXPECT_EQ(observed_rows(wall.cloud, {}), std::vector<float>(wall.cloud.size(), 0.0f));
+  EXPECT_EQ(observed_rows(shown_rows(wall.cloud, {})), std::vector<float>(wall.cloud.size(), 0.0f));
 }
 
 TEST(ObservedRows, AFaintGaussianInFullViewIs) {
   Wall wall;
   wall.cloud.opacity_logit[wall.before] = -4;  // opacity 0.018
-  EXPECT_EQ(observed_rows(wall.cloud, arc_of_cameras(3, 64))[wall.before], 1);
+  EXPECT_EQ(observed_rows(shown_rows(wall.cloud, arc_of_cameras(3, 64)))[wall.before], 1);
 }
 
 /// The working scene of `scene` in which rows [0, dragged) have copies at `at(row's mean)`.

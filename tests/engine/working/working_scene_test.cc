@@ -171,6 +171,24 @@ TEST(WorkingScene, WhatIsLeftBehindIsAnOriginalOrATrail) {
   EXPECT_EQ(working.cloud(), before) << "it stays where it is, as it is";
 }
 
+TEST(WorkingScene, AFrozenRowThatIsGivenUpLeavesAsInAMove) {
+  Begun begun;
+  WorkingScene& working = begun.working;
+  working.gaussians().opacity_logit[3] = -9;  // fainter already
+  for (const std::uint32_t row : {1u, 3u}) {
+    working.give_up(row);
+    EXPECT_EQ(working.role()[row], Role::original);
+    EXPECT_EQ(working.cloud().mean.get(row), begun.input.mean.get(row));
+  }
+  EXPECT_EQ(working.cloud().opacity_logit[1], keep_logit(Mode::move));
+  EXPECT_EQ(working.cloud().opacity_logit[3], -9);
+  EXPECT_EQ(working.rows_that_left(), (Rows{1, 3}));
+  EXPECT_TRUE(working.check());
+  const auto restored = restore(members_of(working), begun.input, Frame(DVec3(0)));
+  ASSERT_TRUE(restored);
+  expect_same(*restored, working);
+}
+
 TEST(WorkingScene, NotesTheMeanOfOneRow) {
   Begun begun;
   WorkingScene& working = begun.working;

@@ -1,0 +1,44 @@
+#include "engine/repair/vacated.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/neighbours/point_index.h"
+
+namespace engine::repair {
+namespace {
+
+// So many neighbours say how densely a place was covered.
+constexpr std::size_t neighbours_asked = 8;
+// A place is taken if something arrived within so many times the distance that its neighbours had in the mean: between
+// the rows of an even surface that is shifted along itself there are at most 0.8.
+constexpr double taken_within = 1.5;
+
+std::vector<float> means_of(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows) {
+  std::vector<float> points;
+  points.reserve(3 * rows.size());
+  for (const std::uint32_t row : rows)
+    for (int axis = 0; axis < 3; ++axis) points.push_back(cloud.mean.get(row)[axis]);
+  return points;
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> rows_left_open(const scene::GaussianCloud& original, std::span<const std::uint32_t> left,
+                                          const WorkingScene& working, std::span<const std::uint32_t> arrived) {
+  if (left.empty() || arrived.empty()) return {left.begin(), left.end()};
+  const std::vector<float> places = means_of(original, left);
+  const std::size_t asked = std::min(left.size(), neighbours_asked + 1);  // the nearest is the row itself
+  const auto beside = neighbours::PointIndex(places, 3).nearest(places, asked);
+  const auto now = neighbours::PointIndex(means_of(working.cloud(), arrived), 3).nearest(places, 1);
+  std::vector<std::uint32_t> open;
+  for (std::size_t k = 0; k < left.size(); ++k) {
+    double spacing = 0;
+    for (std::size_t n = 1; n < asked; ++n) spacing += std::sqrt(double(beside[k * asked + n].squared_distance));
+    spacing /= double(std::max<std::size_t>(asked - 1, 1));
+    if (std::sqrt(double(now[k].squared_distance)) > taken_within * spacing) open.push_back(left[k]);
+  }
+  return open;
+}
+
+}  // namespace engine::repair

@@ -1,0 +1,25 @@
+// What a drag has left open.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/working/working_scene.h"
+
+namespace engine::repair {
+
+using working::WorkingScene;
+
+/// Those of `left`, rows of the input that have left their place, whose place is empty now: no row of `arrived` is as
+/// near to it as its neighbours were. What slides along itself, is stretched or stays beside an anchor leaves open only
+/// what it no longer covers.
+///   original  the scene as the edit found it, in the frame of the edit
+///   left      ascending
+///   arrived   rows of the working scene
+[[nodiscard]] std::vector<std::uint32_t> rows_left_open(const scene::GaussianCloud& original,
+                                                        std::span<const std::uint32_t> left,
+                                                        const WorkingScene& working,
+                                                        std::span<const std::uint32_t> arrived);
+
+}  // namespace engine::repair
