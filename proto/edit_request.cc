@@ -48,8 +48,8 @@ Region read_region(const JsonField& field, std::string_view size_name) {
 }
 
 EditRequest read_edit_request(const JsonField& field) {
-  const Members members(
-      field, {"scene", "version", "mode", "preset", "prompt", "handles", "selection", "attach", "region", "params"});
+  const Members members(field, {"scene", "version", "mode", "preset", "prompt", "handles", "selection", "heal",
+                                "attach", "region", "params"});
   EditRequest request;
   if (const auto f = members.optional("scene")) request.scene = f->text();
   if (const auto f = members.optional("version")) request.version = f->whole(0, no_limit);
@@ -57,10 +57,13 @@ EditRequest read_edit_request(const JsonField& field) {
   if (const auto f = members.optional("preset")) request.preset = f->one_of(engine::names<Preset>);
   if (const auto f = members.optional("prompt"); f && !f->is_null()) request.prompt = f->text();
   const auto selection = members.optional("selection");
-  if (const auto handles = members.required("handles"))
-    for (const JsonField& handle : handles->elements(1, max_handles, "handles"))
+  // What is selected can be removed without a word on where it is.
+  const bool may_lack_handles = request.mode == Mode::remove && selection.has_value();
+  if (const auto handles = may_lack_handles ? members.optional("handles") : members.required("handles"))
+    for (const JsonField& handle : handles->elements(may_lack_handles ? 0 : 1, max_handles, "handles"))
       request.handles.push_back(read_handle(handle, selection.has_value()));
   if (selection) request.selection = read_selection(*selection);
+  if (const auto f = members.optional("heal")) request.heal = read_selection(*f);
   if (const auto f = members.optional("attach")) request.attach = f->one_of(engine::names<Attach>);
   if (const auto f = members.optional("region")) request.region = read_region(*f, "size");
   if (const auto f = members.optional("params")) request.params = read_params(*f);
@@ -111,7 +114,7 @@ bool is_released_config(const json& document) {
   return document.contains("start") || document.contains("direction") || document.contains("voxel_size");
 }
 
-bool is_edit_request(const json& document) { return document.contains("handles"); }
+bool is_edit_request(const json& document) { return document.contains("handles") || document.contains("selection"); }
 
 Result<RequestFile> decode_either(const json& document, const std::string& name) {
   const auto in_file = [&](Result<EditRequest> request, bool released) -> Result<RequestFile> {
@@ -121,7 +124,8 @@ Result<RequestFile> decode_either(const json& document, const std::string& name)
   if (is_edit_request(document)) return in_file(decode(document, name, read_edit_request), false);
   if (is_released_config(document)) return in_file(decode(document, name, read_released_config), true);
   return fail(ErrorCode::invalid_argument,
-              "expected an edit request (with handles) or a 3DGS-Drag configuration (with start, direction and "
+              "expected an edit request (with handles, or a selection to remove) or a 3DGS-Drag configuration (with "
+              "start, direction and "
               "voxel_size)",
               name);
 }
@@ -218,6 +222,7 @@ std::string to_json(const EditRequest& request) {
   ordered_json& handles = out["handles"] = ordered_json::array();
   for (const Handle& handle : request.handles) handles.push_back(encode(handle));
   if (request.selection) out["selection"] = encode(*request.selection);
+  if (request.heal) out["heal"] = encode(*request.heal);
   if (request.attach) out["attach"] = name_of(*request.attach);
   if (request.region) out["region"] = {{"center", request.region->center}, {"size", request.region->size}};
   out["params"] = encode(request.params);

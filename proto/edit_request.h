@@ -60,6 +60,7 @@ struct EditRequest {
   std::optional<std::string> prompt;   ///< For a corrector that reads one.
   std::vector<Handle> handles;         ///< 1 to max_handles
   std::optional<Selection> selection;  ///< What moves. None: the handles' spheres.
+  std::optional<Selection> heal = {};  ///< What is made anew although it was seen.
   std::optional<Attach> attach = {};   ///< What holds it. None: auto.
   std::optional<Region> region;
   Params params;

@@ -14,7 +14,7 @@ import {
   upOf,
 } from "./camera.js";
 import { History } from "./history.js";
-import { previewKey, requestOf } from "./requests.js";
+import { changesScene, previewKey, requestOf } from "./requests.js";
 import { NOTHING_SELECTED, Selecting } from "./selecting.js";
 import { follow, hasEnded, merged } from "./watch.js";
 
@@ -45,6 +45,7 @@ export const NOTHING_OPEN = {
   preset: "",
   prompt: null,
   attach: null,
+  heal: [], // Operations on the scene: what a run makes anew. A request may have them; the page has no brush for them yet.
   params: {},
   autoPreview: true,
   preview: null, // What the service answered, and `key`: of what it is a preview.
@@ -436,12 +437,12 @@ export class Editor {
   }
 
   #requestChanged() {
-    const { scene, handles, selection, preview, problem, autoPreview, dragging, selectMode } = this.state;
+    const { scene, selection, preview, problem, autoPreview, dragging, selectMode } = this.state;
     if (!scene) return;
     const request = this.request();
     const key = previewKey(request, this.state.info?.parameters);
     if (problem && problem.key !== JSON.stringify(request)) this.store.set({ problem: null });
-    if (!handles.some((h) => h.target)) {
+    if (!changesScene(this.state)) {
       this.#later("preview", 0, () => {});
       this.#previewing?.abort();
       if (preview) this.store.set({ preview: null });
@@ -541,6 +542,7 @@ export class Editor {
     this.#place({ handles, selection });
     this.store.set({
       attach: request.attach ?? null,
+      heal: request.heal ?? [],
       selectMode: false,
       selected: null,
       mode: request.mode ?? "move",

@@ -5,7 +5,7 @@ import { attrs, h, problemPlace, problemText, showProblem, text } from "./dom.js
 import { choice, labelled, pointField, segments, toggle } from "./fields.js";
 import { bytes, count, counted, duration, gaussians } from "./format.js";
 import { paramFields } from "./params.js";
-import { partOf, readRequests } from "./requests.js";
+import { changesScene, isStated, partOf, readRequests } from "./requests.js";
 import { whatMoves } from "./selection.js";
 
 const CONSTRAINTS = [
@@ -39,6 +39,7 @@ export function buildRequestPanel(editor) {
     options: [
       ["move", "Move", "What is dragged leaves its old place"],
       ["extend", "Extend", "What is dragged is drawn out: what lies between is filled"],
+      ["remove", "Remove", "What is selected, or in the handles' spheres, goes; what it hid is completed"],
     ],
     changed: (value) => store.set({ mode: value }),
   });
@@ -200,8 +201,8 @@ export function buildRequestPanel(editor) {
       "prompt",
     ],
     (state) => {
-      const ready = state.scene !== null && state.handles.length > 0;
-      const moves = state.handles.some((handle) => handle.target);
+      const ready = state.scene !== null && isStated(state);
+      const moves = changesScene(state);
       preview.disabled = !ready || !moves;
       estimate.disabled = !ready || state.submitting;
       run.disabled = !ready || !moves || state.submitting;
@@ -289,8 +290,8 @@ export async function importFile(editor, file, place) {
 }
 
 function exportFile(editor) {
-  const { scene, handles } = editor.state;
-  if (handles.length === 0) return say("There is nothing to export: no handle has been placed.");
+  const { scene } = editor.state;
+  if (!isStated(editor.state)) return say("There is nothing to export: no handle has been placed.");
   const url = URL.createObjectURL(
     new Blob([`${JSON.stringify(editor.request(), null, 2)}\n`], { type: "application/json" }),
   );

@@ -11,7 +11,9 @@ export class ImportError extends Error {
 }
 
 /** The request that the screen describes. What is left to the service's defaults is left out. */
-export function requestOf({ scene, version, mode, preset, prompt, handles, selection = [], attach, region, params }) {
+export function requestOf(state) {
+  const { scene, version, mode, preset, prompt, handles, selection = [], heal = [], attach, region, params } = state;
+  const goes = mode !== "remove"; // else targets stay on the screen, for when the mode changes back
   const given = Object.entries(params ?? {}).filter(
     ([, value]) => value !== null && value !== undefined && value !== "",
   );
@@ -23,18 +25,27 @@ export function requestOf({ scene, version, mode, preset, prompt, handles, selec
     ...(prompt ? { prompt } : {}),
     handles: handles.map((handle) => ({
       source: handle.source,
-      ...(handle.target ? { target: handle.target } : {}),
+      ...(goes && handle.target ? { target: handle.target } : {}),
       ...radiusGiven(handle, selection),
       group: handle.group,
-      ...(handle.rotation ? { rotation: handle.rotation } : {}),
-      ...(handle.scale ? { scale: handle.scale } : {}),
+      ...(goes && handle.rotation ? { rotation: handle.rotation } : {}),
+      ...(goes && handle.scale ? { scale: handle.scale } : {}),
     })),
     ...(selection.length ? { selection } : {}),
+    ...(heal.length ? { heal } : {}),
     ...(attach ? { attach } : {}),
     ...(region ? { region } : {}),
     ...(given.length ? { params: Object.fromEntries(given) } : {}),
   };
 }
+
+/** Is there anything that could be sent: something to take hold of, or to remove? */
+export const isStated = ({ mode, handles, selection = [] }) =>
+  handles.length > 0 || (mode === "remove" && selection.length > 0);
+
+/** Would it change the scene? What is removed goes nowhere; else a handle has a target. */
+export const changesScene = (state) =>
+  isStated(state) && (state.mode === "remove" || state.handles.some((handle) => handle.target));
 
 /** A handle's sphere says what moves only where no selection does. With one, a radius is given if somebody gave one. */
 function radiusGiven({ radius, grip = null }, selection) {
@@ -45,7 +56,7 @@ function radiusGiven({ radius, grip = null }, selection) {
 /** What of the screen decides how a preview looks: two equal texts, the same preview. It shows where Gaussians go, so of
  *  the `parameters` that the service describes those of the motion count, and any that it does not describe. */
 export function previewKey(request, parameters = []) {
-  const { handles, selection, attach, mode, region, params = {}, preset, scene, version } = request;
+  const { handles, selection, attach, mode, region, params = {}, preset, scene, version } = request; // healing shows later
   const others = new Set(parameters.filter(({ part }) => part !== "motion").map(({ name }) => name));
   const motion = Object.entries(params).filter(([name]) => !others.has(name));
   motion.sort(([a], [b]) => (a < b ? -1 : 1));
@@ -91,7 +102,7 @@ export function readRequests(text) {
 }
 
 const isObject = (value) => typeof value === "object" && value !== null && !Array.isArray(value);
-const isRequest = (document) => "handles" in document;
+const isRequest = (document) => "handles" in document || "selection" in document;
 const isReleased = (document) => ["start", "direction", "voxel_size"].some((name) => name in document);
 const isEither = (document) => isRequest(document) || isReleased(document);
 
@@ -134,14 +145,18 @@ function list(value, where, count) {
 }
 
 function modeOf(value, where) {
-  if (value === "move" || value === "extend") return value;
-  throw new ImportError('expected "move" or "extend"', where);
+  if (["move", "extend", "remove"].includes(value)) return value;
+  throw new ImportError('expected "move", "extend" or "remove"', where);
 }
 
 function readRequest(document, where) {
-  known(document, ["scene", "version", "mode", "preset", "prompt", "handles", "selection", "region", "params"], where);
+  const names = ["scene", "version", "mode", "preset", "prompt", "handles", "selection", "heal", "region", "params"];
+  known(document, names, where);
+  const mode = modeOf(document.mode ?? "move", within(where, "mode"));
   const selection = readSelection(document.selection, within(where, "selection"));
-  const handles = list(document.handles, within(where, "handles")).map((handle, i) => {
+  const heal = readSelection(document.heal, within(where, "heal"));
+  const needless = mode === "remove" && selection.length > 0 && (document.handles ?? []).length === 0;
+  const handles = (needless ? [] : list(document.handles, within(where, "handles"))).map((handle, i) => {
     const at = within(where, `handles[${i}]`);
     if (!isObject(handle)) throw new ImportError("expected an object", at);
     known(handle, ["source", "target", "radius", "group"], at);
@@ -162,11 +177,12 @@ function readRequest(document, where) {
   const params = document.params ?? {};
   if (!isObject(params)) throw new ImportError("expected an object", within(where, "params"));
   return {
-    mode: modeOf(document.mode ?? "move", within(where, "mode")),
+    mode,
     preset: document.preset ?? null,
     prompt: document.prompt ?? null,
     handles,
     selection,
+    heal,
     region,
     params: { ...params },
   };
@@ -219,6 +235,7 @@ function readReleased(document, where) {
     prompt: null,
     handles,
     selection: [],
+    heal: [],
     region,
     params: {},
   };

@@ -19,12 +19,13 @@ Result<deform::Assignment> assign(const Array3& mean, const Request& request) {
   for (const Handle& handle : request.handles) spheres.push_back({handle.source, handle.radius});
   std::optional<deform::Box> region;
   if (request.region) region = deform::Box{request.region->center, request.region->size};
-  if (!request.selected) return deform::assign(mean, spheres, region);
-  if (request.selected->back() >= mean.size())
+  const auto beyond = [&](std::uint32_t row, const char* where) {
     return fail(ErrorCode::unprocessable,
-                "row " + std::to_string(request.selected->back()) + " is selected; the scene has " +
-                    std::to_string(mean.size()),
-                "selection");
+                "row " + std::to_string(row) + " is selected; the scene has " + std::to_string(mean.size()), where);
+  };
+  if (!request.healed.empty() && request.healed.back() >= mean.size()) return beyond(request.healed.back(), "heal");
+  if (!request.selected) return deform::assign(mean, spheres, region);
+  if (request.selected->back() >= mean.size()) return beyond(request.selected->back(), "selection");
   std::vector<DVec3> centers;
   for (const Handle& handle : request.handles) centers.push_back(handle.source);
   auto assignment = deform::assign_selected(mean, *request.selected, centers, region);
@@ -130,6 +131,12 @@ PlannedMotion plan_motion(const WorkingScene& working, const Request& request, c
   const auto drags = interval_drags(working.frame(), request, positions, u, intervals);
   PlannedMotion motion;
   motion.rows = working.dragged_rows();
+  if (request.mode == Mode::remove) {
+    motion.deformation = deform::at_rest(working.cloud(), motion.rows);
+    motion.moving = motion.rows;
+    motion.removes = true;
+    return motion;
+  }
   motion.deformation = follow_handles(working, motion.rows, drags, request, parts, memory);
   for (std::size_t k = 0; k < motion.rows.size(); ++k)
     if (motion.deformation.moves[k]) motion.moving.push_back(motion.rows[k]);
@@ -149,6 +156,7 @@ DraggedAlone drag_alone(std::vector<std::uint32_t> rows, const scene::GaussianCl
   for (int u = 1; u <= intervals; ++u) {
     const PlannedMotion motion = plan_motion(drag.working, request, own_parts, drag.positions, u, intervals, memory);
     copy_and_paste(drag.working, motion, departure_of(request), rotate_sh);
+    if (motion.removes) continue;  // nothing is left that a handle could be on
     for (const std::size_t lost : relocate(drag.working, request, drag.positions))
       drag.warnings.push_back(handle_lost(lost, u));
   }

@@ -31,6 +31,7 @@ struct PlannedMotion {
   /// What goes on behind them: copies of rows of the input as they are, shifted.
   std::vector<std::uint32_t> continued;
   std::vector<DVec3> shift;  ///< [continued] world units.
+  bool removes = false;      ///< They move nowhere: nothing of them is copied.
 };
 
 /// The deformation of interval u = 1..intervals, from the handles' present positions (in the frame of `working`).

@@ -46,9 +46,10 @@ Result<void> carry_out_interval(State& state, Edit& edit, int u) {
   if (!copies) return propagate(copies);
   if (auto shown = show(state, edit, u, "deformed"); !shown) return shown;
   if (auto masked = mask(state, edit, u, *copies); !masked) return masked;
-  if (edit.optimises() && !copies->empty())
+  if (edit.optimises() && (motion->removes || !copies->empty()))
     if (auto repaired = correct_and_optimise(state, edit, u); !repaired) return repaired;
-  if (auto relocated = relocate_handles(state, edit, u); !relocated) return relocated;
+  if (!motion->removes)  // nothing is left that a handle could be on
+    if (auto relocated = relocate_handles(state, edit, u); !relocated) return relocated;
   state.interval = u;
   return {};
 }

@@ -18,6 +18,7 @@ constexpr double far_away = 16;
 }  // namespace
 
 int resolved_intervals(const Request& request) {
+  if (request.mode == Mode::remove) return 1;  // there is no way to go
   if (request.params.intervals > 0) return request.params.intervals;
   // A body finds its whole way at once.
   if (request.params.interpolation == Interpolation::arap) return 1;
@@ -66,6 +67,8 @@ std::vector<DVec3> handle_sources(const working::Frame& frame, const Request& re
 
 void give_radii(const scene::Bounds& selected, Request& request) {
   const DVec3 size = DVec3(selected.high) - DVec3(selected.low);
+  if (request.mode == Mode::remove && request.handles.empty())
+    request.handles.emplace_back().source = (DVec3(selected.low) + DVec3(selected.high)) / 2.0;
   const double longest = std::max({size.x, size.y, size.z});
   const bool is_body = request.params.interpolation == Interpolation::arap;
   double way = 0;

@@ -41,7 +41,8 @@ namespace engine::edit {
                                                        std::span<const DVec3> positions, int u, int intervals);
 
 /// Gives a radius to handles that have none. For an elastic body, of the longest edge of the box around what is
-/// selected, a twentieth, or a quarter for handles that turn or scale what they grip; else half of that edge.
+/// selected, a twentieth, or a quarter for handles that turn or scale what they grip; else half of that edge. A removal
+/// without a handle gets one, in the middle of that box.
 ///   request  with a selection
 void give_radii(const scene::Bounds& selected, Request& request);
 

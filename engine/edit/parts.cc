@@ -81,7 +81,7 @@ void draw_out(const scene::LayeredCloud& scene, std::span<const std::uint32_t> r
 Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> handle, const Request& request,
                Memory& memory) {
   Parts parts;
-  if (request.params.interpolation != Interpolation::arap) return parts;
+  if (request.params.interpolation != Interpolation::arap || request.mode == Mode::remove) return parts;
   std::vector<std::uint32_t> dragged;
   std::map<int, std::vector<std::uint32_t>> rows_of_group;
   for (std::uint32_t row = 0; row < handle.size(); ++row) {

@@ -16,6 +16,7 @@ std::vector<std::uint32_t> copy_and_paste(WorkingScene& working, const PlannedMo
   for (std::size_t k = 0; k < motion.rows.size(); ++k) {
     const std::uint32_t row = motion.rows[k];
     working.note_mean(row);
+    if (motion.removes) left_behind.push_back(row);
     if (!motion.deformation.moves[k]) continue;
     entries.push_back(k);
     if (mode == Mode::move && working.role()[row] == working::Role::copy) {
@@ -25,8 +26,9 @@ std::vector<std::uint32_t> copy_and_paste(WorkingScene& working, const PlannedMo
       left_behind.push_back(row);
     }
   }
-  working.append(working.cloud(), left_behind, std::vector<working::Role>(left_behind.size(), working::Role::copy),
-                 left_behind);
+  if (!motion.removes)
+    working.append(working.cloud(), left_behind, std::vector<working::Role>(left_behind.size(), working::Role::copy),
+                   left_behind);
   for (const std::uint32_t row : left_behind) {
     float& logit = working.gaussians().opacity_logit[row];
     logit = std::min(logit, working::keep_logit(mode));

@@ -38,7 +38,7 @@ Result<PreviewOutcome> preview(const scene::LayeredCloud& scene, const Request& 
   for (const DVec3& position : drag.positions)
     outcome.positions.push_back(drag.working.frame().world_from_edit(position));
   outcome.changeable = published.changeable;
-  if (drag.working.rows_of(working::Role::copy).empty()) outcome.warnings.push_back(nothing_moves());
+  if (drag.working.rows_that_left().empty()) outcome.warnings.push_back(nothing_moves());
   for (const std::size_t anchor : parts.idle) outcome.warnings.push_back(anchor_is_idle(anchor));
   for (std::string& warning : drag.warnings) outcome.warnings.push_back(std::move(warning));
   if (published.faint > 0) outcome.warnings.push_back(faint_left_out(published.faint));

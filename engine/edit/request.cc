@@ -42,6 +42,21 @@ Result<void> validate(const Region& region) {
   return {};
 }
 
+/// What is removed goes nowhere.
+Result<void> validate_removal(const Request& request) {
+  for (std::size_t i = 0; i < request.handles.size(); ++i) {
+    const Handle& handle = request.handles[i];
+    const std::string where = "handles[" + std::to_string(i) + "]";
+    const char* const field = handle.target     ? ".target"
+                              : handle.rotation ? ".rotation"
+                              : handle.scale    ? ".scale"
+                                                : nullptr;
+    if (field != nullptr)
+      return invalid("what is removed goes nowhere: leave this out, or ask for mode \"move\"", where + field);
+  }
+  return {};
+}
+
 /// What only an elastic body does.
 Result<void> validate_motion(const Request& request) {
   if (request.params.interpolation == Interpolation::arap) return {};
@@ -56,14 +71,18 @@ Result<void> validate_motion(const Request& request) {
   return {};
 }
 
+Result<void> validate_ascending(std::span<const std::uint32_t> rows, const char* where) {
+  if (std::ranges::adjacent_find(rows, std::greater_equal<>()) != rows.end())
+    return invalid("selected rows are given once each, in ascending order", where);
+  return {};
+}
+
 Result<void> validate_selected(std::span<const std::uint32_t> rows) {
   if (rows.empty())
     return fail(ErrorCode::unprocessable,
                 "the selection holds no Gaussian, so nothing could be dragged: add to it, or take less away",
                 "selection");
-  if (std::ranges::adjacent_find(rows, std::greater_equal<>()) != rows.end())
-    return invalid("selected rows are given once each, in ascending order", "selection");
-  return {};
+  return validate_ascending(rows, "selection");
 }
 
 }  // namespace
@@ -80,6 +99,9 @@ Result<void> validate(const Request& request) {
     if (auto valid = validate(request.handles[i], "handles[" + std::to_string(i) + "]"); !valid) return valid;
   if (request.selected)
     if (auto valid = validate_selected(*request.selected); !valid) return valid;
+  if (request.mode == Mode::remove)
+    if (auto valid = validate_removal(request); !valid) return valid;
+  if (auto valid = validate_ascending(request.healed, "heal"); !valid) return valid;
   if (auto valid = validate_motion(request); !valid) return valid;
   if (request.region)
     if (auto valid = validate(*request.region); !valid) return valid;

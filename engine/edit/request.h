@@ -47,10 +47,13 @@ struct Region {
 
 struct Request {
   Mode mode = Mode::move;
-  std::vector<Handle> handles;
+  std::vector<Handle> handles;  ///< In a removal they only say where, and what is removed if there is no selection.
   /// Rows of the scene that are meant, strictly ascending: each goes with the handle nearest to it, and the radius of a
   /// handle says nothing of what moves. None: the spheres of the handles say it.
   std::optional<std::vector<std::uint32_t>> selected;
+  /// Rows of the scene that are made anew although cameras saw them, strictly ascending: a stain, a painted shadow.
+  /// Only with a corrector, and where what is dragged leaves its place; dragged rows among them count where they were.
+  std::vector<std::uint32_t> healed;
   std::optional<Region> region;
   Attach attach = Attach::automatic;  ///< What holds the part (Interpolation::arap).
   Params params;
@@ -58,10 +61,11 @@ struct Request {
                              ///< habit, y down.
 };
 
-/// What becomes of the place that the part comes from. A body that is drawn out leaves nothing behind, as in a move: it
-/// is what lies between. A ball that is drawn out leaves its trail.
+/// What becomes of the place that the part comes from: `move` or `extend`. A body that is drawn out leaves nothing
+/// behind, as in a move: it is what lies between. A ball that is drawn out leaves its trail.
 [[nodiscard]] constexpr Mode departure_of(const Request& request) {
-  return request.params.interpolation == Interpolation::arap ? Mode::move : request.mode;
+  const bool leaves = request.mode == Mode::remove || request.params.interpolation == Interpolation::arap;
+  return leaves ? Mode::move : request.mode;
 }
 
 /// Ranges and finiteness of every field.

@@ -28,7 +28,7 @@ repair::Repair make_repair(const State& state, const Edit& edit) {
       out.push_back(scene::fit_within(frame.edit_from_world(camera), edit.params().max_image_side));
     return out;
   };
-  return {frame.edit_from_world(edit.input), in_frame(edit.candidates), in_frame(state.views),
+  return {frame.edit_from_world(edit.input), in_frame(edit.candidates), in_frame(state.views), edit.request.healed,
           departure_of(edit.request),        edit.params().seed,        *edit.corrector};
 }
 
@@ -101,7 +101,9 @@ Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Cam
     edit.progress.refine(work);
   }
   for (const scene::Camera& view : state.views) state.masks.emplace_back(view.width, view.height);
-  return {};
+  if (edit.corrector == nullptr || edit.request.healed.empty()) return {};
+  return unite_masks(state.scene, edit.request.healed, state.views, state.masks,
+                     [&](double) { return edit.progress.advance(1); });
 }
 
 Result<PlannedMotion> deform(const State& state, Edit& edit, int u) {

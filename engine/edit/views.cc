@@ -28,9 +28,8 @@ DVec3 direction_to(DVec3 eye, DVec3 from) {
 /// A scene with a drag laid over it, and what of it to look at.
 struct DryRun {
   scene::GaussianCloud top;            ///< Originals, as they were lowered; then what the drag has added.
-  std::vector<std::uint32_t> changed;  ///< Rows of the scene in whose place the originals are.
+  std::vector<std::uint32_t> changed;  ///< Rows of the scene in whose place the originals are, ascending.
   std::vector<std::uint32_t> copies;   ///< At their final place: rows of the layers.
-  std::vector<std::uint32_t> parents;  ///< Of the copies, each once, ascending.
 };
 
 /// Where the whole drag would take the dragged rows: a function of what moves alone.
@@ -49,13 +48,9 @@ DryRun dry_run(const WorkingScene& begun, const scene::GaussianCloud& input, con
   const std::uint32_t added_from = std::uint32_t(begun.size() + originals.size() - alone.input_rows());
   std::vector<std::uint32_t> taken = originals;
   for (auto row = std::uint32_t(alone.input_rows()); row < alone.size(); ++row) taken.push_back(row);
-  for (auto row = std::uint32_t(alone.input_rows()); row < alone.size(); ++row) {
+  for (auto row = std::uint32_t(alone.input_rows()); row < alone.size(); ++row)
     if (working::has_arrived(alone.role()[row])) out.copies.push_back(added_from + row);
-    if (alone.role()[row] == working::Role::copy) out.parents.push_back(drag.rows[alone.parent()[row]]);
-  }
   out.top = scene::gather(alone.cloud(), taken);
-  std::sort(out.parents.begin(), out.parents.end());
-  out.parents.erase(std::unique(out.parents.begin(), out.parents.end()), out.parents.end());
   return out;
 }
 
@@ -104,15 +99,16 @@ Result<ViewChoice> choose_views(const WorkingScene& begun, const scene::Gaussian
                                 int intervals, const std::function<Result<void>(double)>& advance) {
   DryRun dry = dry_run(begun, input, request, parts, intervals);
   ViewChoice choice;
-  choice.moves = !dry.copies.empty();
-  if (!choice.moves && request.params.optimise_unmoved) dry.copies = dry.parents = begun.dragged_rows();
+  choice.moves = !dry.changed.empty();
+  std::vector<std::uint32_t> sources_of = dry.changed;
+  if (!choice.moves && request.params.optimise_unmoved) dry.copies = sources_of = begun.dragged_rows();
   render::Layers layers(begun.cloud());
   layers.top = &dry.top;
   layers.hidden = layers.changed = dry.changed;
   const auto targets =
       covered_areas(layers, begun.frame(), dry.copies, candidates, [&](double part) { return advance(part / 2); });
   if (!targets) return propagate(targets);
-  const auto sources = covered_areas(begun.cloud(), begun.frame(), dry.parents, candidates,
+  const auto sources = covered_areas(begun.cloud(), begun.frame(), sources_of, candidates,
                                      [&](double part) { return advance((1 + part) / 2); });
   if (!sources) return propagate(sources);
 

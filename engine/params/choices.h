@@ -15,8 +15,11 @@ using deform::Rotation;
 enum class Mode {
   move,    ///< The dragged part leaves its place.
   extend,  ///< It is drawn out: the original and the trail stay.
+  remove   ///< It leaves its place and arrives nowhere.
 };
-constexpr auto names_of(Mode) { return std::array{Name{Mode::move, "move"}, Name{Mode::extend, "extend"}}; }
+constexpr auto names_of(Mode) {
+  return std::array{Name{Mode::move, "move"}, Name{Mode::extend, "extend"}, Name{Mode::remove, "remove"}};
+}
 
 /// A name for a set of parameters. How their numbers were found: docs/tradeoff.md.
 enum class Preset {

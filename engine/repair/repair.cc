@@ -33,6 +33,8 @@ constexpr float shows = 0.2f;
 constexpr float decided = 0.5f;
 // Pixels. What is thinner than twice this was not hidden: outlines are blurred by as much.
 constexpr int blur = 1;
+// A stain goes so deep, in parts of its distance: the layers of a surface below the one that shows are stained as well.
+constexpr double stain_depth = 0.03;
 // By so much farther away than a completed surface a row is behind it.
 constexpr double behind = 0.03;
 constexpr std::size_t most_examples = 6;  // of the buffer, for each view: its neighbours on either side
@@ -62,6 +64,9 @@ class OpaqueTrail {
   std::vector<float> lowered_;  ///< Opacities as they were; seeds appended since have none.
 };
 
+/// Pixels by which outlines of what has left are widened: they are blurred.
+int rim_px(const scene::Camera& view) { return std::max(1, view.height / 128); }
+
 /// "512 x 384 x 3": pixels and channels.
 std::string size_text(int width, int height, int channels) {
   return std::to_string(width) + " x " + std::to_string(height) + " x " + std::to_string(channels);
@@ -84,13 +89,15 @@ struct Repair::ViewNow {
 };
 
 Repair::Repair(scene::GaussianCloud original, std::span<const scene::Camera> observers,
-               std::vector<scene::Camera> views, Mode mode, std::uint64_t seed, correct::Corrector& corrector)
+               std::vector<scene::Camera> views, std::span<const std::uint32_t> healed, Mode mode, std::uint64_t seed,
+               correct::Corrector& corrector)
     : original_(std::move(original)),
       views_(std::move(views)),
       mode_(mode),
       seed_(seed),
       corrector_(corrector),
       witnesses_(original_, observers),
+      healed_(healed.begin(), healed.end()),
       unedited_(render_unedited(original_, views_)) {
   for (std::size_t v = 0; v < views_.size(); ++v)
     buffer_.push_back({std::move(unedited_.color[v]), scene::Mask(views_[v].width, views_[v].height), {}});
@@ -100,6 +107,11 @@ Repair::Repair(scene::GaussianCloud original, std::span<const scene::Camera> obs
     for (std::uint32_t row = 0; row < original_.size(); ++row)
       if (shown[row] < shows && !witnesses_.saw(original_.mean.get(row))) unseen_.push_back(row);
   observed_ = observed_rows(std::move(shown));
+  if (mode == Mode::extend) healed_.clear();
+  for (std::size_t v = 0; v < views_.size(); ++v) {
+    const scene::Image share = working::footprint(original_, healed_, views_[v], workspace_);
+    stained_.push_back(mask::dilate(mask::mask2d(share), rim_px(views_[v])));
+  }
   if (mode == Mode::move) originals_.emplace(interleaved(original_.mean), 3);
 }
 
@@ -154,6 +166,11 @@ scene::Image Repair::surfaces_behind(const ViewNow& now, std::size_t v, const Ro
   return continued_surfaces(surface_view, is_free_at, seed_for(Purpose::surfaces, v, round));
 }
 
+void Repair::give_up_healed(WorkingScene& working) const {
+  for (const std::uint32_t row : healed_)
+    if (working.role()[row] == Role::frozen) working.give_up(row);
+}
+
 void Repair::doubt_unseen(const WorkingScene& working, const Rows& rows, std::size_t v, ViewNow& now) {
   const scene::Camera& view = views_[v];
   render::Layers layers(working.cloud());
@@ -164,9 +181,11 @@ void Repair::doubt_unseen(const WorkingScene& working, const Rows& rows, std::si
   parallel_for(std::size_t(view.height), 4, [&](std::size_t begin, std::size_t end) {
     for (int y = int(begin); y < int(end); ++y)
       for (int x = 0; x < view.width; ++x) {
-        const double depth = double(now.inverse_depth.at(x, y));
-        if (vacated_[v].at(x, y) == 0 || !(depth > 0) || share.at(x, y) >= decided) continue;
-        unseen.at(x, y) = !witnesses_.saw(point_at(view, {x + 0.5, y + 0.5}, depth));
+        const double inverse_depth = double(now.inverse_depth.at(x, y));
+        if (vacated_[v].at(x, y) == 0 || !(inverse_depth > 0) || share.at(x, y) >= decided) continue;
+        const bool is_under_stain =
+            stained_[v].at(x, y) != 0 && inverse_depth * double(unedited_.median_depth[v].at(x, y)) > 1 - stain_depth;
+        unseen.at(x, y) = is_under_stain || !witnesses_.saw(point_at(view, {x + 0.5, y + 0.5}, inverse_depth));
       }
   });
   unseen = mask::opened(unseen, blur);
@@ -240,6 +259,7 @@ Result<Corrected> Repair::correct(WorkingScene& working, std::span<const scene::
                                   const std::function<Result<void>(double)>& advance) {
   Corrected corrected;
   corrected.pictures.resize(views_.size());
+  give_up_healed(working);
   Rows rows = rows_of(working);
   note_vacated(working, rows, masks);
   if (auto tuned = corrector_.fine_tune(buffer_, 0); !tuned) return propagate(tuned);
@@ -285,7 +305,8 @@ void Repair::note_vacated(const WorkingScene& working, const Rows& rows, std::sp
   for (std::size_t v = 0; v < views_.size(); ++v) {
     const scene::Image share = working::footprint(original_, rows.vacating, views_[v], workspace_);
     const scene::Image open_share = working::footprint(original_, open, views_[v], workspace_);
-    vacated_[v] = mask::dilate(mask::mask2d(open_share), std::max(1, views_[v].height / 128));
+    vacated_[v] = mask::dilate(mask::mask2d(open_share), rim_px(views_[v]));
+    mask::unite(vacated_[v], stained_[v]);
     buffer_[v].excluded = mask::mask2d(share, trace);
     buffer_[v].box = scene::bounding_box(masks[v]);
   }

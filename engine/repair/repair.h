@@ -49,10 +49,11 @@ class Repair {
   ///   original   the scene as the edit found it, in the frame of the edit
   ///   observers  cameras that have seen it, in that frame
   ///   views      of the edit, in that frame, best first
+  ///   healed     rows of it that are made anew although they were seen, in a move
   ///   seed       of all random choices
   ///   corrector  outlives this
   Repair(scene::GaussianCloud original, std::span<const scene::Camera> observers, std::vector<scene::Camera> views,
-         Mode mode, std::uint64_t seed, correct::Corrector& corrector);
+         std::span<const std::uint32_t> healed, Mode mode, std::uint64_t seed, correct::Corrector& corrector);
 
   /// One correction of all views. Appends seeds to the working scene.
   ///   masks    per view, dilated; views without a set pixel stay as they are
@@ -95,7 +96,10 @@ class Repair {
   /// Lays what goes on behind the dragged part into the working scene as seeds.
   [[nodiscard]] Result<Background> complete_background(WorkingScene& working, Rows& rows, std::size_t v,
                                                        const Round& round);
-  /// Takes the trust of what view v shows in vacated pixels and no camera has seen.
+  /// Healed rows go, for good.
+  void give_up_healed(WorkingScene& working) const;
+  /// Takes the trust of what view v shows in vacated pixels and no camera has seen, and of what lay right under a
+  /// stain.
   void doubt_unseen(const WorkingScene& working, const Rows& rows, std::size_t v, ViewNow& now);
   /// Rows that nobody has seen leave where a surface was completed in view v, if they would hide it.
   void clear_unseen(WorkingScene& working, Rows& rows, std::size_t v, const scene::Image& surface);
@@ -107,6 +111,8 @@ class Repair {
   correct::Corrector& corrector_;
   std::vector<float> observed_;  ///< Of observed_rows().
   Witnesses witnesses_;
+  std::vector<std::uint32_t> healed_;  ///< Ascending.
+  std::vector<scene::Mask> stained_;   ///< Per view: pixels that the healed rows made up.
   std::vector<std::uint32_t> unseen_;  ///< Rows of the input that no camera has seen, ascending.
   UneditedViews unedited_;
   std::vector<correct::Example> buffer_;

@@ -45,7 +45,7 @@ struct EditOptions {
 
 /// Errors of the engine name a field of the request; the user knows that field by its place in the file.
 void locate_in_file(engine::Error& error, const EditOptions& options, const proto::RequestFile& file) {
-  for (const char* field : {"handles", "selection", "region", "params"})
+  for (const char* field : {"handles", "selection", "heal", "region", "params"})
     if (error.where.starts_with(field)) {
       error.where = path(options.request).filename().string() + ":" + file.address_of(error.where);
       return;
@@ -78,13 +78,25 @@ Result<std::vector<scene::Camera>> load_cameras(const std::string& dataset) {
   return io::cameras_of(*read);
 }
 
-/// Carries the selection of a request out, if it has one.
+/// Carries the selection of a request out, if it has one, and that of what is to be healed.
 ///   returns  warnings
 Result<std::vector<std::string>> select_rows(const scene::GaussianCloud& input,
                                              const std::vector<scene::Camera>& cameras, BothRequests& request) {
   const auto& selection = request.file.request.selection;
-  if (!selection) return std::vector<std::string>();
-  return edits::select_rows(input, *selection, {.views = cameras, .up = request.engine.up}, request.engine);
+  const auto& heal = request.file.request.heal;
+  const edits::Viewpoints viewpoints{.views = cameras, .up = request.engine.up};
+  std::vector<std::string> warnings;
+  if (selection) {
+    auto selected = edits::select_rows(input, *selection, viewpoints, request.engine);
+    if (!selected) return selected;
+    warnings = std::move(*selected);
+  }
+  if (heal) {
+    const auto healed = edits::heal_rows(input, *heal, viewpoints, request.engine);
+    if (!healed) return healed;
+    warnings.insert(warnings.end(), healed->begin(), healed->end());
+  }
+  return warnings;
 }
 
 /// Before, after and mask of the best views.

@@ -102,7 +102,9 @@ std::vector<proto::Part> to_parts(const std::vector<edit::Attachment>& attachmen
 std::vector<std::string> fields_without_effect(const proto::EditRequest& request) {
   std::vector<std::string> fields;
   if (request.prompt) fields.emplace_back("prompt");  // no corrector of this build reads it
+  if (request.attach && request.mode == proto::Mode::remove) fields.emplace_back("attach");  // nothing of it stays
   if (uses_corrector(engine::params::filled_in(request.params, preset_of(request)))) return fields;
+  if (request.heal) fields.emplace_back("heal");
   proto::Params given = request.params;
   if (given.corrector == proto::Corrector::none) given.corrector.reset();  // that was its effect
   engine::params::for_each_parameter([&](const auto& parameter) {

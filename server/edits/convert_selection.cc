@@ -290,6 +290,32 @@ std::vector<std::string> hand_over(const select::Selected& selected, std::span<c
   return sentences;
 }
 
+engine::Error about_healing(engine::Error error) {
+  constexpr std::string_view selection = "selection";
+  if (error.where.starts_with(selection)) error.where.replace(0, selection.size(), "heal");
+  return error;
+}
+
+Result<std::vector<std::string>> hand_over_healed(const select::Selected& selected, engine::edit::Request& request) {
+  request.healed = engine::marked_rows(selected.rows);
+  if (request.healed.empty())
+    return fail(engine::ErrorCode::unprocessable, "what is to be healed holds no Gaussian: add to it, or leave it out",
+                "heal");
+  std::vector<std::string> sentences;
+  for (const auto& [message, where] : selected.warnings)
+    sentences.push_back(about_healing({engine::ErrorCode::invalid_argument, message, where}).where + ": " + message);
+  return sentences;
+}
+
+Result<std::vector<std::string>> heal_rows(const scene::GaussianCloud& cloud, const proto::Selection& selection,
+                                           const Viewpoints& viewpoints, engine::edit::Request& request) {
+  const auto resolved = with_cameras(selection, viewpoints);
+  if (!resolved) return tl::make_unexpected(about_healing(resolved.error()));
+  const auto selected = carry_out(cloud, *resolved);
+  if (!selected) return tl::make_unexpected(about_healing(selected.error()));
+  return hand_over_healed(*selected, request);
+}
+
 Result<std::vector<std::string>> select_rows(const scene::GaussianCloud& cloud, const proto::Selection& selection,
                                              const Viewpoints& viewpoints, engine::edit::Request& request) {
   const auto resolved = with_cameras(selection, viewpoints);

@@ -64,7 +64,22 @@ using ShownShares = std::function<std::vector<double>(const std::vector<engine::
                                                  const ShownShares& shown_shares, engine::edit::Request& request);
 constexpr double most_of_a_view = 0.9;
 
-/// All of this, one after the other, on a scene.
+/// An error or a warning of the selection that is to be healed, which has an address of its own: "heal[2].sphere".
+[[nodiscard]] engine::Error about_healing(engine::Error error);
+
+/// Says in a request what is made anew.
+///   returns  warnings, one sentence each
+///   errors   unprocessable: there is none of it; `where` is "heal"
+[[nodiscard]] engine::Result<std::vector<std::string>> hand_over_healed(const engine::select::Selected& selected,
+                                                                        engine::edit::Request& request);
+
+/// with_cameras(), to_engine() and hand_over_healed(), one after the other, on a scene.
+[[nodiscard]] engine::Result<std::vector<std::string>> heal_rows(const engine::scene::GaussianCloud& cloud,
+                                                                 const proto::Selection& selection,
+                                                                 const Viewpoints& viewpoints,
+                                                                 engine::edit::Request& request);
+
+/// with_cameras(), to_engine() and hand_over(), one after the other, on a scene.
 ///   errors  those of with_cameras(), to_engine() and select::select()
 [[nodiscard]] engine::Result<std::vector<std::string>> select_rows(const engine::scene::GaussianCloud& cloud,
                                                                    const proto::Selection& selection,

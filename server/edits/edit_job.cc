@@ -99,13 +99,17 @@ class Run {
     return {};
   }
 
-  /// Says what moves, if a selection does.
+  /// Says what moves, if a selection does, and what is healed.
   Result<void> select_rows() {
-    if (!asked_.selection) return {};
-    const auto warnings =
-        edits::select_rows(*input_, *asked_.selection, {.views = cameras_, .up = request_.up}, request_);
-    if (!warnings) return propagate(warnings);
-    for (const std::string& warning : *warnings) keeper_.warn(warning);
+    const edits::Viewpoints viewpoints{.views = cameras_, .up = request_.up};
+    const auto warn = [&](const Result<std::vector<std::string>>& warnings) -> Result<void> {
+      if (!warnings) return propagate(warnings);
+      for (const std::string& warning : *warnings) keeper_.warn(warning);
+      return {};
+    };
+    if (asked_.selection)
+      if (auto done = warn(edits::select_rows(*input_, *asked_.selection, viewpoints, request_)); !done) return done;
+    if (asked_.heal) return warn(edits::heal_rows(*input_, *asked_.heal, viewpoints, request_));
     return {};
   }
 
@@ -123,7 +127,8 @@ class Run {
     proto::EditRecord& record = keeper_.record();
     record.intervals = report.resolved.intervals;
     record.request = resolved(asked_, report.resolved, request_.handles);
-    record.request->selection.reset();  // it may be long, and the job's payload has it
+    record.request->selection.reset();  // they may be long, and the job's payload has them
+    record.request->heal.reset();
     record.simd = engine::render::simd_target();
     record.handles.clear();
     for (const edit::HandleReport& handle : report.handles) record.handles.push_back({handle.gaussians});

@@ -108,6 +108,17 @@ Result<std::vector<std::string>> select_rows(Selections& selections, const proto
                    [&](const auto& cameras) { return selections.shown_shares(version, **made, cameras); }, request);
 }
 
+/// The same for what is to be healed.
+Result<std::vector<std::string>> heal_rows(Selections& selections, const proto::EditRequest& asked,
+                                           const scenes::LoadedVersion& version, edit::Request& request) {
+  if (!asked.heal) return std::vector<std::string>();
+  const auto resolved_selection = selections.resolve(*asked.scene, *asked.heal);
+  if (!resolved_selection) return tl::make_unexpected(about_healing(resolved_selection.error()));
+  const auto made = selections.make(version, *resolved_selection);
+  if (!made) return tl::make_unexpected(about_healing(made.error()));
+  return hand_over_healed((*made)->selected, request);
+}
+
 Result<Checked> check(scenes::SceneStore& scenes, Selections& selections, const proto::EditRequest& asked) {
   auto request = to_engine(asked);
   if (!request) return propagate(request);
@@ -117,6 +128,9 @@ Result<Checked> check(scenes::SceneStore& scenes, Selections& selections, const 
   if (!version) return propagate(version);
   auto warnings = select_rows(selections, asked, *version, *request);
   if (!warnings) return propagate(warnings);
+  const auto healing = heal_rows(selections, asked, *version, *request);
+  if (!healing) return propagate(healing);
+  warnings->insert(warnings->end(), healing->begin(), healing->end());
   auto preview = asked.selection ? selections.preview(*version, *request) : edit::preview(version->cloud, *request);
   if (!preview) return propagate(preview);
   return Checked{std::move(*request), std::move(*version), std::move(*preview), std::move(*warnings)};

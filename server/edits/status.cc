@@ -47,7 +47,8 @@ void fill_in(proto::EditStatus& status, proto::EditRecord record, const jobs::Jo
   status.handles = std::move(record.handles);
   status.parts = std::move(record.parts);
   if (record.request) {
-    record.request->selection = std::move(status.request.selection);  // it is kept once, in the payload
+    record.request->selection = std::move(status.request.selection);  // they are kept once, in the payload
+    record.request->heal = std::move(status.request.heal);
     status.request = std::move(*record.request);
   }
   status.timings = std::move(record.timings);

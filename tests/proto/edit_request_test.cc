@@ -116,6 +116,25 @@ TEST(EditRequest, ComesBackFromItsOwnJson) {
   }
 }
 
+TEST(EditRequest, WhatIsSelectedIsRemovedWithoutAHandle) {
+  const std::string selection = R"("selection": [{"sphere": {"center": [0, 0, 0], "radius": 1}}])";
+  const std::string heal = R"("heal": [{"box": {"center": [1, 0, 0], "size": [1, 1, 1]}}])";
+  for (const std::string handles : {"", R"("handles": [], )"}) {
+    const auto request = parse_edit_request(R"({"mode": "remove", )" + handles + selection + ", " + heal + "}");
+    ASSERT_TRUE(request) << request.error().message;
+    EXPECT_EQ(request->mode, Mode::remove);
+    EXPECT_TRUE(request->handles.empty());
+    ASSERT_TRUE(request->heal);
+    EXPECT_EQ(request->heal->size(), 1u);
+    EXPECT_EQ(*parse_edit_request(to_json(*request)), *request);
+  }
+  const auto where = [](const std::string& text) { return parse_edit_request(text).error().where; };
+  EXPECT_EQ(where(R"({"mode": "remove"})"), "handles") << "nothing says what";
+  EXPECT_EQ(where(R"({"mode": "move", )" + selection + "}"), "handles");
+  EXPECT_EQ(where(R"({"mode": "remove", "handles": [], )" + heal + "}"), "handles");
+  EXPECT_EQ(where(R"({"mode": "remove", "heal": [{"ball": 1}], )" + selection + "}").substr(0, 7), "heal[0]");
+}
+
 TEST(EditRequest, NamesAMissingField) {
   expect_refused(without("", "handles"), "handles");
   expect_refused(without("/handles/0", "source"), "handles[0].source");

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <memory>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <utility>
@@ -13,6 +15,8 @@
 #include "engine/correct/scene_corrector.h"
 #include "engine/edit/checkpoint.h"
 #include "engine/edit/edit.h"
+#include "engine/edit/handles.h"
+#include "engine/edit/preview.h"
 #include "engine/render/forward.h"
 #include "engine/render/largest_weight.h"
 #include "tests/engine/edit/block.h"
@@ -89,6 +93,91 @@ TEST(EditWithACorrector, RowsThatWereSeenStayTheInputs) {
   EXPECT_TRUE(std::ranges::none_of(outcome.overlay.changed, was_seen));
   EXPECT_EQ(outcome.report.copies, outcome.overlay.added());
   EXPECT_LE(outcome.report.seeds + 512, outcome.report.copies + 20) << "the block's copies, seeds, their children";
+}
+
+/// The block scene, but the block is removed, by its ball.
+BlockScene removing_the_block() {
+  BlockScene block;
+  block.request.mode = Mode::remove;
+  block.request.handles[0].target.reset();
+  return block;
+}
+
+TEST(EditWithACorrector, RemovesABlockAndClosesWhatItLeft) {
+  const BlockScene block = removing_the_block();
+  const Outcome outcome = run_with_scene_corrector(block);
+  for (auto row = std::uint32_t(block.floor_rows); row < block.cloud.size(); ++row)
+    EXPECT_TRUE(std::ranges::binary_search(outcome.overlay.removed, row)) << row;
+  EXPECT_EQ(outcome.overlay.added(), outcome.report.copies);
+  EXPECT_GT(outcome.report.seeds, 0u);
+  EXPECT_EQ(outcome.report.resolved.intervals, 1);
+  const Below below = below_block(block, outcome);
+  EXPECT_GT(below.least_alpha, 0.9f);
+  EXPECT_LT(below.most_red, floor_color.x + 0.1f);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(below.mean_color[c], floor_color[c], 0.04f) << c;
+  EXPECT_TRUE(outcome.report.warnings.empty());
+}
+
+TEST(EditWithACorrector, ARemovalIsTheSameByASelectionWithoutAHandle) {
+  BlockScene block = removing_the_block();
+  const Outcome by_ball = run_with_scene_corrector(block);
+  std::vector<std::uint32_t> rows(block.cloud.size() - block.floor_rows);
+  std::iota(rows.begin(), rows.end(), std::uint32_t(block.floor_rows));
+  block.request.selected = rows;
+  block.request.region.reset();
+  block.request.handles.clear();
+  const float half = block_side / 2;
+  give_radii({Vec3(block.middle) - Vec3(half), Vec3(block.middle) + Vec3(half)}, block.request);
+  ASSERT_EQ(block.request.handles.size(), 1u);
+  EXPECT_EQ(block.request.handles[0].source, DVec3(Vec3(block.middle)));
+  const Outcome by_rows = run_with_scene_corrector(block);
+  EXPECT_EQ(by_rows.overlay.removed, by_ball.overlay.removed);
+  EXPECT_EQ(by_rows.overlay.rows, by_ball.overlay.rows);
+}
+
+TEST(EditWithACorrector, ARemovalPreviewsWithoutRepair) {
+  BlockScene block = removing_the_block();
+  const auto shown =
+      preview(scene::LayeredCloud{std::make_shared<scene::GaussianCloud>(block.cloud), nullptr}, block.request);
+  ASSERT_TRUE(shown);
+  EXPECT_EQ(shown->overlay.removed.size(), block.cloud.size() - block.floor_rows);
+  EXPECT_EQ(shown->overlay.added(), 0u);
+  EXPECT_TRUE(shown->warnings.empty());
+  block.request.params.iterations = 0;
+  EXPECT_EQ(run_with(block, nullptr).overlay, shown->overlay);
+}
+
+TEST(EditWithACorrector, HealsAStainThatEveryCameraSaw) {
+  BlockScene block;
+  const auto is_stained = [&](std::uint32_t row) {
+    const Vec3 mean = block.cloud.mean.get(row);
+    return row < block.floor_rows && std::abs(mean.x + 0.7f) < 0.2f && std::abs(mean.z) < 0.2f;
+  };
+  for (std::uint32_t row = 0; row < block.floor_rows; ++row)
+    if (is_stained(row)) {
+      block.request.healed.push_back(row);
+      for (int c = 0; c < 3; ++c)
+        block.cloud.sh_row(row)[std::size_t(c) * 4] = (block_color[c] - 0.5f) / float(scene::sh_c0);
+    }
+  ASSERT_GT(block.request.healed.size(), 20u);
+  const auto redness = [&](const Outcome& outcome) {
+    float most = 0;
+    const scene::GaussianCloud after = scene::flatten(block.cloud, outcome.overlay);
+    for (const scene::Camera& view : block.cameras) {
+      const render::Rendering shown = render::forward(after, view);
+      const DVec2 at = view.pixel_from_cam(view.cam_from_world(DVec3(-0.7, 0, 0)));
+      most = std::max(most, shown.color.at(int(at.x), int(at.y), 0));
+      EXPECT_GT(shown.alpha.at(int(at.x), int(at.y)), 0.9f);
+    }
+    return most;
+  };
+  const Outcome healed = run_with_scene_corrector(block);
+  EXPECT_LT(redness(healed), floor_color.x + 0.1f);
+  for (const std::uint32_t row : block.request.healed)
+    EXPECT_TRUE(std::ranges::binary_search(healed.overlay.removed, row)) << row;
+  EXPECT_GT(redness(run_with(block, nullptr)), 0.8f) << "nothing heals without a corrector";
+  block.request.healed.clear();
+  EXPECT_GT(redness(run_with_scene_corrector(block)), 0.8f) << "what was seen stays";
 }
 
 TEST(EditWithACorrector, WhatWasSeenHardlyMovesInTheOptimisation) {

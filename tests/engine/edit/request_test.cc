@@ -62,6 +62,34 @@ TEST(ValidateRequest, NamesTheFieldThatIsWrong) {
   }
 }
 
+TEST(ValidateRequest, WhatIsRemovedGoesNowhere) {
+  Request request = good();
+  request.mode = Mode::remove;
+  request.params.interpolation = Interpolation::arap;  // so that nothing else is wrong with turns and scales
+  const auto where = [&] {
+    const auto valid = validate(request);
+    return valid ? std::string() : valid.error().where;
+  };
+  EXPECT_EQ(where(), "handles[0].target");
+  request.handles[0].target.reset();
+  EXPECT_EQ(where(), "");
+  request.handles[1].rotation = DQuat(1, 0, 0, 0);
+  EXPECT_EQ(where(), "handles[1].rotation");
+  request.handles[1].rotation.reset();
+  request.handles[1].scale = 2;
+  EXPECT_EQ(where(), "handles[1].scale");
+}
+
+TEST(ValidateRequest, HealedRowsAreGivenOnceInOrder) {
+  Request request = good();
+  request.healed = {1, 5, 6};
+  EXPECT_TRUE(validate(request));
+  for (const auto& rows : {std::vector<std::uint32_t>{5, 5}, {6, 1}}) {
+    request.healed = rows;
+    EXPECT_EQ(validate(request).error().where, "heal");
+  }
+}
+
 TEST(ValidateRequest, ASelectionOfNothingCannotBeCarriedOut) {
   Request request = good();
   request.selected.emplace();

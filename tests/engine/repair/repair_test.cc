@@ -69,7 +69,8 @@ struct Moved {
     masks = edit::dilated(masks);
   }
   [[nodiscard]] Repair repair() {
-    return {original, block.cameras, block.cameras, block.request.mode, block.request.params.seed, corrector};
+    return {original, block.cameras, block.cameras, block.request.healed, block.request.mode, block.request.params.seed,
+            corrector};
   }
   Result<Corrected> correct(const Round& round = {1, 1, 0.5}) {
     return repair().correct(working, masks, round, [](double) { return Result<void>{}; });

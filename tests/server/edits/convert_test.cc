@@ -322,6 +322,19 @@ TEST(Convert, ListsFieldsThatHaveNoEffect) {
   EXPECT_EQ(fields_without_effect(asked), all) << "no optimisation would use what is corrected";
 }
 
+TEST(Convert, HealingNeedsACorrectorAndARemovalHoldsNothing) {
+  using Fields = std::vector<std::string>;
+  proto::EditRequest asked = full_request();
+  asked.params = {};
+  asked.heal.emplace();
+  asked.attach = proto::Attach::held;
+  EXPECT_EQ(fields_without_effect(asked), Fields{});
+  asked.mode = proto::Mode::remove;
+  EXPECT_EQ(fields_without_effect(asked), Fields{"attach"});
+  asked.preset = proto::Preset::preview;
+  EXPECT_EQ(fields_without_effect(asked), (Fields{"attach", "heal"}));
+}
+
 TEST(Convert, APresetAloneIsNeverWithoutEffect) {
   for (const auto preset : every_preset) {
     proto::EditRequest plain;

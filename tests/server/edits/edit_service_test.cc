@@ -226,6 +226,27 @@ TEST_F(ServiceTest, AnEditOfASelectionGoesOnToTheSameBytes) {
   EXPECT_EQ(version_bytes(*store, scene, *resumed.result_version), version_bytes(*store, scene, *whole.result_version));
 }
 
+TEST_F(ServiceTest, RemovesWhatIsSelectedAndHealsWhatIsSaid) {
+  proto::EditRequest request = move_selected_ball(scene);
+  request.mode = proto::Mode::remove;
+  request.handles.clear();
+  request.preset = proto::Preset::draft;
+  const auto preview = value(service->preview(request));
+  ASSERT_EQ(preview.handles.size(), 1u);
+  EXPECT_GT(preview.handles[0].gaussians, 0u);
+  request.heal = {{.action = proto::selection::Rows{{{0, 3}}}}};
+  EXPECT_EQ(value(service->estimate(request)).request.heal, request.heal);
+  const auto ended = wait_for_end(*service, submit(request));
+  ASSERT_EQ(ended.state, "succeeded") << ended.error->message;
+  EXPECT_EQ(ended.request.heal, request.heal);
+  EXPECT_EQ(ended.request.selection, request.selection);
+  EXPECT_TRUE(ended.request.handles.empty());
+  request.heal = {{.action = proto::selection::Sphere{{9, 9, 9}, 0.1}}};
+  EXPECT_EQ(service->submit(request, "").error().where, "heal");
+  request.heal = {{.action = proto::selection::Rows{{{0, 345}}}}};
+  EXPECT_EQ(service->estimate(request).error().where, "heal[0].rows[0]");
+}
+
 TEST_F(ServiceTest, SaysWhatIsWrongWithASelection) {
   struct Case {
     const char* what;

@@ -3,7 +3,9 @@ import { readFileSync } from "node:fs";
 import { test } from "node:test";
 
 import {
+  changesScene,
   ImportError,
+  isStated,
   labelOf,
   partOf,
   previewKey,
@@ -43,6 +45,25 @@ test("a released 3DGS-Drag configuration becomes a request", () => {
     [0.12, 0.12, 0.12],
   );
   assert.deepEqual(request.region, { center: [-0.6, -0.2, -0.5], size: [2, 1, 1] });
+});
+
+test("a removal has no targets, and with a selection no handles", () => {
+  const selection = [{ sphere: { center: [0, 0, 0], radius: 1 } }];
+  const heal = [{ box: { center: [0, 0, 0], size: [1, 1, 1] } }];
+  const handle = { source: [1, 2, 3], target: [4, 5, 6], radius: 0.5, group: 0, rotation: [1, 0, 0, 0], scale: 2 };
+  const asked = requestOf({ scene: "s1", version: 0, mode: "remove", handles: [handle], heal });
+  assert.deepEqual(asked.handles, [{ source: [1, 2, 3], radius: 0.5, group: 0 }], "they stay for another mode");
+  assert.deepEqual(asked.heal, heal);
+  const state = { mode: "remove", handles: [], selection };
+  assert.ok(isStated(state) && changesScene(state));
+  assert.ok(!isStated({ ...state, selection: [] }) && !isStated({ ...state, mode: "move" }));
+  assert.ok(changesScene({ mode: "remove", handles: [{ ...handle, target: null }] }));
+  assert.ok(!changesScene({ mode: "move", handles: [{ ...handle, target: null }], selection }));
+  const read = only(JSON.stringify({ mode: "remove", selection, heal }));
+  assert.deepEqual([read.mode, read.handles, read.selection, read.heal], ["remove", [], selection, heal]);
+  refused({ mode: "move", selection }, "handles");
+  refused({ mode: "remove", handles: [] }, "handles");
+  refused({ mode: "take", selection }, "mode");
 });
 
 test("a released configuration needs neither cluster nor mask nor mode", () => {
