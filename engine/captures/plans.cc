@@ -103,6 +103,36 @@ Plan apple_on_barrel() {
   return plan;
 }
 
+/// A quilted pouf, curved both ways; its crown is at height 0.
+Object pouf(float radius) {
+  constexpr float half_angle = 0.8f;
+  constexpr int rings = 16;
+  std::vector<procedural::ProfilePoint> profile{{radius * std::sin(half_angle), -1.5f}};
+  for (int i = rings; i >= 0; --i) {
+    const float a = half_angle * float(i) / rings;
+    profile.push_back({radius * std::sin(a), radius * (std::cos(a) - 1)});
+  }
+  return {"pouf", {}, {lathe(profile, checks(srgb(196, 150, 120), srgb(120, 66, 74), 0.13f), 1, 64)}};
+}
+
+Plan ball_on_pouf() {
+  constexpr double radius = 1.3, ball = 0.2;
+  const DVec3 middle = dat(0, -radius, 0), along(0.2, 0, 1);
+  const Motion pose = turned(middle, along, 15 * degree);
+  Plan plan{.what = "A ball rolled over the crown of a pouf, which is curved both ways."};
+  plan.surroundings = {procedural::make_room(-1.5f), pouf(float(radius)),
+                       procedural::make_framed_print({at(-0.4f, 0.75f, 1.40f), 0}, 1.6f, 1.1f)};
+  plan.things = {{procedural::make_ball({at(0, 0, -0.25f), 0.7f}, float(ball), srgb(238, 226, 200), srgb(30, 96, 104)),
+                  turned(middle, along, -32 * degree), pose}};
+  plan.glossy = {"ball"};
+  plan.orbit = {.target = dat(0, 0, -0.2), .distance = 3.2, .lowest = 16, .highest = 40};
+  const auto on_ball = [&](double x, double height, double z) { return pose(dat(x, height, z - 0.25)); };
+  plan.grips = {{on_ball(-0.13, 0.2, -0.14), 0.33}, {on_ball(0.13, 0.2, -0.14), 0.33}, {on_ball(0, 0.32, -0.14), 0.33}};
+  plan.clicks = {{on_ball(0, 0.2, -0.2), on_ball(0.1, 0.33, -0.1)},
+                 {pose(dat(0.3, -0.05, -0.3)), pose(dat(-0.3, -0.05, -0.3)), dat(-0.4, 0.75, 1.4)}};
+  return plan;
+}
+
 Plan crate_before_clutter() {
   const DVec3 foot = dat(-0.42, 0, -0.62), shift = dat(0.86, 0, 0.03);
   Plan plan{.what = "A crate moved aside before a table full of things.", .is_test = true};
@@ -275,6 +305,7 @@ const std::vector<NamedPlan>& known_plans() {
   static const std::vector<NamedPlan> all{{"mug", mug_on_side_table},
                                           {"barrel", apple_on_barrel},
                                           {"clutter", crate_before_clutter},
+                                          {"pouf", ball_on_pouf},
                                           {"turn", block_turned},
                                           {"board", board_slid},
                                           {"scale", ball_scaled},

@@ -26,9 +26,10 @@ constexpr float half_seen = 0.5f;
 // Share of the dragged part in a pixel from which on it is no longer background, and from which on it no longer shows
 // what is behind.
 constexpr float covering = 0.1f, trace = 0.02f;
-// Part of its light from which on a Gaussian was seen, wherever it lies: what is under a thing shines through its
-// blurred rim with up to a sixth, and in the layers of a surface a Gaussian shows a third (the captured mug).
-constexpr float shows = 0.2f;
+// Part of its light from which on a Gaussian was seen, wherever it lies. What is under a thing shines through the
+// thing's blurred rim with up to a third (the captured pouf: with 0.2 what nobody saw stayed, in front of what was
+// completed).
+constexpr float shows = 0.5f;
 // Share of seeds in a pixel from which on it shows what the repair has decided.
 constexpr float decided = 0.5f;
 // Pixels. What is thinner than twice this was not hidden: outlines are blurred by as much.
@@ -86,6 +87,7 @@ struct Repair::ViewNow {
   scene::Image trust;          ///< [1]
   scene::Image inverse_depth;  ///< [1] Of the first half of the light; 0: nothing.
   scene::Mask reliable;        ///< Trusted and opaque.
+  scene::Mask unseen;          ///< Of doubt_unseen().
 };
 
 Repair::Repair(scene::GaussianCloud original, std::span<const scene::Camera> observers,
@@ -124,7 +126,7 @@ Repair::ViewNow Repair::look(const WorkingScene& working, std::span<const std::u
   render::Rendering now;
   render::forward(layers, view, options, trust_, workspace_, now);
   ViewNow seen{std::move(now.color), std::move(now.weight), std::move(now.median_depth),
-               scene::Mask(view.width, view.height)};
+               scene::Mask(view.width, view.height), scene::Mask(view.width, view.height)};
   for (std::size_t i = 0; i < now.alpha.data.size(); ++i) {
     float& depth = seen.inverse_depth.data[i];
     depth = depth > 0 ? 1 / depth : 0;
@@ -157,7 +159,8 @@ Result<scene::Image> Repair::ask_corrector(scene::Image picture, const scene::Ma
 
 scene::Image Repair::surfaces_behind(const ViewNow& now, std::size_t v, const Round& round) const {
   const scene::Camera& view = views_[v];
-  SurfaceView surface_view{now.inverse_depth, now.reliable, vacated_[v], scene::Mask(view.width, view.height)};
+  SurfaceView surface_view{now.inverse_depth, now.reliable, vacated_[v], scene::Mask(view.width, view.height),
+                           now.unseen};
   for (std::size_t i = 0; i < now.trust.data.size(); ++i)
     surface_view.doubtful.data[i] = now.trust.data[i] < correct::trusted;
   const auto is_free_at = [&](DVec2 pixel, double inverse_depth) {
@@ -188,9 +191,11 @@ void Repair::doubt_unseen(const WorkingScene& working, const Rows& rows, std::si
         unseen.at(x, y) = is_under_stain || !witnesses_.saw(point_at(view, {x + 0.5, y + 0.5}, inverse_depth));
       }
   });
-  unseen = mask::opened(unseen, blur);
-  for (std::size_t i = 0; i < unseen.data.size(); ++i)
-    if (unseen.data[i] != 0) now.trust.data[i] = 0, now.reliable.data[i] = 0;
+  unseen = mask::dilate(mask::opened(unseen, blur), rim_px(view));
+  for (std::size_t i = 0; i < unseen.data.size(); ++i) {
+    if (unseen.data[i] == 0 || vacated_[v].data[i] == 0) continue;
+    now.trust.data[i] = 0, now.reliable.data[i] = 0, now.unseen.data[i] = 1;
+  }
 }
 
 void Repair::clear_unseen(WorkingScene& working, Rows& rows, std::size_t v, const scene::Image& surface) {
@@ -210,6 +215,21 @@ void Repair::clear_unseen(WorkingScene& working, Rows& rows, std::size_t v, cons
   if (rows.gone.size() == before) return;
   std::sort(rows.gone.begin(), rows.gone.end());
   std::sort(rows.dragged.begin(), rows.dragged.end());
+}
+
+std::size_t Repair::most_telling_view(const WorkingScene& working, const Rows& rows, const Round& round) {
+  std::size_t best = 0;
+  std::ptrdiff_t most = 0;
+  if (rows.gone.empty()) return best;
+  for (std::size_t v = 0; v < views_.size(); ++v) {
+    ViewNow now = look(working, rows.dragged, v);
+    doubt_unseen(working, rows, v, now);
+    const scene::Image surface = surfaces_behind(now, v, round);
+    const auto shown =
+        std::count_if(surface.data.begin(), surface.data.end(), [](float inverse_depth) { return inverse_depth > 0; });
+    if (shown > most) most = shown, best = v;
+  }
+  return best;
 }
 
 Result<Repair::Background> Repair::complete_background(WorkingScene& working, Rows& rows, std::size_t v,
@@ -263,9 +283,9 @@ Result<Corrected> Repair::correct(WorkingScene& working, std::span<const scene::
   Rows rows = rows_of(working);
   note_vacated(working, rows, masks);
   if (auto tuned = corrector_.fine_tune(buffer_, 0); !tuned) return propagate(tuned);
-  const std::vector<std::size_t> order = outward(views_);
   trust_ = trust_of_rows(working, observed_, mode_);
   const OpaqueTrail opaque(working, original_, mode_);
+  const std::vector<std::size_t> order = outward(views_, most_telling_view(working, rows, round));
   for (std::size_t k = 0; k < order.size(); ++k) {
     const std::size_t v = order[k];
     Background background;

@@ -93,6 +93,9 @@ class Repair {
   [[nodiscard]] std::uint64_t seed_for(Purpose purpose, std::size_t v, const Round& round) const;
   /// Inverse depth of the surfaces that go on behind the dragged part in view v; 0 where none does.
   [[nodiscard]] scene::Image surfaces_behind(const ViewNow& now, std::size_t v, const Round& round) const;
+  /// The view that shows most of what can be completed, and is to decide what is there: at an outline of what goes on,
+  /// little of it is seen. The first one if nothing is to be completed.
+  [[nodiscard]] std::size_t most_telling_view(const WorkingScene& working, const Rows& rows, const Round& round);
   /// Lays what goes on behind the dragged part into the working scene as seeds.
   [[nodiscard]] Result<Background> complete_background(WorkingScene& working, Rows& rows, std::size_t v,
                                                        const Round& round);

@@ -1,8 +1,9 @@
 // Surfaces that go on behind what left: where a part stood on something, nobody has seen what is under it.
 //
-// A surface near the place is a plane in a picture of inverse depth (a plane in space is affine there). It goes on at a
-// pixel of the vacated place if the pixel lies amid pixels that show it, if nothing in front of it is seen there,
-// and if no view has looked through the point where it would be.
+// A surface near the place is a plane in a picture of inverse depth (a plane in space is affine there), or curved, as a
+// polynomial of second degree, where that explains clearly more. It goes on at a pixel of the vacated place if the
+// pixel lies amid pixels that show it, if nothing in front of it is seen there, and if no view has looked through the
+// point where it would be.
 #pragma once
 
 #include <cstdint>
@@ -20,6 +21,7 @@ struct SurfaceView {
   scene::Mask shows_surface;   ///< Pixels that may be relied upon: trusted, opaque, not the part itself.
   scene::Mask vacated;         ///< Pixels that the part has left.
   scene::Mask doubtful;        ///< Pixels whose content is not trusted.
+  scene::Mask unseen;          ///< Pixels whose content nobody has seen: it hides nothing. They are doubtful, too.
 };
 
 /// Is the point (pixel position, inverse depth) in space that some view has looked through?

@@ -6,11 +6,11 @@
 
 namespace engine::repair {
 
-std::vector<std::size_t> outward(std::span<const scene::Camera> views) {
+std::vector<std::size_t> outward(std::span<const scene::Camera> views, std::size_t from) {
   std::vector<double> far(views.size(), 1e9);
   std::vector<std::uint8_t> done(views.size(), 0);
   std::vector<std::size_t> order;
-  for (std::size_t next = 0; order.size() < views.size();) {
+  for (std::size_t next = from; order.size() < views.size();) {
     order.push_back(next);
     done[next] = 1;
     for (std::size_t v = 0; v < views.size(); ++v)

@@ -9,9 +9,9 @@
 
 namespace engine::repair {
 
-/// All views: the first one, then always the one whose camera is nearest to one already there, so that a view that
+/// All views: view `from`, then always the one whose camera is nearest to one already there, so that a view that
 /// decides what nobody has seen is followed by those that see it nearly from there.
-[[nodiscard]] std::vector<std::size_t> outward(std::span<const scene::Camera> views);
+[[nodiscard]] std::vector<std::size_t> outward(std::span<const scene::Camera> views, std::size_t from);
 
 /// Up to `count` views by the distance of their cameras from that of view `to`, which comes first; ties by number.
 [[nodiscard]] std::vector<std::size_t> nearest_views(std::span<const scene::Camera> views, std::size_t to,

@@ -1,6 +1,7 @@
 // A block on a floor, or above it: a scene with a place that nobody has seen.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -74,6 +75,20 @@ struct BlockScene {
     request.params.intervals = 1;
     request.params.max_image_side = 64;
     request.params.iterations = 10;
+  }
+  /// Does the block, which its Gaussians and the pixels blur, hide this point of the floor from every camera?
+  [[nodiscard]] bool hides(DVec3 point) const {
+    const DVec3 half(0.5 * double(block_side) + 0.12);
+    return std::all_of(cameras.begin(), cameras.end(), [&](const scene::Camera& camera) {
+      const DVec3 way = camera.centre() - point;
+      double enters = 0, leaves = 1;  // of the way, within the slabs of all axes
+      for (int axis = 0; axis < 3; ++axis) {
+        const double a = (middle[axis] - half[axis] - point[axis]) / way[axis];
+        const double b = (middle[axis] + half[axis] - point[axis]) / way[axis];
+        enters = std::max(enters, std::min(a, b)), leaves = std::min(leaves, std::max(a, b));
+      }
+      return enters < leaves;
+    });
   }
   /// Positions on the floor where the block stands, clear of what is around it.
   [[nodiscard]] static std::vector<DVec3> below_block() {
