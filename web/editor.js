@@ -462,8 +462,7 @@ export class Editor {
   }
 
   async preview() {
-    const { scene, handles } = this.state;
-    if (!scene || !handles.some((h) => h.target)) return;
+    if (!this.state.scene || !changesScene(this.state)) return;
     this.selecting.use(null);
     this.#previewing?.abort();
     const abort = (this.#previewing = new AbortController());

@@ -286,6 +286,32 @@ describe('selecting', () => {
     await desk.page.waitForFunction((n) => document.querySelector('[data-testid=selection-count]').dataset.count === String(n), whole);
   });
 
+  test('what is selected is removed without a handle', async () => {
+    const { page, id, complaints } = desk;
+    const shown = () => page.getByTestId('picture').evaluate((canvas, [fx, fy]) =>
+      [...canvas.getContext('2d').getImageData(fx * canvas.width, fy * canvas.height, 1, 1).data.slice(0, 3)], [0.785, 0.64]);
+    await id('hand-handle').click();
+    const before = await shown();
+    assert.ok(await id('run').isDisabled(), 'nothing says where it should go');
+    await id('settings').locator('summary').click();
+    await id('mode-remove').click();
+    const [response] = await Promise.all([
+      page.waitForResponse((r) => r.url().endsWith('/v1/previews')),
+      id('preview-answer').getByText('Preview of').waitFor(),
+    ]);
+    const asked = response.request().postDataJSON();
+    assert.deepEqual([asked.mode, asked.handles], ['remove', []]);
+    await page.waitForFunction(() => document.querySelector('[data-testid=view]').dataset.quality === 'full');
+    await page.waitForFunction(() => document.querySelector('[data-testid=view]').dataset.version !== '0');
+    const after = await shown();
+    if (process.env.SPLATDRAG_SHOTS) await page.screenshot({ path: `${process.env.SPLATDRAG_SHOTS}/remove.png` });
+    assert.ok(Math.hypot(...after.map((x, i) => x - before[i])) > 40, `${before} to ${after}: the mug is gone`);
+    assert.ok(!(await id('run').isDisabled()));
+    await id('mode-move').click();
+    await id('settings').locator('summary').click();
+    assert.deepEqual(complaints, []);
+  });
+
   test('one handle drags what is selected, and the edit succeeds', async () => {
     const { service, page, id, click, complaints } = desk;
     await id('hand-handle').click();
