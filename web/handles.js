@@ -14,6 +14,7 @@ const NO_HANDLES = {
   spheres: "No handles yet. Click a part of the scene to take hold of it, then drag the dot to where it should go.",
   selection:
     "What is selected moves with a handle: take “Handles”, click on it, then drag the dot to where it should go.",
+  removal: "What is selected will be removed. It needs no handle.",
 };
 
 function sliderOf(radius, sceneRadius) {
@@ -46,10 +47,11 @@ export class HandleList {
     const empty = h("p", { class: "empty", testid: "no-handles" });
     this.element = h("section", {}, h("div", { class: "row between" }, h("h2", {}, "Handles"), clear), empty, list);
     editor.store.watch(
-      ["handles", "selection", "selected", "counts", "preview", "problem", "scene", "version"],
-      ({ handles, selection }) => {
+      ["handles", "selection", "selected", "counts", "preview", "problem", "scene", "version", "mode"],
+      ({ handles, selection, mode }) => {
         empty.hidden = handles.length > 0;
-        text(empty, selection.length > 0 ? NO_HANDLES.selection : NO_HANDLES.spheres);
+        const meant = selection.length === 0 ? "spheres" : mode === "remove" ? "removal" : "selection";
+        text(empty, NO_HANDLES[meant]);
         clear.disabled = handles.length === 0;
         this.#update(handles);
       },

@@ -223,7 +223,8 @@ export function buildRequestPanel(editor) {
 }
 
 /** What the service last said about this very request. */
-function answers(editor, { preview, estimate, scene }) {
+function answers(editor, state) {
+  const { preview, estimate, scene } = state;
   if (!scene) return [];
   const lines = [];
   if (estimate && estimate.key === JSON.stringify(editor.request())) {
@@ -238,13 +239,16 @@ function answers(editor, { preview, estimate, scene }) {
     lines.push(...warnings(estimate.warnings));
   } else if (preview) {
     const current = editor.previewIsCurrent;
-    const { changeable } = preview.gaussians;
+    const shows =
+      state.mode === "remove"
+        ? `without ${gaussians(preview.handles.reduce((sum, handle) => sum + handle.gaussians, 0))}`
+        : `of ${gaussians(preview.gaussians.changeable)}`;
     lines.push(
       h(
         "p",
         { testid: "preview-answer", class: current ? "" : "stale" },
         current
-          ? `Preview of ${gaussians(changeable)} in ${duration(preview.seconds)}.`
+          ? `Preview ${shows} in ${duration(preview.seconds)}.`
           : "The preview is of an earlier state of the handles.",
       ),
     );

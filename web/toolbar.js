@@ -4,6 +4,7 @@ import { attrs, byId, h, text } from "./dom.js";
 import { parentOf, shownVersion } from "./editor.js";
 import { choice, segments } from "./fields.js";
 import { gaussians } from "./format.js";
+import { isStated } from "./requests.js";
 
 const LAYERS = [
   ["color", "Colour", "The scene"],
@@ -124,7 +125,7 @@ export function buildToolbar(editor, viewer) {
   store.watch(
     [
       ...["scene", "version", "views", "viewName", "viewsKind", "layer", "comparing", "compareWith", "preview"],
-      ...["handles", "selection", "selectMode"],
+      ...["handles", "selection", "mode", "selectMode"],
     ],
     (state) => {
       const { scene } = state;
@@ -165,7 +166,7 @@ export function buildToolbar(editor, viewer) {
       back.hidden = !previewing;
       byId("hint").hidden = state.selectMode
         ? state.selection.length > 0
-        : state.handles.length > 0 || scene.versions.length > 1;
+        : isStated(state) || scene.versions.length > 1;
     },
   );
 }

@@ -297,7 +297,7 @@ describe('selecting', () => {
     await id('mode-remove').click();
     const [response] = await Promise.all([
       page.waitForResponse((r) => r.url().endsWith('/v1/previews')),
-      id('preview-answer').getByText('Preview of').waitFor(),
+      id('preview-answer').getByText(`Preview without ${whole.toLocaleString('en-US')} Gaussians`).waitFor(),
     ]);
     const asked = response.request().postDataJSON();
     assert.deepEqual([asked.mode, asked.handles], ['remove', []]);
