@@ -84,6 +84,8 @@ scene::Mask dilate(const scene::Mask& mask, int radius_px) {
   return wide;
 }
 
+int blur_radius(int picture_height) { return std::max(1, picture_height / 192); }
+
 scene::Mask opened(const scene::Mask& mask, int radius_px) {
   const auto complement = [](scene::Mask of) {
     for (std::uint8_t& flag : of.data) flag = flag == 0;

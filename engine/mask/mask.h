@@ -14,6 +14,10 @@ namespace engine::mask {
 /// Radius of the dilation for a picture of this height: 10 px at 512 px, in proportion, at least 1 px.
 [[nodiscard]] int dilation_radius(int picture_height);
 
+/// Pixels by which outlines of things are blurred in a picture of this height: 2 px at 512 px, in proportion, at
+/// least 1.
+[[nodiscard]] int blur_radius(int picture_height);
+
 /// Sets every pixel whose centre is within `radius_px` (a disc, its rim included) of the centre of a set one.
 /// Exact, O(pixels) for any radius; a radius of 0 or less changes nothing.
 [[nodiscard]] scene::Mask dilate(const scene::Mask& mask, int radius_px);

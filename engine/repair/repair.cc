@@ -32,11 +32,9 @@ constexpr float covering = 0.1f, trace = 0.02f;
 constexpr float shows = 0.5f;
 // Share of seeds in a pixel from which on it shows what the repair has decided.
 constexpr float decided = 0.5f;
-// Pixels. What is thinner than twice this was not hidden: outlines are blurred by as much.
-constexpr int blur = 1;
 // A stain goes so deep, in parts of its distance: the layers of a surface below the one that shows are stained as well.
 constexpr double stain_depth = 0.03;
-// By so much farther away than a completed surface a row is behind it.
+// By so much of its distance nearer or farther than a completed surface a row is not on it.
 constexpr double behind = 0.03;
 constexpr std::size_t most_examples = 6;  // of the buffer, for each view: its neighbours on either side
 
@@ -87,7 +85,7 @@ struct Repair::ViewNow {
   scene::Image trust;          ///< [1]
   scene::Image inverse_depth;  ///< [1] Of the first half of the light; 0: nothing.
   scene::Mask reliable;        ///< Trusted and opaque.
-  scene::Mask unseen;          ///< Of doubt_unseen().
+  scene::Mask within;          ///< Not seen by anyone, and within what has left.
 };
 
 Repair::Repair(scene::GaussianCloud original, std::span<const scene::Camera> observers,
@@ -160,7 +158,7 @@ Result<scene::Image> Repair::ask_corrector(scene::Image picture, const scene::Ma
 scene::Image Repair::surfaces_behind(const ViewNow& now, std::size_t v, const Round& round) const {
   const scene::Camera& view = views_[v];
   SurfaceView surface_view{now.inverse_depth, now.reliable, vacated_[v], scene::Mask(view.width, view.height),
-                           now.unseen};
+                           now.within};
   for (std::size_t i = 0; i < now.trust.data.size(); ++i)
     surface_view.doubtful.data[i] = now.trust.data[i] < correct::trusted;
   const auto is_free_at = [&](DVec2 pixel, double inverse_depth) {
@@ -191,10 +189,11 @@ void Repair::doubt_unseen(const WorkingScene& working, const Rows& rows, std::si
         unseen.at(x, y) = is_under_stain || !witnesses_.saw(point_at(view, {x + 0.5, y + 0.5}, inverse_depth));
       }
   });
-  unseen = mask::dilate(mask::opened(unseen, blur), rim_px(view));
+  unseen = mask::dilate(mask::opened(unseen, mask::blur_radius(view.height)), rim_px(view));
   for (std::size_t i = 0; i < unseen.data.size(); ++i) {
     if (unseen.data[i] == 0 || vacated_[v].data[i] == 0) continue;
-    now.trust.data[i] = 0, now.reliable.data[i] = 0, now.unseen.data[i] = 1;
+    now.trust.data[i] = 0, now.reliable.data[i] = 0;
+    now.within.data[i] = now.inverse_depth.data[i] * far_side_[v].data[i] >= 1;
   }
 }
 
@@ -209,6 +208,9 @@ void Repair::clear_unseen(WorkingScene& working, Rows& rows, std::size_t v, cons
     if (!(pixel.x >= 0 && pixel.y >= 0 && pixel.x < view.width && pixel.y < view.height)) continue;
     const double inverse_depth = double(surface.at(int(pixel.x), int(pixel.y)));
     if (!(inverse_depth > 0) || p.z * inverse_depth > 1 + behind) continue;
+    // What lies deeper than the part did, and not on the surface either, is the inside of something else.
+    const bool is_within = p.z <= double(far_side_[v].at(int(pixel.x), int(pixel.y)));
+    if (!is_within && p.z * inverse_depth < 1 - behind) continue;
     working.give_up(row);
     rows.gone.push_back(row), rows.dragged.push_back(row);
   }
@@ -321,12 +323,14 @@ Repair::Rows Repair::rows_of(const WorkingScene& working) const {
 
 void Repair::note_vacated(const WorkingScene& working, const Rows& rows, std::span<const scene::Mask> masks) {
   vacated_.resize(views_.size());
+  far_side_.resize(views_.size());
   const std::vector<std::uint32_t> open = rows_left_open(original_, rows.vacating, working, rows.moved);
   for (std::size_t v = 0; v < views_.size(); ++v) {
     const scene::Image share = working::footprint(original_, rows.vacating, views_[v], workspace_);
     const scene::Image open_share = working::footprint(original_, open, views_[v], workspace_);
     vacated_[v] = mask::dilate(mask::mask2d(open_share), rim_px(views_[v]));
     mask::unite(vacated_[v], stained_[v]);
+    far_side_[v] = far_side(original_, open, views_[v]);
     buffer_[v].excluded = mask::mask2d(share, trace);
     buffer_[v].box = scene::bounding_box(masks[v]);
   }

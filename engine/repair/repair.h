@@ -119,7 +119,8 @@ class Repair {
   std::vector<std::uint32_t> unseen_;  ///< Rows of the input that no camera has seen, ascending.
   UneditedViews unedited_;
   std::vector<correct::Example> buffer_;
-  std::vector<scene::Mask> vacated_;  ///< Per view: what the part has left.
+  std::vector<scene::Mask> vacated_;    ///< Per view: what the part has left.
+  std::vector<scene::Image> far_side_;  ///< Per view: of what the part has left. See far_side().
   render::Workspace workspace_;
   std::vector<float> trust_;                         ///< Of the rows of the working scene, in the correction at hand.
   std::optional<neighbours::PointIndex> originals_;  ///< Their means, in a move: seeds take after the nearest one.

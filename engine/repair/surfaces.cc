@@ -215,13 +215,13 @@ std::vector<std::uint8_t> directions_met(const SurfaceView& view, const Surround
   return met;
 }
 
-/// Without crumbs: what hangs together and is nowhere three pixels wide is an error of the depth, as at the blurred
-/// outlines of things, and not a surface.
+/// Without crumbs: what hangs together and is nowhere wider than outlines are blurred is an error of the depth, as at
+/// the blurred outlines of things, and not a surface.
 scene::Image without_crumbs(const scene::Image& found) {
   scene::Image out = found;
   scene::Mask filled(found.width, found.height);
   for (std::size_t i = 0; i < found.data.size(); ++i) filled.data[i] = found.data[i] > 0;
-  const scene::Mask wide = mask::opened(filled, 1);
+  const scene::Mask wide = mask::opened(filled, mask::blur_radius(found.height));
   std::vector<std::uint8_t> seen(found.data.size(), 0);
   std::vector<std::size_t> together;
   const int width = found.width, height = found.height;
@@ -265,7 +265,7 @@ scene::Image continued_surfaces(const SurfaceView& view, const IsFree& is_free, 
           if (here <= found) continue;  // a nearer one is there already
           const bool hides = here > (1 + in_front) * seen;
           const bool replaces =
-              view.doubtful.at(x, y) != 0 && (view.unseen.at(x, y) != 0 || here > (1 - in_front) * seen);
+              view.doubtful.at(x, y) != 0 && (view.within.at(x, y) != 0 || here > (1 - in_front) * seen);
           if (!hides && !replaces) continue;
           if (!is_free({x + 0.5, y + 0.5}, here)) out.at(x, y) = float(here);
         }

@@ -21,7 +21,8 @@ struct SurfaceView {
   scene::Mask shows_surface;   ///< Pixels that may be relied upon: trusted, opaque, not the part itself.
   scene::Mask vacated;         ///< Pixels that the part has left.
   scene::Mask doubtful;        ///< Pixels whose content is not trusted.
-  scene::Mask unseen;          ///< Pixels whose content nobody has seen: it hides nothing. They are doubtful, too.
+  scene::Mask
+      within;  ///< Pixels whose content nobody saw, within what has left: it hides nothing. They are doubtful, too.
 };
 
 /// Is the point (pixel position, inverse depth) in space that some view has looked through?

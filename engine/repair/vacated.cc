@@ -13,6 +13,8 @@ constexpr std::size_t neighbours_asked = 8;
 // A place is taken if something arrived within so many times the distance that its neighbours had in the mean: between
 // the rows of an even surface that is shifted along itself there are at most 0.8.
 constexpr double taken_within = 1.5;
+// Pixels around its mean in which a row counts as being there: those between neighbouring means of a part, mostly.
+constexpr int far_side_px = 2;
 
 std::vector<float> means_of(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows) {
   std::vector<float> points;
@@ -39,6 +41,25 @@ std::vector<std::uint32_t> rows_left_open(const scene::GaussianCloud& original, 
     if (std::sqrt(double(now[k].squared_distance)) > taken_within * spacing) open.push_back(left[k]);
   }
   return open;
+}
+
+scene::Image far_side(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
+                      const scene::Camera& camera) {
+  scene::Image far(camera.width, camera.height, 1);
+  for (const std::uint32_t row : rows) {
+    const DVec3 p = camera.cam_from_world(cloud.mean.get(row));
+    if (!(p.z > 0)) continue;
+    const DVec2 pixel = camera.pixel_from_cam(p);
+    // Compared as numbers: one far beside the picture has no place that an int could hold.
+    if (!(pixel.x > -far_side_px && pixel.y > -far_side_px && pixel.x < camera.width + far_side_px &&
+          pixel.y < camera.height + far_side_px))
+      continue;
+    const int x = int(std::floor(pixel.x)), y = int(std::floor(pixel.y));
+    for (int v = std::max(y - far_side_px, 0); v <= std::min(y + far_side_px, camera.height - 1); ++v)
+      for (int u = std::max(x - far_side_px, 0); u <= std::min(x + far_side_px, camera.width - 1); ++u)
+        far.at(u, v) = std::max(far.at(u, v), float(p.z));
+  }
+  return far;
 }
 
 }  // namespace engine::repair

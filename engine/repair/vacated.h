@@ -5,6 +5,9 @@
 #include <span>
 #include <vector>
 
+#include "engine/scene/camera.h"
+#include "engine/scene/gaussian_cloud.h"
+#include "engine/scene/image.h"
 #include "engine/working/working_scene.h"
 
 namespace engine::repair {
@@ -21,5 +24,10 @@ using working::WorkingScene;
                                                         std::span<const std::uint32_t> left,
                                                         const WorkingScene& working,
                                                         std::span<const std::uint32_t> arrived);
+
+/// How far the far side of these rows is in each pixel, world units along the axis: that of the farthest mean within
+/// two pixels. 0: there is none. [1]
+[[nodiscard]] scene::Image far_side(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
+                                    const scene::Camera& camera);
 
 }  // namespace engine::repair

@@ -112,6 +112,13 @@ TEST(Opened, KeepsWhatReachesTheRimOfThePicture) {
   EXPECT_EQ(opened(Mask(5, 5), 2), Mask(5, 5));
 }
 
+TEST(BlurRadius, GrowsWithThePictureAndIsNeverNothing) {
+  EXPECT_EQ(blur_radius(512), 2);
+  EXPECT_EQ(blur_radius(240), 1);
+  EXPECT_EQ(blur_radius(1), 1);
+  EXPECT_EQ(blur_radius(16384), 85);
+}
+
 TEST(Unite, KeepsWhatEitherHolds) {
   Mask a(2, 2), b(2, 2);
   a.at(0, 0) = b.at(0, 0) = b.at(1, 1) = 1;

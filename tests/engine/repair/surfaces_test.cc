@@ -138,11 +138,11 @@ TEST(ContinuedSurfaces, WhereItIsSeenItselfItOnlyReplacesWhatIsDoubtful) {
   expect_goes_on(continued_surfaces(view, nowhere_free, 1));
 }
 
-TEST(ContinuedSurfaces, WhatNobodySawHidesNothing) {
+TEST(ContinuedSurfaces, WhatNobodySawWithinWhatLeftHidesNothing) {
   SurfaceView view = plane_with(hole, 0.8);
   view.doubtful = view.vacated;
   EXPECT_EQ(count(continued_surfaces(view, nowhere_free, 1)), 0u);
-  view.unseen = view.vacated;
+  view.within = view.vacated;
   expect_goes_on(continued_surfaces(view, nowhere_free, 1), 1e-4);
 }
 

@@ -66,5 +66,27 @@ TEST(RowsLeftOpen, OneRowAloneIsOpenOnceItHasMoved) {
   EXPECT_EQ(rows_left_open(strip.original, one, strip.working, now), one);
 }
 
+TEST(FarSide, IsThatOfTheFarthestRowWithinTwoPixels) {
+  const scene::Camera camera = scene::look_at(DVec3(0, 0, -3), DVec3(0), DVec3(0, -1, 0), 0.9, 32, 32);
+  scene::GaussianCloud cloud;
+  for (const float z : {0.0f, 1.0f, 0.5f}) edit::add_gaussian(cloud, {0, 0, z}, Vec3(0.01f), 4, edit::block_color);
+  const std::vector<std::uint32_t> all{0, 1, 2}, near{0, 2};
+  const scene::Image far = far_side(cloud, all, camera);
+  EXPECT_NEAR(far.at(16, 16), 4, 1e-6);
+  EXPECT_NEAR(far.at(18, 15), 4, 1e-6);
+  EXPECT_EQ(far.at(20, 16), 0);
+  EXPECT_NEAR(far_side(cloud, near, camera).at(16, 16), 3.5, 1e-6);
+  EXPECT_EQ(far_side(cloud, {}, camera), scene::Image(32, 32, 1));
+}
+
+TEST(FarSide, IsNowhereForRowsBehindTheCameraOrFarBesideItsPicture) {
+  const scene::Camera camera = scene::look_at(DVec3(0, 0, -3), DVec3(0), DVec3(0, -1, 0), 0.9, 32, 32);
+  scene::GaussianCloud cloud;
+  for (const Vec3 mean : {Vec3(0, 0, -5), Vec3(1e30f, 0, 0), Vec3(0, -1e30f, 1), Vec3(0, 0, -3)})
+    edit::add_gaussian(cloud, mean, Vec3(0.01f), 4, edit::block_color);
+  const std::vector<std::uint32_t> all{0, 1, 2, 3};
+  EXPECT_EQ(far_side(cloud, all, camera), scene::Image(32, 32, 1));
+}
+
 }  // namespace
 }  // namespace engine::repair
