@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "engine/edit/views.h"
+#include "engine/repair/witnesses.h"
 
 namespace engine::edit {
 namespace {
@@ -27,6 +28,7 @@ constexpr double dome_row_seconds = 4e-7;                  // rays of virtual ca
 constexpr double drag_row_seconds = 2e-7;                  // to deform, paste or relocate one dragged Gaussian
 constexpr double observe_frames = 1.1;                     // largest weights, or depth beside colour
 constexpr double look_frames = 1.3;                        // depth and trust beside colour
+constexpr double surface_seconds = 8e-3;                   // to find the surfaces that go on in a view
 constexpr double index_row_seconds = 4e-7;                 // a search tree of the scene, for seeds
 constexpr double fill_seconds = 3.2e-4, fill_power = 0.5;  // of the pixels of the box: large holes have coarse scales
 constexpr double set_up_frames = 1.3,
@@ -115,14 +117,16 @@ class Maker {
 
   void add_correction(int u, int a) {
     const bool first = u == work_.finished + 1 && a == 1;
+    const double witnesses = work_.vacates ? double(std::min(work_.candidates, repair::most_witnesses)) : 0;
     if (first)
       add(Stage::observe, u,
-          observe_frames * (double(work_.candidates) + views_) * frame() +
+          observe_frames * (double(work_.candidates) + witnesses + views_) * frame() +
               slow((row_seconds + (work_.vacates ? index_row_seconds : 0)) * n_));
-    // In a move each view is looked at without the part as well, and filled: two footprints say where.
-    const double filled =
-        work_.vacates ? look_frames * frame() + 2 * footprint(pixels_) + slow(fill_seconds * std::pow(box_, fill_power))
-                      : 0;
+    // In a move each view is looked at without the part as well: to find the one that shows most of the hole, and to
+    // fill it. Footprints say what was vacated, and which of it is filled already.
+    const double filled = work_.vacates ? 2 * (look_frames * frame() + slow(surface_seconds)) + 5 * footprint(pixels_) +
+                                              slow(fill_seconds * std::pow(box_, fill_power))
+                                        : 0;
     add(Stage::correct, u, views_ * (look_frames * frame() + filled));
     if (a == work_.corrections) add_pictures(u, Shows::given);
   }

@@ -35,7 +35,7 @@ constexpr float decided = 0.5f;
 // A stain goes so deep, in parts of its distance: the layers of a surface below the one that shows are stained as well.
 constexpr double stain_depth = 0.03;
 // By so much of its distance nearer or farther than a completed surface a row is not on it.
-constexpr double behind = 0.03;
+constexpr double off_surface = 0.03;
 constexpr std::size_t most_examples = 6;  // of the buffer, for each view: its neighbours on either side
 
 /// While it lives, what a drawn-out part leaves along its way is as opaque as the part: it was only made half
@@ -96,7 +96,7 @@ Repair::Repair(scene::GaussianCloud original, std::span<const scene::Camera> obs
       mode_(mode),
       seed_(seed),
       corrector_(corrector),
-      witnesses_(original_, observers),
+      witnesses_(original_, mode == Mode::move ? observers : observers.first(0)),
       healed_(healed.begin(), healed.end()),
       unedited_(render_unedited(original_, views_)) {
   for (std::size_t v = 0; v < views_.size(); ++v)
@@ -207,10 +207,10 @@ void Repair::clear_unseen(WorkingScene& working, Rows& rows, std::size_t v, cons
     const DVec2 pixel = view.pixel_from_cam(p);
     if (!(pixel.x >= 0 && pixel.y >= 0 && pixel.x < view.width && pixel.y < view.height)) continue;
     const double inverse_depth = double(surface.at(int(pixel.x), int(pixel.y)));
-    if (!(inverse_depth > 0) || p.z * inverse_depth > 1 + behind) continue;
+    if (!(inverse_depth > 0) || p.z * inverse_depth > 1 + off_surface) continue;
     // What lies deeper than the part did, and not on the surface either, is the inside of something else.
     const bool is_within = p.z <= double(far_side_[v].at(int(pixel.x), int(pixel.y)));
-    if (!is_within && p.z * inverse_depth < 1 - behind) continue;
+    if (!is_within && p.z * inverse_depth < 1 - off_surface) continue;
     working.give_up(row);
     rows.gone.push_back(row), rows.dragged.push_back(row);
   }

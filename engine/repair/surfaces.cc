@@ -251,6 +251,7 @@ scene::Image without_crumbs(const scene::Image& found) {
 scene::Image continued_surfaces(const SurfaceView& view, const IsFree& is_free, std::uint64_t seed) {
   const int width = view.inverse_depth.width, height = view.inverse_depth.height;
   scene::Image out(width, height, 1);
+  if (view.vacated.area() == 0) return out;
   const Surroundings near(view.vacated);
   for (const Surface& surface : find_surfaces(points_of(view, near), near.pixel(), seed)) {
     const std::vector<std::uint8_t> met = directions_met(view, near, surface);

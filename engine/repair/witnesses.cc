@@ -10,8 +10,6 @@
 namespace engine::repair {
 namespace {
 
-// More cameras than these see no point that they do not see, and each keeps a picture.
-constexpr std::size_t most_witnesses = 128;
 // Pixels of the longer side: as fine as what is asked, which is on which side of a thing's outline a point lies.
 constexpr int picture_side = 512;
 // A point that lies by this share of its distance behind what a camera shows is hidden: depths of splats are no finer.

@@ -1,6 +1,7 @@
 // What the cameras of a capture have seen of it.
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <vector>
 
@@ -11,11 +12,14 @@
 
 namespace engine::repair {
 
+/// Of more cameras an even choice is taken: they see hardly a point that the others do not, and each keeps a picture.
+constexpr std::size_t most_witnesses = 128;
+
 /// Cameras that saw the unedited scene, and how far each of them looked. What is under a thing or within it no camera
 /// saw, however well the scene's Gaussians there shine through its blurred rim.
 class Witnesses {
  public:
-  /// Renders the scene once for each camera, or for an even choice of them if there are very many.
+  /// Renders the scene once for each camera, up to most_witnesses.
   Witnesses(const scene::GaussianCloud& scene, std::span<const scene::Camera> cameras);
 
   /// Did cameras see this point, or through it, with nothing in front? Beside the edge of what is in front two of them
