@@ -243,6 +243,27 @@ TEST(Repair, WhatNobodySawUnderAThingGoesWhereTheFloorGoesOn) {
   EXPECT_TRUE(moved.working.check());
 }
 
+TEST(Repair, WhatIsOpenedIsNotClosedAgain) {
+  // A hatch in the floor is lifted off: the floor around it would go on just where the hatch was.
+  BlockScene block(/*gap=*/0.5f);
+  std::vector<std::uint32_t> hatch;
+  for (std::uint32_t row = 0; row < block.cloud.size(); ++row) {
+    const Vec3 mean = block.cloud.mean.get(row);
+    if (row >= block.floor_rows)
+      block.cloud.opacity_logit[row] = -12;  // the block is not there
+    else if (std::abs(mean.x) < 0.3f && std::abs(mean.z) < 0.3f)
+      hatch.push_back(row);
+  }
+  block.request.selected = hatch;
+  block.request.region.reset();
+  block.request.handles[0].source = DVec3(0);
+  block.request.handles[0].target = DVec3(0.9, -0.3, 0);
+  Moved moved(std::move(block));
+  const auto outcome = moved.correct();
+  ASSERT_TRUE(outcome);
+  EXPECT_LT(outcome->seeds, 25u) << "along its outline alone; all of it would be 85";
+}
+
 TEST(Repair, LeavesAPitOpenThatViewsHaveLookedInto) {
   // The block hangs before a pit in the floor for the view in the middle; those at the ends see into it past the block.
   BlockScene block(/*gap=*/0.5f);
