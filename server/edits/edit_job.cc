@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <exception>
 #include <memory>
 #include <new>
 #include <optional>
@@ -255,6 +256,10 @@ Result<JobResult> carry_out(JobContext& context, const Workshop& workshop) {
     return fail(ErrorCode::too_large,
                 "the edit needs more memory than this machine has left: choose smaller radii, fewer views or a smaller "
                 "max_image_side, or edit a smaller scene");
+  } catch (const std::exception& bug) {
+    // Whoever reads the log can act on what was thrown; to clients it may show more than they should see.
+    log(workshop, spdlog::level::err, context, std::string("bug: ") + bug.what());
+    return fail(ErrorCode::internal, "the edit met an unexpected error, please report it; the service's log says more");
   }
 }
 
