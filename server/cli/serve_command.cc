@@ -10,6 +10,7 @@
 #include "server/cli/commands.h"
 #include "server/cli/compute.h"
 #include "server/cli/folders.h"
+#include "server/edits/machine_memory.h"
 #include "server/http/log.h"
 #include "server/service/serve.h"
 
@@ -92,6 +93,9 @@ void add_store_options(CLI::App& command, ServeOptions& options) {
       ->check(CLI::ExistingDirectory)
       ->type_name("DIR");
   add_bytes(command, "--scene-memory", options.scenes.memory_bytes, "Memory for scenes and previews");
+  options.edits.memory_bytes = edits::usual_edit_memory();
+  add_bytes(command, "--edit-memory", options.edits.memory_bytes,
+            "What one edit may take, by its estimate; usually half of what the machine and its control group have");
   add_count(command, "--max-gaussians", options.scenes.read.max_gaussians, "Gaussians of a scene");
   add_count(command, "--max-scenes", options.scenes.max_scenes, "Scenes held");
   add_count(command, "--max-previews", options.scenes.max_previews, "Previews in memory");
