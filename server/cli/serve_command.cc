@@ -105,6 +105,8 @@ void add_store_options(CLI::App& command, ServeOptions& options) {
   add_count(command, "--max-dataset-files", options.scenes.max_dataset_files, "Files of a dataset");
   add_count(command, "--max-queued", options.edits.max_queued, "Edits that may wait");
   add_count(command, "--max-edit-records", options.edits.retention.max_count, "Ended edits that are remembered");
+  add_count(command, "--edit-attempts", options.edits.attempts,
+            "An edit during which the service has died so often in a row, at the same place, has failed");
   add_count(command, "--pictured-views", options.edits.pictured_views, "Views rendered after each interval", 0);
   add_count(command, "--max-handles", options.edit_limits.handles, "Handles of an edit", 1, proto::max_handles);
   add_count(command, "--max-views", options.edit_limits.views, "Views that an edit looks through", 1,

@@ -63,12 +63,18 @@ proto::EditRecord earlier_record(const JobContext& context) {
   return std::move(*record);
 }
 
+/// Where in its work an edit is, as far as it is the same in each attempt.
+std::string place_of(const proto::EditRecord& record) {
+  return record.interval > 0 ? "interval " + std::to_string(record.interval) + ", " + record.stage : record.stage;
+}
+
 class Run {
  public:
   Run(JobContext& context, const Workshop& workshop)
-      : context_(context),
-        workshop_(workshop),
-        keeper_(earlier_record(context), [&context](std::string text) { context.publish_progress(std::move(text)); }) {}
+      : context_(context), workshop_(workshop), keeper_(earlier_record(context), [this](std::string text) {
+          context_.publish_progress(std::move(text));
+          context_.enter(place_of(keeper_.record()));
+        }) {}
 
   Result<void> operator()() {
     if (auto loaded = load(); !loaded) return loaded;

@@ -155,7 +155,8 @@ struct EditService::Impl {
   [[nodiscard]] std::filesystem::path jobs_folder() const { return options.folder / "jobs"; }
 
   Result<void> open() {
-    auto opened = jobs::SqliteStore::open({.folder = options.folder, .used_numbers = highest_edit(scenes)});
+    auto opened = jobs::SqliteStore::open(
+        {.folder = options.folder, .used_numbers = highest_edit(scenes), .max_deaths = options.attempts});
     if (!opened) return propagate(opened);
     records = std::move(*opened);
     auto made = jobs::Queue::open(

@@ -31,7 +31,8 @@ struct ServiceOptions {
   std::filesystem::path folder;  ///< <data-dir>/edits: job records and what running edits need.
   std::size_t max_queued = 32;
   engine::jobs::Retention retention = {};
-  int pictured_views = 4;            ///< Of each interval, for its intermediate renders.
+  int pictured_views = 4;  ///< Of each interval, for its intermediate renders.
+  int attempts = 3;        ///< An edit has failed once the service died so often at the same place of it; 0: never.
   std::uint64_t memory_bytes = 0;    ///< What one edit may be estimated to take; 0: any amount.
   int threads = 0;                   ///< 0: as many as the machine has cores.
   spdlog::logger* logger = nullptr;  ///< Is told what becomes of edits; outlives the service. Null: nobody is.
