@@ -28,6 +28,7 @@ ordered_json object(const ServiceLimits& limits) {
           {"image_side", limits.image_side},
           {"queued_edits", limits.queued_edits},
           {"scene_memory_bytes", limits.scene_memory_bytes},
+          {"edit_memory_bytes", limits.edit_memory_bytes},
           {"streams", limits.streams},
           {"scenes", limits.scenes},
           {"dataset_bytes", limits.dataset_bytes}};

@@ -28,18 +28,25 @@ namespace {
 using scene::Image;
 namespace Filesystem = OIIO::Filesystem;
 
-/// OpenImageIO's name of the format that these first bytes announce. We ask for that one reader by name: left to
-/// itself, the library tries dozens of formats on what a stranger has sent.
-const char* sniff(std::span<const std::byte> bytes) {
+/// A format that is read: what people call it, and OpenImageIO.
+struct Format {
+  const char* name;
+  const char* reader;
+};
+
+/// The format that these first bytes announce. We ask for that one reader by name: left to itself, the library tries
+/// dozens of formats on what a stranger has sent. BMP is not among them: the library's reader of it puts memory that it
+/// has not written into its messages.
+std::optional<Format> sniff(std::span<const std::byte> bytes) {
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), std::min<std::size_t>(bytes.size(), 12));
   using namespace std::string_view_literals;
-  if (text.starts_with("\x89PNG\r\n\x1a\n")) return "png";
-  if (text.starts_with("\xff\xd8\xff")) return "jpeg";
-  if (text.starts_with("\x76\x2f\x31\x01")) return "openexr";
-  if (text.starts_with("II*\0"sv) || text.starts_with("MM\0*"sv)) return "tiff";
-  if (text.starts_with("RIFF") && text.substr(std::min<std::size_t>(text.size(), 8)) == "WEBP") return "webp";
-  if (text.starts_with("BM")) return "bmp";
-  return nullptr;
+  if (text.starts_with("\x89PNG\r\n\x1a\n")) return Format{"PNG", "png"};
+  if (text.starts_with("\xff\xd8\xff")) return Format{"JPEG", "jpeg"};
+  if (text.starts_with("\x76\x2f\x31\x01")) return Format{"EXR", "openexr"};
+  if (text.starts_with("II*\0"sv) || text.starts_with("MM\0*"sv)) return Format{"TIFF", "tiff"};
+  if (text.starts_with("RIFF") && text.substr(std::min<std::size_t>(text.size(), 8)) == "WEBP")
+    return Format{"WebP", "webp"};
+  return std::nullopt;
 }
 
 std::size_t big_endian(std::span<const std::byte> bytes, std::size_t at, std::size_t size) {
@@ -79,30 +86,48 @@ bool png_is_complete(std::span<const std::byte> bytes) {
   return false;
 }
 
-bool is_complete(std::string_view format, std::span<const std::byte> bytes) {
-  return format == "png" ? png_is_complete(bytes) : format != "jpeg" || jpeg_is_complete(bytes);
+bool is_complete(const Format& format, std::span<const std::byte> bytes) {
+  const std::string_view name = format.name;
+  return name == "PNG" ? png_is_complete(bytes) : name != "JPEG" || jpeg_is_complete(bytes);
 }
 
-/// The first line of what the library says.
-std::string one_line(std::string message) {
-  message.resize(std::min(message.find('\n'), message.size()));
-  return message.empty() ? "the picture cannot be decoded" : message;
+/// What a library says of a damaged file is written for its programmers, and what of the file or of memory stands in it
+/// nobody has checked: it goes no further. Asked for all the same, or the library prints it.
+template <class Speaker>
+void drop_message_of(Speaker& speaker) {
+  (void)speaker.geterror();
+}
+
+tl::unexpected<Error> damaged(const Format& format, const char* part, const std::string& name) {
+  return fail(ErrorCode::corrupt_data,
+              std::string("this ") + format.name + " picture is damaged: its " + part +
+                  " cannot be decoded; copy or download it again, or save it anew",
+              name);
+}
+
+/// The same where nobody knows how far the library came before it threw.
+tl::unexpected<Error> undecodable(const std::string& name) {
+  return fail(ErrorCode::corrupt_data, "the picture cannot be decoded: copy or download it again, or save it anew",
+              name);
 }
 
 /// A reader that is open on `source`; its size is within the limits.
 Result<std::unique_ptr<OIIO::ImageInput>> open_reader(std::span<const std::byte> first_bytes,
                                                       Filesystem::IOProxy& source, const std::string& name,
                                                       const ImageOptions& options) {
-  const char* format = sniff(first_bytes);
-  if (format == nullptr)
-    return fail(ErrorCode::unsupported, name + " is not a PNG, JPEG, EXR, TIFF, WebP or BMP picture", name);
-  auto reader = OIIO::ImageInput::create(format);
-  if (!reader) return fail(ErrorCode::unsupported, std::string("this build cannot read ") + format + " pictures", name);
+  const auto format = sniff(first_bytes);
+  if (!format)
+    return fail(ErrorCode::unsupported, name + " is not a PNG, JPEG, EXR, TIFF or WebP picture: save it as one", name);
+  auto reader = OIIO::ImageInput::create(format->reader);
+  if (!reader)
+    return fail(ErrorCode::unsupported, std::string("this build cannot read ") + format->name + " pictures", name);
   reader->threads(1);
   OIIO::ImageSpec spec, hints;
   hints.attribute("oiio:UnassociatedAlpha", 1);  // or integer colours come multiplied by alpha, and rounded
-  if (!reader->set_ioproxy(&source) || !reader->open(name, spec, hints))
-    return fail(ErrorCode::corrupt_data, one_line(reader->geterror()), name);
+  if (!reader->set_ioproxy(&source) || !reader->open(name, spec, hints)) {
+    drop_message_of(*reader);
+    return damaged(*format, "header", name);
+  }
   if (spec.width < 1 || spec.height < 1 || spec.depth > 1 || spec.nchannels < 1 || spec.deep)
     return fail(ErrorCode::corrupt_data, "the picture's header describes no flat picture", name);
   const std::string found = "the picture has " + std::to_string(spec.width) + "x" + std::to_string(spec.height) +
@@ -165,7 +190,8 @@ Image turned(const Image& stored, int orientation) {
 
 Result<Image> decode(std::span<const std::byte> bytes, const std::string& name, const ImageOptions& options) {
   // Asked before the library sees a byte: at the end of a PNG it leaks memory, of a JPEG it sees nothing wrong.
-  if (const char* format = sniff(bytes); format != nullptr && !is_complete(format, bytes))
+  const auto format = sniff(bytes);
+  if (format && !is_complete(*format, bytes))
     return fail(ErrorCode::corrupt_data, "the picture ends before its last row: copy or download it again", name);
   Filesystem::IOMemReader source(const_cast<std::byte*>(bytes.data()), bytes.size());  // reads; takes a void*
   auto opened = open_reader(bytes, source, name, options);
@@ -178,8 +204,10 @@ Result<Image> decode(std::span<const std::byte> bytes, const std::string& name, 
   const auto channels = std::size_t(spec.nchannels);
   const std::size_t pixels = std::size_t(spec.width) * std::size_t(spec.height);
   std::vector<float> interleaved(pixels * channels);
-  if (!reader.read_image(0, 0, 0, -1, OIIO::TypeDesc::FLOAT, interleaved.data()))
-    return fail(ErrorCode::corrupt_data, one_line(reader.geterror()), name);
+  if (!reader.read_image(0, 0, 0, -1, OIIO::TypeDesc::FLOAT, interleaved.data())) {
+    drop_message_of(reader);
+    return damaged(*format, "pixels", name);
+  }
 
   const bool with_alpha = layout->alpha >= 0;
   const bool multiply =
@@ -230,8 +258,10 @@ Result<std::vector<std::byte>> encode(const char* format, OIIO::ImageSpec spec, 
   if (!writer) return fail(ErrorCode::unsupported, std::string("this build cannot write ") + format + " pictures");
   writer->threads(1);
   if (!writer->set_ioproxy(&target) || !writer->open(format, spec) || !writer->write_image(spec.format, pixels) ||
-      !writer->close())
-    return fail(ErrorCode::internal, one_line(writer->geterror()));
+      !writer->close()) {
+    drop_message_of(*writer);
+    return fail(ErrorCode::internal, std::string("the picture could not be encoded as ") + format);
+  }
   const auto* first = reinterpret_cast<const std::byte*>(bytes.data());
   return std::vector<std::byte>(first, first + bytes.size());
 }
@@ -266,8 +296,8 @@ Result<Image> decode_image(std::span<const std::byte> bytes, const std::string& 
     return decode(bytes, name, options);
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::too_large, name + " does not fit into the memory of this machine", name);
-  } catch (const std::exception& failure) {
-    return fail(ErrorCode::corrupt_data, one_line(failure.what()), name);
+  } catch (const std::exception&) {
+    return undecodable(name);
   }
 }
 
@@ -287,8 +317,8 @@ Result<PictureSize> picture_size(const std::filesystem::path& path, const ImageO
     const auto reader = open_reader(*first_bytes, source, file->name(), options);
     if (!reader) return propagate(reader);
     return PictureSize{(*reader)->spec().width, (*reader)->spec().height};
-  } catch (const std::exception& failure) {
-    return fail(ErrorCode::corrupt_data, one_line(failure.what()), file->name());
+  } catch (const std::exception&) {
+    return undecodable(file->name());
   }
 }
 
@@ -374,8 +404,10 @@ Result<Image> resized(const Image& image, int width, int height, ResizeFilter fi
     const OIIO::ImageBuf from(from_spec, const_cast<float*>(image.plane(c).data()));  // only read; takes a void*
     OIIO::ImageBuf to(to_spec, out.plane(c).data());
     const char* name = filter == ResizeFilter::box ? "box" : "lanczos3";
-    if (!OIIO::ImageBufAlgo::resize(to, from, name, 0.0f, {}, /*nthreads=*/1))
-      return fail(ErrorCode::internal, one_line(to.geterror()));
+    if (!OIIO::ImageBufAlgo::resize(to, from, name, 0.0f, {}, /*nthreads=*/1)) {
+      drop_message_of(to);
+      return fail(ErrorCode::internal, "the picture could not be brought to another size");
+    }
   }
   return out;
 }

@@ -1,4 +1,5 @@
-// Pictures as files: PNG, JPEG, EXR, TIFF, WebP and BMP in; PNG, JPEG and EXR out. By content, never by name.
+// Pictures as files: PNG, JPEG, EXR, TIFF and WebP in; PNG, JPEG and EXR out. By content, never by name. Errors are in
+// our own words: what a library says of a stranger's bytes may hold more than it should.
 #pragma once
 
 #include <cstddef>

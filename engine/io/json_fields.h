@@ -93,8 +93,10 @@ class JsonFields {
   const auto* text = reinterpret_cast<const char*>(bytes.data());
   try {
     return nlohmann::json::parse(text, text + bytes.size());
-  } catch (const nlohmann::json::exception& failure) {
-    return fail(ErrorCode::corrupt_data, std::string("not valid JSON: ") + failure.what(), file);
+  } catch (const nlohmann::json::parse_error& failure) {
+    return fail(ErrorCode::corrupt_data, "not valid JSON: it goes wrong at byte " + std::to_string(failure.byte), file);
+  } catch (const nlohmann::json::exception&) {
+    return fail(ErrorCode::corrupt_data, "not valid JSON: a number is too large to be represented", file);
   }
 }
 

@@ -22,14 +22,14 @@ constexpr std::array<Row, state_count> make_transitions() {
   constexpr std::optional run(JobState::running), stop(JobState::stop_requested), cancel(JobState::cancel_requested),
       good(JobState::succeeded), bad(JobState::failed), gone(JobState::cancelled);
   return {{
-      //  claim report finish_interval stop cancel succeed fail release
-      Row{run, no, no, no, gone, no, no, no},                 // queued
-      Row{run, run, run, stop, cancel, good, bad, run},       // running
-      Row{stop, stop, stop, stop, cancel, good, bad, stop},   // stop_requested
-      Row{no, cancel, cancel, no, cancel, gone, gone, gone},  // cancel_requested
-      Row{},                                                  // succeeded
-      Row{},                                                  // failed
-      Row{no, no, no, no, gone, no, no, no},                  // cancelled
+      //  claim report finish_interval stop cancel succeed fail release abandon
+      Row{run, no, no, no, gone, no, no, no, no},                   // queued
+      Row{run, run, run, stop, cancel, good, bad, run, run},        // running
+      Row{stop, stop, stop, stop, cancel, good, bad, stop, stop},   // stop_requested
+      Row{no, cancel, cancel, no, cancel, gone, gone, gone, gone},  // cancel_requested
+      Row{},                                                        // succeeded
+      Row{},                                                        // failed
+      Row{no, no, no, no, gone, no, no, no, no},                    // cancelled
   }};
 }
 constexpr auto transitions = make_transitions();
@@ -59,6 +59,21 @@ std::optional<JobState> next_state(const Job& job, Event event) {
     default:
       return job.claimed ? next : std::nullopt;
   }
+}
+
+/// The process that held the job has died. Its claim goes; who has died too often at the same place is not tried again.
+void abandon(Job& job, int max_deaths) {
+  job.claimed = false;
+  if (is_final(job.state)) return;
+  job.deaths = job.deaths > 0 && job.died_at == job.place ? job.deaths + 1 : 1;
+  job.died_at = job.place;
+  if (max_deaths == 0 || job.deaths < max_deaths) return;
+  job.state = JobState::failed;
+  job.error = Error{ErrorCode::internal,
+                    "the service ended " + std::to_string(job.deaths) + " times in a row while it was at this job" +
+                        (job.place.empty() ? "" : " (" + job.place + ")") +
+                        ", which is not taken up again: it may need more memory than there is",
+                    job.id};
 }
 
 }  // namespace
@@ -92,6 +107,7 @@ Result<Job> transition(Job job, const Change& change, Time now) {
   switch (change.event) {
     case Event::claim:
       job.claimed = true;
+      job.place.clear();
       if (!job.started) job.started = now;
       break;
     case Event::finish_interval:
@@ -101,6 +117,7 @@ Result<Job> transition(Job job, const Change& change, Time now) {
                         std::to_string(job.finished_intervals) + ": intervals must count up",
                     job.id);
       job.finished_intervals = change.interval;
+      job.deaths = 0;
       break;
     case Event::succeed:
       if (*next == JobState::succeeded) {
@@ -114,7 +131,12 @@ Result<Job> transition(Job job, const Change& change, Time now) {
     case Event::release:
       job.claimed = false;
       break;
+    case Event::abandon:
+      abandon(job, change.max_deaths);
+      break;
     case Event::report:
+      if (change.place) job.place = *change.place;
+      break;
     case Event::stop:
     case Event::cancel:
       break;

@@ -26,6 +26,8 @@ using Time = std::chrono::sys_time<std::chrono::milliseconds>;
 /// - A job whose worker went away (shutdown, kill -9) keeps its state and is claimed again before younger ones; one
 /// that
 ///   was to be cancelled is then `cancelled`.
+/// - A job at whose work the process has died several times in a row, at the same place and with nothing finished in
+///   between, has `failed`: it may well be what ends the process, and would go on doing so.
 enum class JobState { queued, running, stop_requested, cancel_requested, succeeded, failed, cancelled };
 inline constexpr int state_count = 7;
 
@@ -45,6 +47,9 @@ struct Job {
   int finished_intervals = 0;  ///< The last of them has its checkpoint on disk.
   int queue_position = 0;      ///< 1 for the next job of those that wait, 0 for one that does not wait.
   std::string progress;        ///< The progress that was published last.
+  std::string place;           ///< What its worker was about to do last; "": nothing it would have said.
+  std::string died_at;         ///< The place at which a process last died that held the job.
+  int deaths = 0;              ///< How many did so one after the other at this place, no interval finished in between.
   std::string result;          ///< Result of a job that succeeded. Empty in a list.
   std::optional<Error> error;  ///< Why the job failed; none unless `state` is failed.
   Time created{};
@@ -56,18 +61,21 @@ struct Job {
 [[nodiscard]] std::string id_of(std::int64_t number);
 [[nodiscard]] std::optional<std::int64_t> number_of(std::string_view id);
 
-/// What can happen to a job. Its worker brings about all but `stop` and `cancel`.
-enum class Event { claim, report, finish_interval, stop, cancel, succeed, fail, release };
-inline constexpr int event_count = 8;
+/// What can happen to a job. Its worker brings about all but `stop`, `cancel` and `abandon`: whoever finds it claimed
+/// by a process that is no more does that.
+enum class Event { claim, report, finish_interval, stop, cancel, succeed, fail, release, abandon };
+inline constexpr int event_count = 9;
 
 /// An event with its data; fields that do not belong to the event are ignored.
 struct Change {
   Event event = Event::report;
   std::optional<std::string> progress = {};  ///< With any event: the record's new progress.
+  std::optional<std::string> place = {};     ///< report: the record's new place.
   int interval = 0;            ///< finish_interval: number of the interval, larger than any before; the first is 1.
   std::string result = {};     ///< succeed: the record's result.
   bool stopped_early = false;  ///< succeed: the record's `stopped_early`.
   Error error = {};            ///< fail: the record's error.
+  int max_deaths = 0;          ///< abandon: the job fails when its `deaths` come to so many; 0: never.
 };
 
 /// The record after the change. Every store calls this function, so the rules are the same everywhere.

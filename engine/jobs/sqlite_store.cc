@@ -18,7 +18,7 @@
 namespace engine::jobs {
 namespace {
 
-constexpr int schema_number = 1;  // of the tables below; user_version in the file
+constexpr int schema_number = 2;  // of the tables below; user_version in the file
 constexpr const char* schema = R"(
   CREATE TABLE jobs (
     number INTEGER PRIMARY KEY AUTOINCREMENT,  -- AUTOINCREMENT: a removed job's number is never given away again
@@ -41,6 +41,13 @@ constexpr const char* schema = R"(
   CREATE INDEX active ON jobs (lane, number) WHERE ended IS NULL;
   CREATE INDEX finished ON jobs (ended, number) WHERE ended IS NOT NULL;
   PRAGMA user_version = 1;
+)";
+/// From schema 1 to 2: new files take this way, too, so that there is only one.
+constexpr const char* counts_deaths = R"(
+  ALTER TABLE jobs ADD COLUMN place TEXT NOT NULL DEFAULT '';
+  ALTER TABLE jobs ADD COLUMN died_at TEXT NOT NULL DEFAULT '';
+  ALTER TABLE jobs ADD COLUMN deaths INTEGER NOT NULL DEFAULT 0;
+  PRAGMA user_version = 2;
 )";
 
 /// SQLite's result codes become an Error here, travel as an exception to guarded() and leave this file as a Result.
@@ -211,7 +218,7 @@ std::string select(const std::string& payload, const std::string& result) {
          ", idempotency_key, state, claimed, stopped_early, finished_intervals, progress, " + result +
          ", error_code, error_message, error_where, created, started, ended, "
          "CASE state WHEN 'queued' THEN (SELECT count(*) FROM jobs AS other WHERE other.ended IS NULL AND "
-         "other.state = 'queued' AND other.number <= jobs.number) ELSE 0 END FROM jobs ";
+         "other.state = 'queued' AND other.number <= jobs.number) ELSE 0 END, place, died_at, deaths FROM jobs ";
 }
 
 std::optional<Time> time_at(const Statement& row, int column) {
@@ -242,6 +249,9 @@ Job read(const Database& database, const Statement& row) {
   job.started = time_at(row, 14);
   job.ended = time_at(row, 15);
   job.queue_position = int(row.integer(16));
+  job.place = row.text(17);
+  job.died_at = row.text(18);
+  job.deaths = int(row.integer(19));
   return job;
 }
 
@@ -269,11 +279,11 @@ Job apply_in(Database& database, const std::string& id, const Change& change, Ti
   }
   Statement(database,
             "UPDATE jobs SET state = ?2, claimed = ?3, stopped_early = ?4, finished_intervals = ?5, progress = ?6, "
-            "result = ?7, error_code = ?8, error_message = ?9, error_where = ?10, started = ?11, ended = ?12 "
-            "WHERE number = ?1",
+            "result = ?7, error_code = ?8, error_message = ?9, error_where = ?10, started = ?11, ended = ?12, "
+            "place = ?13, died_at = ?14, deaths = ?15 WHERE number = ?1",
             known_number(id), to_string(job.state), std::int64_t(job.claimed), std::int64_t(job.stopped_early),
             std::int64_t(job.finished_intervals), job.progress, job.result, code, message, where, job.started,
-            job.ended)
+            job.ended, job.place, job.died_at, std::int64_t(job.deaths))
       .run();
   return find_in(database, id);
 }
@@ -297,7 +307,18 @@ void skip_numbers(Database& database, std::int64_t used) {
   Statement(database, "UPDATE sqlite_sequence SET seq = max(seq, ?1) WHERE name = 'jobs'", used).run();
 }
 
-void prepare(Database& database, Time now, std::int64_t used_numbers) {
+/// Makes the tables, or those of an older version into ours.
+void bring_up_to_date(Database& database, int found_schema) {
+  if (found_schema == 0) {
+    if (text_of(database, "SELECT count(*) FROM sqlite_schema") != "0")
+      throw Failure({ErrorCode::corrupt_data, "the file is no job store: move it away, or choose another data folder",
+                     database.file()});
+    database.execute(schema);
+  }
+  if (found_schema < 2) database.execute(counts_deaths);
+}
+
+void prepare(Database& database, Time now, const SqliteOptions& options) {
   // EXCLUSIVE before the first access: the lock is then held until the process ends, and no shared memory is needed.
   database.execute("PRAGMA locking_mode = EXCLUSIVE; PRAGMA synchronous = FULL;");
   if (text_of(database, "PRAGMA journal_mode = WAL") != "wal")
@@ -312,15 +333,10 @@ void prepare(Database& database, Time now, std::int64_t used_numbers) {
                    "the job store was written by a newer version (" + std::to_string(found_schema) + ", known is " +
                        std::to_string(schema_number) + "): use that one, or choose another data folder",
                    database.file()});
-  if (found_schema < schema_number) {
-    if (text_of(database, "SELECT count(*) FROM sqlite_schema") != "0")
-      throw Failure({ErrorCode::corrupt_data, "the file is no job store: move it away, or choose another data folder",
-                     database.file()});
-    database.execute(schema);
-  }
+  bring_up_to_date(database, found_schema);
   for (const std::string& id : ids(Statement(database, "SELECT number FROM jobs WHERE claimed ORDER BY number")))
-    apply_in(database, id, {.event = Event::release}, now);
-  if (used_numbers > 0) skip_numbers(database, used_numbers);
+    apply_in(database, id, {.event = Event::abandon, .max_deaths = options.max_deaths}, now);
+  if (options.used_numbers > 0) skip_numbers(database, options.used_numbers);
   transaction.commit();
 }
 
@@ -376,7 +392,7 @@ Result<std::unique_ptr<SqliteStore>> SqliteStore::open(const SqliteOptions& opti
   return guarded([&] {
     auto impl = std::make_unique<Impl>(options.folder / "jobs.db", options.now);
     impl->database.open(options.busy_timeout);
-    prepare(impl->database, impl->now(), options.used_numbers);
+    prepare(impl->database, impl->now(), options);
     return std::unique_ptr<SqliteStore>(new SqliteStore(std::move(impl)));
   });
 }

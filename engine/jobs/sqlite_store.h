@@ -17,13 +17,15 @@ struct SqliteOptions {
   std::chrono::milliseconds busy_timeout{2000};  ///< Longest wait for a process that is just ending.
   std::int64_t used_numbers = 0;                 ///< Ids up to this one are known elsewhere and not given away, even if
                                                  ///< the file is new because an old one was lost.
+  int max_deaths =
+      3;  ///< A job whose process has died so often in a row at the same place has failed; 0: never. A choice.
   std::function<Time()> now = [] {
     return std::chrono::floor<std::chrono::milliseconds>(std::chrono::system_clock::now());
   };
 };
 
 /// The embedded store: write-ahead log, synchronous=FULL. The process holds the file alone until it ends, however it
-/// ends; so whoever opens it knows that no worker is left, and open() releases every claim (Event::release).
+/// ends; so whoever opens it knows that no worker is left, and open() ends every claim (Event::abandon).
 class SqliteStore final : public Store {
  public:
   ///   errors  unavailable: another process holds the file, or it cannot be opened; corrupt_data: it is damaged or no

@@ -68,6 +68,13 @@ Result<void> JobContext::save_checkpoint(int interval, std::string_view bytes) {
   return {};
 }
 
+void JobContext::enter(const std::string& place) {
+  if (place == job_.place) return;
+  job_.place = place;
+  // A disk that is full is met at the next checkpoint; until then a death counts for the place before.
+  (void)queue_.store_.apply(job_.id, {.event = Event::report, .progress = running_.progress(), .place = place});
+}
+
 void JobContext::publish_progress(std::string progress) {
   running_.set_progress(progress);
   queue_.bump_revision();

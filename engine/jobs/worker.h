@@ -62,6 +62,10 @@ class JobContext {
   ///   errors    cancelled: it was saved, but the job is to end here (cancel or shutdown: return the error);
   ///             invalid_argument: `interval` does not count up; no_space, unavailable: it was not saved
   [[nodiscard]] Result<void> save_checkpoint(int interval, std::string_view bytes);
+  /// Notes on disk what the job does next, so that a process that dies at it time and again is known to: call it where
+  /// another kind of work begins, with a text that is the same in each attempt. Costs a write where the text is another
+  /// than before. For the thread of save_checkpoint().
+  void enter(const std::string& place);
   /// Tells readers how far the job is; they see it at once.
   void publish_progress(std::string progress);
 

@@ -10,6 +10,7 @@
 #include "server/cli/commands.h"
 #include "server/cli/compute.h"
 #include "server/cli/folders.h"
+#include "server/edits/machine_memory.h"
 #include "server/http/log.h"
 #include "server/service/serve.h"
 
@@ -92,6 +93,9 @@ void add_store_options(CLI::App& command, ServeOptions& options) {
       ->check(CLI::ExistingDirectory)
       ->type_name("DIR");
   add_bytes(command, "--scene-memory", options.scenes.memory_bytes, "Memory for scenes and previews");
+  options.edits.memory_bytes = edits::usual_edit_memory();
+  add_bytes(command, "--edit-memory", options.edits.memory_bytes,
+            "What one edit may take, by its estimate; usually half of what the machine and its control group have");
   add_count(command, "--max-gaussians", options.scenes.read.max_gaussians, "Gaussians of a scene");
   add_count(command, "--max-scenes", options.scenes.max_scenes, "Scenes held");
   add_count(command, "--max-previews", options.scenes.max_previews, "Previews in memory");
@@ -101,6 +105,8 @@ void add_store_options(CLI::App& command, ServeOptions& options) {
   add_count(command, "--max-dataset-files", options.scenes.max_dataset_files, "Files of a dataset");
   add_count(command, "--max-queued", options.edits.max_queued, "Edits that may wait");
   add_count(command, "--max-edit-records", options.edits.retention.max_count, "Ended edits that are remembered");
+  add_count(command, "--edit-attempts", options.edits.attempts,
+            "An edit during which the service has died so often in a row, at the same place, has failed");
   add_count(command, "--pictured-views", options.edits.pictured_views, "Views rendered after each interval", 0);
   add_count(command, "--max-handles", options.edit_limits.handles, "Handles of an edit", 1, proto::max_handles);
   add_count(command, "--max-views", options.edit_limits.views, "Views that an edit looks through", 1,

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <exception>
 #include <memory>
 #include <new>
 #include <optional>
@@ -62,12 +63,18 @@ proto::EditRecord earlier_record(const JobContext& context) {
   return std::move(*record);
 }
 
+/// Where in its work an edit is, as far as it is the same in each attempt.
+std::string place_of(const proto::EditRecord& record) {
+  return record.interval > 0 ? "interval " + std::to_string(record.interval) + ", " + record.stage : record.stage;
+}
+
 class Run {
  public:
   Run(JobContext& context, const Workshop& workshop)
-      : context_(context),
-        workshop_(workshop),
-        keeper_(earlier_record(context), [&context](std::string text) { context.publish_progress(std::move(text)); }) {}
+      : context_(context), workshop_(workshop), keeper_(earlier_record(context), [this](std::string text) {
+          context_.publish_progress(std::move(text));
+          context_.enter(place_of(keeper_.record()));
+        }) {}
 
   Result<void> operator()() {
     if (auto loaded = load(); !loaded) return loaded;
@@ -255,6 +262,10 @@ Result<JobResult> carry_out(JobContext& context, const Workshop& workshop) {
     return fail(ErrorCode::too_large,
                 "the edit needs more memory than this machine has left: choose smaller radii, fewer views or a smaller "
                 "max_image_side, or edit a smaller scene");
+  } catch (const std::exception& bug) {
+    // Whoever reads the log can act on what was thrown; to clients it may show more than they should see.
+    log(workshop, spdlog::level::err, context, std::string("bug: ") + bug.what());
+    return fail(ErrorCode::internal, "the edit met an unexpected error, please report it; the service's log says more");
   }
 }
 

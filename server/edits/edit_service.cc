@@ -11,6 +11,7 @@
 #include "engine/jobs/sqlite_store.h"
 #include "engine/jobs/worker.h"
 #include "proto/time_text.h"
+#include "server/edits/admission.h"
 #include "server/edits/convert.h"
 #include "server/edits/convert_selection.h"
 #include "server/edits/edit_job.h"
@@ -136,6 +137,11 @@ Result<Checked> check(scenes::SceneStore& scenes, Selections& selections, const 
   return Checked{std::move(*request), std::move(*version), std::move(*preview), std::move(*warnings)};
 }
 
+struct Admitted {
+  Checked checked;
+  std::vector<engine::scene::Camera> cameras;  ///< Of the dataset.
+};
+
 }  // namespace
 
 struct EditService::Impl {
@@ -149,7 +155,8 @@ struct EditService::Impl {
   [[nodiscard]] std::filesystem::path jobs_folder() const { return options.folder / "jobs"; }
 
   Result<void> open() {
-    auto opened = jobs::SqliteStore::open({.folder = options.folder, .used_numbers = highest_edit(scenes)});
+    auto opened = jobs::SqliteStore::open(
+        {.folder = options.folder, .used_numbers = highest_edit(scenes), .max_deaths = options.attempts});
     if (!opened) return propagate(opened);
     records = std::move(*opened);
     auto made = jobs::Queue::open(
@@ -161,6 +168,20 @@ struct EditService::Impl {
       return carry_out(context, workshop);
     });
     return {};
+  }
+
+  /// A request that can be carried out here, and what will be: errors as submit().
+  Result<Admitted> admitted(const proto::EditRequest& asked) {
+    auto checked = check(scenes, selections, asked);
+    if (!checked) return propagate(checked);
+    const auto dataset = scenes.dataset(*asked.scene);
+    if (!dataset) return propagate(dataset);
+    Admitted out{std::move(*checked), cameras_of(dataset->get())};
+    const edit::Request& request = out.checked.request;
+    const JobWorkload work = memory_workload_of(out.checked.version.cloud, request, out.checked.preview, out.cameras,
+                                                uses_corrector(request.params), options.pictured_views);
+    if (auto fits = admit(work, request.params, out.cameras, options.memory_bytes); !fits) return propagate(fits);
+    return out;
   }
 
   /// The edit of an idempotency key, if the key is known; an error if it came with another request.
@@ -216,7 +237,7 @@ Result<EditService::Submission> EditService::submit(const proto::EditRequest& re
   if (!earlier) return propagate(earlier);
   if (*earlier) return Submission{status_of(**earlier), false};
   const auto hold = impl_->scenes_in_use.lock_shared(*asked->scene);
-  if (const auto checked = check(impl_->scenes, impl_->selections, *asked); !checked) return propagate(checked);
+  if (const auto admitted = impl_->admitted(*asked); !admitted) return propagate(admitted);
   const auto submission = impl_->queue->submit(job);
   if (!submission) return propagate(submission);
   return Submission{status_of(submission->job), submission->created};
@@ -225,27 +246,25 @@ Result<EditService::Submission> EditService::submit(const proto::EditRequest& re
 Result<proto::EditEstimate> EditService::estimate(const proto::EditRequest& request) {
   const auto asked = canonical(request);
   if (!asked) return propagate(asked);
-  const auto checked = check(impl_->scenes, impl_->selections, *asked);
-  if (!checked) return propagate(checked);
-  const auto dataset = impl_->scenes.dataset(*asked->scene);
-  if (!dataset) return propagate(dataset);
+  const auto admitted = impl_->admitted(*asked);  // before frames are rendered to see how long they take
+  if (!admitted) return propagate(admitted);
+  const Checked& checked = admitted->checked;
   const auto info = impl_->scenes.find(*asked->scene);
   if (!info) return propagate(info);
-  edit::Request request_there = checked->request;
+  edit::Request request_there = checked.request;
   if (info->up) request_there.up = *info->up;
-  const JobWorkload work =
-      workload_of(checked->version.cloud, request_there, checked->preview, cameras_of(dataset->get()),
-                  uses_corrector(request_there.params), impl_->options.pictured_views);
+  const JobWorkload work = workload_of(checked.version.cloud, request_there, checked.preview, admitted->cameras,
+                                       uses_corrector(request_there.params), impl_->options.pictured_views);
 
   proto::EditEstimate estimate;
-  estimate.handles = checked->handles();
+  estimate.handles = checked.handles();
   estimate.views = work.edit.views;
   estimate.intervals = work.edit.intervals;
-  estimate.parts = to_parts(checked->preview.parts);
+  estimate.parts = to_parts(checked.preview.parts);
   estimate.seconds = std::round(100 * estimated_seconds(work)) / 100;
   estimate.memory_bytes = estimated_bytes(work);
-  estimate.request = checked->resolved_for(*asked);
-  estimate.warnings = checked->warnings(*asked);
+  estimate.request = checked.resolved_for(*asked);
+  estimate.warnings = checked.warnings(*asked);
   return estimate;
 }
 

@@ -31,7 +31,9 @@ struct ServiceOptions {
   std::filesystem::path folder;  ///< <data-dir>/edits: job records and what running edits need.
   std::size_t max_queued = 32;
   engine::jobs::Retention retention = {};
-  int pictured_views = 4;            ///< Of each interval, for its intermediate renders.
+  int pictured_views = 4;  ///< Of each interval, for its intermediate renders.
+  int attempts = 3;        ///< An edit has failed once the service died so often at the same place of it; 0: never.
+  std::uint64_t memory_bytes = 0;    ///< What one edit may be estimated to take; 0: any amount.
   int threads = 0;                   ///< 0: as many as the machine has cores.
   spdlog::logger* logger = nullptr;  ///< Is told what becomes of edits; outlives the service. Null: nobody is.
   /// The loss inside masks; outlives the service. Null: the engine's own.
@@ -56,7 +58,8 @@ class EditService {
   /// Accepts an edit: on disk when this returns. The scene, its version and every field are checked first, and each
   /// handle is held against the scene; a selection is carried out.
   ///   errors  invalid_argument, not_found (`where` "scene", "version"; a view of a selection), unprocessable (a handle
-  ///           without Gaussians, an empty selection; a key used for another request), unsupported, busy
+  ///           without Gaussians, an empty selection; a key used for another request), unsupported, busy; those of
+  ///           admit()
   [[nodiscard]] Result<Submission> submit(const proto::EditRequest& request, const std::string& idempotency_key);
   /// What submit() would do, and what it would cost. Errors as submit().
   [[nodiscard]] Result<proto::EditEstimate> estimate(const proto::EditRequest& request);

@@ -34,31 +34,44 @@ std::vector<scene::Camera> cameras_of(const engine::io::Dataset* dataset) {
   return engine::io::cameras_of(*dataset);
 }
 
-JobWorkload workload_of(const scene::LayeredCloud& version, const edit::Request& request,
-                        const edit::PreviewOutcome& preview, std::span<const scene::Camera> dataset, bool corrected,
-                        int pictured) {
+std::size_t view_pixels_at(int max_image_side, std::span<const scene::Camera> dataset) {
+  const auto side = std::size_t(max_image_side);
+  return dataset.empty() ? side * side : edit::view_pixels(dataset, max_image_side);  // virtual cameras are square
+}
+
+JobWorkload memory_workload_of(const scene::LayeredCloud& version, const edit::Request& request,
+                               const edit::PreviewOutcome& preview, std::span<const scene::Camera> dataset,
+                               bool corrected, int pictured) {
   const scene::GaussianCloud& cloud = *version.base;
   const edit::Params& params = request.params;
-  std::vector<scene::Camera> cameras(dataset.begin(), dataset.end());
-  if (cameras.empty()) cameras = some_virtual_cameras(cloud, request);
-  const scene::GaussianCloud& copies = preview.overlay.rows;
-  std::vector<std::uint32_t> rows(copies.size());
-  std::iota(rows.begin(), rows.end(), 0u);
-
   JobWorkload work;
   work.row_bytes = cloud.size() == 0 ? 0 : scene::memory_bytes(cloud) / cloud.size();
   work.layered = version.overlay != nullptr;
   work.copies = preview.overlay.added();
   work.edit = edit::workload_of(version.size(), request, corrected);
   work.edit.dragged = std::accumulate(preview.counts.begin(), preview.counts.end(), std::size_t{0});
-  work.edit.covered = edit::covered_part(copies, rows, cameras);
   work.edit.candidates = dataset.empty() ? std::size_t(params.views) : dataset.size();
   work.edit.virtual_views = dataset.empty();
   work.edit.views = dataset.empty() ? std::size_t(params.views) : edit::views_at_most(dataset, params);
-  work.edit.view_pixels = edit::view_pixels(cameras, params.max_image_side);
+  work.edit.view_pixels = view_pixels_at(params.max_image_side, dataset);
   work.edit.shown = work.edit.kept = true;
   work.edit.pictured = std::min(std::size_t(std::max(0, pictured)), work.edit.views);
-  work.edit.frame = edit::measured_frames(cloud, cameras, params.max_image_side);
+  return work;
+}
+
+JobWorkload workload_of(const scene::LayeredCloud& version, const edit::Request& request,
+                        const edit::PreviewOutcome& preview, std::span<const scene::Camera> dataset, bool corrected,
+                        int pictured) {
+  const scene::GaussianCloud& cloud = *version.base;
+  std::vector<scene::Camera> cameras(dataset.begin(), dataset.end());
+  if (cameras.empty()) cameras = some_virtual_cameras(cloud, request);
+  const scene::GaussianCloud& copies = preview.overlay.rows;
+  std::vector<std::uint32_t> rows(copies.size());
+  std::iota(rows.begin(), rows.end(), 0u);
+
+  JobWorkload work = memory_workload_of(version, request, preview, dataset, corrected, pictured);
+  work.edit.covered = edit::covered_part(copies, rows, cameras);
+  work.edit.frame = edit::measured_frames(cloud, cameras, request.params.max_image_side);
   work.edit.slowness = edit::measured_slowness();
   return work;
 }

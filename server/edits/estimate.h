@@ -26,6 +26,17 @@ struct JobWorkload {
 /// Those of a dataset, in its order; none without one.
 [[nodiscard]] std::vector<engine::scene::Camera> cameras_of(const engine::io::Dataset* dataset);
 
+/// Pixels of a view of pictures with this longer side: of the dataset's cameras, or else of virtual ones.
+[[nodiscard]] std::size_t view_pixels_at(int max_image_side, std::span<const engine::scene::Camera> dataset);
+
+/// What estimated_bytes() depends on, and no more: it costs next to nothing, whatever the request asks for.
+///   preview, dataset, corrected, pictured  as of workload_of()
+[[nodiscard]] JobWorkload memory_workload_of(const engine::scene::LayeredCloud& version,
+                                             const engine::edit::Request& request,
+                                             const engine::edit::PreviewOutcome& preview,
+                                             std::span<const engine::scene::Camera> dataset, bool corrected,
+                                             int pictured);
+
 /// Looks at the scene and the machine: renders a few frames.
 ///   request    with the scene's own `up`
 ///   preview    of that request

@@ -44,6 +44,7 @@ proto::ServiceInfo service_info(const ServeOptions& options) {
                  .image_side = std::uint64_t(options.edit_limits.image_side),
                  .queued_edits = options.edits.max_queued,
                  .scene_memory_bytes = options.scenes.memory_bytes,
+                 .edit_memory_bytes = options.edits.memory_bytes,
                  .streams = options.http.dispatcher.max_streams,
                  .scenes = options.scenes.max_scenes,
                  .dataset_bytes = options.scenes.max_dataset_bytes};

@@ -22,7 +22,8 @@ const random = ((state) => () => {
 let service, scene, request, truth, seconds;
 before(async () => {
   const demo = await demoScene({ gaussians: 20_000, views: 12, size: '640x480', photos: false });
-  service = await Service.start();
+  // More kills than a service meets by itself: an edit must not be given up for them.
+  service = await Service.start({ args: ['--edit-attempts', 1000] });
   scene = await service.client.upload(demo.ply, { name: 'killed' });
   await service.client.putDataset(scene.id, await datasetZip(demo.folder));
   request = { scene: scene.id, ...demo.leaf, params: { intervals: 12, max_image_side: 640 } };

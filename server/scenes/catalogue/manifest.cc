@@ -234,8 +234,10 @@ Result<Manifest> read_manifest(const std::filesystem::path& folder) {
     return decode(json::parse(text, text + bytes->size()));
   } catch (const Wrong& wrong) {
     return fail(ErrorCode::corrupt_data, wrong.what, file + ":" + wrong.where);
-  } catch (const json::exception& failure) {
-    return fail(ErrorCode::corrupt_data, std::string("not valid JSON: ") + failure.what(), file);
+  } catch (const json::parse_error& failure) {
+    return fail(ErrorCode::corrupt_data, "not valid JSON: it goes wrong at byte " + std::to_string(failure.byte), file);
+  } catch (const json::exception&) {
+    return fail(ErrorCode::corrupt_data, "not valid JSON: a number is too large to be represented", file);
   }
 }
 

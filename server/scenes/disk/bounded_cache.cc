@@ -21,8 +21,8 @@ Result<BoundedCache::CachedObject> call_guarded(const std::function<Result<Bound
     return make();
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::too_large, "it does not fit into the memory of this machine");
-  } catch (const std::exception& failure) {
-    return fail(ErrorCode::internal, failure.what());
+  } catch (const std::exception&) {
+    return fail(ErrorCode::internal, "it could not be loaded, for a reason that nobody foresaw; please report this");
   }
 }
 

@@ -54,6 +54,28 @@ ErrorCode code_for(int zip_error) {
   }
 }
 
+/// In our own words: libzip's are for programmers, and hold what the file or the system made it say.
+const char* reason_of(int zip_error) {
+  switch (zip_error) {
+    case ZIP_ER_NOZIP:
+      return "it is no zip file, or its end is missing";
+    case ZIP_ER_COMPNOTSUPP:
+      return "it is compressed in a way that is not supported; deflate is";
+    case ZIP_ER_ENCRNOTSUPP:
+    case ZIP_ER_NOPASSWD:
+    case ZIP_ER_WRONGPASSWD:
+      return "it is encrypted";
+    case ZIP_ER_MEMORY:
+      return "it needs more memory than there is";
+    case ZIP_ER_READ:
+    case ZIP_ER_SEEK:
+    case ZIP_ER_OPEN:
+      return "it cannot be read";
+    default:
+      return "it is damaged";
+  }
+}
+
 /// An entry's name as it may stand in an address: one line of ASCII, not long.
 std::string printable(std::string_view text) {
   std::string out;
@@ -83,11 +105,8 @@ Result<Archive> open_archive(const fs::path& zip, const std::string& name) {
   int error = 0;
   Archive archive(zip_open(zip.c_str(), ZIP_RDONLY, &error));
   if (archive) return archive;
-  zip_error_t described;
-  zip_error_init_with_code(&described, error);
-  const std::string why = zip_error_strerror(&described);
-  zip_error_fini(&described);
-  return fail(code_for(error), "this is not a zip file that can be read (" + why + "): make it anew", name);
+  return fail(code_for(error), std::string("the zip file cannot be opened, ") + reason_of(error) + ": make it anew",
+              name);
 }
 
 /// Path of an entry below the folder; nothing if the name may not stand in a zip file from a stranger. Some programs of
@@ -199,9 +218,9 @@ class Unzip {
   }
 
   static Result<void> failed(zip_error_t* error, const std::string& where) {
-    return fail(code_for(zip_error_code_zip(error)),
-                std::string("the entry cannot be unpacked (") + zip_error_strerror(error) + "): make the zip file anew",
-                where);
+    const int code = zip_error_code_zip(error);
+    return fail(code_for(code),
+                std::string("the entry cannot be unpacked, ") + reason_of(code) + ": make the zip file anew", where);
   }
 
   Archive archive_;

@@ -205,6 +205,7 @@ TEST(TransformsJson, RefusesWhatIsNotJson) {
     ASSERT_FALSE(parsed) << text;
     EXPECT_EQ(parsed.error().code, ErrorCode::corrupt_data);
     EXPECT_EQ(parsed.error().where, "transforms.json");
+    EXPECT_EQ(parsed.error().message.find("json.exception"), std::string::npos) << "the library's words, not ours";
   }
   EXPECT_FALSE(parse("[]"));
   EXPECT_FALSE(parse("17"));

@@ -4,7 +4,10 @@
 
 #include <array>
 #include <map>
+#include <string>
 #include <tuple>
+#include <utility>
+#include <vector>
 
 namespace engine::jobs {
 namespace {
@@ -31,7 +34,7 @@ struct Line {
   JobState state;
   bool claimed;
   int finished_intervals;
-  std::array<std::string, event_count> next;  // claim report finish_interval stop cancel succeed fail release
+  std::array<std::string, event_count> next;  // claim report finish_interval stop cancel succeed fail release abandon
 };
 
 const std::string no = "-", run = "running", stopping = "stop_requested", leaving = "cancel_requested",
@@ -40,18 +43,18 @@ const std::string no = "-", run = "running", stopping = "stop_requested", leavin
 const std::vector<Line>& table() {
   using enum JobState;
   static const std::vector<Line> lines = {
-      {queued, false, 0, {run, no, no, no, gone, no, no, no}},
-      {running, true, 0, {no, run, run, no, leaving, good, bad, run}},
-      {running, true, 2, {no, run, run, stopping, leaving, good, bad, run}},
-      {running, false, 0, {run, no, no, no, gone, no, no, no}},
-      {running, false, 2, {run, no, no, stopping, gone, no, no, no}},
-      {stop_requested, true, 2, {no, stopping, stopping, stopping, leaving, good, bad, stopping}},
-      {stop_requested, false, 2, {stopping, no, no, stopping, gone, no, no, no}},
-      {cancel_requested, true, 0, {no, leaving, leaving, no, leaving, gone, gone, gone}},
-      {cancel_requested, true, 2, {no, leaving, leaving, no, leaving, gone, gone, gone}},
-      {succeeded, false, 2, {no, no, no, no, no, no, no, no}},
-      {failed, false, 2, {no, no, no, no, no, no, no, no}},
-      {cancelled, false, 0, {no, no, no, no, gone, no, no, no}},
+      {queued, false, 0, {run, no, no, no, gone, no, no, no, no}},
+      {running, true, 0, {no, run, run, no, leaving, good, bad, run, run}},
+      {running, true, 2, {no, run, run, stopping, leaving, good, bad, run, run}},
+      {running, false, 0, {run, no, no, no, gone, no, no, no, no}},
+      {running, false, 2, {run, no, no, stopping, gone, no, no, no, no}},
+      {stop_requested, true, 2, {no, stopping, stopping, stopping, leaving, good, bad, stopping, stopping}},
+      {stop_requested, false, 2, {stopping, no, no, stopping, gone, no, no, no, no}},
+      {cancel_requested, true, 0, {no, leaving, leaving, no, leaving, gone, gone, gone, gone}},
+      {cancel_requested, true, 2, {no, leaving, leaving, no, leaving, gone, gone, gone, gone}},
+      {succeeded, false, 2, {no, no, no, no, no, no, no, no, no}},
+      {failed, false, 2, {no, no, no, no, no, no, no, no, no}},
+      {cancelled, false, 0, {no, no, no, no, gone, no, no, no, no}},
   };
   return lines;
 }
@@ -97,6 +100,82 @@ TEST(JobStates, CancellingAgainChangesNothing) {
   const auto again = after_event(job, Event::cancel);
   ASSERT_TRUE(again);
   EXPECT_EQ(again->ended, job.ended);
+}
+
+/// The job after an attempt that comes as far as `places` and dies there.
+Job after_death(Job job, const std::vector<std::string>& places, int max_deaths = 3) {
+  job = *transition(std::move(job), {.event = Event::claim}, noon);
+  for (const std::string& place : places)
+    job = *transition(std::move(job), {.event = Event::report, .place = place}, noon);
+  return *transition(std::move(job), {.event = Event::abandon, .max_deaths = max_deaths}, noon);
+}
+
+TEST(JobDeaths, ThreeAtOnePlaceAreEnough) {
+  Job job = job_in(JobState::queued, false, 0);
+  for (int death = 1; death <= 2; ++death) {
+    job = after_death(std::move(job), {"load", "interval 1, correct"});
+    EXPECT_EQ(job.state, JobState::running);
+    EXPECT_FALSE(job.claimed) << "it is taken up again";
+    EXPECT_EQ(job.deaths, death);
+  }
+  job = after_death(std::move(job), {"load", "interval 1, correct"});
+  EXPECT_EQ(job.state, JobState::failed);
+  EXPECT_FALSE(job.claimed);
+  EXPECT_EQ(job.ended, noon);
+  ASSERT_TRUE(job.error);
+  EXPECT_EQ(job.error->where, "e000007");
+  EXPECT_NE(job.error->message.find("ended 3 times in a row while it was at this job (interval 1, correct)"),
+            std::string::npos)
+      << job.error->message;
+}
+
+TEST(JobDeaths, CountOnlyInARowAtTheSamePlace) {
+  Job job = job_in(JobState::queued, false, 0);
+  for (int round = 0; round < 5; ++round) {
+    job = after_death(std::move(job), {"load"});
+    job = after_death(std::move(job), {"load"});
+    job = after_death(std::move(job), {"load", "interval 1, correct"});
+    EXPECT_EQ(job.deaths, 1);
+    EXPECT_EQ(job.state, JobState::running);
+  }
+}
+
+TEST(JobDeaths, AreForgottenWithAFinishedInterval) {
+  Job job = after_death(after_death(job_in(JobState::queued, false, 0), {"work"}), {"work"});
+  job = *transition(std::move(job), {.event = Event::claim}, noon);
+  job = *transition(std::move(job), {.event = Event::report, .place = "work"}, noon);
+  job = *transition(std::move(job), {.event = Event::finish_interval, .interval = 1}, noon);
+  job = *transition(std::move(job), {.event = Event::abandon, .max_deaths = 3}, noon);
+  EXPECT_EQ(job.state, JobState::running);
+  EXPECT_EQ(job.deaths, 1);
+}
+
+TEST(JobDeaths, BeforeTheFirstPlaceCountToo) {
+  Job job = job_in(JobState::queued, false, 0);
+  for (int death = 0; death < 3; ++death) job = after_death(std::move(job), {});
+  EXPECT_EQ(job.state, JobState::failed);
+}
+
+TEST(JobDeaths, AShutdownIsNone) {
+  Job job = after_death(after_death(job_in(JobState::queued, false, 0), {"work"}), {"work"});
+  for (int i = 0; i < 5; ++i) {
+    job = *transition(std::move(job), {.event = Event::claim}, noon);
+    job = *transition(std::move(job), {.event = Event::report, .place = "work"}, noon);
+    job = *transition(std::move(job), {.event = Event::release}, noon);
+  }
+  EXPECT_EQ(job.state, JobState::running);
+  EXPECT_EQ(job.deaths, 2);
+}
+
+TEST(JobDeaths, DoNoHarmWhereNobodyCountsOrTheJobIsCancelled) {
+  Job job = job_in(JobState::queued, false, 0);
+  for (int death = 0; death < 50; ++death) job = after_death(std::move(job), {"work"}, /*max_deaths=*/0);
+  EXPECT_EQ(job.state, JobState::running);
+  job = *transition(std::move(job), {.event = Event::claim}, noon);
+  job = *transition(std::move(job), {.event = Event::cancel}, noon);
+  job = *transition(std::move(job), {.event = Event::abandon, .max_deaths = 3}, noon);
+  EXPECT_EQ(job.state, JobState::cancelled);
+  EXPECT_FALSE(job.error);
 }
 
 TEST(JobStates, KeepTheTimeOfTheFirstStart) {

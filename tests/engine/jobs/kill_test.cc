@@ -53,7 +53,7 @@ Result<JobResult> count_intervals(JobContext& context) {
 int serve(const fs::path& folder, int round, int accepted) {
   try {
     // The one before may still be dying; its lock goes with it.
-    const auto store = value(SqliteStore::open({.folder = folder}));
+    const auto store = value(SqliteStore::open({.folder = folder, .max_deaths = 0}));
     const auto queue = open_queue(*store, folder);
     Worker worker(*queue, count_intervals, {.progress_period = std::chrono::milliseconds(5)});
     const std::string id =
@@ -70,10 +70,11 @@ int serve(const fs::path& folder, int round, int accepted) {
 
 TEST(Kill, LosesNoAcceptedJobAndChangesNoResult) {
   const support::TempDir dir;
+  const auto reopened = [&] { return value(SqliteStore::open({.folder = dir.path(), .max_deaths = 0})); };
   constexpr int intervals = 250;  // at 4 ms each: more than all rounds together give it
   std::string long_job;
   {
-    const auto store = open_store(dir.path());
+    const auto store = reopened();
     long_job =
         value(open_queue(*store, dir.path())->submit({.lane = "a", .payload = std::to_string(intervals)})).job.id;
   }
@@ -100,7 +101,7 @@ TEST(Kill, LosesNoAcceptedJobAndChangesNoResult) {
       ASSERT_EQ(WEXITSTATUS(status), 0);
     }
     // What the record calls finished is on disk, and it never goes back.
-    const auto store = open_store(dir.path());
+    const auto store = reopened();
     const Job job = value(store->find(long_job));
     EXPECT_GE(job.finished_intervals, finished_before);
     if (job.finished_intervals > finished_before && finished_before > 0) ++resumed_rounds;
@@ -114,7 +115,7 @@ TEST(Kill, LosesNoAcceptedJobAndChangesNoResult) {
   for (char id[id_length]; ::read(accepted[0], id, id_length) == id_length;) promises.emplace(id, id_length);
   ::close(accepted[0]);
 
-  const auto store = open_store(dir.path());
+  const auto store = reopened();
   const Job job = value(store->find(long_job));
   EXPECT_EQ(job.state, JobState::succeeded);
   EXPECT_EQ(job.result, undisturbed(intervals));

@@ -259,8 +259,42 @@ TEST_F(SqliteStoreTest, RefusesAFileThatIsNoJobStore) {
   EXPECT_EQ(code_of(SqliteStore::open({.folder = dir.path()})), ErrorCode::corrupt_data);
 }
 
+TEST_F(SqliteStoreTest, CountsHowOftenInARowAProcessDiedAtTheSamePlace) {
+  const std::string id = submit();
+  for (int death = 1; death <= 3; ++death) {
+    EXPECT_EQ(claim(), id);
+    value(store->apply(id, {.event = Event::report, .place = "interval 1, correct"}));
+    reopen();  // as after a kill: the claim is still there
+    const Job job = value(store->find(id));
+    EXPECT_EQ(job.deaths, death);
+    EXPECT_EQ(job.died_at, "interval 1, correct");
+    EXPECT_EQ(job.state, death < 3 ? JobState::running : JobState::failed);
+  }
+  EXPECT_EQ(claim(), "") << "it is not resumed any more";
+  EXPECT_EQ(value(store->find(id)).error->where, id);
+  EXPECT_EQ(submit(), "e000002");
+  EXPECT_EQ(claim(), "e000002") << "its lane goes on";
+}
+
+TEST_F(SqliteStoreTest, ReadsAFileOfTheVersionBefore) {
+  submit();
+  claim();
+  value(store->apply("e000001", {.event = Event::finish_interval, .progress = "half", .interval = 2}));
+  execute(
+      "ALTER TABLE jobs DROP COLUMN place; ALTER TABLE jobs DROP COLUMN died_at; ALTER TABLE jobs DROP COLUMN deaths; "
+      "PRAGMA user_version = 1");
+  store = open_store(dir.path());
+  const Job job = value(store->find("e000001"));
+  EXPECT_EQ(job.finished_intervals, 2);
+  EXPECT_EQ(job.progress, "half");
+  EXPECT_EQ(job.deaths, 1) << "the process that held it is gone";
+  EXPECT_EQ(claim(), "e000001");
+  reopen();
+  EXPECT_EQ(value(store->find("e000001")).deaths, 2);
+}
+
 TEST_F(SqliteStoreTest, RefusesAFileOfANewerVersion) {
-  execute("PRAGMA user_version = 2");
+  execute("PRAGMA user_version = 3");
   EXPECT_EQ(code_of(SqliteStore::open({.folder = dir.path()})), ErrorCode::unsupported);
 }
 

@@ -205,6 +205,24 @@ TEST_F(WorkerTest, ShowsProgressAtOnce) {
   EXPECT_EQ(value(store->find(id)).progress, "all") << "the last word is on disk";
 }
 
+TEST_F(WorkerTest, NotesOnDiskWhatItIsAboutToDo) {
+  const std::string id = submit();
+  Gate entered;
+  start([&](JobContext& context) {
+    context.publish_progress("half");
+    context.enter("interval 1, correct");
+    entered.open();
+    gate.pass();
+    return JobResult{};
+  });
+  entered.pass();
+  const Job job = value(store->find(id));
+  EXPECT_EQ(job.place, "interval 1, correct");
+  EXPECT_EQ(job.progress, "half") << "written along with it";
+  gate.open();
+  wait_for_end(*queue, id);
+}
+
 TEST_F(WorkerTest, WritesProgressToDiskOnlySoOften) {
   const std::string id = submit();
   Gate published;

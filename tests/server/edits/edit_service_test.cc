@@ -745,6 +745,33 @@ TEST_F(ServiceTest, AnEstimateKnowsTheRequestAndGrowsWithIt) {
   EXPECT_TRUE(value(service->list({})).empty()) << "nothing was accepted";
 }
 
+TEST_F(ServiceTest, RefusesAnEditThatWouldTakeMoreMemoryThanOneMay) {
+  const auto limit_to = [&](std::uint64_t memory_bytes) {
+    service.reset();
+    service = value(EditService::open(
+        *store, {.folder = dir.path() / "edits", .pictured_views = 2, .memory_bytes = memory_bytes, .threads = 1}));
+  };
+  // As many views, and as large, as a request may ask for: to render even one to see how long it takes would be much.
+  proto::EditRequest greedy = move_and_correct_ball(scene);
+  greedy.params.views = 1000;
+  greedy.params.max_image_side = 8192;
+  limit_to(std::uint64_t{4} << 30);
+  for (const auto& refused :
+       {service->submit(greedy, "key").map([](const auto&) {}), service->estimate(greedy).map([](const auto&) {})}) {
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::too_large);
+    EXPECT_EQ(refused.error().where, "params.max_image_side");
+  }
+  EXPECT_TRUE(value(service->list({})).empty());
+
+  const proto::EditRequest modest = move_and_correct_ball(scene);
+  const std::uint64_t needed = value(service->estimate(modest)).memory_bytes;
+  limit_to(needed - 1);
+  EXPECT_EQ(code_of(service->submit(modest, "")), ErrorCode::too_large);
+  limit_to(needed);
+  EXPECT_EQ(wait_for_end(*service, submit(modest, "other key")).state, "succeeded");
+}
+
 TEST_F(ServiceTest, AnEstimateCountsTheCorrection) {
   proto::EditRequest request = move_and_correct_ball(scene);
   request.params.corrector = proto::Corrector::none;

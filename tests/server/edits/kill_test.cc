@@ -78,7 +78,8 @@ class Child {
 
 /// The data folder as a service that has just started sees it.
 struct Opened {
-  explicit Opened(const fs::path& data) : store(open_scenes(data)), service(open_service(*store, data)), folder(data) {}
+  explicit Opened(const fs::path& data)
+      : store(open_scenes(data)), service(open_service(*store, data, 32, /*attempts=*/0)), folder(data) {}
   void expect(bool condition, const char* what) const {
     if (!condition) throw std::runtime_error(what);
   }
@@ -118,7 +119,7 @@ void carry_out(const fs::path& data, const proto::EditRequest& request) {
 }
 
 int finished_intervals(const fs::path& data) {
-  const auto records = value(engine::jobs::SqliteStore::open({.folder = data / "edits"}));
+  const auto records = value(engine::jobs::SqliteStore::open({.folder = data / "edits", .max_deaths = 0}));
   const auto job = records->find(first_edit);
   return job ? job->finished_intervals : 0;
 }
@@ -159,6 +160,47 @@ TEST(EditKill, AtTwentyMomentsChangesNoByteOfTheResult) {
   RecordProperty("resumed", resumed);
   EXPECT_GE(killed, kills - 4) << "the edit was over before it could be disturbed";
   EXPECT_GE(resumed, 2) << "hardly a round got far enough to matter";
+}
+
+/// Ends the process, as running out of memory does.
+class Killer final : public engine::optim::PerceptualLoss {
+ public:
+  Result<double> evaluate(const engine::scene::Image&, const engine::scene::Image&, engine::scene::Image&) override {
+    ::kill(::getpid(), SIGKILL);
+    return 0.0;
+  }
+};
+
+TEST(EditKill, AnEditThatEndsTheServiceAtTheSamePlaceIsGivenUp) {
+  const support::TempDir dir;
+  make_scene(dir.path());
+  proto::EditRequest request = move_ball(first_scene);
+  request.params.iterations = 2;
+  Killer killer;
+  const auto open = [&](scenes::SceneStore& store) {
+    return value(EditService::open(
+        store, {.folder = dir.path() / "edits", .pictured_views = 2, .threads = 1, .perceptual = &killer}));
+  };
+  for (int death = 0; death < 3; ++death) {
+    const Child child([&](const Child&) {
+      const auto store = open_scenes(dir.path());
+      const auto service = open(*store);
+      (void)wait_for_end(*service, value(service->submit(request, "key")).status.id);
+    });
+    EXPECT_FALSE(child.ended_well()) << "attempt " << death;
+  }
+  const Child fourth([&](const Child&) {
+    const auto store = open_scenes(dir.path());
+    const auto service = open(*store);
+    const auto given_up = value(service->find(first_edit));
+    if (given_up.state != "failed" || !given_up.error) throw std::runtime_error("it is " + given_up.state);
+    if (given_up.error->message.find("3 times in a row while it was at this job (interval 1, optimise)") ==
+        std::string::npos)
+      throw std::runtime_error(given_up.error->message);
+    const auto next = value(service->submit(move_ball(first_scene), "another")).status.id;
+    if (wait_for_end(*service, next).state != "succeeded") throw std::runtime_error("the queue does not go on");
+  });
+  EXPECT_TRUE(fourth.ended_well());
 }
 
 TEST(EditKill, BetweenAcceptanceAndStartLosesNoEdit) {

@@ -1,7 +1,11 @@
 // A number that is none comes up while an edit optimises: the edit fails with its name, and no scene holds it.
 #include <gtest/gtest.h>
+#include <spdlog/sinks/ostream_sink.h>
 
 #include <limits>
+#include <memory>
+#include <sstream>
+#include <stdexcept>
 #include <string>
 
 #include "engine/optim/perceptual.h"
@@ -24,6 +28,37 @@ class Poison final : public engine::optim::PerceptualLoss {
  private:
   int left_;
 };
+
+/// Throws what no client should read.
+class Thrower final : public engine::optim::PerceptualLoss {
+ public:
+  Result<double> evaluate(const engine::scene::Image&, const engine::scene::Image&, engine::scene::Image&) override {
+    throw std::runtime_error("0x7f0ded secret of the heap");
+  }
+};
+
+TEST(EditPoison, WhatALibraryThrowsGoesToTheLogAndNotToTheClient) {
+  const support::TempDir dir;
+  const auto store = open_scenes(dir.path());
+  proto::EditRequest request = move_ball(add_ball(*store, dir.path()));
+  request.params.iterations = 2;
+  Thrower thrower;
+  std::ostringstream text;
+  spdlog::logger logger("test", std::make_shared<spdlog::sinks::ostream_sink_mt>(text));
+  {
+    const auto service = value(EditService::open(*store, {.folder = dir.path() / "edits",
+                                                          .pictured_views = 2,
+                                                          .threads = 1,
+                                                          .logger = &logger,
+                                                          .perceptual = &thrower}));
+    const auto ended = wait_for_end(*service, value(service->submit(request, "")).status.id);
+    EXPECT_EQ(ended.state, "failed");
+    ASSERT_TRUE(ended.error);
+    EXPECT_EQ(ended.error->code, ErrorCode::internal);
+    EXPECT_EQ(ended.error->message.find("heap"), std::string::npos) << ended.error->message;
+  }
+  EXPECT_NE(text.str().find("bug: 0x7f0ded secret of the heap"), std::string::npos) << text.str();
+}
 
 TEST(EditPoison, EndsTheEditWithTheNameOfAParameterAndPublishesNothing) {
   constexpr int iterations = 6;

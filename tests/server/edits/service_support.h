@@ -35,11 +35,13 @@ inline constexpr bool under_thread_sanitizer = false;
 
 /// One thread to compute with: results are the same for any number, as the engine's tests show, and an edit that can
 /// be interfered with must not be over too soon. Two where somebody watches how they share the work.
+///   attempts  0: an edit is taken up again however often the process dies; for tests that kill it on purpose
 inline std::unique_ptr<EditService> open_service(scenes::SceneStore& store, const std::filesystem::path& data,
-                                                 std::size_t max_queued = 32) {
+                                                 std::size_t max_queued = 32, int attempts = 3) {
   return value(EditService::open(store, {.folder = data / "edits",
                                          .max_queued = max_queued,
                                          .pictured_views = 2,
+                                         .attempts = attempts,
                                          .threads = under_thread_sanitizer ? 2 : 1}));
 }
 

@@ -140,6 +140,7 @@ TEST(BoundedCache, ForgetsAFailureAndItsReservation) {
       cache.get<int>("a", 15, []() -> Result<BoundedCache::CachedObject> { throw std::runtime_error("odd"); });
   ASSERT_FALSE(thrown);
   EXPECT_EQ(thrown.error().code, ErrorCode::internal);
+  EXPECT_EQ(thrown.error().message.find("odd"), std::string::npos) << "a library's words are not for clients";
   EXPECT_EQ(cache.used(), 0u);
   EXPECT_EQ(ask(cache, "a", 15, 9), 9);
 }

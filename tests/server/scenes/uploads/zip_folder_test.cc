@@ -171,5 +171,25 @@ TEST_F(ZipFolder, RefusesWhatIsNoZipFile) {
   EXPECT_EQ(done.error().where, "data.zip");
 }
 
+TEST_F(ZipFolder, SaysInOurOwnWordsWhyAnEntryCannotBeUnpacked) {
+  write_zip(zip, {{"a.txt", std::string(2000, 'a')}});
+  const std::string whole = support::read_file(zip);
+  const std::size_t directory = whole.find("PK\x01\x02");
+  ASSERT_NE(directory, std::string::npos);
+  const auto reason = [&](std::size_t at, char value) {
+    std::string damaged = whole;
+    damaged[at] = value;
+    support::write_file(zip, damaged);
+    fs::remove_all(out);
+    fs::create_directories(out);
+    const auto done = unzip(zip, "data.zip", out, limits);
+    return done ? "" : done.error().where + ": " + done.error().message;
+  };
+  EXPECT_EQ(reason(directory + 16, '!'),  // the checksum
+            "data.zip:a.txt: the entry cannot be unpacked, it is damaged: make the zip file anew");
+  EXPECT_EQ(reason(directory + 8, 1),  // the flag of encryption
+            "data.zip:a.txt: the entry cannot be unpacked, it is encrypted: make the zip file anew");
+}
+
 }  // namespace
 }  // namespace server::scenes

@@ -1,0 +1,104 @@
+#include "server/edits/admission.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+namespace server::edits {
+namespace {
+
+using engine::ErrorCode;
+using engine::params::Params;
+
+constexpr std::uint64_t gib = std::uint64_t{1} << 30;
+
+/// A scene of 150,000 Gaussians without a dataset.
+struct Edit {
+  Edit(int views, int side) {
+    params.views = views, params.max_image_side = side;
+    work.row_bytes = 152, work.copies = 6000;
+    work.edit.gaussians = 150'000, work.edit.dragged = 6000;
+    work.edit.intervals = 1, work.edit.iterations = 200, work.edit.corrected = true;
+    work.edit.views = std::size_t(views), work.edit.view_pixels = view_pixels_at(side, {});
+  }
+  [[nodiscard]] engine::Result<void> admitted(std::uint64_t limit) const { return admit(work, params, {}, limit); }
+  Params params;
+  JobWorkload work;
+};
+
+/// The number behind "at most " that follows the name of a parameter.
+int advised(const std::string& message, const std::string& parameter) {
+  const std::string before = "lower " + parameter + " to at most ";
+  const std::size_t at = message.find(before);
+  return at == std::string::npos ? 0 : std::stoi(message.substr(at + before.size()));
+}
+
+TEST(Admission, TakesWhatFits) {
+  const Edit usual(50, 512);
+  EXPECT_TRUE(usual.admitted(2 * gib));
+  EXPECT_TRUE(usual.admitted(estimated_bytes(usual.work)));
+  EXPECT_FALSE(usual.admitted(estimated_bytes(usual.work) - 1));
+  EXPECT_TRUE(Edit(1000, 8192).admitted(0)) << "no limit";
+}
+
+TEST(Admission, NamesWhatIsFurthestBeyondTheUsual) {
+  const auto pixels = Edit(50, 8192).admitted(4 * gib);
+  ASSERT_FALSE(pixels);
+  EXPECT_EQ(pixels.error().code, ErrorCode::too_large);
+  EXPECT_EQ(pixels.error().where, "params.max_image_side");
+  EXPECT_NE(pixels.error().message.find("--edit-memory) is 4.0 GiB: "), std::string::npos) << pixels.error().message;
+  const auto views = Edit(1000, 512).admitted(4 * gib);
+  ASSERT_FALSE(views);
+  EXPECT_EQ(views.error().where, "params.views");
+  EXPECT_EQ(Edit(1000, 8192).admitted(4 * gib).error().where, "params.max_image_side");
+}
+
+TEST(Admission, AdvisesTheMostThatFits) {
+  for (const auto& [views, side, limit] : {std::tuple{1000, 512, 4 * gib}, std::tuple{50, 4096, 2 * gib},
+                                           std::tuple{400, 2048, gib}, std::tuple{1000, 8192, 16 * gib}}) {
+    SCOPED_TRACE(testing::Message() << views << " views of " << side << " pixels, " << limit << " bytes");
+    const auto refused = Edit(views, side).admitted(limit);
+    ASSERT_FALSE(refused);
+    const int fewer = advised(refused.error().message, "params.views");
+    const int smaller = advised(refused.error().message, "params.max_image_side");
+    EXPECT_TRUE(fewer > 0 || smaller > 0);
+    if (fewer > 0) {
+      EXPECT_TRUE(Edit(fewer, side).admitted(limit));
+      EXPECT_FALSE(Edit(fewer + 1, side).admitted(limit));
+    }
+    if (smaller > 0) {
+      EXPECT_TRUE(Edit(views, smaller).admitted(limit));
+      EXPECT_FALSE(Edit(views, smaller + 1).admitted(limit));
+    }
+  }
+}
+
+TEST(Admission, LooksAtWhatTheCamerasOfADatasetHave) {
+  engine::scene::Camera camera;
+  camera.width = 640, camera.height = 480;
+  const std::vector<engine::scene::Camera> dataset(1000, camera);
+  Edit edit(1000, 8192);
+  edit.work.edit.view_pixels = view_pixels_at(8192, dataset);
+  EXPECT_EQ(edit.work.edit.view_pixels, 640u * 480u) << "they are never enlarged";
+  EXPECT_TRUE(admit(edit.work, edit.params, dataset, 25 * gib));
+  const auto refused = admit(edit.work, edit.params, dataset, 8 * gib);
+  ASSERT_FALSE(refused);
+  const int smaller = advised(refused.error().message, "params.max_image_side");
+  EXPECT_LT(smaller, 640) << "a side beyond that of the cameras changes nothing: " << refused.error().message;
+  EXPECT_GT(smaller, 16);
+}
+
+TEST(Admission, SaysSoWhereOneParameterAloneIsNotEnough) {
+  const auto both = Edit(1000, 16384).admitted(gib / 4);
+  ASSERT_FALSE(both);
+  EXPECT_EQ(both.error().where, "params.max_image_side");
+  EXPECT_NE(both.error().message.find("params.views and params.max_image_side"), std::string::npos);
+  const auto none = Edit(1, 16).admitted(1 << 20);
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().where, "scene");
+  EXPECT_NE(none.error().message.find("--edit-memory) is 1 MiB: "), std::string::npos) << none.error().message;
+}
+
+}  // namespace
+}  // namespace server::edits
