@@ -10,6 +10,7 @@
 #include "engine/edit/handles.h"
 #include "engine/edit/views.h"
 #include "engine/render/forward.h"
+#include "engine/repair/witnesses.h"
 #include "engine/working/footprint.h"
 
 namespace engine::edit {
@@ -108,6 +109,12 @@ Workload workload_of(std::size_t gaussians, const Request& request, bool correct
   work.corrected = corrected;
   work.vacates = departure_of(request) == Mode::move;
   return work;
+}
+
+std::uint64_t witness_bytes(const Workload& work) {
+  if (!work.corrected || !work.vacates) return 0;
+  const std::uint64_t pixels = std::min<std::uint64_t>(work.view_pixels, repair::witness_side * repair::witness_side);
+  return std::min(work.candidates, repair::most_witnesses) * pixels * sizeof(float);
 }
 
 Workload measured(Workload work, const State& state, const scene::GaussianCloud& input,

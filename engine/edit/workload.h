@@ -41,4 +41,7 @@ namespace engine::edit {
 [[nodiscard]] Workload measured(Workload work, const State& state, const scene::GaussianCloud& input,
                                 std::span<const scene::Camera> candidates, const Params& params);
 
+/// Memory of what the repair keeps of what cameras saw of the unedited scene, at most. Bytes.
+[[nodiscard]] std::uint64_t witness_bytes(const Workload& work);
+
 }  // namespace engine::edit

@@ -10,8 +10,6 @@
 namespace engine::repair {
 namespace {
 
-// Pixels of the longer side: as fine as what is asked, which is on which side of a thing's outline a point lies.
-constexpr int picture_side = 512;
 // A point that lies by this share of its distance behind what a camera shows is hidden: depths of splats are no finer.
 constexpr double hidden_behind = 0.01;
 // Relative difference of depths up to which neighbouring pixels show one surface, seen at a slant.
@@ -47,7 +45,7 @@ Witnesses::Witnesses(const scene::GaussianCloud& scene, std::span<const scene::C
   options.depth = true;
   render::Workspace workspace;
   for (std::size_t k = 0; k < count; ++k) {
-    cameras_.push_back(scene::fit_within(cameras[k * cameras.size() / count], picture_side));
+    cameras_.push_back(scene::fit_within(cameras[k * cameras.size() / count], witness_side));
     render::Rendering rendering;
     render::forward(scene, cameras_.back(), options, {}, workspace, rendering);
     depth_.push_back(std::move(rendering.median_depth));

@@ -19,7 +19,7 @@ constexpr int virtual_cameras_looked_for = 8;  // they stand around the part ali
 constexpr double load_seconds = 1e-3, publish_seconds = 6e-3, flatten_row_seconds = 2e-8;
 
 constexpr std::size_t frame_row_bytes = 200, frame_pixel_bytes = 32, trained_pixel_bytes = 36, frozen_row_bytes = 24;
-constexpr std::size_t corrected_pixel_bytes = 30, corrected_row_bytes = 100;
+constexpr std::size_t corrected_pixel_bytes = 36, corrected_row_bytes = 100;
 
 /// Some of the cameras that the edit would make for itself.
 std::vector<scene::Camera> some_virtual_cameras(const scene::GaussianCloud& cloud, edit::Request request) {
@@ -95,8 +95,10 @@ std::uint64_t estimated_bytes(const JobWorkload& work) {
                                     ? views * trained_pixel_bytes * pixels +
                                           std::min<std::uint64_t>(views * frozen_row_bytes * n, edit::frozen_memory)
                                     : 0;
-  const std::uint64_t corrected =
-      work.edit.corrected ? views * corrected_pixel_bytes * pixels + n * (work.row_bytes + corrected_row_bytes) : 0;
+  const std::uint64_t corrected = work.edit.corrected
+                                      ? views * corrected_pixel_bytes * pixels +
+                                            n * (work.row_bytes + corrected_row_bytes) + edit::witness_bytes(work.edit)
+                                      : 0;
   return rows * work.row_bytes + n * frame_row_bytes + (views + frame_pixel_bytes) * pixels + trained + corrected;
 }
 
