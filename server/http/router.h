@@ -39,6 +39,8 @@ class Call {
   [[nodiscard]] virtual std::optional<std::string> query(std::string_view name) const = 0;
   /// A header; empty if there is none.
   [[nodiscard]] virtual std::string header(std::string_view name) const = 0;
+  /// Whether there is one, be it empty.
+  [[nodiscard]] virtual bool has_header(std::string_view name) const = 0;
   /// The JSON text of a Body::json route.
   [[nodiscard]] virtual const std::string& body() const = 0;
   /// Whether a Body::upload request is JSON; its text is then body().

@@ -41,10 +41,12 @@ Result<int> number_in_path(const Call& call, const std::string& name) {
   return fail(ErrorCode::not_found, "the path has a whole number here", name);
 }
 
+/// Empty: the client gave none. One that is there and empty is a client's mistake: it believes itself safe to repeat.
 Result<std::string> idempotency_key(const Call& call) {
+  if (!call.has_header("Idempotency-Key")) return std::string();
   const std::string key = call.header("Idempotency-Key");
   const bool printable = std::all_of(key.begin(), key.end(), [](char c) { return c >= ' ' && c <= '~'; });
-  if (key.size() <= max_key_bytes && printable) return key;
+  if (!key.empty() && key.size() <= max_key_bytes && printable) return key;
   return fail(ErrorCode::invalid_argument, "an idempotency key has 1 to 200 printable ASCII characters",
               "Idempotency-Key");
 }

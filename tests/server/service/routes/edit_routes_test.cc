@@ -34,6 +34,7 @@ struct Request : http::Call {
     const auto found = headers.find(name);
     return found == headers.end() ? "" : found->second;
   }
+  bool has_header(std::string_view name) const override { return headers.contains(name); }
   const std::string& body() const override { return text; }
   bool is_json() const override { return true; }
   Result<http::UploadInfo> receive(const std::filesystem::path&) const override {
@@ -180,7 +181,7 @@ TEST_F(EditRoutesTest, AKeyedRequestIsReplayed) {
 }
 
 TEST_F(EditRoutesTest, AKeyIsShortAndPrintable) {
-  for (const std::string& key : {std::string(201, 'k'), std::string("tab\t"), std::string("\xc3\xa4")}) {
+  for (const std::string& key : {std::string(), std::string(201, 'k'), std::string("tab\t"), std::string("\xc3\xa4")}) {
     Request request = edit_body();
     request.headers["Idempotency-Key"] = key;
     const auto reply = call("POST", "/v1/edits", request);
@@ -189,6 +190,7 @@ TEST_F(EditRoutesTest, AKeyIsShortAndPrintable) {
     EXPECT_EQ(reply.error().where, "Idempotency-Key");
   }
   Request request = edit_body();
+  EXPECT_TRUE(value(service->list({})).empty()) << "none was accepted under a key that is none";
   request.headers["Idempotency-Key"] = std::string(200, '~');
   EXPECT_TRUE(call("POST", "/v1/edits", request));
 }
