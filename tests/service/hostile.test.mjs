@@ -232,6 +232,23 @@ describe('a file that is wrong', () => {
     await unharmed();
   });
 
+  test('a damaged picture: the client hears our words, and the log stays one of JSON lines', async () => {
+    const { views } = (await client.get(`/v1/scenes/${scene.id}/views`)).json();
+    const { body: png } = await client.get(`/v1/scenes/${scene.id}/versions/0/render`, { query: { view: views[0].name, what: 'alpha', format: 'png' } });
+    const damaged = Buffer.from(png);
+    damaged[png.indexOf('IDAT') + 8] ^= 0xff;
+    const bitmap = Buffer.concat([Buffer.from('BM'), Buffer.alloc(60)]);
+    for (const [image, code, words] of [[damaged, 'corrupt_data', /this PNG picture is damaged: its pixels cannot be decoded/], [bitmap, 'unsupported', /is not a PNG, JPEG, EXR, TIFF or WebP picture/]]) {
+      const masks = [{ view: views[0].name, image: image.toString('base64') }];
+      const problem = await refused(client.post(`/v1/scenes/${scene.id}/versions/0/select`, { selection: [{ masks }] }, { expect: 422 }), code, 'selection[0].masks[0].image');
+      assert.match(problem.detail, words);
+    }
+    await unharmed();
+    const lines = service.log.slice(service.log.indexOf('\n') + 1).split('\n').filter((line) => line !== '' && !line.startsWith('splatdrag '));
+    const entries = lines.slice(0, -1).map((line) => JSON.parse(line));  // the last may still be on its way
+    assert.ok(entries.some(({ message, said }) => message === 'a library complains' && said.startsWith('libpng ')));
+  });
+
   test('a scene as far out as its numbers go', async () => {
     const end = demo.ply.indexOf('end_header\n') + 11;
     const stride = (demo.ply.length - end) / Number(/element vertex (\d+)/.exec(demo.ply.subarray(0, end).toString('latin1'))[1]);
