@@ -18,6 +18,7 @@ struct Refusal {
   std::string code = "invalid_argument";
   std::string detail;
   std::string where;
+  int retry_after = 1;  ///< Seconds; said with 429 and 503. What is in the way of most requests passes within one.
 };
 
 /// What the head says.

@@ -70,6 +70,9 @@ class EventSink {
   [[nodiscard]] virtual bool open() const = 0;
 };
 
+/// How an error is answered.
+[[nodiscard]] Refusal refusal_of(const engine::Error& error);
+
 /// What a handler says to a request; the dispatcher makes an Answer of it.
 struct Reply {
   int status = 200;

@@ -1,6 +1,7 @@
 #include "server/service/routes/edit_routes.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -125,6 +126,27 @@ TEST_F(EditRoutesTest, AnEditIsAcceptedWithItsPlace) {
   const json edit = json::parse(value(call("GET", "/v1/edits/{id}", about("e000001"))).body);
   EXPECT_EQ(edit.at("state"), "succeeded");
   EXPECT_EQ(edit.at("links").at("result"), "/v1/scenes/" + scene + "/versions/1");
+}
+
+TEST_F(EditRoutesTest, AFullQueueSaysWhenThereIsRoom) {
+  reopen(/*max_queued=*/1);
+  router = {};
+  add_edit_routes(router, *service, {});
+  proto::EditRequest long_edit = edits::move_ball(scene, 20);
+  long_edit.params.views = 400;
+  long_edit.params.max_image_side = 512;
+  const std::string id = submit(long_edit);
+  const auto known = edits::wait_for(*service, id, [](const auto& status) { return status.eta_seconds > 4; });
+  const Request body = edit_body();
+  EXPECT_EQ(value(call("POST", "/v1/edits", body)).status, 202);
+  const auto refused = value(call("POST", "/v1/edits", body));
+  EXPECT_EQ(refused.status, 429);
+  EXPECT_EQ(json::parse(refused.body).at("code"), "busy");
+  EXPECT_EQ(json::parse(refused.body).at("request_id"), body.request_id());
+  const int seconds = std::stoi(header_of(refused, "Retry-After"));
+  EXPECT_GT(seconds, 1);
+  EXPECT_LE(seconds, std::ceil(2 * *known.eta_seconds)) << "it is what is left of the edit that runs";
+  for (const auto& edit : value(service->list({}))) (void)value(service->cancel(edit.id));
 }
 
 TEST_F(EditRoutesTest, AskForNoMoreThanTheServiceAllows) {
