@@ -11,6 +11,7 @@
 #include "server/cli/compute.h"
 #include "server/cli/folders.h"
 #include "server/edits/machine_memory.h"
+#include "server/http/library_messages.h"
 #include "server/http/log.h"
 #include "server/service/serve.h"
 
@@ -32,6 +33,7 @@ Result<void> run(const ServeCommandOptions& given, Terminal& terminal) {
   const auto format = given.log_format == "text" ? http::LogFormat::text : http::LogFormat::json;
   const auto logger = http::make_logger(terminal.err, given.log_level, format);
   if (!logger) return propagate(logger);
+  const http::LibraryMessages messages(**logger);
   if (const auto checked = service::check_token(options, **logger); !checked) return checked;
   options.threads = given.compute.threads;
   const auto computing = compute(given.compute, [&](const Machine& machine) -> Result<void> {

@@ -10,6 +10,7 @@
 #include "engine/jobs/durable_file.h"
 #include "engine/jobs/sqlite_store.h"
 #include "engine/jobs/worker.h"
+#include "proto/edit_record.h"
 #include "proto/time_text.h"
 #include "server/edits/admission.h"
 #include "server/edits/convert.h"
@@ -384,6 +385,18 @@ std::uint64_t EditService::version() const { return impl_->queue->revision(); }
 
 std::uint64_t EditService::wait_for_change(std::uint64_t seen, std::chrono::milliseconds timeout) const {
   return impl_->queue->wait_for_change(seen, timeout);
+}
+
+std::optional<double> EditService::seconds_until_room() {
+  const auto active = impl_->queue->list({.active_only = true, .limit = all_jobs});
+  if (!active) return std::nullopt;
+  std::optional<double> least;
+  for (const jobs::Job& job : *active) {
+    if (!job.claimed) continue;
+    const auto record = proto::parse_edit_record(job.progress);
+    if (record && record->eta_seconds) least = std::min(least.value_or(*record->eta_seconds), *record->eta_seconds);
+  }
+  return least;
 }
 
 std::optional<engine::Error> EditService::trouble() const {

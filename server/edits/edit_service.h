@@ -92,6 +92,9 @@ class EditService {
   [[nodiscard]] std::uint64_t version() const;
   std::uint64_t wait_for_change(std::uint64_t seen, std::chrono::milliseconds timeout) const;
 
+  /// Seconds until a full queue has room again: what is left of the running edit, as far as it knows.
+  [[nodiscard]] std::optional<double> seconds_until_room();
+
   /// What keeps edits from being carried out, if anything does; names no folder of this machine.
   [[nodiscard]] std::optional<engine::Error> trouble() const;
   /// How many edits are in each state, by its name.

@@ -65,7 +65,10 @@ bool AccessGuard::is_own_host(std::string_view host) const {
 
 std::optional<Refusal> AccessGuard::check_origin(const RequestHead& head) const {
   const std::string host = head.header("host");
-  if (!is_own_host(host))
+  // HTTP/1.0 knows no Host, and health checks of proxies speak it. Browsers, which the check is there for (a foreign
+  // page that drives the service under a name of its own), have always sent one.
+  const bool names_none = head.is_http_1_0 && head.count("host") == 0;
+  if (!names_none && !is_own_host(host))
     return Refusal{421, "misdirected_request",
                    "this service does not go by the name in the Host header; --allowed-host adds names", ""};
   const Refusal foreign{403, "forbidden",
@@ -74,7 +77,8 @@ std::optional<Refusal> AccessGuard::check_origin(const RequestHead& head) const 
                         ""};
   if (head.count("origin") > 0) {
     const std::string origin = head.header("origin");
-    const bool own = same_ignoring_case(origin, "http://" + host) || same_ignoring_case(origin, "https://" + host);
+    const bool own =
+        !names_none && (same_ignoring_case(origin, "http://" + host) || same_ignoring_case(origin, "https://" + host));
     const bool allowed = std::any_of(options_.allowed_origins.begin(), options_.allowed_origins.end(),
                                      [&](const std::string& other) { return same_ignoring_case(origin, other); });
     if (!own && !allowed) return foreign;

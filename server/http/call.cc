@@ -118,6 +118,8 @@ std::optional<std::string> HttpCall::query(std::string_view name) const {
 
 std::string HttpCall::header(std::string_view name) const { return fields_.head.header(lower_case(name)); }
 
+bool HttpCall::has_header(std::string_view name) const { return fields_.head.count(lower_case(name)) > 0; }
+
 bool HttpCall::has(const std::string& etag) const {
   return fields_.head.only_reads() && names_etag(fields_.head.header("if-none-match"), etag);
 }

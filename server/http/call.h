@@ -41,6 +41,7 @@ class HttpCall final : public Call {
   [[nodiscard]] const std::string& path(std::string_view name) const override;
   [[nodiscard]] std::optional<std::string> query(std::string_view name) const override;
   [[nodiscard]] std::string header(std::string_view name) const override;
+  [[nodiscard]] bool has_header(std::string_view name) const override;
   [[nodiscard]] const std::string& body() const override { return fields_.body; }
   [[nodiscard]] bool is_json() const override { return fields_.is_json; }
   [[nodiscard]] Result<UploadInfo> receive(const std::filesystem::path& file) const override;

@@ -7,8 +7,6 @@
 #include <exception>
 #include <new>
 
-#include "proto/error_code.h"
-#include "proto/problem.h"
 #include "server/http/call.h"
 #include "server/http/log.h"
 #include "server/http/negotiation.h"
@@ -19,10 +17,6 @@ namespace server::http {
 using engine::ErrorCode;
 
 namespace {
-
-Refusal refusal_of(const engine::Error& error) {
-  return {proto::http_status(error.code), std::string(proto::name_of(error.code)), error.message, error.where};
-}
 
 tl::unexpected<Refusal> refuse(int status, std::string code, std::string detail, std::string where = {}) {
   return tl::make_unexpected(Refusal{status, std::move(code), std::move(detail), std::move(where)});

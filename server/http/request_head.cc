@@ -1,6 +1,7 @@
 #include "server/http/request_head.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "engine/core/numbers.h"
 
@@ -30,7 +31,43 @@ std::optional<std::string_view> take_line(std::string_view& text) {
   return line;
 }
 
-tl::expected<void, Refusal> read_request_line(std::string_view line, RequestHead& head) {
+/// A target that names a host ("http://a:1/x?y") as that host and the rest. Nothing: it names none.
+struct AbsoluteTarget {
+  std::string_view host, rest;
+};
+
+std::optional<AbsoluteTarget> split_absolute(std::string_view target) {
+  for (const std::string_view scheme : {"http://", "https://"}) {
+    if (!same_ignoring_case(target.substr(0, scheme.size()), scheme)) continue;
+    const std::string_view host_and_rest = target.substr(scheme.size());
+    const std::size_t end = std::min(host_and_rest.find_first_of("/?#"), host_and_rest.size());
+    return AbsoluteTarget{host_and_rest.substr(0, end), host_and_rest.substr(end)};
+  }
+  return std::nullopt;
+}
+
+/// Takes a target apart that is a path, or a path at a host: then `host` is set.
+tl::expected<void, Refusal> read_target(std::string_view target, RequestHead& head, std::optional<std::string>& host) {
+  if (!std::all_of(target.begin(), target.end(), is_target_char))
+    return refuse(400, "the request's address must be printable ASCII");
+  if (const auto absolute = split_absolute(target)) {
+    if (absolute->host.empty() || absolute->host.find('@') != std::string_view::npos)
+      return refuse(400, "the request's address needs a host, and may not name a user");
+    host = absolute->host;
+    target = absolute->rest;
+  } else if (!target.starts_with('/')) {
+    return refuse(400, "the request's address must be a path, \"/v1/info\", or one at a host, \"http://host/v1/info\"");
+  }
+  const std::string_view before_fragment = target.substr(0, target.find('#'));
+  const std::size_t question = before_fragment.find('?');
+  head.path = before_fragment.substr(0, question);
+  if (head.path.empty()) head.path = "/";
+  head.query = question == std::string_view::npos ? std::string_view() : before_fragment.substr(question + 1);
+  return {};
+}
+
+tl::expected<void, Refusal> read_request_line(std::string_view line, RequestHead& head,
+                                              std::optional<std::string>& host) {
   const std::size_t first = line.find(' ');
   const std::size_t last = line.rfind(' ');
   if (first == std::string_view::npos || first == last) return refuse(400, "that is no HTTP request");
@@ -40,15 +77,9 @@ tl::expected<void, Refusal> read_request_line(std::string_view line, RequestHead
   if (version != "HTTP/1.1" && version != "HTTP/1.0") return refuse(505, "this service speaks HTTP/1.1", "unsupported");
   if (target.size() > max_target_bytes)
     return refuse(414, "an address may have " + std::to_string(max_target_bytes) + " bytes", "too_large");
-  if (!target.starts_with('/') || !std::all_of(target.begin(), target.end(), is_target_char))
-    return refuse(400, "the request's address must be a path in printable ASCII");
-  const std::string_view before_fragment = target.substr(0, target.find('#'));
-  const std::size_t question = before_fragment.find('?');
   head.method = method;
-  head.path = before_fragment.substr(0, question);
-  head.query = question == std::string_view::npos ? std::string_view() : before_fragment.substr(question + 1);
   head.is_http_1_0 = version == "HTTP/1.0";
-  return {};
+  return read_target(target, head, host);
 }
 
 tl::expected<void, Refusal> read_field(std::string_view line, RequestHead& head) {
@@ -147,7 +178,8 @@ tl::expected<RequestHead, Refusal> parse_head(std::string_view text) {
   RequestHead head;
   const auto request_line = take_line(text);
   if (!request_line) return refuse(400, "that is no HTTP request");
-  if (const auto read = read_request_line(*request_line, head); !read) return tl::make_unexpected(read.error());
+  std::optional<std::string> host;
+  if (const auto read = read_request_line(*request_line, head, host); !read) return tl::make_unexpected(read.error());
   for (;;) {
     const auto line = take_line(text);
     if (!line) return refuse(400, "a header line does not end in CR LF");
@@ -157,6 +189,10 @@ tl::expected<RequestHead, Refusal> parse_head(std::string_view text) {
   if (const auto read = read_framing(head); !read) return tl::make_unexpected(read.error());
   if (head.count("host") > 1 || (head.count("host") == 0 && !head.is_http_1_0))
     return refuse(400, "a request needs exactly one Host header");
+  if (host) {
+    std::erase_if(head.headers, [](const auto& header) { return header.first == "host"; });
+    head.headers.emplace_back("host", std::move(*host));
+  }
   read_connection(head);
   head.expects_continue = same_ignoring_case(head.header("expect"), "100-continue") && !head.is_http_1_0;
   return head;

@@ -18,12 +18,13 @@ struct Refusal {
   std::string code = "invalid_argument";
   std::string detail;
   std::string where;
+  int retry_after = 1;  ///< Seconds; said with 429 and 503. What is in the way of most requests passes within one.
 };
 
 /// What the head says.
 struct RequestHead {
   std::string method;
-  std::string path;   ///< Path as sent, still escaped.
+  std::string path;   ///< Path as sent, still escaped; without scheme and host where the target names them, too.
   std::string query;  ///< What follows the '?', as sent.
   bool is_http_1_0 = false;
   std::vector<std::pair<std::string, std::string>> headers;  ///< Names in lower case, values trimmed.
@@ -46,7 +47,8 @@ constexpr std::size_t max_target_bytes = 8192;  ///< Of path and query; RFC 9112
 /// Takes a head apart.
 ///   text     up to and including the empty line
 ///   returns  the head, or a refusal: 400 malformed, 431 too many fields, 414 a target too long, 501 a transfer coding
-///            other than chunked, 505 not HTTP/1.x
+///            other than chunked, 505 not HTTP/1.x. Where the target names a host ("GET http://a:1/x"), that is the
+///            one in `headers`, whatever Host says (RFC 9112, section 3.2.2).
 [[nodiscard]] tl::expected<RequestHead, Refusal> parse_head(std::string_view text);
 
 /// Whether this may stand in a header's value: no control characters but the tabulator.

@@ -1,5 +1,6 @@
 #include "server/http/router.h"
 
+#include "proto/error_code.h"
 #include "proto/problem.h"
 
 namespace server::http {
@@ -24,13 +25,18 @@ Reply Reply::no_content() {
   return reply;
 }
 
+Refusal refusal_of(const engine::Error& error) {
+  return {proto::http_status(error.code), std::string(proto::name_of(error.code)), error.message, error.where};
+}
+
 Reply Reply::refusal(const Refusal& refusal, const std::string& request_id) {
   Reply reply;
   reply.status = refusal.status;
   reply.media_type = "application/problem+json";
   reply.body = proto::to_json(proto::Problem{refusal.status, refusal.code, refusal.detail, refusal.where, request_id});
   if (refusal.status == 401) reply.headers.emplace_back("WWW-Authenticate", "Bearer");
-  if (refusal.status == 429 || refusal.status == 503) reply.headers.emplace_back("Retry-After", "1");
+  if (refusal.status == 429 || refusal.status == 503)
+    reply.headers.emplace_back("Retry-After", std::to_string(refusal.retry_after));
   return reply;
 }
 

@@ -39,6 +39,8 @@ class Call {
   [[nodiscard]] virtual std::optional<std::string> query(std::string_view name) const = 0;
   /// A header; empty if there is none.
   [[nodiscard]] virtual std::string header(std::string_view name) const = 0;
+  /// Whether there is one, be it empty.
+  [[nodiscard]] virtual bool has_header(std::string_view name) const = 0;
   /// The JSON text of a Body::json route.
   [[nodiscard]] virtual const std::string& body() const = 0;
   /// Whether a Body::upload request is JSON; its text is then body().
@@ -67,6 +69,9 @@ class EventSink {
   /// stream that waits for news asks every second or so, so that it never holds up a server that wants to stop.
   [[nodiscard]] virtual bool open() const = 0;
 };
+
+/// How an error is answered.
+[[nodiscard]] Refusal refusal_of(const engine::Error& error);
 
 /// What a handler says to a request; the dispatcher makes an Answer of it.
 struct Reply {

@@ -48,7 +48,8 @@ Result<std::shared_ptr<const ViewSet>> SceneViews::virtual_views(const scenes::S
     auto done = renders_.run_in_turn([&] {
       for (const Camera& camera :
            engine::views::virtual_cameras(*loaded->cloud.base, around(scene.centre, scene.radius), options))
-        set->views.push_back({camera, false});
+        // Where a scene's middle is at 1e38, single precision has no place to stand: such a scene has no virtual views.
+        if (engine::scene::validate(camera)) set->views.push_back({camera, false});
     });
     if (!done) return propagate(done);
     return scenes::BoundedCache::CachedObject{set, bytes};

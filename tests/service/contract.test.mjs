@@ -4,6 +4,7 @@ import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { after, before, describe, test } from 'node:test';
 import { complaint, contractFile, document, operations, resolve } from './support/contract.mjs';
+import { parseYamlDocument, visitYaml } from './support/packages.mjs';
 import { Service } from './support/program.mjs';
 
 /// Calls `visit(value, address)` on everything below a value.
@@ -12,6 +13,25 @@ const walk = (value, visit, address = '') => {
   if (value !== null && typeof value === 'object')
     for (const [name, member] of Object.entries(value)) walk(member, visit, `${address}/${name}`);
 };
+
+/// What YAML reads otherwise than its writer meant it: "{description: This, and that}" has a key "and that" of no value.
+const misread = (text) => {
+  const yaml = parseYamlDocument(text);
+  const found = [...yaml.errors, ...yaml.warnings].map(({ message }) => message);
+  visitYaml(yaml, {
+    Pair: (_, { key, value }) => {
+      if (value === null || (value.value === null && value.source === '')) found.push(`"${key.value}" has no value: is a text not quoted?`);
+    },
+  });
+  return found;
+};
+
+test('the contract says in YAML what it says to a reader', () => {
+  assert.deepEqual(misread('{a: {description: What is selected is not, and the other way round.}}').length, 1, 'an unquoted comma is found');
+  assert.deepEqual(misread('a: {description: "What is selected is not, and the other way round.", b: null}'), []);
+  assert.equal(misread('{a: 1, a: 2}').length, 1, 'a key that is given twice is found');
+  assert.deepEqual(misread(readFileSync(contractFile, 'utf8')), []);
+});
 
 test('every reference in the contract leads somewhere', () => {
   walk(document, (value) => {

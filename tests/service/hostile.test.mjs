@@ -155,6 +155,8 @@ describe('a body that is not what the contract asks for', () => {
     await refused(client.request('POST', '/v1/edits', { query: { validate_only: 'maybe' }, json: base(), expect: 400 }), 'invalid_argument', 'validate_only');
     const long = await client.request('POST', '/v1/edits', { json: base(), headers: { 'idempotency-key': 'k'.repeat(201) }, expect: 400 });
     assert.equal(long.json().where, 'Idempotency-Key');
+    const empty = await client.request('POST', '/v1/edits', { json: base(), headers: { 'idempotency-key': '' }, expect: 400 });
+    assert.equal(empty.json().where, 'Idempotency-Key');
     await unharmed();
   });
 });
@@ -226,6 +228,44 @@ describe('a file that is wrong', () => {
     for (const junk of [Buffer.alloc(1000), Buffer.from('hello'), Buffer.from('<svg/>'), Buffer.from('\x1f\x8b\x08'), zip([])]) {
       const response = await upload(junk);
       assert.ok([400, 422].includes(response.status), `${junk.subarray(0, 8)}: ${response.status}`);
+    }
+    await unharmed();
+  });
+
+  test('a damaged picture: the client hears our words, and the log stays one of JSON lines', async () => {
+    const { views } = (await client.get(`/v1/scenes/${scene.id}/views`)).json();
+    const { body: png } = await client.get(`/v1/scenes/${scene.id}/versions/0/render`, { query: { view: views[0].name, what: 'alpha', format: 'png' } });
+    const damaged = Buffer.from(png);
+    damaged[png.indexOf('IDAT') + 8] ^= 0xff;
+    const bitmap = Buffer.concat([Buffer.from('BM'), Buffer.alloc(60)]);
+    for (const [image, code, words] of [[damaged, 'corrupt_data', /this PNG picture is damaged: its pixels cannot be decoded/], [bitmap, 'unsupported', /is not a PNG, JPEG, EXR, TIFF or WebP picture/]]) {
+      const masks = [{ view: views[0].name, image: image.toString('base64') }];
+      const problem = await refused(client.post(`/v1/scenes/${scene.id}/versions/0/select`, { selection: [{ masks }] }, { expect: 422 }), code, 'selection[0].masks[0].image');
+      assert.match(problem.detail, words);
+    }
+    await unharmed();
+    const lines = service.log.slice(service.log.indexOf('\n') + 1).split('\n').filter((line) => line !== '' && !line.startsWith('splatdrag '));
+    const entries = lines.slice(0, -1).map((line) => JSON.parse(line));  // the last may still be on its way
+    assert.ok(entries.some(({ message, said }) => message === 'a library complains' && said.startsWith('libpng ')));
+  });
+
+  test('a scene as far out as its numbers go', async () => {
+    const end = demo.ply.indexOf('end_header\n') + 11;
+    const stride = (demo.ply.length - end) / Number(/element vertex (\d+)/.exec(demo.ply.subarray(0, end).toString('latin1'))[1]);
+    const [some, all] = [Buffer.from(demo.ply), Buffer.from(demo.ply)];
+    for (const at of [0, 4, 8]) {
+      some.writeFloatLE(3e38, end + at);
+      some.writeFloatLE(-3e38, end + stride + at);
+      for (let row = end; row < all.length; row += stride) all.writeFloatLE(row % (2 * stride) < stride ? 3e38 : 2e38, row + at);
+    }
+    for (const far of [some, all]) {
+      const { id, bounds } = (await client.request('POST', '/v1/scenes', { body: far, headers: octets, expect: 201 })).json();  // held against the contract
+      assert.ok(bounds.high[0] > 2.9e38, `bounds ${JSON.stringify(bounds)}`);
+      await client.get('/v1/scenes');
+      await client.get(`/v1/scenes/${id}/views`);
+      const everything = await client.post(`/v1/scenes/${id}/versions/0/select`, { selection: [{ rows: [[0, 2]] }] });
+      assert.equal(everything.status, 200);
+      await client.delete(`/v1/scenes/${id}`);
     }
     await unharmed();
   });

@@ -1,6 +1,7 @@
 #include "server/service/routes/edit_routes.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <string>
 #include <utility>
@@ -26,6 +27,7 @@ using std::chrono::steady_clock;
 // Choices, not measurements:
 constexpr int max_listed = 1000;                             // edits in one answer, as openapi.yaml says
 constexpr std::size_t max_key_bytes = 200;                   // of an Idempotency-Key, as openapi.yaml says
+constexpr double longest_retry_seconds = 3600;               // what is left of an edit is an estimate
 constexpr std::chrono::milliseconds look_around_every{500};  // between two looks of a stream whether it is to end
 
 Result<bool> flag(const Call& call, const std::string& name) {
@@ -41,10 +43,12 @@ Result<int> number_in_path(const Call& call, const std::string& name) {
   return fail(ErrorCode::not_found, "the path has a whole number here", name);
 }
 
+/// Empty: the client gave none. One that is there and empty is a client's mistake: it believes itself safe to repeat.
 Result<std::string> idempotency_key(const Call& call) {
+  if (!call.has_header("Idempotency-Key")) return std::string();
   const std::string key = call.header("Idempotency-Key");
   const bool printable = std::all_of(key.begin(), key.end(), [](char c) { return c >= ' ' && c <= '~'; });
-  if (key.size() <= max_key_bytes && printable) return key;
+  if (!key.empty() && key.size() <= max_key_bytes && printable) return key;
   return fail(ErrorCode::invalid_argument, "an idempotency key has 1 to 200 printable ASCII characters",
               "Idempotency-Key");
 }
@@ -93,6 +97,15 @@ Result<Reply> post_preview(const Call& call, EditService& service, const EditLim
   return Reply::json(proto::to_json(*preview));
 }
 
+/// A full queue takes no edit before the running one is done; whoever asks each second until then only takes time from
+/// it.
+Reply queue_is_full(const Call& call, const engine::Error& error, EditService& service) {
+  http::Refusal refusal = http::refusal_of(error);
+  const double seconds = std::ceil(service.seconds_until_room().value_or(1));
+  refusal.retry_after = int(std::clamp(seconds, 1.0, longest_retry_seconds));
+  return Reply::refusal(refusal, call.request_id());
+}
+
 Result<Reply> post_edit(const Call& call, EditService& service, const EditLimits& limits) {
   const auto only_validate = flag(call, "validate_only");
   if (!only_validate) return propagate(only_validate);
@@ -106,6 +119,8 @@ Result<Reply> post_edit(const Call& call, EditService& service, const EditLimits
     return Reply::json(proto::to_json(*estimate));
   }
   const auto submission = service.submit(*request, *key);
+  if (!submission && submission.error().code == ErrorCode::busy)
+    return queue_is_full(call, submission.error(), service);
   if (!submission) return propagate(submission);
   Reply reply = Reply::json(proto::to_json(submission->status), 202);
   reply.headers.emplace_back("Location", "/v1/edits/" + submission->status.id);

@@ -45,13 +45,33 @@ TEST_F(Hostile, GarbageIsRefusedAtOnce) {
        {std::string("\x16\x03\x01\x02\x00\x01\x00", 7), std::string("hello\r\n\r\n"), std::string("\0\0\0\0", 4),
         std::string("GET\r\n\r\n"), std::string("GET /\r\n\r\n"), std::string("GET / FTP/1.1\r\n\r\n"),
         std::string("GET / HTTP/1.1\nHost: x\n\n\r\n\r\n"), "G\xc3\xa9T / HTTP/1.1\r\n" + host() + "\r\n",
-        "GET /\x80 HTTP/1.1\r\n" + host() + "\r\n", "GET http://evil/ HTTP/1.1\r\n" + host() + "\r\n"}) {
+        "GET /\x80 HTTP/1.1\r\n" + host() + "\r\n", "GET ftp://evil/ HTTP/1.1\r\n" + host() + "\r\n",
+        "GET evil HTTP/1.1\r\n" + host() + "\r\n", "OPTIONS * HTTP/1.1\r\n" + host() + "\r\n"}) {
     const auto began = Clock::now();
     EXPECT_EQ(send(bytes).status, 400) << bytes;
     EXPECT_LT(Clock::now() - began, at_once) << bytes;
   }
   EXPECT_EQ(send("GET / HTTP/2.0\r\n" + host() + "\r\n").status, 505);
   EXPECT_EQ(send("GET / HTTP/1.1\r\n\r\n").status, 400) << "no Host";
+}
+
+TEST_F(Hostile, ATargetThatNamesAHostIsHeldToIt) {
+  const std::string own = "127.0.0.1:" + std::to_string(server.port());
+  EXPECT_EQ(send("GET http://" + own + "/json HTTP/1.1\r\n" + host() + "\r\n").status, 200);
+  EXPECT_EQ(send("GET HTTP://" + own + "/json HTTP/1.1\r\nHost: other.example\r\n\r\n").status, 200)
+      << "the target's host counts, not the header's";
+  EXPECT_EQ(send("GET http://evil.example/json HTTP/1.1\r\n" + host() + "\r\n").status, 421);
+  EXPECT_EQ(send("GET http://evil.example/json HTTP/1.0\r\n\r\n").status, 421) << "it does name one";
+  EXPECT_EQ(send("GET http://" + own + "/json HTTP/1.1\r\n\r\n").status, 400) << "HTTP/1.1 has a Host header still";
+}
+
+TEST_F(Hostile, OnlyHttp10MayNameNoHost) {
+  EXPECT_EQ(send("GET /json HTTP/1.0\r\n\r\n").status, 200) << "a health check of a proxy";
+  EXPECT_EQ(send("GET /json HTTP/1.0\r\nHost: evil.example\r\n\r\n").status, 421);
+  EXPECT_EQ(send("GET /json HTTP/1.0\r\nHost:\r\n\r\n").status, 421);
+  EXPECT_EQ(send("GET /json HTTP/1.1\r\nHost:\r\n\r\n").status, 421);
+  for (const char* origin : {"http://evil.example", "http://", "https://"})
+    EXPECT_EQ(send(std::string("GET /json HTTP/1.0\r\nOrigin: ") + origin + "\r\n\r\n").status, 403) << origin;
 }
 
 TEST_F(Hostile, HeadersThatCouldBeReadTwoWaysAreRefused) {

@@ -20,6 +20,26 @@ TEST(ParseHead, TakesARequestApart) {
   EXPECT_TRUE(head->has_body());
 }
 
+TEST(ParseHead, TakesATargetApartThatNamesAHost) {
+  const auto head = [](const std::string& target) {
+    return parse_head("GET " + target + " HTTP/1.1\r\nHost: b\r\nAccept: x\r\n\r\n");
+  };
+  const auto full = head("http://a.example:81/v1/info?x=http://c/#part");
+  ASSERT_TRUE(full);
+  EXPECT_EQ(full->header("host"), "a.example:81");
+  EXPECT_EQ(full->count("host"), 1u);
+  EXPECT_EQ(full->path, "/v1/info");
+  EXPECT_EQ(full->query, "x=http://c/");
+  const auto bare = head("https://[::1]?y");
+  ASSERT_TRUE(bare);
+  EXPECT_EQ(bare->header("host"), "[::1]");
+  EXPECT_EQ(bare->path, "/");
+  EXPECT_EQ(bare->query, "y");
+  EXPECT_EQ(head("/http://a/")->header("host"), "b") << "that is a path";
+  for (const char* wrong : {"http://", "http:///x", "http://user@a/", "http:/a", "ftp://a/", "a/b", "*", "//a\x7f"})
+    EXPECT_EQ(head(wrong).error().status, 400) << wrong;
+}
+
 TEST(ParseHead, KnowsWhetherTheConnectionGoesOn) {
   const auto keeps = [](const std::string& version, const std::string& connection) {
     return parse_head("GET / " + version + "\r\nHost: a\r\nConnection: " + connection + "\r\n\r\n")->keep_alive;

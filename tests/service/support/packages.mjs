@@ -9,5 +9,5 @@ const load = async (name) => {
 };
 
 export const { default: { default: Ajv2020 } } = await load('ajv/dist/2020.js');
-export const { parse: parseYaml } = await load('yaml');
+export const { parse: parseYaml, parseDocument: parseYamlDocument, visit: visitYaml } = await load('yaml');
 export const loadBrowser = async () => (await load('playwright-core')).chromium;

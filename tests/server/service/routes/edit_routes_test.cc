@@ -1,6 +1,7 @@
 #include "server/service/routes/edit_routes.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -34,6 +35,7 @@ struct Request : http::Call {
     const auto found = headers.find(name);
     return found == headers.end() ? "" : found->second;
   }
+  bool has_header(std::string_view name) const override { return headers.contains(name); }
   const std::string& body() const override { return text; }
   bool is_json() const override { return true; }
   Result<http::UploadInfo> receive(const std::filesystem::path&) const override {
@@ -126,6 +128,27 @@ TEST_F(EditRoutesTest, AnEditIsAcceptedWithItsPlace) {
   EXPECT_EQ(edit.at("links").at("result"), "/v1/scenes/" + scene + "/versions/1");
 }
 
+TEST_F(EditRoutesTest, AFullQueueSaysWhenThereIsRoom) {
+  reopen(/*max_queued=*/1);
+  router = {};
+  add_edit_routes(router, *service, {});
+  proto::EditRequest long_edit = edits::move_ball(scene, 20);
+  long_edit.params.views = 400;
+  long_edit.params.max_image_side = 512;
+  const std::string id = submit(long_edit);
+  const auto known = edits::wait_for(*service, id, [](const auto& status) { return status.eta_seconds > 4; });
+  const Request body = edit_body();
+  EXPECT_EQ(value(call("POST", "/v1/edits", body)).status, 202);
+  const auto refused = value(call("POST", "/v1/edits", body));
+  EXPECT_EQ(refused.status, 429);
+  EXPECT_EQ(json::parse(refused.body).at("code"), "busy");
+  EXPECT_EQ(json::parse(refused.body).at("request_id"), body.request_id());
+  const int seconds = std::stoi(header_of(refused, "Retry-After"));
+  EXPECT_GT(seconds, 1);
+  EXPECT_LE(seconds, std::ceil(2 * *known.eta_seconds)) << "it is what is left of the edit that runs";
+  for (const auto& edit : value(service->list({}))) (void)value(service->cancel(edit.id));
+}
+
 TEST_F(EditRoutesTest, AskForNoMoreThanTheServiceAllows) {
   router = {};
   add_edit_routes(router, *service, {.limits = {.handles = 1, .views = 10, .image_side = 100}});
@@ -180,7 +203,7 @@ TEST_F(EditRoutesTest, AKeyedRequestIsReplayed) {
 }
 
 TEST_F(EditRoutesTest, AKeyIsShortAndPrintable) {
-  for (const std::string& key : {std::string(201, 'k'), std::string("tab\t"), std::string("\xc3\xa4")}) {
+  for (const std::string& key : {std::string(), std::string(201, 'k'), std::string("tab\t"), std::string("\xc3\xa4")}) {
     Request request = edit_body();
     request.headers["Idempotency-Key"] = key;
     const auto reply = call("POST", "/v1/edits", request);
@@ -189,6 +212,7 @@ TEST_F(EditRoutesTest, AKeyIsShortAndPrintable) {
     EXPECT_EQ(reply.error().where, "Idempotency-Key");
   }
   Request request = edit_body();
+  EXPECT_TRUE(value(service->list({})).empty()) << "none was accepted under a key that is none";
   request.headers["Idempotency-Key"] = std::string(200, '~');
   EXPECT_TRUE(call("POST", "/v1/edits", request));
 }

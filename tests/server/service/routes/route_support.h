@@ -32,6 +32,7 @@ struct FakeCall : http::Call {
     return found == in_query.end() ? std::nullopt : std::optional(found->second);
   }
   std::string header(std::string_view) const override { return {}; }
+  bool has_header(std::string_view) const override { return false; }
   const std::string& body() const override { return text; }
   bool is_json() const override { return json_body; }
   engine::Result<http::UploadInfo> receive(const std::filesystem::path& file) const override {
