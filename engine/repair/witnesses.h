@@ -14,7 +14,8 @@ namespace engine::repair {
 
 /// Of more cameras an even choice is taken: they see hardly a point that the others do not, and each keeps a picture.
 constexpr std::size_t most_witnesses = 128;
-/// Pixels of the longer side of that picture: as fine as what is asked, which is on which side of an outline a point lies.
+/// Pixels of the longer side of that picture: as fine as what is asked, which is on which side of an outline a point
+/// lies.
 constexpr int witness_side = 512;
 
 /// Cameras that saw the unedited scene, and how far each of them looked. What is under a thing or within it no camera
