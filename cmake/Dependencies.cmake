@@ -15,7 +15,7 @@ find_library(LZ4_LIBRARY lz4 REQUIRED)
 add_library(FLANN::FLANN INTERFACE IMPORTED)
 set_target_properties(FLANN::FLANN PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "${FLANN_INCLUDE_DIR}"
                       INTERFACE_LINK_LIBRARIES "${LZ4_LIBRARY}")
-find_package(Eigen3 3.4 REQUIRED NO_MODULE)  # sparse equations
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)  # equations, sparse and small
 find_package(ZLIB REQUIRED)                  # spz versions 1 to 3
 find_package(zstd REQUIRED)                  # spz version 4
 find_package(SQLite3 3.38 REQUIRED)          # job records

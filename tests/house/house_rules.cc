@@ -20,7 +20,7 @@ struct Reserved {
 const std::vector<Reserved>& reserved() {
   static const std::vector<Reserved> list = {
       {"flann/", {"engine/neighbours"}},
-      {"Eigen/", {"engine/elastic"}, false},
+      {"Eigen/", {"engine/elastic", "engine/repair"}, false},
       {"torch/", {"engine/diffusion"}, false},
       {"ATen/", {"engine/diffusion"}, false},
       {"OpenImageIO/", {"engine/io"}},

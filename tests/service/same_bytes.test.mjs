@@ -145,10 +145,11 @@ const nameOfStopped = (kept) => kept === long.params.intervals ? 'a long edit' :
 
 test('over REST: an edit stopped early', { skip }, async () => {
   for (const interval of rewriting ? [1, 2, 3, 4] : [1, 3]) {
-    for (let more = true; more;) {
+    // Of an interval that is over before the order comes there is no row, and need not be one.
+    for (let tries = 0, more = true; more; ++tries) {
       const { kept, parts } = await stoppedAfter(interval);
       expectSame(nameOfStopped(kept), parts);
-      more = rewriting && kept !== interval;
+      more = rewriting && kept !== interval && tries < 40;
     }
   }
   for (let kept = 1; kept < long.params.intervals; ++kept) used.add(nameOfStopped(kept));

@@ -61,10 +61,6 @@ const char* reason_of(int zip_error) {
       return "it is no zip file, or its end is missing";
     case ZIP_ER_COMPNOTSUPP:
       return "it is compressed in a way that is not supported; deflate is";
-    case ZIP_ER_ENCRNOTSUPP:
-    case ZIP_ER_NOPASSWD:
-    case ZIP_ER_WRONGPASSWD:
-      return "it is encrypted";
     case ZIP_ER_MEMORY:
       return "it needs more memory than there is";
     case ZIP_ER_READ:

@@ -33,7 +33,8 @@ TEST(Estimate, GrowsWithEverythingThatTakesMemory) {
       {"dragged", [](JobWorkload& w) { w.edit.dragged *= 2; }, false},
       {"copies", [](JobWorkload& w) { w.copies *= 2; }, true},
       {"intervals", [](JobWorkload& w) { ++w.edit.intervals; }, true},
-      {"candidates", [](JobWorkload& w) { ++w.edit.candidates; }, false},
+      {"candidates", [](JobWorkload& w) { ++w.edit.candidates; }, true},
+      {"candidates beyond those that are kept", [](JobWorkload& w) { w.edit.candidates = 5000; }, true},
       {"views", [](JobWorkload& w) { ++w.edit.views; }, true},
       {"pictures", [](JobWorkload& w) { ++w.edit.pictured; }, false},
       {"iterations", [](JobWorkload& w) { w.edit.iterations *= 2; }, false},
@@ -48,6 +49,13 @@ TEST(Estimate, GrowsWithEverythingThatTakesMemory) {
     EXPECT_GE(estimated_bytes(more), estimated_bytes(typical()));
     EXPECT_GE(estimated_seconds(more), estimated_seconds(typical()));
   }
+}
+
+TEST(Estimate, OfManyCamerasOnlySomeAreKept) {
+  JobWorkload many = typical(), more = typical();
+  many.edit.candidates = 1000, more.edit.candidates = 100'000;
+  EXPECT_EQ(estimated_bytes(many), estimated_bytes(more));
+  EXPECT_LT(estimated_bytes(many) - estimated_bytes(typical()), 100'000'000u);
 }
 
 TEST(Estimate, TheTimeOfAJobIsThatOfTheEditAndWhatComesBeforeAndAfter) {

@@ -188,7 +188,7 @@ TEST_F(ZipFolder, SaysInOurOwnWordsWhyAnEntryCannotBeUnpacked) {
   EXPECT_EQ(reason(directory + 16, '!'),  // the checksum
             "data.zip:a.txt: the entry cannot be unpacked, it is damaged: make the zip file anew");
   EXPECT_EQ(reason(directory + 8, 1),  // the flag of encryption
-            "data.zip:a.txt: the entry cannot be unpacked, it is encrypted: make the zip file anew");
+            "data.zip:a.txt: the entry is encrypted: make the zip file without a password");
 }
 
 }  // namespace
