@@ -37,6 +37,7 @@ LibraryMessages::~LibraryMessages() {
 }
 
 void LibraryMessages::take(std::string_view text) {
+  const std::lock_guard lock(mutex_);
   if (logging_) return;  // the logger itself complains, of what we are just handing to it
   logging_ = true;
   line_ += text;

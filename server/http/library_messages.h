@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdio>
+#include <mutex>
 #include <string>
 #include <string_view>
 
@@ -31,8 +32,11 @@ class LibraryMessages {
   spdlog::logger& logger_;
   std::FILE* before_ = nullptr;  ///< What `stderr` was.
   std::FILE* stream_ = nullptr;  ///< What it is.
-  std::string line_;             ///< Begun and not ended. Guarded by the lock of `stream_`, like the next.
-  bool logging_ = false;
+  /// Recursive: the logger may complain to `stderr`, too. (The lock of `stream_` would do; ThreadSanitizer sees none of
+  /// the C library's.)
+  std::recursive_mutex mutex_;
+  std::string line_;      ///< Begun and not ended. Guarded by `mutex_`, like the next.
+  bool logging_ = false;  ///< Somewhere below, this thread hands a line to the logger.
 };
 
 }  // namespace server::http
