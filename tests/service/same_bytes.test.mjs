@@ -132,7 +132,8 @@ test('over REST: an edit of an edit', { skip }, async () => {
   expectSame('an edit of an edit', await partsOf(await client.succeeded(id)));
 });
 
-const long = { ...requestOf('many intervals, corrected'), params: { ...requestOf('many intervals, corrected').params, iterations: 60 } };
+// With so many iterations that a stop arrives between two intervals.
+const long = { ...requestOf('many intervals, corrected'), params: { ...requestOf('many intervals, corrected').params, iterations: 400 } };
 /// Stops the long edit when an interval is finished. Another may be finished before the order comes: {kept, parts}.
 const stoppedAfter = async (interval) => {
   const { id } = await client.submit({ scene, version: 0, ...long });
