@@ -134,7 +134,8 @@ test('over REST: an edit of an edit', { skip }, async () => {
 
 // With so many iterations that a stop arrives between two intervals.
 const long = { ...requestOf('many intervals, corrected'), params: { ...requestOf('many intervals, corrected').params, iterations: 400 } };
-/// Stops the long edit when an interval is finished. Another may be finished before the order comes: {kept, parts}.
+/// Stops the long edit when an interval is finished: {kept, parts}. The next has mostly begun before the order comes, and
+/// is then finished, too.
 const stoppedAfter = async (interval) => {
   const { id } = await client.submit({ scene, version: 0, ...long });
   await client.until(id, (edit) => edit.finished_intervals.length >= interval, { every: 5 });
@@ -145,15 +146,13 @@ const stoppedAfter = async (interval) => {
 const nameOfStopped = (kept) => kept === long.params.intervals ? 'a long edit' : `a long edit, stopped after ${kept} of ${long.params.intervals}`;
 
 test('over REST: an edit stopped early', { skip }, async () => {
-  for (const interval of rewriting ? [1, 2, 3, 4] : [1, 3]) {
-    // Of an interval that is over before the order comes there is no row, and need not be one.
-    for (let tries = 0, more = true; more; ++tries) {
-      const { kept, parts } = await stoppedAfter(interval);
-      expectSame(nameOfStopped(kept), parts);
-      more = rewriting && kept !== interval && tries < 40;
-    }
+  for (const interval of rewriting ? [1, 2, 3] : [1, 3]) {
+    const { kept, parts } = await stoppedAfter(interval);
+    assert.ok(kept >= interval);
+    // The moment in which an order leaves only the first is too short to make a row of it.
+    if (kept > 1) expectSame(nameOfStopped(kept), parts);
   }
-  for (let kept = 1; kept < long.params.intervals; ++kept) used.add(nameOfStopped(kept));
+  for (let kept = 2; kept < long.params.intervals; ++kept) used.add(nameOfStopped(kept));
 });
 
 test('over REST: an edit killed twice and resumed with other numbers of threads', { skip }, async () => {
