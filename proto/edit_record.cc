@@ -45,7 +45,7 @@ FinishedInterval decode_interval(const ordered_json& object) {
 
 ordered_json encode(const std::optional<GaussianCounts>& counts) {
   if (!counts) return nullptr;
-  return {counts->input, counts->output, counts->removed, counts->copies, counts->changeable};
+  return {counts->input, counts->output, counts->removed, counts->copies, counts->changeable, counts->crumbs};
 }
 
 EditRecord decode(const ordered_json& object) {
@@ -67,8 +67,9 @@ EditRecord decode(const ordered_json& object) {
     record.request = parse_edit_request(request.dump()).value();
   for (const ordered_json& timing : object.at("timings"))
     record.timings.push_back({timing.at(0).get<std::string>(), timing.at(1).get<double>()});
-  if (const auto n = optional_at<std::array<std::size_t, 5>>(object, "gaussians"))
-    record.gaussians = {(*n)[0], (*n)[1], (*n)[2], (*n)[3], (*n)[4]};
+  if (const auto n = optional_at<std::vector<std::size_t>>(object, "gaussians"))
+    record.gaussians = {n->at(0), n->at(1), n->at(2),
+                        n->at(3), n->at(4), n->size() > 5 ? n->at(5) : 0};  // records of earlier versions have five
   record.warnings = object.at("warnings").get<std::vector<std::string>>();
   record.result_version = optional_at<int>(object, "result_version");
   record.simd = object.at("simd").get<std::string>();

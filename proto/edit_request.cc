@@ -49,7 +49,7 @@ Region read_region(const JsonField& field, std::string_view size_name) {
 
 EditRequest read_edit_request(const JsonField& field) {
   const Members members(field, {"scene", "version", "mode", "preset", "prompt", "handles", "selection", "heal",
-                                "attach", "region", "params"});
+                                "attach", "crumbs", "region", "params"});
   EditRequest request;
   if (const auto f = members.optional("scene")) request.scene = f->text();
   if (const auto f = members.optional("version")) request.version = f->whole(0, no_limit);
@@ -65,6 +65,7 @@ EditRequest read_edit_request(const JsonField& field) {
   if (selection) request.selection = read_selection(*selection);
   if (const auto f = members.optional("heal")) request.heal = read_selection(*f);
   if (const auto f = members.optional("attach")) request.attach = f->one_of(engine::names<Attach>);
+  if (const auto f = members.optional("crumbs")) request.crumbs = f->one_of(engine::names<Crumbs>);
   if (const auto f = members.optional("region")) request.region = read_region(*f, "size");
   if (const auto f = members.optional("params")) request.params = read_params(*f);
   return request;
@@ -224,6 +225,7 @@ std::string to_json(const EditRequest& request) {
   if (request.selection) out["selection"] = encode(*request.selection);
   if (request.heal) out["heal"] = encode(*request.heal);
   if (request.attach) out["attach"] = name_of(*request.attach);
+  if (request.crumbs) out["crumbs"] = name_of(*request.crumbs);
   if (request.region) out["region"] = {{"center", request.region->center}, {"size", request.region->size}};
   out["params"] = encode(request.params);
   return pretty(out);

@@ -20,6 +20,7 @@ using engine::params::Annealing;
 using engine::params::Attach;
 using engine::params::Background;
 using engine::params::Corrector;
+using engine::params::Crumbs;
 using engine::params::Interpolation;
 using engine::params::Mode;
 using engine::params::Perceptual;
@@ -62,6 +63,7 @@ struct EditRequest {
   std::optional<Selection> selection;  ///< What moves. None: the handles' spheres.
   std::optional<Selection> heal = {};  ///< What is made anew although it was seen.
   std::optional<Attach> attach = {};   ///< What holds it. None: auto.
+  std::optional<Crumbs> crumbs = {};   ///< What becomes of what the selection has left out. None: move.
   std::optional<Region> region;
   Params params;
   bool operator==(const EditRequest&) const = default;

@@ -33,11 +33,8 @@ ordered_json list_of(const Items& items, Encode encode_item) {
 ordered_json encode(const EditRequest& request) { return ordered_json::parse(to_json(request)); }
 
 ordered_json encode(const GaussianCounts& counts) {
-  return {{"input", counts.input},
-          {"output", counts.output},
-          {"removed", counts.removed},
-          {"copies", counts.copies},
-          {"changeable", counts.changeable}};
+  return {{"input", counts.input},   {"output", counts.output},         {"removed", counts.removed},
+          {"copies", counts.copies}, {"changeable", counts.changeable}, {"crumbs", counts.crumbs}};
 }
 
 ordered_json encode(const HandleCount& handle) { return {{"gaussians", handle.gaussians}}; }

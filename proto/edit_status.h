@@ -46,9 +46,9 @@ struct StageSeconds {
 };
 
 /// Gaussians of an edit: in its input and its output, rows removed and new rows (`copies`), members of M
-/// (`changeable`).
+/// (`changeable`); rows that the selection had left out, and that went along or away (`crumbs`).
 struct GaussianCounts {
-  std::size_t input = 0, output = 0, removed = 0, copies = 0, changeable = 0;
+  std::size_t input = 0, output = 0, removed = 0, copies = 0, changeable = 0, crumbs = 0;
 };
 
 /// Everything about one edit. Times are RFC 3339, UTC, milliseconds.

@@ -45,6 +45,7 @@ export const NOTHING_OPEN = {
   preset: "",
   prompt: null,
   attach: null,
+  crumbs: null, // What becomes of what the selection has left out; null: it goes along.
   heal: [], // Operations on the scene: what a run makes anew. A request may have them; the page has no brush for them yet.
   params: {},
   autoPreview: true,
@@ -59,7 +60,7 @@ export const NOTHING_OPEN = {
 
 // What outlives a reload: as it is; and all, of which open() puts back what still fits the scene.
 const LASTING_KEYS = [
-  ...["region", "mode", "preset", "prompt", "params", "autoPreview", "layer", "tab", "constraint"],
+  ...["region", "mode", "preset", "crumbs", "prompt", "params", "autoPreview", "layer", "tab", "constraint"],
   ...["selectTool", "selectDepth", "brushRadius", "tinted"],
 ];
 const STORED_KEYS = ["pose", "version", "handles", "selection", "viewName", ...LASTING_KEYS];
@@ -112,6 +113,7 @@ export class Editor {
         "region",
         "mode",
         "preset",
+        "crumbs",
         "params",
         "autoPreview",
         "dragging",
@@ -541,6 +543,7 @@ export class Editor {
     this.#place({ handles, selection });
     this.store.set({
       attach: request.attach ?? null,
+      crumbs: request.crumbs ?? null,
       heal: request.heal ?? [],
       selectMode: false,
       selected: null,

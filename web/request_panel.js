@@ -72,6 +72,18 @@ export function buildRequestPanel(editor) {
     options: [["", "default"]],
     changed: (value) => store.set({ preset: value }),
   });
+  const crumbs = choice({
+    label: "Crumbs",
+    testid: "crumbs",
+    options: [
+      ["", "go along"],
+      ["remove", "go away"],
+      ["keep", "stay"],
+    ],
+    changed: (value) => store.set({ crumbs: value || null }),
+  });
+  const crumbsField = labelled("Crumbs", crumbs.element);
+  crumbsField.title = "Small pieces of the part that the selection has left out";
   const params = paramFields(setParam);
   const also = h("p", { class: "note", hidden: true, testid: "other-params" });
   const paramProblem = problemPlace("param-problem");
@@ -80,6 +92,7 @@ export function buildRequestPanel(editor) {
     { class: "settings", testid: "settings" },
     h("summary", {}, "Settings"),
     labelled("Preset", preset.element),
+    crumbsField,
     params.element,
     regionOn.element,
     regionFields,
@@ -161,7 +174,20 @@ export function buildRequestPanel(editor) {
   );
 
   store.watch(
-    ["constraint", "mode", "region", "preset", "params", "autoPreview", "info", "handles", "scene", "prompt"],
+    [
+      "constraint",
+      "mode",
+      "region",
+      "preset",
+      "crumbs",
+      "selection",
+      "params",
+      "autoPreview",
+      "info",
+      "handles",
+      "scene",
+      "prompt",
+    ],
     (state) => {
       constraint.update(state.constraint);
       mode.update(state.mode);
@@ -173,6 +199,8 @@ export function buildRequestPanel(editor) {
       }
       preset.options([["", "default"], ...runPresets(state.info).map((name) => [name, name])]);
       preset.update(state.preset);
+      crumbsField.hidden = state.selection.length === 0;
+      crumbs.update(state.crumbs === "move" ? "" : (state.crumbs ?? ""));
       params.update(state.info, state.params, state.preset);
       auto.update(state.autoPreview);
       const others = Object.keys(state.params).filter((name) => !params.shows(name));
@@ -197,6 +225,7 @@ export function buildRequestPanel(editor) {
       "region",
       "mode",
       "preset",
+      "crumbs",
       "params",
       "prompt",
     ],
@@ -211,9 +240,9 @@ export function buildRequestPanel(editor) {
       const at = state.problem ? partOf(state.problem.error.where) : {};
       const here = (...parts) => (state.problem && parts.includes(at.part) ? state.problem.error : null);
       showProblem(regionProblem, here("region"));
-      showProblem(paramProblem, here("param", "mode", "preset"));
+      showProblem(paramProblem, here("param", "mode", "preset", "crumbs"));
       showProblem(problem, here("request", "handles", "prompt"));
-      if (here("region") || here("param", "preset")) settings.open = true;
+      if (here("region") || here("param", "preset", "crumbs")) settings.open = true;
       if (here("handle") && !state.handles[at.index]) showProblem(problem, state.problem.error);
       answer.replaceChildren(...answers(editor, state));
     },
@@ -248,13 +277,19 @@ function answers(editor, state) {
         "p",
         { testid: "preview-answer", class: current ? "" : "stale" },
         current
-          ? `Preview ${shows} in ${duration(preview.seconds)}.`
+          ? `Preview ${shows}${withCrumbs(preview, state)} in ${duration(preview.seconds)}.`
           : "The preview is of an earlier state of the handles.",
       ),
     );
     if (current) lines.push(...warnings(preview.warnings));
   }
   return lines;
+}
+
+/** What the selection had left out, and does not stay. */
+function withCrumbs({ gaussians: { crumbs } }, state) {
+  if (crumbs === 0) return "";
+  return state.crumbs === "remove" ? `, ${count(crumbs)} crumbs gone,` : `, ${count(crumbs)} of them crumbs,`;
 }
 
 export const warnings = (list) => (list ?? []).map((warning) => h("p", { class: "warning" }, warning));

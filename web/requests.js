@@ -12,7 +12,7 @@ export class ImportError extends Error {
 
 /** The request that the screen describes. What is left to the service's defaults is left out. */
 export function requestOf(state) {
-  const { scene, version, mode, preset, prompt, handles, selection = [], heal = [], attach, region, params } = state;
+  const { scene, version, mode, preset, prompt, handles, selection = [], heal = [], attach, crumbs, region, params } = state;
   const goes = mode !== "remove"; // else targets stay on the screen, for when the mode changes back
   const given = Object.entries(params ?? {}).filter(
     ([, value]) => value !== null && value !== undefined && value !== "",
@@ -34,6 +34,7 @@ export function requestOf(state) {
     ...(selection.length ? { selection } : {}),
     ...(heal.length ? { heal } : {}),
     ...(attach ? { attach } : {}),
+    ...(crumbs && selection.length ? { crumbs } : {}), // they are what a selection has left out
     ...(region ? { region } : {}),
     ...(given.length ? { params: Object.fromEntries(given) } : {}),
   };
@@ -56,11 +57,11 @@ function radiusGiven({ radius, grip = null }, selection) {
 /** What of the screen decides how a preview looks: two equal texts, the same preview. It shows where Gaussians go, so of
  *  the `parameters` that the service describes those of the motion count, and any that it does not describe. */
 export function previewKey(request, parameters = []) {
-  const { handles, selection, attach, mode, region, params = {}, preset, scene, version } = request; // healing shows later
+  const { handles, selection, attach, crumbs, mode, region, params = {}, preset, scene, version } = request; // healing shows later
   const others = new Set(parameters.filter(({ part }) => part !== "motion").map(({ name }) => name));
   const motion = Object.entries(params).filter(([name]) => !others.has(name));
   motion.sort(([a], [b]) => (a < b ? -1 : 1));
-  return JSON.stringify({ scene, version, handles, selection, attach, mode, region, preset, motion });
+  return JSON.stringify({ scene, version, handles, selection, attach, crumbs, mode, region, preset, motion });
 }
 
 /** "max_image_side" as a person reads it. */
@@ -77,7 +78,7 @@ export function partOf(where = "") {
   const param = /^params\.(\w+)/.exec(where);
   if (param) return { part: "param", name: param[1] };
   if (/^region\b/.test(where)) return { part: "region" };
-  if (/^(mode|preset|handles|prompt)$/.test(where)) return { part: where };
+  if (/^(mode|preset|handles|prompt|crumbs)$/.test(where)) return { part: where };
   return { part: "request" };
 }
 
@@ -149,9 +150,17 @@ function modeOf(value, where) {
   throw new ImportError('expected "move", "extend" or "remove"', where);
 }
 
+/** One of the names, or null where none is given. */
+function nameAmong(names, value, where) {
+  if (value === undefined || names.includes(value)) return value ?? null;
+  throw new ImportError(`expected one of ${names.map((name) => JSON.stringify(name)).join(", ")}`, where);
+}
+
+const FIELDS =
+  "scene version mode preset prompt handles selection heal attach crumbs region params".split(" ");
+
 function readRequest(document, where) {
-  const names = ["scene", "version", "mode", "preset", "prompt", "handles", "selection", "heal", "region", "params"];
-  known(document, names, where);
+  known(document, FIELDS, where);
   const mode = modeOf(document.mode ?? "move", within(where, "mode"));
   const selection = readSelection(document.selection, within(where, "selection"));
   const heal = readSelection(document.heal, within(where, "heal"));
@@ -183,6 +192,8 @@ function readRequest(document, where) {
     handles,
     selection,
     heal,
+    attach: nameAmong(["auto", "held", "free"], document.attach, within(where, "attach")),
+    crumbs: nameAmong(["move", "remove", "keep"], document.crumbs, within(where, "crumbs")),
     region,
     params: { ...params },
   };
@@ -236,6 +247,8 @@ function readReleased(document, where) {
     handles,
     selection: [],
     heal: [],
+    attach: null,
+    crumbs: null,
     region,
     params: {},
   };

@@ -48,7 +48,7 @@ edit::Request asked_of(const CapturedCase& the_case) {
 
 /// The request, and the rows that follow its handles.
 Result<Grasp> grasp_of(std::string by, edit::Request request, const scene::GaussianCloud& scene) {
-  const auto assigned = edit::assign(scene.mean, request);
+  const auto assigned = edit::assign(scene, request);
   if (!assigned) return propagate(assigned);
   Grasp out{std::move(by), std::move(request), {}};
   // An anchor holds what its ball holds; what is selected is meant to move, and does, however near to an anchor it is.

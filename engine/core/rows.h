@@ -1,7 +1,9 @@
 // Rows by number, of columns that say something of each row.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <iterator>
 #include <ranges>
 #include <span>
 #include <vector>
@@ -23,6 +25,14 @@ template <std::ranges::sized_range Values, class Wanted>
 /// The rows whose byte is not 0, ascending.
 [[nodiscard]] inline std::vector<std::uint32_t> marked_rows(std::span<const std::uint8_t> marks) {
   return rows_where(marks, [](std::uint8_t mark) { return mark != 0; });
+}
+
+/// The rows of either list; both ascend, each row once.
+[[nodiscard]] inline std::vector<std::uint32_t> united(std::span<const std::uint32_t> a,
+                                                       std::span<const std::uint32_t> b) {
+  std::vector<std::uint32_t> rows;
+  std::ranges::set_union(a, b, std::back_inserter(rows));
+  return rows;
 }
 
 }  // namespace engine

@@ -1,6 +1,7 @@
 #include "engine/edit/drag.h"
 
 #include <algorithm>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -14,7 +15,32 @@
 
 namespace engine::edit {
 
-Result<deform::Assignment> assign(const Array3& mean, const Request& request) {
+namespace {
+
+/// What crumbs there are goes along with the part, or is given up.
+void take_crumbs(const scene::LayeredCloud& scene, const Request& request, std::span<const DVec3> centers,
+                 const std::optional<deform::Box>& region, Memory& memory, Taken& taken) {
+  if (request.crumbs == Crumbs::keep) return;
+  const std::vector<std::uint32_t>& crumbs = memory.crumbs_of(scene, *request.selected);
+  if (crumbs.empty()) return;
+  // Crumbs outside of the region stay, and where it holds none, that is no error.
+  const auto assigned = deform::assign_selected(scene::means(scene), crumbs, centers, region);
+  if (!assigned) return;
+  for (const std::uint32_t row : crumbs) {
+    const std::uint16_t handle = assigned->handle[row];
+    if (handle == 0) continue;
+    ++taken.crumbs;
+    if (request.crumbs == Crumbs::remove)
+      taken.given_up.push_back(row);
+    else
+      taken.handle[row] = handle, ++taken.count[handle - 1u];
+  }
+}
+
+}  // namespace
+
+Result<Taken> assign(const scene::LayeredCloud& scene, const Request& request, Memory& memory) {
+  const Array3 mean = scene::means(scene);
   std::vector<deform::Sphere> spheres;
   for (const Handle& handle : request.handles) spheres.push_back({handle.source, handle.radius});
   std::optional<deform::Box> region;
@@ -24,12 +50,19 @@ Result<deform::Assignment> assign(const Array3& mean, const Request& request) {
                 "row " + std::to_string(row) + " is selected; the scene has " + std::to_string(mean.size()), where);
   };
   if (!request.healed.empty() && request.healed.back() >= mean.size()) return beyond(request.healed.back(), "heal");
-  if (!request.selected) return deform::assign(mean, spheres, region);
+  const auto taken = [](Result<deform::Assignment> assignment) {
+    return std::move(assignment).map([](deform::Assignment&& of) {
+      return Taken{std::move(of.handle), std::move(of.count), 0, {}};
+    });
+  };
+  if (!request.selected) return taken(deform::assign(mean, spheres, region));
   if (request.selected->back() >= mean.size()) return beyond(request.selected->back(), "selection");
   std::vector<DVec3> centers;
   for (const Handle& handle : request.handles) centers.push_back(handle.source);
-  auto assignment = deform::assign_selected(mean, *request.selected, centers, region);
-  for (std::size_t h = 0; assignment && h < request.handles.size(); ++h)
+  auto assignment = taken(deform::assign_selected(mean, *request.selected, centers, region));
+  if (!assignment) return assignment;
+  take_crumbs(scene, request, centers, region, memory, *assignment);
+  for (std::size_t h = 0; h < request.handles.size(); ++h)
     if (!request.handles[h].is_anchor() &&
         assignment->count[h] == 0)  // an anchor may hold what is beside the selection
       return fail(ErrorCode::unprocessable,
@@ -37,6 +70,12 @@ Result<deform::Assignment> assign(const Array3& mean, const Request& request) {
                       ": move this handle or leave it out",
                   "handles[" + std::to_string(h) + "].source");
   return assignment;
+}
+
+Result<Taken> assign(const scene::GaussianCloud& scene, const Request& request) {
+  const std::shared_ptr<const scene::GaussianCloud> borrowed(std::shared_ptr<const void>(), &scene);
+  Memory memory;
+  return assign(scene::LayeredCloud{borrowed, nullptr}, request, memory);
 }
 
 namespace {

@@ -19,9 +19,18 @@ namespace engine::edit {
 
 using working::WorkingScene;
 
-/// P_h^i of every handle of the request.
+/// What a request takes along.
+struct Taken {
+  deform::HandleColumn handle;          ///< [N] P_h^i of every handle.
+  std::vector<std::size_t> count;       ///< [H] |P_h^i|
+  std::size_t crumbs = 0;               ///< Rows that the selection has left out, and that go along or away.
+  std::vector<std::uint32_t> given_up;  ///< Those of them that go away, and no handle has. Ascending.
+};
+
+///   memory  of the scene
 ///   errors  unprocessable: a handle without Gaussians; `where` names it
-[[nodiscard]] Result<deform::Assignment> assign(const Array3& mean, const Request& request);
+[[nodiscard]] Result<Taken> assign(const scene::LayeredCloud& scene, const Request& request, Memory& memory);
+[[nodiscard]] Result<Taken> assign(const scene::GaussianCloud& scene, const Request& request);
 
 /// What an interval will do to P_h, before it is done.
 struct PlannedMotion {

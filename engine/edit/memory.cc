@@ -43,6 +43,17 @@ const std::vector<select::Touch>& Memory::contact_of(const scene::LayeredCloud& 
   return find_or_make(contacts_, fits, make, [](const Contact& known) { return known.part.size(); }).touches;
 }
 
+const std::vector<std::uint32_t>& Memory::crumbs_of(const scene::LayeredCloud& scene,
+                                                    std::span<const std::uint32_t> selected) {
+  return find_or_make(
+             crumbs_, [&](const Crumbs& known) { return std::ranges::equal(known.selected, selected); },
+             [&] {
+               return Crumbs{{selected.begin(), selected.end()}, select::crumbs_of(scene, selected)};
+             },
+             [](const Crumbs& known) { return known.selected.size(); })
+      .rows;
+}
+
 const deform::Body& Memory::body_of(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
                                     std::span<const deform::Drag> drags, std::span<const std::uint8_t> held) {
   return find_or_make(

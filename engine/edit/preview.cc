@@ -1,5 +1,7 @@
 #include "engine/edit/preview.h"
+#include "engine/core/rows.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "engine/edit/drag.h"
@@ -17,17 +19,24 @@ Result<PreviewOutcome> preview(const scene::LayeredCloud& scene, const Request& 
 Result<PreviewOutcome> preview(const scene::LayeredCloud& scene, const Request& request, Memory& memory) {
   if (const auto valid = validate(request); !valid) return propagate(valid);
   PreviewOutcome outcome;
-  auto assignment = assign(scene::means(scene), request);
+  auto assignment = assign(scene, request, memory);
   if (!assignment) return propagate(assignment);
   outcome.counts = std::move(assignment->count);
+  outcome.crumbs = assignment->crumbs;
   outcome.intervals = resolved_intervals(request);
 
   const Parts parts = parts_of(scene, assignment->handle, request, memory);
   outcome.parts = parts.attachments;
   std::vector<std::uint32_t> rows = rows_in_use(assignment->handle, parts);
+  const std::vector<std::uint32_t>& given_up = assignment->given_up;
+  rows = united(rows, given_up);
   const scene::GaussianCloud dragged = scene::gather(scene, rows);
   DraggedAlone drag = drag_alone(std::move(rows), dragged, assignment->handle, request, parts, outcome.intervals,
                                  request.params.rotate_sh, memory);
+  const bool moves = !drag.working.rows_that_left().empty();
+  if (moves)
+    for (std::uint32_t k = 0; k < drag.rows.size(); ++k)
+      if (std::ranges::binary_search(given_up, drag.rows[k])) drag.working.give_up(k);
   Published published = publish(drag.working, dragged, departure_of(request));
 
   outcome.overlay = std::move(published.overlay);
@@ -38,7 +47,7 @@ Result<PreviewOutcome> preview(const scene::LayeredCloud& scene, const Request& 
   for (const DVec3& position : drag.positions)
     outcome.positions.push_back(drag.working.frame().world_from_edit(position));
   outcome.changeable = published.changeable;
-  if (drag.working.rows_that_left().empty()) outcome.warnings.push_back(nothing_moves());
+  if (!moves) outcome.warnings.push_back(nothing_moves());
   for (const std::size_t anchor : parts.idle) outcome.warnings.push_back(anchor_is_idle(anchor));
   for (std::string& warning : drag.warnings) outcome.warnings.push_back(std::move(warning));
   if (published.faint > 0) outcome.warnings.push_back(faint_left_out(published.faint));

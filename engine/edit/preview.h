@@ -15,6 +15,7 @@ namespace engine::edit {
 struct PreviewOutcome {
   scene::Overlay overlay;           ///< Over the previewed version, as an edit without correction would publish it.
   std::vector<std::size_t> counts;  ///< |P_h^i| per handle.
+  std::size_t crumbs = 0;           ///< That go along or away.
   std::vector<DVec3> positions;     ///< Of the handles after the whole drag, world units.
   int intervals = 0;                ///< T
   std::vector<deform::Attachment> parts;  ///< Of Interpolation::arap: how each group moves, and why.

@@ -36,6 +36,7 @@ struct StageTime {
 struct Report {
   Params resolved;  ///< With every default filled in (intervals is never 0 here).
   std::vector<HandleReport> handles;
+  std::size_t crumbs = 0;         ///< Rows that the selection has left out, and that went along or away.
   std::vector<Attachment> parts;  ///< Of Interpolation::arap: how each group moves, and why.
   std::vector<ViewReport> views;
   std::size_t input_gaussians = 0;

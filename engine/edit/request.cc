@@ -71,6 +71,19 @@ Result<void> validate_motion(const Request& request) {
   return {};
 }
 
+/// Crumbs are beside a selection, and go away where a part leaves its place.
+Result<void> validate_crumbs(const Request& request) {
+  if (request.crumbs == Crumbs::move) return {};
+  const std::string asked = "\"" + std::string(name_of(request.crumbs)) + "\" ";
+  if (!request.selected)
+    return invalid(asked + "is about what a selection has left out: select what moves, or leave this out", "crumbs");
+  if (request.crumbs == Crumbs::remove && departure_of(request) != Mode::move)
+    return invalid(asked + "takes away what the part leaves behind; with mode \"extend\" and params.interpolation \"" +
+                       std::string(name_of(request.params.interpolation)) + "\" it leaves its whole place as it is",
+                   "crumbs");
+  return {};
+}
+
 Result<void> validate_ascending(std::span<const std::uint32_t> rows, const char* where) {
   if (std::ranges::adjacent_find(rows, std::greater_equal<>()) != rows.end())
     return invalid("selected rows are given once each, in ascending order", where);
@@ -101,6 +114,7 @@ Result<void> validate(const Request& request) {
     if (auto valid = validate_selected(*request.selected); !valid) return valid;
   if (request.mode == Mode::remove)
     if (auto valid = validate_removal(request); !valid) return valid;
+  if (auto valid = validate_crumbs(request); !valid) return valid;
   if (auto valid = validate_ascending(request.healed, "heal"); !valid) return valid;
   if (auto valid = validate_motion(request); !valid) return valid;
   if (request.region)

@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "engine/core/rows.h"
 #include "engine/edit/handles.h"
 #include "engine/edit/masks.h"
 #include "engine/edit/messages.h"
@@ -65,17 +66,19 @@ void plan_ahead(const State& state, Edit& edit) {
 
 Result<State> assign_and_divide(Edit& edit) {
   if (auto going = edit.progress.enter(Stage::assign, 0); !going) return propagate(going);
-  auto assignment = assign(edit.input.mean, edit.request);
-  if (!assignment) return propagate(assignment);
-  edit.parts = parts_of(edit.input, assignment->handle, edit.request);
+  auto taken = assign(edit.input, edit.request);
+  if (!taken) return propagate(taken);
+  edit.parts = parts_of(edit.input, taken->handle, edit.request);
+  edit.given_up = std::move(taken->given_up);
   State state;
   state.report.parts = edit.parts.attachments;
-  state.scene = WorkingScene(edit.input, frame_of(edit.request), std::move(assignment->handle));
+  state.scene = WorkingScene(edit.input, frame_of(edit.request), std::move(taken->handle));
   state.positions = handle_sources(state.scene.frame(), edit.request);
   state.report.resolved = edit.params();
   state.report.resolved.intervals = resolved_intervals(edit.request);
   state.report.input_gaussians = edit.input.size();
-  for (const std::size_t count : assignment->count) state.report.handles.push_back({count, {}});
+  for (const std::size_t count : taken->count) state.report.handles.push_back({count, {}});
+  state.report.crumbs = taken->crumbs;
   return state;
 }
 
@@ -101,8 +104,10 @@ Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Cam
     edit.progress.refine(work);
   }
   for (const scene::Camera& view : state.views) state.masks.emplace_back(view.width, view.height);
-  if (edit.corrector == nullptr || edit.request.healed.empty()) return {};
-  return unite_masks(state.scene, edit.request.healed, state.views, state.masks,
+  Rows vanishing = edit.given_up;
+  if (edit.corrector != nullptr) vanishing = united(vanishing, edit.request.healed);
+  if (vanishing.empty()) return {};
+  return unite_masks(state.scene, vanishing, state.views, state.masks,
                      [&](double) { return edit.progress.advance(1); });
 }
 
@@ -116,6 +121,8 @@ Result<PlannedMotion> deform(const State& state, Edit& edit, int u) {
 Result<Rows> paste(State& state, Edit& edit, int u, const PlannedMotion& motion) {
   if (auto going = edit.progress.enter(Stage::deform, u); !going) return propagate(going);
   Rows copies = copy_and_paste(state.scene, motion, departure_of(edit.request), edit.params().rotate_sh);
+  if (u == 1 && !motion.moving.empty())
+    for (const std::uint32_t row : edit.given_up) state.scene.give_up(row);
   // An elastic body has drawn its Gaussians out already.
   if (edit.corrector != nullptr && edit.optimises() && edit.params().interpolation != Interpolation::arap)
     repair::draw_out(state.scene);

@@ -33,6 +33,7 @@ struct Edit {
   correct::Corrector* corrector;
   ProgressMeter progress;
   Parts parts = {};                            ///< How what moves hangs on to what stays.
+  Rows given_up = {};                          ///< Crumbs that go away, in the first interval.
   std::vector<scene::Camera> candidates = {};  ///< That views are chosen from; they have seen the scene.
   std::optional<repair::Repair> repair = {};   ///< What the unedited scene looks like to a corrector.
   Rows masked_rows = {};                       ///< Those that the masks were last united with.

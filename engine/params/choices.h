@@ -21,6 +21,16 @@ constexpr auto names_of(Mode) {
   return std::array{Name{Mode::move, "move"}, Name{Mode::extend, "extend"}, Name{Mode::remove, "remove"}};
 }
 
+/// What becomes of crumbs: of what a selection has left out of the part that it means.
+enum class Crumbs {
+  move,    ///< They go along.
+  remove,  ///< They go away.
+  keep     ///< They stay, as all that is not selected.
+};
+constexpr auto names_of(Crumbs) {
+  return std::array{Name{Crumbs::move, "move"}, Name{Crumbs::remove, "remove"}, Name{Crumbs::keep, "keep"}};
+}
+
 /// A name for a set of parameters. How their numbers were found: docs/tradeoff.md.
 enum class Preset {
   preview,   ///< Only deforms.

@@ -76,6 +76,7 @@ engine::Result<edit::Request> to_engine(const proto::EditRequest& request) {
     to.scale = handle.scale;
   }
   out.attach = request.attach.value_or(edit::Attach::automatic);
+  out.crumbs = request.crumbs.value_or(edit::Crumbs::move);
   if (request.region) out.region = {to_vec(request.region->center), to_vec(request.region->size)};
   out.params = filled_in(request.params, preset_of(request), out, request.selection.has_value());
   if (auto all = available(out.params); !all) return engine::propagate(all);

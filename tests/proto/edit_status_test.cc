@@ -44,7 +44,7 @@ EditStatus succeeded() {
                                 .renders = {{"0001.jpg", {"before", "deformed"}}, {"0002.jpg", {"before"}}}}};
   status.handles = {{17}};
   status.timings = {{"mask", 1.5}};
-  status.gaussians = GaussianCounts{10, 12, 1, 3, 4};
+  status.gaussians = GaussianCounts{10, 12, 1, 3, 4, 5};
   status.warnings = {"careful"};
   status.result_version = 2;
   status.started = "2026-11-21T11:09:39.000Z";
@@ -94,7 +94,7 @@ TEST(EditStatus, OfASuccessLinksItsResultAndItsPictures) {
   EXPECT_EQ(edit.at("handles"), json::parse(R"([{"gaussians": 17}])"));
   EXPECT_EQ(edit.at("timings"), json::parse(R"([{"stage": "mask", "seconds": 1.5}])"));
   EXPECT_EQ(edit.at("gaussians"),
-            json::parse(R"({"input": 10, "output": 12, "removed": 1, "copies": 3, "changeable": 4})"));
+            json::parse(R"({"input": 10, "output": 12, "removed": 1, "copies": 3, "changeable": 4, "crumbs": 5})"));
   EXPECT_EQ(edit.at("simd"), "AVX2");
   EXPECT_EQ(edit.at("stopped_early"), true);
 }
@@ -163,13 +163,13 @@ TEST(Preview, LinksTheVersionThatShowsIt) {
                         .positions = {{1, 2, 3}},
                         .intervals = 4,
                         .parts = {},
-                        .gaussians = {10, 11, 1, 2, 3},
+                        .gaussians = {10, 11, 1, 2, 3, 4},
                         .seconds = 0.01,
                         .warnings = {}};
   EXPECT_EQ(json::parse(to_json(preview)), json::parse(R"({
     "scene": "s000001", "version": "p000003", "parent": 1, "expires": "2026-11-21T11:19:38.123Z",
     "handles": [{"gaussians": 12, "position": [1, 2, 3]}], "intervals": 4, "parts": [],
-    "gaussians": {"input": 10, "output": 11, "removed": 1, "copies": 2, "changeable": 3},
+    "gaussians": {"input": 10, "output": 11, "removed": 1, "copies": 2, "changeable": 3, "crumbs": 4},
     "seconds": 0.01, "warnings": [],
     "links": {"render": "/v1/scenes/s000001/versions/p000003/render",
               "pick": "/v1/scenes/s000001/versions/p000003/pick",

@@ -431,7 +431,7 @@ export function start({ port = 0, token = null, slow = 0, empty = false, tick = 
           progress: 1,
           eta_seconds: null,
           result_version: version,
-          gaussians: { input: points.length, output: points.length, removed: 120, copies: 120, changeable: 240 },
+          gaussians: { input: points.length, output: points.length, removed: 120, copies: 120, changeable: 240, crumbs: 0 },
           timings: [
             { stage: "assign", seconds: 0.02 },
             { stage: "deform", seconds: 1.7 },
@@ -632,7 +632,7 @@ export function start({ port = 0, token = null, slow = 0, empty = false, tick = 
           expires: new Date(Date.now() + 600_000).toISOString(),
           handles: counts.map((c, i) => ({ ...c, position: json.handles[i].target ?? json.handles[i].source })),
           intervals,
-          gaussians: { input: points.length, output: points.length, removed: 0, copies: moved, changeable: 2 * moved },
+          gaussians: { input: points.length, output: points.length, removed: 0, copies: moved, changeable: 2 * moved, crumbs: 0 },
           seconds: 0.08,
           warnings: json.prompt ? ["without effect on this edit: prompt"] : [],
           links: {},

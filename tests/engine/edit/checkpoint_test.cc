@@ -46,7 +46,7 @@ struct Sample {
     report.views = {{"view_0", 0.25}};
     report.input_gaussians = input.size();
     report.output_gaussians = 1, report.changeable = 2;
-    report.copies = 3, report.seeds = 5, report.removed = 4;
+    report.copies = 3, report.seeds = 5, report.removed = 4, report.crumbs = 6;
     report.losses = {0.5, 0.25};
     report.warnings = {"something \"odd\""};
     report.times = {{Stage::deform, 0.5}};

@@ -16,7 +16,7 @@ namespace engine::edit {
 
 /// The scene as an edit by this request begins it.
 inline WorkingScene begun(const scene::GaussianCloud& scene, const Request& request) {
-  auto assignment = assign(scene.mean, request);
+  auto assignment = assign(scene, request);
   if (!assignment) {
     ADD_FAILURE() << assignment.error().message;
     return {};

@@ -46,7 +46,7 @@ Request pulled(const scene::GaussianCloud& cloud, DVec3 by) {
 TEST(PartsOf, HoldWhatGrowsOutOfTheRest) {
   const auto cloud = wall();
   const Request request = pulled(cloud, {0, 0, 1});
-  const Parts parts = parts_of(cloud, assign(cloud.mean, request)->handle, request);
+  const Parts parts = parts_of(cloud, assign(cloud, request)->handle, request);
   ASSERT_EQ(parts.attachments.size(), 1u);
   EXPECT_EQ(parts.attachments[0].how, How::held);
   EXPECT_FALSE(parts.attachments[0].why.empty());
@@ -62,7 +62,7 @@ TEST(PartsOf, HoldWhatGrowsOutOfTheRestNearTheirAnchors) {
   request.handles[0].target = DVec3(2.5, 1.9, 0.4);
   const auto rims = [&] {
     std::pair<std::size_t, std::size_t> at{0, 0};
-    for (const std::uint32_t row : parts_of(cloud, assign(cloud.mean, request)->handle, request).rim)
+    for (const std::uint32_t row : parts_of(cloud, assign(cloud, request)->handle, request).rim)
       ++(cloud.mean.get(row).x < 2.5f ? at.first : at.second);
     return at;
   };
@@ -79,7 +79,7 @@ TEST(PartsOf, AreNoneForOtherInterpolations) {
   const auto cloud = wall();
   Request request = pulled(cloud, {0, 0, 1});
   request.params.interpolation = Interpolation::rigid;
-  EXPECT_TRUE(parts_of(cloud, assign(cloud.mean, request)->handle, request).attachments.empty());
+  EXPECT_TRUE(parts_of(cloud, assign(cloud, request)->handle, request).attachments.empty());
 }
 
 TEST(Among, NumbersRowsAsASceneOfTheseAloneDoes) {
@@ -107,7 +107,7 @@ TEST(ElasticBody, LeavesItsRimAndComesToItsTarget) {
   ASSERT_EQ(done->report.parts.size(), 1u);
   EXPECT_EQ(done->report.parts[0].how, How::held);
   EXPECT_LT(glm::distance(done->report.handles[0].relocated.back(), *request.handles[0].target), 0.1);
-  const Parts parts = parts_of(cloud, assign(cloud.mean, request)->handle, request);
+  const Parts parts = parts_of(cloud, assign(cloud, request)->handle, request);
   ASSERT_FALSE(parts.rim.empty());
   for (const std::uint32_t row : parts.rim)
     EXPECT_FALSE(std::ranges::binary_search(done->overlay.removed, row)) << row << ": the rim stays";

@@ -2,12 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "engine/core/parallel.h"
 #include "engine/edit/edit.h"
 #include "tests/engine/edit/samples.h"
+#include "tests/engine/select/small_scenes.h"
 
 namespace engine::edit {
 namespace {
@@ -56,6 +59,54 @@ std::vector<std::uint32_t> in_spheres(const scene::GaussianCloud& cloud, const R
         break;
       }
   return rows;
+}
+
+/// A board of which all but a corner is selected.
+Request board_without_corner(const select::BoardOnTable& scene, Crumbs crumbs) {
+  Request request;
+  request.handles = {{DVec3(0, 0, 0.03), DVec3(3, 0.5, 1), 0.3, 0}};
+  request.selected = scene.red;
+  request.crumbs = crumbs;
+  request.params.interpolation = Interpolation::arap;
+  request.params.max_image_side = 32;
+  return request;
+}
+
+TEST(Preview, OfCrumbsIsWhatTheEditMakesOfThem) {
+  const select::BoardOnTable scene;
+  for (const Crumbs crumbs : {Crumbs::move, Crumbs::remove, Crumbs::keep})
+    for (const Mode mode : {Mode::move, Mode::remove}) {
+      SCOPED_TRACE(std::string(name_of(crumbs)) + " " + std::string(name_of(mode)));
+      Request request = board_without_corner(scene, crumbs);
+      request.mode = mode;
+      if (mode == Mode::remove) request.handles[0].target.reset();
+      const auto seen = preview(plain(scene.cloud), request);
+      ASSERT_TRUE(seen) << seen.error().message;
+      const auto edited = run(scene.cloud, arc_of_cameras(1, 32, request.handles[0].source), request);
+      ASSERT_TRUE(edited) << edited.error().message;
+      EXPECT_EQ(seen->overlay, edited->overlay);
+      EXPECT_EQ(seen->crumbs, crumbs == Crumbs::keep ? 0 : scene.corner.size());
+      EXPECT_EQ(seen->crumbs, edited->report.crumbs);
+      EXPECT_EQ(seen->overlay.removed, crumbs == Crumbs::keep ? scene.red : scene.board);
+      const auto& arrived = crumbs == Crumbs::move ? scene.board : scene.red;
+      EXPECT_EQ(seen->overlay.added(), mode == Mode::remove ? 0 : arrived.size());
+    }
+}
+
+TEST(Preview, CrumbsStayWhereNothingMovesAndOutsideOfTheRegion) {
+  const select::BoardOnTable scene;
+  Request request = board_without_corner(scene, Crumbs::remove);
+  request.handles[0].target = request.handles[0].source;
+  const auto still = preview(plain(scene.cloud), request);
+  ASSERT_TRUE(still) << still.error().message;
+  EXPECT_TRUE(still->overlay.removed.empty());
+
+  request = board_without_corner(scene, Crumbs::move);
+  request.region = Region{DVec3(1, 1, 0), DVec3(1.5, 1.5, 1)};
+  const auto beside = preview(plain(scene.cloud), request);
+  ASSERT_TRUE(beside) << beside.error().message;
+  EXPECT_EQ(beside->crumbs, 0u);
+  for (const std::uint32_t row : scene.corner) EXPECT_FALSE(std::ranges::binary_search(beside->overlay.removed, row));
 }
 
 TEST(Preview, OfAnElasticBodyIsTheEditsDeformation) {

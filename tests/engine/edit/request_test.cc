@@ -62,6 +62,25 @@ TEST(ValidateRequest, NamesTheFieldThatIsWrong) {
   }
 }
 
+TEST(ValidateRequest, CrumbsAreBesideASelectionAndGoWhereAPartLeaves) {
+  Request request = good();
+  for (const Crumbs crumbs : {Crumbs::remove, Crumbs::keep}) {
+    request.crumbs = crumbs;
+    ASSERT_FALSE(validate(request));
+    EXPECT_EQ(validate(request).error().where, "crumbs");
+  }
+  request.selected = {1, 2};
+  EXPECT_TRUE(validate(request));
+  request.crumbs = Crumbs::remove;
+  EXPECT_TRUE(validate(request));
+  request.mode = Mode::extend;
+  request.params.interpolation = Interpolation::rigid;
+  ASSERT_FALSE(validate(request));
+  EXPECT_EQ(validate(request).error().where, "crumbs");
+  request.params.interpolation = Interpolation::arap;
+  EXPECT_TRUE(validate(request));
+}
+
 TEST(ValidateRequest, WhatIsRemovedGoesNowhere) {
   Request request = good();
   request.mode = Mode::remove;

@@ -11,6 +11,7 @@
 #include "engine/edit/checkpoint.h"
 #include "engine/edit/edit.h"
 #include "tests/engine/edit/samples.h"
+#include "tests/engine/select/small_scenes.h"
 
 namespace engine::edit {
 namespace {
@@ -38,6 +39,18 @@ struct Case {
   }
 };
 
+/// A board whose corner is not selected, and goes away in the first interval.
+Case with_crumbs() {
+  const select::BoardOnTable board;
+  Case c(Mode::move, DVec3(0));
+  c.scene = board.cloud;
+  c.request.handles = {{DVec3(0, 0, 0.03), DVec3(1, 0.5, 0.4), 0.3, 0}};
+  c.request.selected = board.red;
+  c.request.crumbs = Crumbs::remove;
+  c.request.params.interpolation = Interpolation::arap;
+  return c;
+}
+
 std::vector<Case> cases() {
   return {{Mode::move, DVec3(0)}, {Mode::extend, DVec3(0)}, {Mode::move, far_away}, {Mode::extend, far_away}};
 }
@@ -60,6 +73,7 @@ void expect_same(const Outcome& a, const Outcome& b) {
   EXPECT_EQ(a.report.changeable, b.report.changeable);
   EXPECT_EQ(a.report.copies, b.report.copies);
   EXPECT_EQ(a.report.removed, b.report.removed);
+  EXPECT_EQ(a.report.crumbs, b.report.crumbs);
   ASSERT_EQ(a.report.handles.size(), b.report.handles.size());
   for (std::size_t h = 0; h < a.report.handles.size(); ++h) {
     EXPECT_EQ(a.report.handles[h].gaussians, b.report.handles[h].gaussians);
@@ -125,6 +139,16 @@ TEST(Resume, FromAnyIntervalGivesTheBytesOfTheUndisturbedRun) {
         WorkArena arena(threads);
         arena.run([&] { expect_same(resumed(c, bytes, false), whole.outcome); });
       }
+  }
+}
+
+TEST(Resume, CrumbsThatWentAwayStayAway) {
+  const Case c = with_crumbs();
+  const Undisturbed whole = run_undisturbed(c);
+  EXPECT_EQ(whole.outcome.report.crumbs, 16u);
+  for (const auto& [u, bytes] : whole.checkpoints) {
+    SCOPED_TRACE(u);
+    expect_same(resumed(c, bytes, false), whole.outcome);
   }
 }
 

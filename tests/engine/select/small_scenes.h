@@ -49,6 +49,29 @@ inline void add_sheet(scene::GaussianCloud& cloud, Vec3 middle, int side, float 
     }
 }
 
+/// A red board of 24 x 24 rows on a table of 48 x 48, whose corner is white: 4 x 4 rows, or as many as are asked for.
+/// Nobody has seen the table under the board.
+struct BoardOnTable {
+  scene::GaussianCloud cloud;
+  std::vector<std::uint32_t> board, corner, red;  ///< Rows, ascending; the board is the two others.
+
+  explicit BoardOnTable(int corner_side = 4) {
+    for (int y = -12; y < 36; ++y)
+      for (int x = -12; x < 36; ++x)
+        if (x < 0 || y < 0 || x >= 24 || y >= 24)
+          add_sheet(cloud, 0.1f * Vec3(float(x) - 12, float(y) - 12, 0), 1, 0.1f, {0.6f, 0.4f, 0.2f});
+    for (int y = 0; y < 24; ++y)
+      for (int x = 0; x < 24; ++x) {
+        const auto row = std::uint32_t(cloud.size());
+        const bool is_corner = x < corner_side && y < corner_side;
+        add_sheet(cloud, 0.1f * Vec3(float(x) - 12, float(y) - 12, 0.3f), 1, 0.1f,
+                  is_corner ? Vec3(0.95f) : Vec3(0.5f, 0.05f, 0.05f));
+        (is_corner ? corner : red).push_back(row);
+        board.push_back(row);
+      }
+  }
+};
+
 /// At the origin, along z; 100 x 100 pixels, of which 100 are as wide as the view is deep.
 inline scene::Camera front_camera() {
   scene::Camera camera;

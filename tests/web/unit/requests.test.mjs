@@ -66,6 +66,22 @@ test("a removal has no targets, and with a selection no handles", () => {
   refused({ mode: "take", selection }, "mode");
 });
 
+test("crumbs and what holds a part go with a selection, from files as from the screen", () => {
+  const selection = [{ sphere: { center: [0, 0, 0], radius: 1 } }];
+  const handle = { source: [1, 2, 3], target: [4, 5, 6], radius: 0.5, group: 0 };
+  const state = { scene: "s1", version: 0, mode: "move", handles: [handle], selection, crumbs: "keep", attach: "held" };
+  const asked = requestOf(state);
+  assert.deepEqual([asked.crumbs, asked.attach], ["keep", "held"]);
+  assert.equal(requestOf({ ...state, selection: [] }).crumbs, undefined, "without one there are none");
+  assert.equal(requestOf({ ...state, crumbs: null }).crumbs, undefined, "the service's default");
+  assert.notEqual(previewKey(asked), previewKey({ ...asked, crumbs: "remove" }));
+  const read = only(JSON.stringify(asked));
+  assert.deepEqual([read.crumbs, read.attach], ["keep", "held"]);
+  assert.deepEqual(partOf("crumbs"), { part: "crumbs" });
+  refused({ ...asked, crumbs: "eat" }, "crumbs");
+  refused({ ...asked, attach: "glued" }, "attach");
+});
+
 test("a released configuration needs neither cluster nor mask nor mode", () => {
   const request = only('{"start": [[1, 2, 3]], "direction": [[0, 0, 1]], "voxel_size": 0.5}');
   assert.deepEqual(request.handles, [{ source: [1, 2, 3], target: [1, 2, 4], radius: 0.5, group: 0 }]);
