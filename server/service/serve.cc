@@ -121,6 +121,8 @@ Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& lo
   if (!scenes) return propagate(scenes);
   for (const engine::Error& damage : (*scenes)->damaged())
     http::log(logger, spdlog::level::err, "a scene cannot be used: " + damage.message, {{"where", damage.where}});
+  for (const engine::Error& damage : (*scenes)->recovered())
+    http::log(logger, spdlog::level::warn, damage.message, {{"where", damage.where}});
   edits::Selections selections(**scenes);
   options.edits.selections = &selections;
   auto edits = edits::EditService::open(**scenes, options.edits);

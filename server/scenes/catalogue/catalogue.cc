@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <optional>
 #include <set>
 #include <span>
 #include <string_view>
@@ -14,6 +15,7 @@
 #include "engine/core/atomic_file.h"
 #include "engine/core/numbers.h"
 #include "engine/io/read_bytes.h"
+#include "server/scenes/disk/digest.h"
 
 namespace server::scenes {
 namespace {
@@ -26,6 +28,20 @@ using engine::propagate;
 constexpr const char* lock_name = ".lock";
 constexpr const char* counter_name = "next_scene";  ///< Holds the number of the next scene.
 constexpr char id_kind = 's';
+/// What is skipped where only the scenes that are left tell how many there have been: the ids of those removed last are
+/// not to be given away again. A choice.
+constexpr std::uint64_t skipped_numbers = 1000;
+
+/// The number in the counter's file, which releases before checksums wrote alone; nothing for any other text.
+std::optional<std::uint64_t> counted(std::string_view text) {
+  if (!text.ends_with('\n')) return std::nullopt;
+  text.remove_suffix(1);
+  const std::size_t space = text.find(' ');
+  const std::string_view number = text.substr(0, space);
+  if (space != std::string_view::npos && text.substr(space + 1) != digest_of(number)) return std::nullopt;
+  const auto found = engine::number_in<std::uint64_t>(number);
+  return found && *found > 0 ? found : std::nullopt;
+}
 
 }  // namespace
 
@@ -38,18 +54,20 @@ Result<void> Catalogue::lock_folder() {
   return {};
 }
 
-Result<void> Catalogue::read_counter() {
+void Catalogue::read_counter() {
   const auto bytes = engine::io::read_bytes(folder_ / counter_name, 64);
-  if (!bytes && bytes.error().code == ErrorCode::not_found) return {};
-  if (!bytes) return propagate(bytes);
-  std::string_view text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
-  if (text.ends_with('\n')) text.remove_suffix(1);
-  const auto number = engine::number_in<std::uint64_t>(text);
-  if (!number || *number == 0)
-    return fail(ErrorCode::corrupt_data,
-                "expected the number of the next scene: write one above all scenes there have been", counter_name);
-  next_scene_ = std::max(next_scene_, *number);
-  return {};
+  const bool exists = bytes || bytes.error().code != ErrorCode::not_found;
+  if (bytes)
+    if (const auto number = counted({reinterpret_cast<const char*>(bytes->data()), bytes->size()})) {
+      next_scene_ = std::max(next_scene_, *number);
+      return;
+    }
+  if (!exists && next_scene_ == 1) return;  // a new folder
+  next_scene_ += skipped_numbers;
+  recovered_.push_back({ErrorCode::corrupt_data,
+                        "the number of the next scene cannot be read; numbers go on from " +
+                            std::to_string(next_scene_) + ", above all scenes there are",
+                        std::string("scenes/") + counter_name});
 }
 
 /// A scene as it was left, without what a crash left beside it.
@@ -74,6 +92,7 @@ void Catalogue::take_up(const fs::path& folder) {
   if (manifest->dataset && !manifest->dataset->below_root) {
     unpacked = *fs::path(manifest->dataset->folder).begin();
     named.insert(unpacked);
+    if (!manifest->dataset->list_digest.empty()) named.insert(dataset_list_name(*manifest->dataset));
   }
   std::vector<fs::path> leftovers;
   for (const auto& entry : fs::directory_iterator(folder, ignored)) {
@@ -93,7 +112,6 @@ Result<void> Catalogue::open() {
   if (auto status = make_folder(folder_); !status) return status;
   if (auto synced = engine::sync_folder(folder_.parent_path()); !synced) return synced;
   if (auto locked = lock_folder(); !locked) return locked;
-  if (auto read = read_counter(); !read) return read;
   std::vector<fs::path> folders, removed;
   std::error_code error;
   for (auto entry = fs::directory_iterator(folder_, error); !error && entry != fs::end(entry); entry.increment(error)) {
@@ -105,6 +123,7 @@ Result<void> Catalogue::open() {
     folders.push_back(entry->path());
   }
   if (error) return tl::make_unexpected(engine::file_error(error.value(), "read", folder_));
+  read_counter();
   for (const fs::path& folder : removed) remove_quietly(folder);
   for (const fs::path& folder : folders) take_up(folder);
   return {};
@@ -152,7 +171,7 @@ Result<Catalogue::Reservation> Catalogue::reserve() {
 
 Result<std::uint64_t> Catalogue::next_number() {
   const std::lock_guard lock(counter_writer_);
-  const std::string text = std::to_string(next_scene_ + 1) + "\n";
+  const std::string number = std::to_string(next_scene_ + 1), text = number + " " + digest_of(number) + "\n";
   if (auto written = engine::write_file(folder_ / counter_name, std::as_bytes(std::span(text))); !written)
     return propagate(written);
   return next_scene_++;

@@ -60,7 +60,9 @@ bool is_digest(std::string_view text) {
 Result<void> check_digest(const fs::path& file, const std::string& digest, const std::string& where) {
   if (digest.empty()) return {};
   const auto found = digest_of_file(file);
-  if (!found) return fail(found.error().code, "the stored file cannot be read: " + found.error().message, where);
+  if (!found && found.error().code == ErrorCode::not_found)
+    return fail(ErrorCode::corrupt_data, "the stored file is gone: put back a copy of it", where);
+  if (!found) return fail(found.error().code, "the stored file cannot be read", where);  // that error has its path
   if (*found == digest) return {};
   return fail(ErrorCode::corrupt_data,
               "the stored file is damaged: its checksum is not the one noted when it was stored; put back a copy of it",

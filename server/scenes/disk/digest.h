@@ -33,7 +33,7 @@ using engine::Result;
 
 /// Reads the file and holds it against its digest; an empty digest is none, and nothing is read.
 ///   where   what to call the file in errors
-///   errors  corrupt_data: it is not what was stored; not_found and the others of InputFile
+///   errors  corrupt_data: it is not what was stored, or gone; unavailable: it may not be read
 [[nodiscard]] Result<void> check_digest(const std::filesystem::path& file, const std::string& digest,
                                         const std::string& where);
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "server/scenes/catalogue/names.h"
+#include "server/scenes/disk/digest.h"
 #include "server/scenes/disk/disk.h"
 #include "server/scenes/disk/scene_format.h"
 #include "server/scenes/uploads/scene_root.h"
@@ -54,6 +55,10 @@ Result<ManifestPtr> Uploads::add_staged(const fs::path& file, const fs::path& st
   manifest.base_disk_bytes = bytes_below(file);
   manifest.base_memory_bytes = memory_bytes(*upload->file);
   manifest.overlay_memory_bytes = {0};
+  manifest.overlay_digests = {""};
+  auto digest = digest_of_file(file);
+  if (!digest) return public_error_(digest, file.parent_path());
+  manifest.base_digest = std::move(*digest);
   SceneInfo& scene = manifest.scene;
   const SceneStatistics measured = statistics(cloud);
   scene.name = *called;

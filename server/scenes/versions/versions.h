@@ -57,6 +57,8 @@ class Versions {
   [[nodiscard]] Result<LoadedVersion> load_preview(const Snapshot& at, const std::string& preview);
   [[nodiscard]] Result<OverBase> over_base(const Snapshot& at, int parent, const engine::scene::Overlay& overlay);
   void forget_if_removed(const Snapshot& at);
+  /// The file of a version, held against its digest. One that has none, of an earlier release, gets it now.
+  [[nodiscard]] Result<void> check(const Snapshot& at, int version);
 
   const StoreOptions& options_;
   BoundedCache& memory_;
