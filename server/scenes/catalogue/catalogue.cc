@@ -1,10 +1,6 @@
 #include "server/scenes/catalogue/catalogue.h"
 
-#include <fcntl.h>
-#include <sys/file.h>
-
 #include <algorithm>
-#include <cerrno>
 #include <optional>
 #include <set>
 #include <span>
@@ -25,7 +21,6 @@ using engine::ErrorCode;
 using engine::fail;
 using engine::propagate;
 
-constexpr const char* lock_name = ".lock";
 constexpr const char* counter_name = "next_scene";  ///< Holds the number of the next scene.
 constexpr char id_kind = 's';
 /// What is skipped where only the scenes that are left tell how many there have been: the ids of those removed last are
@@ -42,27 +37,24 @@ std::optional<std::uint64_t> counted(std::string_view text) {
   const auto found = engine::number_in<std::uint64_t>(number);
   return found && *found > 0 ? found : std::nullopt;
 }
+std::optional<std::uint64_t> read_count(const fs::path& folder) {
+  const auto bytes = engine::io::read_bytes(folder / counter_name, 64);
+  return bytes ? counted({reinterpret_cast<const char*>(bytes->data()), bytes->size()}) : std::nullopt;
+}
 
 }  // namespace
 
-Result<void> Catalogue::lock_folder() {
-  folder_lock_ = engine::FileDescriptor(::open((folder_ / lock_name).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644));
-  if (folder_lock_.get() < 0) return tl::make_unexpected(engine::file_error(errno, "open", folder_ / lock_name));
-  if (::flock(folder_lock_.get(), LOCK_EX | LOCK_NB) != 0)
-    return fail(ErrorCode::conflict, "another service uses this data folder: stop it, or choose another folder",
-                folder_.string());
-  return {};
-}
+bool is_scene_id(const std::string& name) { return engine::number_of_id(id_kind, name).has_value(); }
+
+bool counter_is_sound(const fs::path& folder) { return read_count(folder).has_value(); }
 
 void Catalogue::read_counter() {
-  const auto bytes = engine::io::read_bytes(folder_ / counter_name, 64);
-  const bool exists = bytes || bytes.error().code != ErrorCode::not_found;
-  if (bytes)
-    if (const auto number = counted({reinterpret_cast<const char*>(bytes->data()), bytes->size()})) {
-      next_scene_ = std::max(next_scene_, *number);
-      return;
-    }
-  if (!exists && next_scene_ == 1) return;  // a new folder
+  if (const auto number = read_count(folder_)) {
+    next_scene_ = std::max(next_scene_, *number);
+    return;
+  }
+  std::error_code ignored;
+  if (next_scene_ == 1 && !fs::exists(folder_ / counter_name, ignored)) return;  // a new folder
   next_scene_ += skipped_numbers;
   recovered_.push_back({ErrorCode::corrupt_data,
                         "the number of the next scene cannot be read; numbers go on from " +
@@ -111,7 +103,9 @@ void Catalogue::take_up(const fs::path& folder) {
 Result<void> Catalogue::open() {
   if (auto status = make_folder(folder_); !status) return status;
   if (auto synced = engine::sync_folder(folder_.parent_path()); !synced) return synced;
-  if (auto locked = lock_folder(); !locked) return locked;
+  auto locked = FolderLock::take(folder_);
+  if (!locked) return propagate(locked);
+  folder_lock_ = std::move(*locked);
   std::vector<fs::path> folders, removed;
   std::error_code error;
   for (auto entry = fs::directory_iterator(folder_, error); !error && entry != fs::end(entry); entry.increment(error)) {

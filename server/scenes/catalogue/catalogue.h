@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
-#include "engine/core/file_descriptor.h"
 #include "engine/core/result.h"
 #include "server/scenes/catalogue/manifest.h"
 #include "server/scenes/disk/disk.h"
+#include "server/scenes/disk/folder_lock.h"
 #include "server/scenes/disk/public_errors.h"
 
 namespace server::scenes {
@@ -51,6 +51,11 @@ struct Snapshot {
 [[nodiscard]] inline std::string stored_name(const Snapshot& at, const std::string& name) {
   return "scenes/" + at.scene->id + "/" + name;
 }
+
+/// Whether a folder's name is that of a scene: "s000001".
+[[nodiscard]] bool is_scene_id(const std::string& name);
+/// Whether the number of the next scene can be read.
+[[nodiscard]] bool counter_is_sound(const std::filesystem::path& folder);
 
 /// Safe to call from any thread once it is open. Its lock is never held over I/O.
 class Catalogue {
@@ -110,7 +115,6 @@ class Catalogue {
   [[nodiscard]] Result<void> remove(const std::string& id);
 
  private:
-  [[nodiscard]] Result<void> lock_folder();
   void read_counter();
   void take_up(const std::filesystem::path& folder);
   [[nodiscard]] Result<std::uint64_t> next_number();
@@ -118,7 +122,7 @@ class Catalogue {
   const std::filesystem::path folder_;
   const std::size_t max_scenes_;
   const PublicErrors& public_error_;
-  engine::FileDescriptor folder_lock_;
+  FolderLock folder_lock_;
   std::vector<engine::Error> damaged_, recovered_;  ///< Only open() writes them.
 
   mutable std::mutex mutex_;  ///< Guards what follows, and the scenes' own manifests.

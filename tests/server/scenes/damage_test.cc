@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "server/scenes/check.h"
 #include "tests/server/scenes/store_support.h"
 
 namespace server::scenes {
@@ -128,6 +129,39 @@ TEST_F(DamageTest, TheCounterOfScenesComesBackFromTheScenes) {
   }
 }
 
+/// What check_store() names.
+std::vector<std::string> damaged_below(const fs::path& folder) {
+  const auto checked = check_store(folder);
+  if (!checked) return {checked.error().message};
+  std::vector<std::string> places;
+  for (const auto& damage : checked->damaged) places.push_back(damage.where);
+  return places;
+}
+
+TEST_F(DamageTest, CheckNamesEveryFileThatIsDamagedOrGone) {
+  const std::string id = add_whole(1);
+  EXPECT_EQ(check_store(options.folder).error().code, ErrorCode::conflict) << "the store is at work";
+  store.reset();
+  EXPECT_TRUE(damaged_below(options.folder).empty());
+  EXPECT_EQ(check_store(options.folder)->files, 8u) << "manifest, base, 2 versions, a list and its 2 files, counter";
+  for (const char* name : {"base.ply", "versions/1.overlay", "versions/2.overlay", "dataset.1.xxh3",
+                           "dataset.1/transforms.json", "dataset.1/images/notes.txt"}) {
+    const fs::path file = options.folder / id / name;
+    const std::string whole = support::read_file(file);
+    const std::vector<std::string> place{"scenes/" + id + "/" + name};
+    flip(file, 4 * whole.size());
+    EXPECT_EQ(damaged_below(options.folder), place);
+    fs::remove(file);
+    EXPECT_EQ(damaged_below(options.folder), place);
+    support::write_file(file, whole);
+  }
+  fs::remove(options.folder / id / "scene.json");
+  EXPECT_EQ(damaged_below(options.folder), std::vector<std::string>{"scenes/" + id + "/scene.json"});
+  support::write_file(options.folder / "next_scene", "");
+  EXPECT_EQ(damaged_below(options.folder).back(), "scenes/next_scene");
+  EXPECT_TRUE(damaged_below(temp.path() / "nothing").empty());
+}
+
 TEST_F(DamageTest, IsNamedOrHarmlessWhereverItIs) {
   const std::string victim = add_whole(1), other = add_whole(2);
   reopen();
@@ -156,6 +190,8 @@ TEST_F(DamageTest, IsNamedOrHarmlessWhereverItIs) {
       flip(options.folder / file, random() % (8 * size));
     }
 
+    const auto listed = damaged_below(options.folder);
+    EXPECT_EQ(listed.size(), 1u);
     open();
     bool says_so = !store->damaged().empty() || !store->recovered().empty();
     for (const auto& [name, got] : all_of(victim)) {
