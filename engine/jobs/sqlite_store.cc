@@ -8,17 +8,20 @@
 #include <exception>
 #include <iterator>
 #include <mutex>
+#include <span>
 #include <string_view>
 #include <type_traits>
 #include <utility>
 
+#include "engine/core/byte_writer.h"
+#include "engine/core/checksum.h"
 #include "engine/core/file_descriptor.h"
 #include "engine/jobs/durable_file.h"
 
 namespace engine::jobs {
 namespace {
 
-constexpr int schema_number = 2;  // of the tables below; user_version in the file
+constexpr int schema_number = 3;  // of the tables below; user_version in the file
 constexpr const char* schema = R"(
   CREATE TABLE jobs (
     number INTEGER PRIMARY KEY AUTOINCREMENT,  -- AUTOINCREMENT: a removed job's number is never given away again
@@ -50,6 +53,35 @@ constexpr const char* counts_deaths = R"(
   PRAGMA user_version = 2;
 )";
 
+/// A row in the order of its checksum, which is the last of its columns. SQLite's own checks see damage to its pages
+/// and indices, but not to what they hold.
+constexpr std::string_view summed_columns =
+    "number, lane, payload, idempotency_key, state, claimed, stopped_early, finished_intervals, progress, result, "
+    "error_code, error_message, error_where, created, started, ended, place, died_at, deaths";
+/// From schema 2 to 3.
+constexpr const char* adds_checksums = "ALTER TABLE jobs ADD COLUMN checksum INTEGER NOT NULL DEFAULT 0;";
+constexpr const char* says_schema_3 = "PRAGMA user_version = 3;";
+
+/// What row_checksum(...) is in SQL: fnv1a() over the values, each with its type and length.
+void row_checksum(sqlite3_context* context, int count, sqlite3_value** values) {
+  ByteWriter all;
+  for (const std::span<sqlite3_value*> rest(values, std::size_t(count)); sqlite3_value* const value : rest) {
+    const int type = sqlite3_value_type(value);
+    all.write(std::int32_t(type));
+    if (type == SQLITE_INTEGER) {
+      all.write(std::int64_t(sqlite3_value_int64(value)));
+    } else if (type != SQLITE_NULL) {
+      const auto* const bytes = static_cast<const std::byte*>(sqlite3_value_blob(value));
+      const std::span text(bytes, std::size_t(sqlite3_value_bytes(value)));
+      all.write(std::uint64_t(text.size()));
+      all.write_all(text);
+    }
+  }
+  sqlite3_result_int64(context, std::int64_t(fnv1a(all.bytes())));
+}
+
+std::string checksum_of_row() { return "row_checksum(" + std::string(summed_columns) + ")"; }
+
 /// SQLite's result codes become an Error here, travel as an exception to guarded() and leave this file as a Result.
 struct Failure : std::exception {
   explicit Failure(Error e) : error(std::move(e)) {}
@@ -74,6 +106,8 @@ class Database {
     const int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX;
     check(sqlite3_open_v2(file_.c_str(), &handle_, flags, nullptr));
     sqlite3_busy_timeout(handle_, int(busy_timeout.count()));
+    check(sqlite3_create_function(handle_, "row_checksum", -1, SQLITE_UTF8 | SQLITE_DETERMINISTIC | SQLITE_INNOCUOUS,
+                                  nullptr, row_checksum, nullptr, nullptr));
   }
   void execute(const char* sql) { check(sqlite3_exec(handle_, sql, nullptr, nullptr, nullptr)); }
   void check(int code) const {
@@ -212,13 +246,16 @@ std::int64_t known_number(const std::string& id) {
   return *number;
 }
 
-/// What read() reads; `payload` and `result` are columns, or '' where the texts are not wanted.
-std::string select(const std::string& payload, const std::string& result) {
+/// What read() reads. A list has neither the long texts nor the row held against its checksum, which is over them, too.
+std::string select(bool whole) {
+  const std::string payload = whole ? "payload" : "''", result = whole ? "result" : "''";
+  const std::string is_sound = whole ? "checksum IS " + checksum_of_row() : "1";
   return "SELECT number, lane, " + payload +
          ", idempotency_key, state, claimed, stopped_early, finished_intervals, progress, " + result +
          ", error_code, error_message, error_where, created, started, ended, "
          "CASE state WHEN 'queued' THEN (SELECT count(*) FROM jobs AS other WHERE other.ended IS NULL AND "
-         "other.state = 'queued' AND other.number <= jobs.number) ELSE 0 END, place, died_at, deaths FROM jobs ";
+         "other.state = 'queued' AND other.number <= jobs.number) ELSE 0 END, place, died_at, deaths, " +
+         is_sound + " FROM jobs ";
 }
 
 std::optional<Time> time_at(const Statement& row, int column) {
@@ -229,6 +266,7 @@ std::optional<Time> time_at(const Statement& row, int column) {
 Job read(const Database& database, const Statement& row) {
   Job job;
   job.id = id_of(row.integer(0));
+  if (row.integer(20) == 0) database.corrupt("the record of job " + job.id);
   job.lane = row.text(1);
   job.payload = row.text(2);
   job.idempotency_key = row.text(3);
@@ -256,15 +294,20 @@ Job read(const Database& database, const Statement& row) {
 }
 
 Job find_in(Database& database, const std::string& id) {
-  Statement row(database, select("payload", "result") + "WHERE number = ?1", known_number(id));
+  Statement row(database, select(true) + "WHERE number = ?1", known_number(id));
   if (!row.step()) no_such_job(id);
   return read(database, row);
 }
 
 std::optional<Job> find_key_in(Database& database, const std::string& key) {
-  Statement row(database, select("payload", "result") + "WHERE idempotency_key = ?1", key);
+  Statement row(database, select(true) + "WHERE idempotency_key = ?1", key);
   if (!row.step()) return std::nullopt;
   return read(database, row);
+}
+
+/// Notes in a row what it holds now.
+void seal(Database& database, std::int64_t number) {
+  Statement(database, "UPDATE jobs SET checksum = " + checksum_of_row() + " WHERE number = ?1", number).run();
 }
 
 Job apply_in(Database& database, const std::string& id, const Change& change, Time now) {
@@ -285,6 +328,7 @@ Job apply_in(Database& database, const std::string& id, const Change& change, Ti
             std::int64_t(job.finished_intervals), job.progress, job.result, code, message, where, job.started,
             job.ended, job.place, job.died_at, std::int64_t(job.deaths))
       .run();
+  seal(database, known_number(id));
   return find_in(database, id);
 }
 
@@ -315,7 +359,24 @@ void bring_up_to_date(Database& database, int found_schema) {
                      database.file()});
     database.execute(schema);
   }
+  // A damaged number of the schema would have columns added twice.
+  const bool is_newer =
+      text_of(database, "SELECT count(*) FROM pragma_table_info('jobs') WHERE name = 'checksum'") != "0";
+  if (found_schema < schema_number && is_newer) database.corrupt("the number of its schema");
   if (found_schema < 2) database.execute(counts_deaths);
+  if (found_schema < 3) {
+    database.execute(adds_checksums);
+    Statement(database, "UPDATE jobs SET checksum = " + checksum_of_row()).run();
+    database.execute(says_schema_3);
+  }
+}
+
+/// SQLite's own check, of indices, too, and ours of what the rows hold.
+void check_all(Database& database) {
+  if (const auto found = text_of(database, "PRAGMA integrity_check(1)"); found != "ok") database.corrupt(found);
+  for (const std::string& id :
+       ids(Statement(database, "SELECT number FROM jobs WHERE checksum IS NOT " + checksum_of_row() + " LIMIT 1")))
+    database.corrupt("the record of job " + id);
 }
 
 void prepare(Database& database, Time now, const SqliteOptions& options) {
@@ -324,8 +385,6 @@ void prepare(Database& database, Time now, const SqliteOptions& options) {
   if (text_of(database, "PRAGMA journal_mode = WAL") != "wal")
     throw Failure({ErrorCode::unavailable, "this file system cannot hold a job store: choose another data folder",
                    database.file()});
-  if (const auto found = text_of(database, "PRAGMA quick_check(1)"); found != "ok") database.corrupt(found);
-
   Transaction transaction(database);
   const int found_schema = std::stoi(text_of(database, "PRAGMA user_version"));
   if (found_schema > schema_number)
@@ -334,6 +393,7 @@ void prepare(Database& database, Time now, const SqliteOptions& options) {
                        std::to_string(schema_number) + "): use that one, or choose another data folder",
                    database.file()});
   bring_up_to_date(database, found_schema);
+  check_all(database);
   for (const std::string& id : ids(Statement(database, "SELECT number FROM jobs WHERE claimed ORDER BY number")))
     apply_in(database, id, {.event = Event::abandon, .max_deaths = options.max_deaths}, now);
   if (options.used_numbers > 0) skip_numbers(database, options.used_numbers);
@@ -423,6 +483,7 @@ Result<Submission> SqliteStore::submit(const NewJob& job, std::size_t max_queued
               "progress, result, created) VALUES (?1, ?2, ?3, 'queued', 0, 0, 0, '', '', ?4)",
               job.lane, job.payload, key, impl_->now())
         .run();
+    seal(database, sqlite3_last_insert_rowid(database.handle()));
     return {.job = find_in(database, id_of(sqlite3_last_insert_rowid(database.handle()))), .created = true};
   });
 }
@@ -446,10 +507,10 @@ Result<std::vector<Job>> SqliteStore::list(const Filter& filter) {
     const std::lock_guard lock(impl_->mutex);
     std::optional<std::string_view> lane;
     if (filter.lane) lane = *filter.lane;
-    Statement row(impl_->database,
-                  select("''", "''") +
-                      "WHERE (?1 IS NULL OR lane = ?1) AND (NOT ?2 OR ended IS NULL) ORDER BY number DESC LIMIT ?3",
-                  lane, std::int64_t(filter.active_only), std::int64_t(filter.limit));
+    Statement row(
+        impl_->database,
+        select(false) + "WHERE (?1 IS NULL OR lane = ?1) AND (NOT ?2 OR ended IS NULL) ORDER BY number DESC LIMIT ?3",
+        lane, std::int64_t(filter.active_only), std::int64_t(filter.limit));
     std::vector<Job> jobs;
     while (row.step()) jobs.push_back(read(impl_->database, row));
     return jobs;
