@@ -114,9 +114,7 @@ class Database {
     if (code != SQLITE_OK && code != SQLITE_ROW && code != SQLITE_DONE) throw Failure(error(code));
   }
   [[noreturn]] void corrupt(const std::string& what) const {
-    throw Failure({ErrorCode::corrupt_data,
-                   "the job store is damaged (" + what + "): put back a copy of it, or move it away to start afresh",
-                   file_});
+    throw Failure({ErrorCode::corrupt_data, "the job store is damaged (" + what + ")", file_});
   }
   [[nodiscard]] sqlite3* handle() const { return handle_; }
   [[nodiscard]] const std::filesystem::path& file() const { return file_; }
@@ -129,11 +127,9 @@ class Database {
       return {ErrorCode::no_space, "the job store cannot grow, the disk is full: free some space and try again", file_};
     switch (code & 0xff) {
       case SQLITE_CORRUPT:
-        return {ErrorCode::corrupt_data,
-                "the job store is damaged: put back a copy of it, or move it away to start afresh", file_};
+        return {ErrorCode::corrupt_data, "the job store is damaged", file_};
       case SQLITE_NOTADB:
-        return {ErrorCode::corrupt_data, "the file is no job store: move it away, or choose another data folder",
-                file_};
+        return {ErrorCode::corrupt_data, "the file is no job store", file_};
       case SQLITE_BUSY:
       case SQLITE_LOCKED:
         return {ErrorCode::unavailable, "another process uses this job store: end it, or choose another data folder",
@@ -310,10 +306,8 @@ void seal(Database& database, std::int64_t number) {
   Statement(database, "UPDATE jobs SET checksum = " + checksum_of_row() + " WHERE number = ?1", number).run();
 }
 
-Job apply_in(Database& database, const std::string& id, const Change& change, Time now) {
-  const auto changed = transition(find_in(database, id), change, now);
-  if (!changed) throw Failure(changed.error());
-  const Job& job = *changed;
+/// Writes down all of a record that may change.
+void write_in(Database& database, const Job& job) {
   std::optional<std::string_view> code, message, where;
   if (job.error) {
     code = code_names[std::size_t(job.error->code)];
@@ -324,11 +318,17 @@ Job apply_in(Database& database, const std::string& id, const Change& change, Ti
             "UPDATE jobs SET state = ?2, claimed = ?3, stopped_early = ?4, finished_intervals = ?5, progress = ?6, "
             "result = ?7, error_code = ?8, error_message = ?9, error_where = ?10, started = ?11, ended = ?12, "
             "place = ?13, died_at = ?14, deaths = ?15 WHERE number = ?1",
-            known_number(id), to_string(job.state), std::int64_t(job.claimed), std::int64_t(job.stopped_early),
+            known_number(job.id), to_string(job.state), std::int64_t(job.claimed), std::int64_t(job.stopped_early),
             std::int64_t(job.finished_intervals), job.progress, job.result, code, message, where, job.started,
             job.ended, job.place, job.died_at, std::int64_t(job.deaths))
       .run();
-  seal(database, known_number(id));
+  seal(database, known_number(job.id));
+}
+
+Job apply_in(Database& database, const std::string& id, const Change& change, Time now) {
+  const auto changed = transition(find_in(database, id), change, now);
+  if (!changed) throw Failure(changed.error());
+  write_in(database, *changed);
   return find_in(database, id);
 }
 
@@ -355,8 +355,7 @@ void skip_numbers(Database& database, std::int64_t used) {
 void bring_up_to_date(Database& database, int found_schema) {
   if (found_schema == 0) {
     if (text_of(database, "SELECT count(*) FROM sqlite_schema") != "0")
-      throw Failure({ErrorCode::corrupt_data, "the file is no job store: move it away, or choose another data folder",
-                     database.file()});
+      throw Failure({ErrorCode::corrupt_data, "the file is no job store", database.file()});
     database.execute(schema);
   }
   // A damaged number of the schema would have columns added twice.
@@ -398,6 +397,13 @@ void prepare(Database& database, Time now, const SqliteOptions& options) {
     apply_in(database, id, {.event = Event::abandon, .max_deaths = options.max_deaths}, now);
   if (options.used_numbers > 0) skip_numbers(database, options.used_numbers);
   transaction.commit();
+}
+
+/// 0 for a file that is absent or cannot be looked at.
+std::uintmax_t size_of(const std::filesystem::path& file) {
+  std::error_code error;
+  const auto size = std::filesystem::file_size(file, error);
+  return error ? 0 : size;
 }
 
 /// Runs `body` and turns what SQLite and the library throw into an Error.
@@ -451,13 +457,16 @@ Result<std::unique_ptr<SqliteStore>> SqliteStore::open(const SqliteOptions& opti
   if (auto made = create_folder(options.folder); !made) return propagate(made);
   return guarded([&] {
     auto impl = std::make_unique<Impl>(options.folder / "jobs.db", options.now);
+    if (options.must_exist && size_of(impl->database.file()) == 0)
+      throw Failure(
+          {ErrorCode::corrupt_data, "the job store is gone, but there have been jobs", impl->database.file()});
     impl->database.open(options.busy_timeout);
     prepare(impl->database, impl->now(), options);
     return std::unique_ptr<SqliteStore>(new SqliteStore(std::move(impl)));
   });
 }
 
-Result<Submission> SqliteStore::submit(const NewJob& job, std::size_t max_queued) {
+Result<Submission> SqliteStore::submit(const NewJob& job, std::size_t max_queued, const Witness& witness) {
   return impl_->transact([&]() -> Submission {
     Database& database = impl_->database;
     std::optional<std::string_view> key;
@@ -484,7 +493,31 @@ Result<Submission> SqliteStore::submit(const NewJob& job, std::size_t max_queued
               job.lane, job.payload, key, impl_->now())
         .run();
     seal(database, sqlite3_last_insert_rowid(database.handle()));
-    return {.job = find_in(database, id_of(sqlite3_last_insert_rowid(database.handle()))), .created = true};
+    Job accepted = find_in(database, id_of(sqlite3_last_insert_rowid(database.handle())));
+    if (const auto witnessed = witness(accepted); !witnessed) throw Failure(witnessed.error());
+    return {.job = std::move(accepted), .created = true};
+  });
+}
+
+Result<void> SqliteStore::restore(const Job& job) {
+  return impl_->transact([&] {
+    Database& database = impl_->database;
+    std::optional<std::string_view> key;
+    if (!job.idempotency_key.empty()) {
+      key = job.idempotency_key;
+      if (const auto other = find_key_in(database, job.idempotency_key); other && other->id != job.id)
+        throw Failure({ErrorCode::conflict, other->id + " has the idempotency key of " + job.id, job.id});
+    }
+    const std::int64_t number = known_number(job.id);
+    Statement(database,
+              "INSERT OR IGNORE INTO jobs (number, lane, payload, state, claimed, stopped_early, finished_intervals, "
+              "progress, result, created) VALUES (?1, ?2, ?3, 'queued', 0, 0, 0, '', '', ?4)",
+              number, job.lane, job.payload, job.created)
+        .run();
+    Statement(database, "UPDATE jobs SET lane = ?2, payload = ?3, idempotency_key = ?4, created = ?5 WHERE number = ?1",
+              number, job.lane, job.payload, key, job.created)
+        .run();
+    write_in(database, job);
   });
 }
 
