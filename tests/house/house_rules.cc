@@ -37,7 +37,7 @@ const std::vector<Reserved>& reserved() {
       {"spdlog/", {"server/cli", "server/http", "server/edits", "server/service"}},
       {"prometheus/", {"server/http"}, false},
       {"zip.h", {"server/scenes/uploads"}, false},
-      {"xxhash.h", {"server/scenes/disk"}, false}};
+      {"xxh", {"server/scenes/disk"}, false}};
   return list;
 }
 

@@ -2,10 +2,13 @@
 
 #include <sys/stat.h>
 #include <xxhash.h>
+#ifdef __x86_64__
+#include <xxh_x86dispatch.h>  // the same functions by the widest instructions there are: four times as fast
+#endif
 
 #include <algorithm>
 #include <array>
-#include <memory>
+#include <new>
 #include <utility>
 #include <vector>
 
@@ -28,38 +31,8 @@ std::string in_hexadecimal(std::uint64_t number) {
   return text;
 }
 
-struct FreeState {
-  void operator()(XXH3_state_t* state) const { XXH3_freeState(state); }
-};
-
-}  // namespace
-
-std::string digest_of(std::span<const std::byte> bytes) {
-  return in_hexadecimal(XXH3_64bits(bytes.data(), bytes.size()));
-}
-
-Result<std::string> digest_of_file(const fs::path& path) {
-  const auto file = engine::io::InputFile::open(path);
-  if (!file) return propagate(file);
-  const std::unique_ptr<XXH3_state_t, FreeState> state(XXH3_createState());
-  if (!state || XXH3_64bits_reset(state.get()) == XXH_ERROR)
-    return fail(ErrorCode::too_large, "this machine has not enough memory for that", file->name());
-  std::vector<std::byte> piece(std::size_t(std::min<std::uint64_t>(piece_bytes, file->size())));
-  for (std::uint64_t at = 0; at < file->size(); at += piece.size()) {
-    const auto part = std::span(piece).first(std::size_t(std::min<std::uint64_t>(piece.size(), file->size() - at)));
-    if (auto read = file->read_at(at, part); !read) return propagate(read);
-    (void)XXH3_64bits_update(state.get(), part.data(), part.size());  // fails only for a null pointer
-  }
-  return in_hexadecimal(XXH3_64bits_digest(state.get()));
-}
-
-bool is_digest(std::string_view text) {
-  return text.size() == digits && text.find_first_not_of("0123456789abcdef") == std::string_view::npos;
-}
-
-Result<void> check_digest(const fs::path& file, const std::string& digest, const std::string& where) {
-  if (digest.empty()) return {};
-  const auto found = digest_of_file(file);
+/// Whether what was found is what was noted.
+Result<void> compare(const Result<std::string>& found, const std::string& digest, const std::string& where) {
   if (!found && found.error().code == ErrorCode::not_found)
     return fail(ErrorCode::corrupt_data, "the stored file is gone: put back a copy of it", where);
   if (!found) return fail(found.error().code, "the stored file cannot be read", where);  // that error has its path
@@ -67,6 +40,61 @@ Result<void> check_digest(const fs::path& file, const std::string& digest, const
   return fail(ErrorCode::corrupt_data,
               "the stored file is damaged: its checksum is not the one noted when it was stored; put back a copy of it",
               where);
+}
+
+}  // namespace
+
+std::string digest_of(std::span<const std::byte> bytes) {
+  return in_hexadecimal(XXH3_64bits(bytes.data(), bytes.size()));
+}
+
+struct RunningDigest::State {
+  XXH3_state_t* const xxh3 = XXH3_createState();
+  State() {
+    if (xxh3 == nullptr) throw std::bad_alloc();
+    (void)XXH3_64bits_reset(xxh3);  // this and the others fail for a null pointer only
+  }
+  ~State() { (void)XXH3_freeState(xxh3); }
+  State(State&&) = delete;
+};
+
+RunningDigest::RunningDigest() : state_(std::make_unique<State>()) {}
+RunningDigest::~RunningDigest() = default;
+
+void RunningDigest::see(std::uint64_t offset, std::span<const std::byte> bytes) {
+  if (offset > seen_ || offset + bytes.size() <= seen_) return;
+  const auto fresh = bytes.subspan(std::size_t(seen_ - offset));
+  (void)XXH3_64bits_update(state_->xxh3, fresh.data(), fresh.size());
+  seen_ += fresh.size();
+}
+
+Result<std::string> RunningDigest::finish(const fs::path& path) {
+  const auto file = engine::io::InputFile::open(path);
+  if (!file) return propagate(file);
+  if (seen_ < file->size()) {
+    std::vector<std::byte> piece(std::size_t(std::min<std::uint64_t>(piece_bytes, file->size() - seen_)));
+    while (seen_ < file->size()) {
+      const auto part =
+          std::span(piece).first(std::size_t(std::min<std::uint64_t>(piece.size(), file->size() - seen_)));
+      if (auto read = file->read_at(seen_, part); !read) return propagate(read);
+      see(seen_, part);
+    }
+  }
+  return in_hexadecimal(XXH3_64bits_digest(state_->xxh3));
+}
+
+Result<void> RunningDigest::check(const fs::path& file, const std::string& digest, const std::string& where) {
+  return digest.empty() ? Result<void>() : compare(finish(file), digest, where);
+}
+
+Result<std::string> digest_of_file(const fs::path& path) { return RunningDigest().finish(path); }
+
+bool is_digest(std::string_view text) {
+  return text.size() == digits && text.find_first_not_of("0123456789abcdef") == std::string_view::npos;
+}
+
+Result<void> check_digest(const fs::path& file, const std::string& digest, const std::string& where) {
+  return RunningDigest().check(file, digest, where);
 }
 
 SoundFiles::Stamp SoundFiles::stamp_of(const fs::path& file) {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <span>
 #include <string>
@@ -27,6 +28,29 @@ using engine::Result;
 /// That of a file's bytes, read a piece at a time.
 ///   errors  those of InputFile
 [[nodiscard]] Result<std::string> digest_of_file(const std::filesystem::path& file);
+
+/// The digest of a file that somebody else reads, made of what they read: what is read in the order of the file costs
+/// no second reading, and what was taken in is what was checked. For io::ReadOptions::witness.
+class RunningDigest {
+ public:
+  RunningDigest();
+  ~RunningDigest();
+  RunningDigest(RunningDigest&&) = delete;
+
+  void see(std::uint64_t offset, std::span<const std::byte> bytes);
+  /// Reads what has not been seen, and holds it all against a digest. Once, at the end. Arguments and errors as
+  /// check_digest().
+  [[nodiscard]] Result<void> check(const std::filesystem::path& file, const std::string& digest,
+                                   const std::string& where);
+
+ private:
+  friend Result<std::string> digest_of_file(const std::filesystem::path& file);
+  [[nodiscard]] Result<std::string> finish(const std::filesystem::path& file);
+
+  struct State;
+  std::unique_ptr<State> state_;
+  std::uint64_t seen_ = 0;  ///< Bytes from the file's beginning.
+};
 
 /// Whether a text can be a digest.
 [[nodiscard]] bool is_digest(std::string_view text);

@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <span>
 #include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "tests/support/data.h"
 
@@ -50,6 +53,31 @@ TEST(Digest, SeesEveryBitAndEveryCut) {
   }
   EXPECT_TRUE(check_digest(file, "", "")) << "none was noted";
   EXPECT_EQ(check_digest(temp.path() / "absent", digest, "a").error().code, ErrorCode::corrupt_data);
+}
+
+TEST(RunningDigest, IsThatOfTheFileHoweverItIsRead) {
+  const support::TempDir temp;
+  const std::string text = "a file of some length, of which readers read what they like";
+  support::write_file(temp.path() / "file", text);
+  const auto bytes = std::as_bytes(std::span(text));
+  using Parts = std::vector<std::pair<std::size_t, std::size_t>>;  // from, count
+  for (const Parts& parts : {Parts{},
+                             {{0, 5}},
+                             {{0, 5}, {5, 10}},
+                             {{0, 20}, {5, 30}},
+                             {{0, 20}, {5, 3}, {30, 4}},
+                             {{7, 3}, {0, bytes.size()}},
+                             {{0, bytes.size()}, {0, bytes.size()}}}) {
+    RunningDigest seen, seen_other;
+    for (const auto& [from, count] : parts) seen.see(from, bytes.subspan(from, count));
+    EXPECT_TRUE(seen.check(temp.path() / "file", digest_of(text), ""));
+    std::string other = text;
+    other[2] = 'X';
+    for (const auto& [from, count] : parts) seen_other.see(from, std::as_bytes(std::span(other)).subspan(from, count));
+    if (!parts.empty()) {
+      EXPECT_FALSE(seen_other.check(temp.path() / "file", digest_of(text), "")) << "it is of what was read";
+    }
+  }
 }
 
 TEST(SoundFiles, ReadAFileAgainOnceItIsAnother) {
