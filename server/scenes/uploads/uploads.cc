@@ -94,13 +94,16 @@ Result<ManifestPtr> Uploads::add(const fs::path& file, const std::string& filena
 }
 
 Result<ManifestPtr> Uploads::add_path(const std::string& path, const std::string& name) {
-  const auto found = below_root(options_.scene_root, path);
+  const auto found = open_below_root(options_.scene_root, path);
   if (!found) return propagate(found);
   const auto staging = scratch_.make();
   if (!staging) return propagate(staging);
   const fs::path copy = staging->folder() / "copy";
-  if (auto copied = scenes::copy_file(*found, copy); !copied) {
-    if (copied.error().where == found->string()) copied.error().where = "path";
+  const std::string opened = "/proc/self/fd/" + std::to_string(found->get());
+  if (auto copied = scenes::copy_file(opened, copy); !copied) {
+    if (copied.error().where.find(opened) != std::string::npos ||
+        copied.error().message.find(opened) != std::string::npos)
+      return engine::fail(copied.error().code, "the file cannot be read to its end", "path");
     return public_error_(copied, staging->folder());
   }
   return add(copy, fs::path(path).filename().string(), name);
