@@ -30,6 +30,8 @@ find_package(PkgConfig REQUIRED)
 pkg_check_modules(httplib REQUIRED IMPORTED_TARGET cpp-httplib>=0.11)
 # Datasets sent as zip files. Debian's CMake package also wants libzip's programs installed; pkg-config does not.
 pkg_check_modules(libzip REQUIRED IMPORTED_TARGET libzip>=1.7)
+# Checksums of stored files. XXH3's output is fixed since 0.8.0.
+pkg_check_modules(libxxhash REQUIRED IMPORTED_TARGET libxxhash>=0.8)
 if(SPLATDRAG_TESTS)
   find_package(GTest 1.12 REQUIRED)
 endif()

@@ -14,7 +14,7 @@ packages=(
   libeigen3-dev                                        # sparse equations
   nlohmann-json3-dev libtomlplusplus-dev libcli11-dev
   zlib1g-dev libzstd-dev                               # compressed scenes
-  libsqlite3-dev libzip-dev                            # job records, datasets as zip files
+  libsqlite3-dev libzip-dev libxxhash-dev              # job records, datasets as zip files, checksums of stored files
   libcpp-httplib-dev libspdlog-dev prometheus-cpp-dev  # the service: HTTP, logs, metrics
   libgtest-dev libbenchmark-dev                        # tests and benchmarks
   curl jq                                              # the demo talks to the service

@@ -23,6 +23,8 @@ Result<InputFile> InputFile::open(const std::filesystem::path& path) {
 }
 
 Result<void> InputFile::read_at(std::uint64_t offset, std::span<std::byte> into) const {
+  const std::uint64_t begin = offset;
+  const std::span<const std::byte> all = into;
   while (!into.empty()) {
     const auto got = ::pread(fd_.get(), into.data(), into.size(), off_t(offset));
     if (got < 0 && errno == EINTR) continue;
@@ -35,6 +37,7 @@ Result<void> InputFile::read_at(std::uint64_t offset, std::span<std::byte> into)
     into = into.subspan(std::size_t(got));
     offset += std::uint64_t(got);
   }
+  if (witness_) witness_(begin, all);
   return {};
 }
 

@@ -6,10 +6,12 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "engine/core/file_descriptor.h"
 #include "engine/core/result.h"
+#include "engine/io/read_options.h"
 
 namespace engine::io {
 
@@ -23,6 +25,9 @@ class InputFile {
   [[nodiscard]] std::uint64_t size() const { return size_; }       ///< Bytes, when it was opened.
   [[nodiscard]] const std::string& name() const { return name_; }  ///< Base name, for Error::where.
 
+  /// From now on shows all that is read.
+  void show_to(ReadWitness witness) { witness_ = std::move(witness); }
+
   /// Fills `into` from `offset` on; corrupt_data if the file ends first.
   [[nodiscard]] Result<void> read_at(std::uint64_t offset, std::span<std::byte> into) const;
   /// `size` bytes from `offset` on. The caller has checked that a vector of that size is acceptable.
@@ -35,6 +40,7 @@ class InputFile {
   std::filesystem::path path_;
   std::string name_;
   std::uint64_t size_ = 0;
+  ReadWitness witness_;
 };
 
 }  // namespace engine::io

@@ -1,9 +1,16 @@
 // What a caller may choose about reading scenes, and the limits every reader keeps.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <span>
 
 namespace engine::io {
+
+/// Is shown what is read of a file, as it is read: the place of the first byte, and the bytes. Some may be shown twice,
+/// or not at all, where a reader has no use for them.
+using ReadWitness = std::function<void(std::uint64_t offset, std::span<const std::byte> bytes)>;
 
 /// The frame an .spz file is taken to be in; its header does not tell.
 enum class SpzFrame {
@@ -17,6 +24,7 @@ struct ReadOptions {
   std::uint64_t max_memory_bytes = std::uint64_t(16)
                                    << 30;  ///< Size of the scene in memory; more is refused (too_large).
   SpzFrame spz_frame = SpzFrame::rub;
+  ReadWitness witness = {};  ///< Of a scene's file: for a checksum that costs no reading of its own.
 };
 
 }  // namespace engine::io

@@ -64,8 +64,9 @@ Result<SceneFile> read_detected(const InputFile& file, const ReadOptions& option
 }  // namespace
 
 Result<SceneFile> read_scene(const std::filesystem::path& path, const ReadOptions& options) {
-  const auto file = InputFile::open(path);
+  auto file = InputFile::open(path);
   if (!file) return propagate(file);
+  file->show_to(options.witness);
   return within_memory(file->name(), [&] { return read_detected(*file, options); });
 }
 

@@ -4,6 +4,8 @@
 #include <utility>
 
 #include "engine/jobs/durable_file.h"
+#include "engine/jobs/notes.h"
+#include "engine/jobs/reconcile.h"
 #include "engine/jobs/running_job.h"
 
 namespace engine::jobs {
@@ -24,23 +26,23 @@ Queue::~Queue() = default;
 
 Result<std::unique_ptr<Queue>> Queue::open(Store& store, const QueueOptions& options) {
   if (auto made = create_folder(options.folder); !made) return propagate(made);
-  std::error_code error;
-  std::vector<fs::path> orphans;
-  for (fs::directory_iterator entry(options.folder, error), end; !error && entry != end; entry.increment(error)) {
-    const std::string id = entry->path().filename();
-    if (!number_of(id)) continue;  // none of ours
-    const auto job = store.find(id);
-    if (!job && job.error().code != ErrorCode::not_found) return propagate(job);
-    if (!job || job->state == JobState::cancelled) orphans.push_back(entry->path());
-  }
-  if (error) return fail(ErrorCode::unavailable, "the folder cannot be read: " + error.message(), options.folder);
-  for (const fs::path& orphan : orphans) remove_files(orphan);
-  return std::unique_ptr<Queue>(new Queue(store, options));
+  auto findings = reconcile(store, options.folder);
+  if (!findings) return propagate(findings);
+  std::unique_ptr<Queue> queue(new Queue(store, options));
+  queue->findings_ = std::move(*findings);
+  return queue;
 }
 
 Result<Submission> Queue::submit(const NewJob& job) {
-  auto submission = store_.submit(job, options_.max_queued);
-  if (!submission) return submission;
+  std::string noted;
+  auto submission = store_.submit(job, options_.max_queued, [&](const Job& accepted) {
+    noted = accepted.id;
+    return write_note(options_.folder, accepted);
+  });
+  if (!submission) {
+    if (!noted.empty()) remove_traces(options_.folder, noted);
+    return submission;
+  }
   if (submission->created) bump_revision();
   submission->job = with_latest_progress(std::move(submission->job));
   return submission;
@@ -77,14 +79,25 @@ Result<Job> Queue::cancel(const std::string& id) {
   auto job = store_.apply(id, {.event = Event::cancel});
   if (!job) return job;
   if (const auto running = find_running(id)) running->interrupt.request_stop();
-  if (job->state == JobState::cancelled) remove_files(folder_of(id));
+  if (job->state == JobState::cancelled) {
+    remove_files(folder_of(id));
+    note_end(*job);
+  }
   bump_revision();
   return with_latest_progress(std::move(*job));
 }
 
 Result<void> Queue::remove(const std::string& id) {
-  if (auto removed = store_.remove(id); !removed) return removed;
-  remove_files(folder_of(id));
+  const auto job = store_.find(id);
+  if (!job) return propagate(job);
+  const bool has_ended = is_final(job->state);
+  if (has_ended)
+    if (auto marked = mark_removed(options_.folder, id); !marked) return marked;
+  if (auto removed = store_.remove(id); !removed) {
+    if (has_ended) unmark_removed(options_.folder, id);
+    return removed;
+  }
+  remove_traces(options_.folder, id);
   bump_revision();
   return {};
 }
@@ -92,10 +105,12 @@ Result<void> Queue::remove(const std::string& id) {
 Result<void> Queue::expire() {
   const auto expired = store_.expire(options_.retention);
   if (!expired) return propagate(expired);
-  for (const std::string& id : *expired) remove_files(folder_of(id));
+  for (const std::string& id : *expired) remove_traces(options_.folder, id);
   if (!expired->empty()) bump_revision();
   return {};
 }
+
+void Queue::note_end(const Job& job) const { (void)write_note(options_.folder, job); }
 
 std::uint64_t Queue::revision() const {
   const std::lock_guard lock(mutex_);

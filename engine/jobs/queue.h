@@ -26,11 +26,15 @@ struct QueueOptions {
 /// Errors are those of Store, unless said otherwise.
 class Queue {
  public:
-  /// Makes the folder, and removes in it what belongs to no job, or to a cancelled one.
+  /// Makes the folder and holds the store against the notes in it (notes.h): what the store has lost is put back, what
+  /// the notes lack is noted. The folder of a cancelled job goes; one that neither knows stays.
   ///   store   outlives the queue
   ///   errors  no_space, unavailable; those of Store
   [[nodiscard]] static Result<std::unique_ptr<Queue>> open(Store& store, const QueueOptions& options);
   ~Queue();
+
+  /// What was found amiss when the queue was opened, and what was done about it. `where` is the job's id.
+  [[nodiscard]] const std::vector<Error>& findings() const { return findings_; }
 
   /// Accepts a job: when this returns, it is on disk and will be done. With an idempotency key that is known already it
   /// answers with the job that was accepted then.
@@ -66,6 +70,8 @@ class Queue {
 
   Queue(Store& store, QueueOptions options) : store_(store), options_(std::move(options)) {}
   [[nodiscard]] std::filesystem::path folder_of(const std::string& id) const { return options_.folder / id; }
+  /// Writes down how a job has ended. Where that fails, the next open() does.
+  void note_end(const Job& job) const;
   void bump_revision();
   [[nodiscard]] std::shared_ptr<RunningJob> find_running(const std::string& id) const;
   void attach(const std::string& id, std::shared_ptr<RunningJob> running);
@@ -74,7 +80,8 @@ class Queue {
 
   Store& store_;
   const QueueOptions options_;
-  mutable std::mutex mutex_;  ///< Guards the two below.
+  std::vector<Error> findings_;  ///< Only open() writes it.
+  mutable std::mutex mutex_;     ///< Guards the two below.
   std::map<std::string, std::shared_ptr<RunningJob>> running_;
   std::uint64_t revision_ = 0;
   mutable std::condition_variable changed_;

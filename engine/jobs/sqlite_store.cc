@@ -8,17 +8,20 @@
 #include <exception>
 #include <iterator>
 #include <mutex>
+#include <span>
 #include <string_view>
 #include <type_traits>
 #include <utility>
 
+#include "engine/core/byte_writer.h"
+#include "engine/core/checksum.h"
 #include "engine/core/file_descriptor.h"
 #include "engine/jobs/durable_file.h"
 
 namespace engine::jobs {
 namespace {
 
-constexpr int schema_number = 2;  // of the tables below; user_version in the file
+constexpr int schema_number = 3;  // of the tables below; user_version in the file
 constexpr const char* schema = R"(
   CREATE TABLE jobs (
     number INTEGER PRIMARY KEY AUTOINCREMENT,  -- AUTOINCREMENT: a removed job's number is never given away again
@@ -50,6 +53,35 @@ constexpr const char* counts_deaths = R"(
   PRAGMA user_version = 2;
 )";
 
+/// A row in the order of its checksum, which is the last of its columns. SQLite's own checks see damage to its pages
+/// and indices, but not to what they hold.
+constexpr std::string_view summed_columns =
+    "number, lane, payload, idempotency_key, state, claimed, stopped_early, finished_intervals, progress, result, "
+    "error_code, error_message, error_where, created, started, ended, place, died_at, deaths";
+/// From schema 2 to 3.
+constexpr const char* adds_checksums = "ALTER TABLE jobs ADD COLUMN checksum INTEGER NOT NULL DEFAULT 0;";
+constexpr const char* says_schema_3 = "PRAGMA user_version = 3;";
+
+/// What row_checksum(...) is in SQL: fnv1a() over the values, each with its type and length.
+void row_checksum(sqlite3_context* context, int count, sqlite3_value** values) {
+  ByteWriter all;
+  for (const std::span<sqlite3_value*> rest(values, std::size_t(count)); sqlite3_value* const value : rest) {
+    const int type = sqlite3_value_type(value);
+    all.write(std::int32_t(type));
+    if (type == SQLITE_INTEGER) {
+      all.write(std::int64_t(sqlite3_value_int64(value)));
+    } else if (type != SQLITE_NULL) {
+      const auto* const bytes = static_cast<const std::byte*>(sqlite3_value_blob(value));
+      const std::span text(bytes, std::size_t(sqlite3_value_bytes(value)));
+      all.write(std::uint64_t(text.size()));
+      all.write_all(text);
+    }
+  }
+  sqlite3_result_int64(context, std::int64_t(fnv1a(all.bytes())));
+}
+
+std::string checksum_of_row() { return "row_checksum(" + std::string(summed_columns) + ")"; }
+
 /// SQLite's result codes become an Error here, travel as an exception to guarded() and leave this file as a Result.
 struct Failure : std::exception {
   explicit Failure(Error e) : error(std::move(e)) {}
@@ -74,15 +106,15 @@ class Database {
     const int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX;
     check(sqlite3_open_v2(file_.c_str(), &handle_, flags, nullptr));
     sqlite3_busy_timeout(handle_, int(busy_timeout.count()));
+    check(sqlite3_create_function(handle_, "row_checksum", -1, SQLITE_UTF8 | SQLITE_DETERMINISTIC | SQLITE_INNOCUOUS,
+                                  nullptr, row_checksum, nullptr, nullptr));
   }
   void execute(const char* sql) { check(sqlite3_exec(handle_, sql, nullptr, nullptr, nullptr)); }
   void check(int code) const {
     if (code != SQLITE_OK && code != SQLITE_ROW && code != SQLITE_DONE) throw Failure(error(code));
   }
   [[noreturn]] void corrupt(const std::string& what) const {
-    throw Failure({ErrorCode::corrupt_data,
-                   "the job store is damaged (" + what + "): put back a copy of it, or move it away to start afresh",
-                   file_});
+    throw Failure({ErrorCode::corrupt_data, "the job store is damaged (" + what + ")", file_});
   }
   [[nodiscard]] sqlite3* handle() const { return handle_; }
   [[nodiscard]] const std::filesystem::path& file() const { return file_; }
@@ -95,11 +127,9 @@ class Database {
       return {ErrorCode::no_space, "the job store cannot grow, the disk is full: free some space and try again", file_};
     switch (code & 0xff) {
       case SQLITE_CORRUPT:
-        return {ErrorCode::corrupt_data,
-                "the job store is damaged: put back a copy of it, or move it away to start afresh", file_};
+        return {ErrorCode::corrupt_data, "the job store is damaged", file_};
       case SQLITE_NOTADB:
-        return {ErrorCode::corrupt_data, "the file is no job store: move it away, or choose another data folder",
-                file_};
+        return {ErrorCode::corrupt_data, "the file is no job store", file_};
       case SQLITE_BUSY:
       case SQLITE_LOCKED:
         return {ErrorCode::unavailable, "another process uses this job store: end it, or choose another data folder",
@@ -212,13 +242,16 @@ std::int64_t known_number(const std::string& id) {
   return *number;
 }
 
-/// What read() reads; `payload` and `result` are columns, or '' where the texts are not wanted.
-std::string select(const std::string& payload, const std::string& result) {
+/// What read() reads. A list has neither the long texts nor the row held against its checksum, which is over them, too.
+std::string select(bool whole) {
+  const std::string payload = whole ? "payload" : "''", result = whole ? "result" : "''";
+  const std::string is_sound = whole ? "checksum IS " + checksum_of_row() : "1";
   return "SELECT number, lane, " + payload +
          ", idempotency_key, state, claimed, stopped_early, finished_intervals, progress, " + result +
          ", error_code, error_message, error_where, created, started, ended, "
          "CASE state WHEN 'queued' THEN (SELECT count(*) FROM jobs AS other WHERE other.ended IS NULL AND "
-         "other.state = 'queued' AND other.number <= jobs.number) ELSE 0 END, place, died_at, deaths FROM jobs ";
+         "other.state = 'queued' AND other.number <= jobs.number) ELSE 0 END, place, died_at, deaths, " +
+         is_sound + " FROM jobs ";
 }
 
 std::optional<Time> time_at(const Statement& row, int column) {
@@ -229,6 +262,7 @@ std::optional<Time> time_at(const Statement& row, int column) {
 Job read(const Database& database, const Statement& row) {
   Job job;
   job.id = id_of(row.integer(0));
+  if (row.integer(20) == 0) database.corrupt("the record of job " + job.id);
   job.lane = row.text(1);
   job.payload = row.text(2);
   job.idempotency_key = row.text(3);
@@ -256,21 +290,24 @@ Job read(const Database& database, const Statement& row) {
 }
 
 Job find_in(Database& database, const std::string& id) {
-  Statement row(database, select("payload", "result") + "WHERE number = ?1", known_number(id));
+  Statement row(database, select(true) + "WHERE number = ?1", known_number(id));
   if (!row.step()) no_such_job(id);
   return read(database, row);
 }
 
 std::optional<Job> find_key_in(Database& database, const std::string& key) {
-  Statement row(database, select("payload", "result") + "WHERE idempotency_key = ?1", key);
+  Statement row(database, select(true) + "WHERE idempotency_key = ?1", key);
   if (!row.step()) return std::nullopt;
   return read(database, row);
 }
 
-Job apply_in(Database& database, const std::string& id, const Change& change, Time now) {
-  const auto changed = transition(find_in(database, id), change, now);
-  if (!changed) throw Failure(changed.error());
-  const Job& job = *changed;
+/// Notes in a row what it holds now.
+void seal(Database& database, std::int64_t number) {
+  Statement(database, "UPDATE jobs SET checksum = " + checksum_of_row() + " WHERE number = ?1", number).run();
+}
+
+/// Writes down all of a record that may change.
+void write_in(Database& database, const Job& job) {
   std::optional<std::string_view> code, message, where;
   if (job.error) {
     code = code_names[std::size_t(job.error->code)];
@@ -281,10 +318,17 @@ Job apply_in(Database& database, const std::string& id, const Change& change, Ti
             "UPDATE jobs SET state = ?2, claimed = ?3, stopped_early = ?4, finished_intervals = ?5, progress = ?6, "
             "result = ?7, error_code = ?8, error_message = ?9, error_where = ?10, started = ?11, ended = ?12, "
             "place = ?13, died_at = ?14, deaths = ?15 WHERE number = ?1",
-            known_number(id), to_string(job.state), std::int64_t(job.claimed), std::int64_t(job.stopped_early),
+            known_number(job.id), to_string(job.state), std::int64_t(job.claimed), std::int64_t(job.stopped_early),
             std::int64_t(job.finished_intervals), job.progress, job.result, code, message, where, job.started,
             job.ended, job.place, job.died_at, std::int64_t(job.deaths))
       .run();
+  seal(database, known_number(job.id));
+}
+
+Job apply_in(Database& database, const std::string& id, const Change& change, Time now) {
+  const auto changed = transition(find_in(database, id), change, now);
+  if (!changed) throw Failure(changed.error());
+  write_in(database, *changed);
   return find_in(database, id);
 }
 
@@ -311,11 +355,27 @@ void skip_numbers(Database& database, std::int64_t used) {
 void bring_up_to_date(Database& database, int found_schema) {
   if (found_schema == 0) {
     if (text_of(database, "SELECT count(*) FROM sqlite_schema") != "0")
-      throw Failure({ErrorCode::corrupt_data, "the file is no job store: move it away, or choose another data folder",
-                     database.file()});
+      throw Failure({ErrorCode::corrupt_data, "the file is no job store", database.file()});
     database.execute(schema);
   }
+  // A damaged number of the schema would have columns added twice.
+  const bool is_newer =
+      text_of(database, "SELECT count(*) FROM pragma_table_info('jobs') WHERE name = 'checksum'") != "0";
+  if (found_schema < schema_number && is_newer) database.corrupt("the number of its schema");
   if (found_schema < 2) database.execute(counts_deaths);
+  if (found_schema < 3) {
+    database.execute(adds_checksums);
+    Statement(database, "UPDATE jobs SET checksum = " + checksum_of_row()).run();
+    database.execute(says_schema_3);
+  }
+}
+
+/// SQLite's own check, of indices, too, and ours of what the rows hold.
+void check_all(Database& database) {
+  if (const auto found = text_of(database, "PRAGMA integrity_check(1)"); found != "ok") database.corrupt(found);
+  for (const std::string& id :
+       ids(Statement(database, "SELECT number FROM jobs WHERE checksum IS NOT " + checksum_of_row() + " LIMIT 1")))
+    database.corrupt("the record of job " + id);
 }
 
 void prepare(Database& database, Time now, const SqliteOptions& options) {
@@ -324,8 +384,6 @@ void prepare(Database& database, Time now, const SqliteOptions& options) {
   if (text_of(database, "PRAGMA journal_mode = WAL") != "wal")
     throw Failure({ErrorCode::unavailable, "this file system cannot hold a job store: choose another data folder",
                    database.file()});
-  if (const auto found = text_of(database, "PRAGMA quick_check(1)"); found != "ok") database.corrupt(found);
-
   Transaction transaction(database);
   const int found_schema = std::stoi(text_of(database, "PRAGMA user_version"));
   if (found_schema > schema_number)
@@ -334,10 +392,18 @@ void prepare(Database& database, Time now, const SqliteOptions& options) {
                        std::to_string(schema_number) + "): use that one, or choose another data folder",
                    database.file()});
   bring_up_to_date(database, found_schema);
+  check_all(database);
   for (const std::string& id : ids(Statement(database, "SELECT number FROM jobs WHERE claimed ORDER BY number")))
     apply_in(database, id, {.event = Event::abandon, .max_deaths = options.max_deaths}, now);
   if (options.used_numbers > 0) skip_numbers(database, options.used_numbers);
   transaction.commit();
+}
+
+/// 0 for a file that is absent or cannot be looked at.
+std::uintmax_t size_of(const std::filesystem::path& file) {
+  std::error_code error;
+  const auto size = std::filesystem::file_size(file, error);
+  return error ? 0 : size;
 }
 
 /// Runs `body` and turns what SQLite and the library throw into an Error.
@@ -391,13 +457,16 @@ Result<std::unique_ptr<SqliteStore>> SqliteStore::open(const SqliteOptions& opti
   if (auto made = create_folder(options.folder); !made) return propagate(made);
   return guarded([&] {
     auto impl = std::make_unique<Impl>(options.folder / "jobs.db", options.now);
+    if (options.must_exist && size_of(impl->database.file()) == 0)
+      throw Failure(
+          {ErrorCode::corrupt_data, "the job store is gone, but there have been jobs", impl->database.file()});
     impl->database.open(options.busy_timeout);
     prepare(impl->database, impl->now(), options);
     return std::unique_ptr<SqliteStore>(new SqliteStore(std::move(impl)));
   });
 }
 
-Result<Submission> SqliteStore::submit(const NewJob& job, std::size_t max_queued) {
+Result<Submission> SqliteStore::submit(const NewJob& job, std::size_t max_queued, const Witness& witness) {
   return impl_->transact([&]() -> Submission {
     Database& database = impl_->database;
     std::optional<std::string_view> key;
@@ -423,7 +492,32 @@ Result<Submission> SqliteStore::submit(const NewJob& job, std::size_t max_queued
               "progress, result, created) VALUES (?1, ?2, ?3, 'queued', 0, 0, 0, '', '', ?4)",
               job.lane, job.payload, key, impl_->now())
         .run();
-    return {.job = find_in(database, id_of(sqlite3_last_insert_rowid(database.handle()))), .created = true};
+    seal(database, sqlite3_last_insert_rowid(database.handle()));
+    Job accepted = find_in(database, id_of(sqlite3_last_insert_rowid(database.handle())));
+    if (const auto witnessed = witness(accepted); !witnessed) throw Failure(witnessed.error());
+    return {.job = std::move(accepted), .created = true};
+  });
+}
+
+Result<void> SqliteStore::restore(const Job& job) {
+  return impl_->transact([&] {
+    Database& database = impl_->database;
+    std::optional<std::string_view> key;
+    if (!job.idempotency_key.empty()) {
+      key = job.idempotency_key;
+      if (const auto other = find_key_in(database, job.idempotency_key); other && other->id != job.id)
+        throw Failure({ErrorCode::conflict, other->id + " has the idempotency key of " + job.id, job.id});
+    }
+    const std::int64_t number = known_number(job.id);
+    Statement(database,
+              "INSERT OR IGNORE INTO jobs (number, lane, payload, state, claimed, stopped_early, finished_intervals, "
+              "progress, result, created) VALUES (?1, ?2, ?3, 'queued', 0, 0, 0, '', '', ?4)",
+              number, job.lane, job.payload, job.created)
+        .run();
+    Statement(database, "UPDATE jobs SET lane = ?2, payload = ?3, idempotency_key = ?4, created = ?5 WHERE number = ?1",
+              number, job.lane, job.payload, key, job.created)
+        .run();
+    write_in(database, job);
   });
 }
 
@@ -446,10 +540,10 @@ Result<std::vector<Job>> SqliteStore::list(const Filter& filter) {
     const std::lock_guard lock(impl_->mutex);
     std::optional<std::string_view> lane;
     if (filter.lane) lane = *filter.lane;
-    Statement row(impl_->database,
-                  select("''", "''") +
-                      "WHERE (?1 IS NULL OR lane = ?1) AND (NOT ?2 OR ended IS NULL) ORDER BY number DESC LIMIT ?3",
-                  lane, std::int64_t(filter.active_only), std::int64_t(filter.limit));
+    Statement row(
+        impl_->database,
+        select(false) + "WHERE (?1 IS NULL OR lane = ?1) AND (NOT ?2 OR ended IS NULL) ORDER BY number DESC LIMIT ?3",
+        lane, std::int64_t(filter.active_only), std::int64_t(filter.limit));
     std::vector<Job> jobs;
     while (row.step()) jobs.push_back(read(impl_->database, row));
     return jobs;

@@ -17,6 +17,7 @@ struct SqliteOptions {
   std::chrono::milliseconds busy_timeout{2000};  ///< Longest wait for a process that is just ending.
   std::int64_t used_numbers = 0;                 ///< Ids up to this one are known elsewhere and not given away, even if
                                                  ///< the file is new because an old one was lost.
+  bool must_exist = false;                       ///< There have been jobs: a file that is absent or empty was lost.
   int max_deaths =
       3;  ///< A job whose process has died so often in a row at the same place has failed; 0: never. A choice.
   std::function<Time()> now = [] {
@@ -28,12 +29,14 @@ struct SqliteOptions {
 /// ends; so whoever opens it knows that no worker is left, and open() ends every claim (Event::abandon).
 class SqliteStore final : public Store {
  public:
-  ///   errors  unavailable: another process holds the file, or it cannot be opened; corrupt_data: it is damaged or no
-  ///           job store; unsupported: a newer version wrote it; no_space. `where` is the file.
+  ///   errors  unavailable: another process holds the file, or it cannot be opened; corrupt_data: it is damaged, lost
+  ///           or no job store; unsupported: a newer version wrote it; no_space. `where` is the file.
   [[nodiscard]] static Result<std::unique_ptr<SqliteStore>> open(const SqliteOptions& options);
   ~SqliteStore() override;
 
-  [[nodiscard]] Result<Submission> submit(const NewJob& job, std::size_t max_queued) override;
+  using Store::submit;
+  [[nodiscard]] Result<Submission> submit(const NewJob& job, std::size_t max_queued, const Witness& witness) override;
+  [[nodiscard]] Result<void> restore(const Job& job) override;
   [[nodiscard]] Result<Job> find(const std::string& id) override;
   [[nodiscard]] Result<std::optional<Job>> find_key(const std::string& idempotency_key) override;
   [[nodiscard]] Result<std::vector<Job>> list(const Filter& filter) override;

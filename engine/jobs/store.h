@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -24,6 +25,9 @@ struct Submission {
   Job job;
   bool created = true;  ///< false: it had been submitted before, under the same idempotency key.
 };
+
+/// Sees the record of a job that is about to be accepted; an error keeps it from being accepted.
+using Witness = std::function<Result<void>(const Job&)>;
 
 /// Which jobs a list holds.
 struct Filter {
@@ -50,8 +54,18 @@ class Store {
 
   /// Accepts a job.
   ///   max_queued  most jobs that may wait
-  ///   errors      busy: as many wait already; unprocessable: the idempotency key belongs to another payload or lane
-  [[nodiscard]] virtual Result<Submission> submit(const NewJob& job, std::size_t max_queued) = 0;
+  ///   witness     called for a new job before anybody else can see it. When submit() returns an error afterwards, the
+  ///               job does not exist
+  ///   errors      busy: as many wait already; unprocessable: the idempotency key belongs to another payload or lane;
+  ///               those of `witness`
+  [[nodiscard]] virtual Result<Submission> submit(const NewJob& job, std::size_t max_queued,
+                                                  const Witness& witness) = 0;
+  [[nodiscard]] Result<Submission> submit(const NewJob& job, std::size_t max_queued) {
+    return submit(job, max_queued, [](const Job&) -> Result<void> { return {}; });
+  }
+  /// Puts back a record that was lost, or that is known to have become this one. Nobody holds the job afterwards.
+  ///   errors  conflict: another job has its idempotency key
+  [[nodiscard]] virtual Result<void> restore(const Job& job) = 0;
   [[nodiscard]] virtual Result<Job> find(const std::string& id) = 0;
   /// The job that was submitted under this idempotency key; nothing if none was.
   [[nodiscard]] virtual Result<std::optional<Job>> find_key(const std::string& idempotency_key) = 0;

@@ -192,6 +192,7 @@ void Worker::record_end(const std::string& id, const Change& change) {
     const auto last_revision = queue_.revision();
     const auto job = queue_.store_.apply(id, change);
     if (job) {
+      if (is_final(job->state)) queue_.note_end(*job);
       if (job->state == JobState::cancelled) {
         std::error_code ignored;
         fs::remove_all(queue_.folder_of(id), ignored);

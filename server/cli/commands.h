@@ -12,6 +12,7 @@ void add_fit_command(CLI::App& program, Action& action);
 void add_render_command(CLI::App& program, Action& action);
 void add_info_command(CLI::App& program, Action& action);
 void add_convert_command(CLI::App& program, Action& action);
+void add_admin_command(CLI::App& program, Action& action);
 void add_bench_edit_command(CLI::App& program, Action& action);
 void add_demo_scene_command(CLI::App& program, Action& action);
 

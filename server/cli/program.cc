@@ -52,6 +52,7 @@ void describe(CLI::App& program, Action& action) {
   add_info_command(program, action);
   add_convert_command(program, action);
   add_demo_scene_command(program, action);
+  add_admin_command(program, action);
   add_bench_edit_command(program, action);
   program.footer(sources + exit_status_help());
   name_environment(program);

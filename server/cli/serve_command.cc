@@ -134,6 +134,8 @@ void add_serve_command(CLI::App& program, Action& action) {
   command->add_flag("--insecure", options->insecure, "Listen to other machines without a token");
   add_count(*command, "--drain-seconds", options->drain_seconds,
             "When the service is stopped, a running edit may go on for so long to finish its interval", 0);
+  add_count(*command, "--unready-seconds", options->unready_seconds,
+            "When the service is stopped, it goes on serving for so long while /readyz says that it ends", 0);
   command->add_option("--log-level", options->log_level, "Least level that is logged")
       ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
       ->type_name("LEVEL");

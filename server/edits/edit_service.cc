@@ -7,8 +7,6 @@
 
 #include "engine/edit/handles.h"
 #include "engine/edit/preview.h"
-#include "engine/jobs/durable_file.h"
-#include "engine/jobs/sqlite_store.h"
 #include "engine/jobs/worker.h"
 #include "proto/edit_record.h"
 #include "proto/time_text.h"
@@ -19,6 +17,7 @@
 #include "server/edits/estimate.h"
 #include "server/edits/interval_pictures.h"
 #include "server/edits/named_locks.h"
+#include "server/edits/records.h"
 #include "server/edits/status.h"
 #include "server/scenes/disk/public_errors.h"
 
@@ -37,16 +36,6 @@ constexpr auto result_is_recorded_within = std::chrono::seconds(2);
 
 double seconds_since(steady_clock::time_point start) {
   return std::chrono::duration<double>(steady_clock::now() - start).count();
-}
-
-/// The highest number of an edit that has made a version. A store of records that is new, because an old one was lost,
-/// must not give it away again: its edit would seem to have its result already.
-std::int64_t highest_edit(const scenes::SceneStore& scenes) {
-  std::int64_t highest = 0;
-  for (const scenes::SceneInfo& info : scenes.list())
-    for (const scenes::VersionInfo& version : info.versions)
-      highest = std::max(highest, jobs::number_of(version.edit).value_or(0));
-  return highest;
 }
 
 /// The answer about a job, in the words of those who ask about edits.
@@ -153,17 +142,13 @@ struct EditService::Impl {
         selections(options.selections != nullptr ? *options.selections : own_selections),
         arena(options.threads, engine::Priority::low) {}
 
-  [[nodiscard]] std::filesystem::path jobs_folder() const { return options.folder / "jobs"; }
-
   Result<void> open() {
-    auto opened = jobs::SqliteStore::open(
-        {.folder = options.folder, .used_numbers = highest_edit(scenes), .max_deaths = options.attempts});
+    auto opened = open_records(scenes, options);
     if (!opened) return propagate(opened);
-    records = std::move(*opened);
-    auto made = jobs::Queue::open(
-        *records, {.folder = jobs_folder(), .max_queued = options.max_queued, .retention = options.retention});
-    if (!made) return propagate(made);
-    queue = std::move(*made);
+    records = std::move(opened->records);
+    queue = std::move(opened->queue);
+    for (const engine::Error& finding : queue->findings())
+      if (options.logger != nullptr) options.logger->log(spdlog::level::warn, finding.message);
     worker.emplace(*queue, [workshop = Workshop{scenes, arena, results, options.logger, options.pictured_views,
                                                 options.perceptual}](jobs::JobContext& context) {
       return carry_out(context, workshop);
@@ -215,7 +200,7 @@ struct EditService::Impl {
   engine::WorkArena arena;
   NamedLocks scenes_in_use;  ///< By scene: shared while an edit of it is accepted, alone in while_idle().
   NamedLocks results;        ///< By edit; see Workshop.
-  std::unique_ptr<jobs::SqliteStore> records;
+  std::unique_ptr<jobs::Store> records;
   std::unique_ptr<jobs::Queue> queue;
   std::optional<jobs::Worker> worker;  ///< Last: it uses all of the above until it ends.
 };
@@ -360,7 +345,10 @@ Result<std::string> EditService::interval_picture(const std::string& id, int int
     for (const std::string& name : stages) names += (names.empty() ? "" : ", ") + name;
     return fail(ErrorCode::not_found, "there is no picture of this stage; there are: " + names, "stage");
   }
-  auto bytes = jobs::read_bytes(impl_->jobs_folder() / id / picture_name(interval, std::size_t(view), stage));
+  const std::string name = picture_name(interval, std::size_t(view), stage);
+  auto bytes = read_picture(jobs_folder(impl_->options.folder) / id / name);
+  if (!bytes && bytes.error().code == ErrorCode::corrupt_data)
+    return fail(ErrorCode::corrupt_data, bytes.error().message, "edits/jobs/" + id + "/" + name);
   if (!bytes) return fail(bytes.error().code, "the picture is gone: " + bytes.error().message, id);
   return bytes;
 }

@@ -47,6 +47,8 @@ class EditService {
  public:
   /// Takes up what was left unfinished.
   ///   scenes  outlives the service
+  ///   errors  corrupt_data: the records of edits are damaged or lost (the message says how to go on); unavailable,
+  ///           no_space
   [[nodiscard]] static Result<std::unique_ptr<EditService>> open(scenes::SceneStore& scenes,
                                                                  const ServiceOptions& options);
   ~EditService();

@@ -1,14 +1,29 @@
 #include "server/edits/interval_pictures.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <span>
 #include <utility>
 
+#include "engine/core/byte_writer.h"
+#include "engine/core/checksum.h"
 #include "engine/io/image_file.h"
 #include "engine/jobs/durable_file.h"
 #include "engine/render/forward.h"
 
 namespace server::edits {
 namespace {
+
+constexpr std::string_view before_checksum = "SDCHKSUM";  // after the JPEG, and before the checksum of all before
+constexpr std::string_view end_of_jpeg = "\xff\xd9";
+
+std::string with_checksum(const std::string& jpeg) {
+  engine::ByteWriter out;
+  out.write_all(std::span(jpeg));
+  out.write_all(std::span(before_checksum));
+  out.write(engine::fnv1a(out.bytes()));
+  return std::move(out).take();
+}
 
 constexpr int jpeg_quality = 90;  // 1 to 100; what POST .../render has by default. A choice.
 
@@ -19,6 +34,19 @@ Result<std::string> encoded(const engine::scene::Image& picture) {
 }
 
 }  // namespace
+
+Result<std::string> read_picture(const std::filesystem::path& file) {
+  auto bytes = engine::jobs::read_bytes(file);
+  if (!bytes) return bytes;
+  constexpr std::size_t added = before_checksum.size() + sizeof(std::uint64_t);
+  if (bytes->size() > added && std::string_view(*bytes).substr(bytes->size() - added).starts_with(before_checksum)) {
+    const std::string jpeg = bytes->substr(0, bytes->size() - added);
+    if (with_checksum(jpeg) == *bytes) return jpeg;
+  } else if (bytes->ends_with(end_of_jpeg)) {
+    return bytes;
+  }
+  return engine::fail(engine::ErrorCode::corrupt_data, "the stored picture is damaged", file);
+}
 
 std::string picture_name(int interval, std::size_t view, std::string_view stage) {
   return "interval-" + std::to_string(interval) + "-view-" + std::to_string(view) + "-" + std::string(stage) + ".jpg";
@@ -45,7 +73,8 @@ Result<void> IntervalPictures::add(const engine::edit::Moment& moment) {
   const std::vector<std::string>& jpegs = corrected.empty() ? cached_jpegs_ : corrected;
   Result<void> written = engine::jobs::create_folder(folder_);
   for (std::size_t v = 0; written && v < count; ++v)
-    written = engine::jobs::write_durably(folder_ / picture_name(moment.interval, v, moment.name), jpegs[v]);
+    written =
+        engine::jobs::write_durably(folder_ / picture_name(moment.interval, v, moment.name), with_checksum(jpegs[v]));
   if (!written)
     return engine::fail(written.error().code, "the pictures of interval " + std::to_string(moment.interval) +
                                                   " cannot be kept: " + written.error().message);

@@ -18,6 +18,11 @@ using engine::Result;
 /// Name of a file, such as "interval-2-view-0-before.jpg".
 [[nodiscard]] std::string picture_name(int interval, std::size_t view, std::string_view stage);
 
+/// Reads a picture that IntervalPictures wrote: JPEG bytes. On disk a checksum stands after them, where viewers of JPEG
+/// files look no more; one of an earlier release has none, and has to end as a JPEG file does.
+///   errors  corrupt_data: it is not what was written; not_found, unavailable
+[[nodiscard]] Result<std::string> read_picture(const std::filesystem::path& file);
+
 /// Writes the pictures of each moment. The same moment gives the same bytes, whether the edit was resumed or not.
 class IntervalPictures {
  public:

@@ -93,6 +93,8 @@ Result<std::unique_ptr<SceneStore>> SceneStore::open(const StoreOptions& options
 
 const std::vector<engine::Error>& SceneStore::damaged() const { return impl_->catalogue.damaged(); }
 
+const std::vector<engine::Error>& SceneStore::recovered() const { return impl_->catalogue.recovered(); }
+
 Result<Scratch> SceneStore::scratch() { return impl_->scratch.make(); }
 
 Result<SceneInfo> SceneStore::add_upload(const fs::path& file, const std::string& filename, const std::string& name) {

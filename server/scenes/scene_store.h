@@ -5,10 +5,12 @@
 //                           base.*            the file as it was uploaded: version 0
 //                           versions/<v>.overlay   what version v changes, over version 0
 //                           dataset.<n>/      cameras and photos, unpacked from a zip file
+//                           dataset.<n>.xxh3  the digests of its files
 //                           files/            versions as files for download; a cache
 //
 // A manifest is written last, to a temporary name, synced and renamed: what it does not name is not there, and is
-// removed at the next start.
+// removed at the next start. It holds the digest of each file that it names and of itself; a file is held against its
+// digest whenever it is read (docs/adr/0022-what-is-stored-is-checked.md).
 #pragma once
 
 #include <cstddef>
@@ -42,6 +44,8 @@ class SceneStore {
   /// Scenes on disk that could not be taken up when the store was opened; their folders are left as they are: somebody
   /// may want to save them.
   [[nodiscard]] const std::vector<engine::Error>& damaged() const;
+  /// What else was damaged when the store was opened, and could be made good.
+  [[nodiscard]] const std::vector<engine::Error>& recovered() const;
 
   /// A new, empty folder for an upload to go to, below the data folder; gone when what is returned is.
   [[nodiscard]] Result<Scratch> scratch();

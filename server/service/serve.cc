@@ -5,12 +5,14 @@
 #include <chrono>
 #include <fstream>
 #include <map>
+#include <thread>
 #include <utility>
 
 #include "engine/render/forward.h"
 #include "proto/edit_request.h"
 #include "server/http/log.h"
 #include "server/http/metrics.h"
+#include "server/service/readiness.h"
 #include "server/service/scene_views.h"
 #include "server/service/token.h"
 
@@ -121,6 +123,8 @@ Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& lo
   if (!scenes) return propagate(scenes);
   for (const engine::Error& damage : (*scenes)->damaged())
     http::log(logger, spdlog::level::err, "a scene cannot be used: " + damage.message, {{"where", damage.where}});
+  for (const engine::Error& damage : (*scenes)->recovered())
+    http::log(logger, spdlog::level::warn, damage.message, {{"where", damage.where}});
   edits::Selections selections(**scenes);
   options.edits.selections = &selections;
   auto edits = edits::EditService::open(**scenes, options.edits);
@@ -130,8 +134,9 @@ Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& lo
   http::AccessGuard guard(options.access);
   http::Metrics metrics;
   add_gauges(metrics, **scenes, **edits, renders);
-  http::Router router = routes::all_routes(
-      {**scenes, **edits, selections, options.edit_limits, renders, views, guard, metrics, service_info(options)});
+  Readiness readiness(options.data_dir, [&] { return (*edits)->trouble(); });
+  http::Router router = routes::all_routes({**scenes, **edits, selections, options.edit_limits, renders, views, guard,
+                                            metrics, service_info(options), [&] { return readiness.trouble(); }});
   auto server = http::HttpServer::start(options.http, std::move(router), guard, metrics, logger);
   if (!server) return propagate(server);
   out << "splatdrag " << SPLATDRAG_VERSION << " is listening on " << (*server)->url() << '\n' << std::flush;
@@ -143,6 +148,9 @@ Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& lo
              {"data_dir", options.data_dir.string()}});
   const std::string signal = signals.wait();
   http::log(logger, spdlog::level::info, "stopping", {{"signal", signal}});
+  readiness.end();
+  // Whoever sends requests here has time to hear of it; what is on its way, such as downloads, has it, too.
+  std::this_thread::sleep_for(std::chrono::seconds(options.unready_seconds));
   (*server)->stop();
   (*edits)->drain(std::chrono::seconds(options.drain_seconds));
   http::log(logger, spdlog::level::info, "stopped");

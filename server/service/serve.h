@@ -24,6 +24,7 @@ struct ServeOptions {
   std::filesystem::path token_file;  ///< Empty: no token.
   bool insecure = false;             ///< Lets other machines in without a token.
   int drain_seconds = 30;            ///< Time that a running edit gets to finish its interval.
+  int unready_seconds = 0;           ///< Time between a signal to end and the end of taking requests.
   int preview_seconds = 600;         ///< Life of a preview that nobody looks at.
   http::ServerOptions http;
   http::AccessOptions access;

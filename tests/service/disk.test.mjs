@@ -45,6 +45,13 @@ describe('a disk that is full', { skip: mounted ? false : 'a small file system c
   const free = () => rm(filler, { force: true });
   const request = () => ({ scene: scene.id, ...demo.leaf, params: { intervals: 6 } });
 
+  const notReady = async () => (await client.request('GET', '/readyz', { expect: 503 })).json().detail;
+  /// Whether the service has met the full disk, and does not only see it.
+  const storeIsFull = async () => {
+    const ready = await client.request('GET', '/readyz', { expect: [200, 503] });
+    return ready.status === 503 && /job store/.test(ready.json().detail);
+  };
+
   /// Of an edit on a full disk. Where not even its failure can be written down, the service says so and does it later.
   const howItEnds = async (id) => {
     const patience = Date.now() + 15_000;
@@ -52,11 +59,10 @@ describe('a disk that is full', { skip: mounted ? false : 'a small file system c
     do {
       await sleep(50);
       edit = await client.edit(id);
-    } while (!finalStates.includes(edit.state) && Date.now() < patience && (await client.request('GET', '/readyz', { expect: [200, 503] })).status === 200);
+    } while (!finalStates.includes(edit.state) && Date.now() < patience && !(await storeIsFull()));
     const noted = finalStates.includes(edit.state);
     if (!noted) {
-      const ready = await client.request('GET', '/readyz', { expect: 503 });
-      assert.match(ready.json().detail, /full/);
+      assert.match(await notReady(), /full/);
       await free();
       edit = await client.ended(id, { timeout: 30_000 });
     }
@@ -68,7 +74,9 @@ describe('a disk that is full', { skip: mounted ? false : 'a small file system c
   };
 
   test('takes no upload, and says so', async () => {
+    await client.request('GET', '/readyz', { expect: 200 });
     await fill(200_000);
+    assert.match(await notReady(), /the disk is full/);
     const response = await client.request('POST', '/v1/scenes', { body: demo.ply, headers: { 'content-type': 'application/octet-stream' }, expect: 507 });
     assert.equal(response.json().code, 'no_space');
     const dataset = await datasetZip(demo.folder);

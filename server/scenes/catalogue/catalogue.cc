@@ -1,10 +1,7 @@
 #include "server/scenes/catalogue/catalogue.h"
 
-#include <fcntl.h>
-#include <sys/file.h>
-
 #include <algorithm>
-#include <cerrno>
+#include <optional>
 #include <set>
 #include <span>
 #include <string_view>
@@ -14,6 +11,7 @@
 #include "engine/core/atomic_file.h"
 #include "engine/core/numbers.h"
 #include "engine/io/read_bytes.h"
+#include "server/scenes/disk/digest.h"
 
 namespace server::scenes {
 namespace {
@@ -23,33 +21,45 @@ using engine::ErrorCode;
 using engine::fail;
 using engine::propagate;
 
-constexpr const char* lock_name = ".lock";
 constexpr const char* counter_name = "next_scene";  ///< Holds the number of the next scene.
 constexpr char id_kind = 's';
+/// What is skipped where only the scenes that are left tell how many there have been: the ids of those removed last are
+/// not to be given away again. A choice.
+constexpr std::uint64_t skipped_numbers = 1000;
+
+/// The number in the counter's file, which releases before checksums wrote alone; nothing for any other text.
+std::optional<std::uint64_t> counted(std::string_view text) {
+  if (!text.ends_with('\n')) return std::nullopt;
+  text.remove_suffix(1);
+  const std::size_t space = text.find(' ');
+  const std::string_view number = text.substr(0, space);
+  if (space != std::string_view::npos && text.substr(space + 1) != digest_of(number)) return std::nullopt;
+  const auto found = engine::number_in<std::uint64_t>(number);
+  return found && *found > 0 ? found : std::nullopt;
+}
+std::optional<std::uint64_t> read_count(const fs::path& folder) {
+  const auto bytes = engine::io::read_bytes(folder / counter_name, 64);
+  return bytes ? counted({reinterpret_cast<const char*>(bytes->data()), bytes->size()}) : std::nullopt;
+}
 
 }  // namespace
 
-Result<void> Catalogue::lock_folder() {
-  folder_lock_ = engine::FileDescriptor(::open((folder_ / lock_name).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644));
-  if (folder_lock_.get() < 0) return tl::make_unexpected(engine::file_error(errno, "open", folder_ / lock_name));
-  if (::flock(folder_lock_.get(), LOCK_EX | LOCK_NB) != 0)
-    return fail(ErrorCode::conflict, "another service uses this data folder: stop it, or choose another folder",
-                folder_.string());
-  return {};
-}
+bool is_scene_id(const std::string& name) { return engine::number_of_id(id_kind, name).has_value(); }
 
-Result<void> Catalogue::read_counter() {
-  const auto bytes = engine::io::read_bytes(folder_ / counter_name, 64);
-  if (!bytes && bytes.error().code == ErrorCode::not_found) return {};
-  if (!bytes) return propagate(bytes);
-  std::string_view text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
-  if (text.ends_with('\n')) text.remove_suffix(1);
-  const auto number = engine::number_in<std::uint64_t>(text);
-  if (!number || *number == 0)
-    return fail(ErrorCode::corrupt_data,
-                "expected the number of the next scene: write one above all scenes there have been", counter_name);
-  next_scene_ = std::max(next_scene_, *number);
-  return {};
+bool counter_is_sound(const fs::path& folder) { return read_count(folder).has_value(); }
+
+void Catalogue::read_counter() {
+  if (const auto number = read_count(folder_)) {
+    next_scene_ = std::max(next_scene_, *number);
+    return;
+  }
+  std::error_code ignored;
+  if (next_scene_ == 1 && !fs::exists(folder_ / counter_name, ignored)) return;  // a new folder
+  next_scene_ += skipped_numbers;
+  recovered_.push_back({ErrorCode::corrupt_data,
+                        "the number of the next scene cannot be read; numbers go on from " +
+                            std::to_string(next_scene_) + ", above all scenes there are",
+                        std::string("scenes/") + counter_name});
 }
 
 /// A scene as it was left, without what a crash left beside it.
@@ -74,6 +84,7 @@ void Catalogue::take_up(const fs::path& folder) {
   if (manifest->dataset && !manifest->dataset->below_root) {
     unpacked = *fs::path(manifest->dataset->folder).begin();
     named.insert(unpacked);
+    if (!manifest->dataset->list_digest.empty()) named.insert(dataset_list_name(*manifest->dataset));
   }
   std::vector<fs::path> leftovers;
   for (const auto& entry : fs::directory_iterator(folder, ignored)) {
@@ -92,8 +103,9 @@ void Catalogue::take_up(const fs::path& folder) {
 Result<void> Catalogue::open() {
   if (auto status = make_folder(folder_); !status) return status;
   if (auto synced = engine::sync_folder(folder_.parent_path()); !synced) return synced;
-  if (auto locked = lock_folder(); !locked) return locked;
-  if (auto read = read_counter(); !read) return read;
+  auto locked = FolderLock::take(folder_);
+  if (!locked) return propagate(locked);
+  folder_lock_ = std::move(*locked);
   std::vector<fs::path> folders, removed;
   std::error_code error;
   for (auto entry = fs::directory_iterator(folder_, error); !error && entry != fs::end(entry); entry.increment(error)) {
@@ -105,6 +117,7 @@ Result<void> Catalogue::open() {
     folders.push_back(entry->path());
   }
   if (error) return tl::make_unexpected(engine::file_error(error.value(), "read", folder_));
+  read_counter();
   for (const fs::path& folder : removed) remove_quietly(folder);
   for (const fs::path& folder : folders) take_up(folder);
   return {};
@@ -152,7 +165,7 @@ Result<Catalogue::Reservation> Catalogue::reserve() {
 
 Result<std::uint64_t> Catalogue::next_number() {
   const std::lock_guard lock(counter_writer_);
-  const std::string text = std::to_string(next_scene_ + 1) + "\n";
+  const std::string number = std::to_string(next_scene_ + 1), text = number + " " + digest_of(number) + "\n";
   if (auto written = engine::write_file(folder_ / counter_name, std::as_bytes(std::span(text))); !written)
     return propagate(written);
   return next_scene_++;

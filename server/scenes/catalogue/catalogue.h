@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
-#include "engine/core/file_descriptor.h"
 #include "engine/core/result.h"
 #include "server/scenes/catalogue/manifest.h"
 #include "server/scenes/disk/disk.h"
+#include "server/scenes/disk/folder_lock.h"
 #include "server/scenes/disk/public_errors.h"
 
 namespace server::scenes {
@@ -47,6 +47,16 @@ struct Snapshot {
   std::shared_ptr<Lease> dataset_folder;
 };
 
+/// What a file in the scene's folder is called in errors: its path inside the data folder.
+[[nodiscard]] inline std::string stored_name(const Snapshot& at, const std::string& name) {
+  return "scenes/" + at.scene->id + "/" + name;
+}
+
+/// Whether a folder's name is that of a scene: "s000001".
+[[nodiscard]] bool is_scene_id(const std::string& name);
+/// Whether the number of the next scene can be read.
+[[nodiscard]] bool counter_is_sound(const std::filesystem::path& folder);
+
 /// Safe to call from any thread once it is open. Its lock is never held over I/O.
 class Catalogue {
  public:
@@ -56,10 +66,13 @@ class Catalogue {
       : folder_(std::move(folder)), max_scenes_(max_scenes), public_error_(public_error) {}
 
   /// Makes the folder or takes up what is in it, without what a crash left there.
-  ///   errors  conflict: another process has it; corrupt_data: its counter; those of file_error(), with full paths
+  ///   errors  conflict: another process has it; those of file_error(), with full paths
   [[nodiscard]] Result<void> open();
   /// Scenes that could not be taken up; their folders are left as they are.
   [[nodiscard]] const std::vector<engine::Error>& damaged() const { return damaged_; }
+
+  /// What was damaged and could be made good.
+  [[nodiscard]] const std::vector<engine::Error>& recovered() const { return recovered_; }
 
   /// The scene as it is now.
   ///   errors  not_found: `where` is "scene"
@@ -102,16 +115,15 @@ class Catalogue {
   [[nodiscard]] Result<void> remove(const std::string& id);
 
  private:
-  [[nodiscard]] Result<void> lock_folder();
-  [[nodiscard]] Result<void> read_counter();
+  void read_counter();
   void take_up(const std::filesystem::path& folder);
   [[nodiscard]] Result<std::uint64_t> next_number();
 
   const std::filesystem::path folder_;
   const std::size_t max_scenes_;
   const PublicErrors& public_error_;
-  engine::FileDescriptor folder_lock_;
-  std::vector<engine::Error> damaged_;  ///< Only open() writes it.
+  FolderLock folder_lock_;
+  std::vector<engine::Error> damaged_, recovered_;  ///< Only open() writes them.
 
   mutable std::mutex mutex_;  ///< Guards what follows, and the scenes' own manifests.
   std::map<std::string, std::shared_ptr<CatalogueEntry>> scenes_;

@@ -8,6 +8,7 @@
 
 #include "engine/core/atomic_file.h"
 #include "engine/io/read_bytes.h"
+#include "server/scenes/disk/digest.h"
 
 namespace server::scenes {
 namespace {
@@ -18,9 +19,13 @@ using engine::propagate;
 using nlohmann::json;
 using nlohmann::ordered_json;
 
-constexpr int manifest_format = 1;  // format number of scene.json
+constexpr int manifest_format = 2;     // format number of scene.json
+constexpr int first_with_digests = 2;  // a format before has none
 /// A larger file is refused before it is read: a hundred thousand versions come to less. A choice.
 constexpr std::uint64_t max_manifest_bytes = std::uint64_t{64} << 20;
+
+/// What stands before the digest of the manifest itself, which is that of all before.
+constexpr std::string_view before_own_digest = ",\n  \"xxh3\": \"";
 
 /// The first thing wrong with a manifest. Thrown and caught in this file only: a manifest has dozens of fields, none of
 /// which can be done without.
@@ -84,6 +89,12 @@ class Object {
     if (!any(name).is_array()) throw Wrong{"expected an array", address(name)};
     return any(name);
   }
+  /// A digest, or "" for null: none was noted.
+  [[nodiscard]] std::string digest(std::string_view name) const {
+    if (any(name).is_null()) return {};
+    if (!is_digest(text(name))) throw Wrong{"expected 16 hexadecimal digits", address(name)};
+    return text(name);
+  }
   /// What `read` makes of a member that may be null.
   template <class Read>
   [[nodiscard]] auto maybe(std::string_view name, Read read) const -> std::optional<decltype(read())> {
@@ -106,6 +117,9 @@ class Object {
 
 ordered_json encoded(engine::DVec3 point) { return {point.x, point.y, point.z}; }
 std::int64_t encoded(Time time) { return time.time_since_epoch().count(); }
+ordered_json encoded_digest(const std::string& digest) {
+  return digest.empty() ? ordered_json(nullptr) : ordered_json(digest);
+}
 template <class T>
 ordered_json or_null(const std::optional<T>& value) {
   return value ? ordered_json(*value) : ordered_json(nullptr);
@@ -116,6 +130,7 @@ ordered_json encoded(const DatasetInfo& info, const DatasetLocation& location) {
           {"folder", location.folder},
           {"below_root", location.below_root},
           {"disk_bytes", location.disk_bytes},
+          {"xxh3", encoded_digest(location.list_digest)},
           {"views", info.views},
           {"photos", info.photos},
           {"psnr_mean_db", or_null(info.psnr_mean_db)},
@@ -124,10 +139,10 @@ ordered_json encoded(const DatasetInfo& info, const DatasetLocation& location) {
           {"warnings", info.warnings}};
 }
 
-void read_dataset(const json& value, Manifest& manifest) {
+void read_dataset(const json& value, int format, Manifest& manifest) {
   const Object in(value, "dataset",
-                  {"kind", "folder", "below_root", "disk_bytes", "views", "photos", "psnr_mean_db", "psnr_worst_db",
-                   "psnr_worst_view", "warnings"});
+                  {"kind", "folder", "below_root", "disk_bytes", "xxh3", "views", "photos", "psnr_mean_db",
+                   "psnr_worst_db", "psnr_worst_view", "warnings"});
   DatasetInfo info;
   info.kind = in.text("kind");
   info.views = in.count("views"), info.photos = in.count("photos");
@@ -138,21 +153,22 @@ void read_dataset(const json& value, Manifest& manifest) {
     if (!warning.is_string()) throw Wrong{"expected a string", in.address("warnings")};
     info.warnings.push_back(warning.get<std::string>());
   }
-  manifest.dataset = DatasetLocation{in.relative("folder"), in.boolean("below_root"), in.count("disk_bytes")};
+  manifest.dataset = DatasetLocation{in.relative("folder"), in.boolean("below_root"), in.count("disk_bytes"),
+                                     format < first_with_digests ? "" : in.digest("xxh3")};
   manifest.scene.dataset = std::move(info);
 }
 
-ordered_json encoded(const VersionInfo& version, std::uint64_t memory_bytes) {
+ordered_json encoded(const VersionInfo& version, std::uint64_t memory_bytes, const std::string& digest) {
   return {{"version", version.version},     {"parent", or_null(version.parent)},
           {"edit", version.edit},           {"created", encoded(version.created)},
           {"gaussians", version.gaussians}, {"disk_bytes", version.disk_bytes},
-          {"memory_bytes", memory_bytes}};
+          {"memory_bytes", memory_bytes},   {"xxh3", encoded_digest(digest)}};
 }
 
-void read_version(const json& value, Manifest& manifest) {
+void read_version(const json& value, int format, Manifest& manifest) {
   const int number = int(manifest.scene.versions.size());
   const Object in(value, "versions[" + std::to_string(number) + "]",
-                  {"version", "parent", "edit", "created", "gaussians", "disk_bytes", "memory_bytes"});
+                  {"version", "parent", "edit", "created", "gaussians", "disk_bytes", "memory_bytes", "xxh3"});
   VersionInfo version;
   version.version = in.whole("version", number, number);
   version.parent = in.maybe("parent", [&] { return in.whole("parent", 0, std::max(number - 1, 0)); });
@@ -162,15 +178,23 @@ void read_version(const json& value, Manifest& manifest) {
   version.gaussians = in.count("gaussians");
   version.disk_bytes = in.count("disk_bytes");
   manifest.overlay_memory_bytes.push_back(in.count("memory_bytes"));
+  manifest.overlay_digests.push_back(format < first_with_digests ? "" : in.digest("xxh3"));
   manifest.scene.versions.push_back(std::move(version));
 }
 
-Manifest decode(const json& document) {
+/// Digest of what stands before the one that a manifest ends with; "" where none does.
+std::string digest_before(std::string_view text) {
+  const std::size_t end = text.rfind(before_own_digest);
+  return end == std::string_view::npos ? std::string() : digest_of(text.substr(0, end));
+}
+
+Manifest decode(const json& document, std::string_view text) {
   const Object in(
       document, "",
-      {"manifest", "id", "nonce", "name", "created", "format", "base", "base_disk_bytes", "base_memory_bytes",
-       "sh_degree", "low", "high", "centre", "radius", "up", "dataset", "next_dataset", "versions"});
-  (void)in.whole("manifest", manifest_format, manifest_format);
+      {"manifest",          "id",           "nonce",     "name", "created", "format", "base",   "base_disk_bytes",
+       "base_memory_bytes", "base_xxh3",    "sh_degree", "low",  "high",    "centre", "radius", "up",
+       "dataset",           "next_dataset", "versions",  "xxh3"});
+  const int format = in.whole("manifest", 1, manifest_format);
   Manifest manifest;
   SceneInfo& scene = manifest.scene;
   scene.id = in.text("id");
@@ -181,15 +205,20 @@ Manifest decode(const json& document) {
   manifest.base = in.relative("base");
   manifest.base_disk_bytes = in.count("base_disk_bytes");
   manifest.base_memory_bytes = in.count("base_memory_bytes");
+  if (format >= first_with_digests) manifest.base_digest = in.digest("base_xxh3");
   scene.sh_degree = in.whole("sh_degree", 0, engine::scene::max_sh_degree);
   scene.low = in.point("low"), scene.high = in.point("high");
   scene.centre = in.point("centre");
   scene.radius = in.number("radius");
   scene.up = in.maybe("up", [&] { return in.point("up"); });
-  if (!in.any("dataset").is_null()) read_dataset(in.any("dataset"), manifest);
+  if (!in.any("dataset").is_null()) read_dataset(in.any("dataset"), format, manifest);
   manifest.next_dataset = in.whole("next_dataset", 1, 1'000'000'000);
-  for (const json& version : in.array("versions")) read_version(version, manifest);
+  for (const json& version : in.array("versions")) read_version(version, format, manifest);
   if (scene.versions.empty()) throw Wrong{"expected at least version 0", "versions"};
+  // Last: of a field that makes no sense its name says more.
+  if (format >= first_with_digests && (in.digest("xxh3").empty() || in.digest("xxh3") != digest_before(text)))
+    throw Wrong{"the file is damaged: it does not have the checksum it was written with; put back a copy of it",
+                "xxh3"};
   return manifest;
 }
 
@@ -204,6 +233,7 @@ ordered_json encoded(const Manifest& manifest) {
                    {"base", manifest.base},
                    {"base_disk_bytes", manifest.base_disk_bytes},
                    {"base_memory_bytes", manifest.base_memory_bytes},
+                   {"base_xxh3", encoded_digest(manifest.base_digest)},
                    {"sh_degree", scene.sh_degree},
                    {"low", encoded(scene.low)},
                    {"high", encoded(scene.high)},
@@ -215,12 +245,15 @@ ordered_json encoded(const Manifest& manifest) {
   if (scene.dataset) out["dataset"] = encoded(*scene.dataset, *manifest.dataset);
   ordered_json& versions = out["versions"] = ordered_json::array();
   for (std::size_t i = 0; i < scene.versions.size(); ++i)
-    versions.push_back(encoded(scene.versions[i], manifest.overlay_memory_bytes[i]));
+    versions.push_back(encoded(scene.versions[i], manifest.overlay_memory_bytes[i], manifest.overlay_digests[i]));
   return out;
 }
 
 std::string text_of(const Manifest& manifest) {
-  return encoded(manifest).dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
+  std::string text = encoded(manifest).dump(2, ' ', false, ordered_json::error_handler_t::replace);
+  text.resize(text.size() - std::string_view("\n}").size());
+  const std::string digest = digest_of(text);
+  return text + std::string(before_own_digest) + digest + "\"\n}\n";
 }
 
 }  // namespace
@@ -229,9 +262,9 @@ Result<Manifest> read_manifest(const std::filesystem::path& folder) {
   const auto bytes = engine::io::read_bytes(folder / manifest_name, max_manifest_bytes);
   if (!bytes) return propagate(bytes);
   const std::string file = (folder.filename() / manifest_name).string();
-  const auto* text = reinterpret_cast<const char*>(bytes->data());
+  const std::string_view text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
   try {
-    return decode(json::parse(text, text + bytes->size()));
+    return decode(json::parse(text), text);
   } catch (const Wrong& wrong) {
     return fail(ErrorCode::corrupt_data, wrong.what, file + ":" + wrong.where);
   } catch (const json::parse_error& failure) {
@@ -250,6 +283,10 @@ bool is_written(const std::filesystem::path& folder, const Manifest& manifest) {
   const auto bytes = engine::io::read_bytes(folder / manifest_name, max_manifest_bytes);
   const std::string text = text_of(manifest);
   return bytes && std::ranges::equal(*bytes, std::as_bytes(std::span(text)));
+}
+
+std::string dataset_list_name(const DatasetLocation& location) {
+  return std::filesystem::path(location.folder).begin()->string() + ".xxh3";
 }
 
 std::string overlay_name(int version) { return "versions/" + std::to_string(version) + ".overlay"; }

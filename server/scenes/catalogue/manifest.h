@@ -19,6 +19,7 @@ struct DatasetLocation {
   std::string folder;            ///< Holds the cameras. Relative to the scene's folder, or to the scene root.
   bool below_root = false;       ///< Whether `folder` is relative to the scene root.
   std::uint64_t disk_bytes = 0;  ///< Bytes that it takes in the scene's folder.
+  std::string list_digest;       ///< Of the list of its files, see dataset_list_name(); "": there is none.
 };
 
 /// What scene.json says, field by field.
@@ -26,6 +27,9 @@ struct Manifest {
   SceneInfo scene;    ///< Without memory_bytes and disk_bytes, which are computed.
   std::string nonce;  ///< Random: a scene of the same id in another data folder is another one.
   std::string base;   ///< File name of version 0.
+  // Digests of files (disk/digest.h); "" is none: it was stored by a release that kept none.
+  std::string base_digest;
+  std::vector<std::string> overlay_digests;  ///< One entry per version; "" for version 0.
   std::uint64_t base_disk_bytes = 0, base_memory_bytes = 0;
   std::vector<std::uint64_t> overlay_memory_bytes;  ///< One entry per version; 0 for version 0.
   std::optional<DatasetLocation> dataset;           ///< Present exactly where scene.dataset is.
@@ -36,7 +40,8 @@ constexpr const char* manifest_name = "scene.json";
 /// What the manifest of a removed scene is called, until nobody reads its files any more.
 constexpr const char* removed_manifest_name = "scene.json.removed";
 
-/// Strict: every field must be there, be of its type and be within what makes sense.
+/// Strict: every field must be there, be of its type and be within what makes sense, and the whole have its checksum. A
+/// manifest of format 1 has no digests, of itself neither.
 ///   errors  not_found: no such file; corrupt_data: `where` is "<folder>/scene.json:field"
 [[nodiscard]] Result<Manifest> read_manifest(const std::filesystem::path& folder);
 
@@ -48,5 +53,9 @@ constexpr const char* removed_manifest_name = "scene.json.removed";
 
 /// File name of what version `version` changes.
 [[nodiscard]] std::string overlay_name(int version);
+
+/// File name of the list of a dataset's files: lines "XXH3 (path) = digest", paths relative to the folder that is the
+/// first part of `location.folder`, as `xxhsum --check` takes them. For a dataset in the scene's folder.
+[[nodiscard]] std::string dataset_list_name(const DatasetLocation& location);
 
 }  // namespace server::scenes

@@ -3,10 +3,14 @@
 #include <algorithm>
 #include <cstdint>
 #include <set>
+#include <span>
 #include <system_error>
 #include <utility>
 
+#include "engine/core/atomic_file.h"
 #include "server/scenes/catalogue/names.h"
+#include "server/scenes/disk/digest.h"
+#include "server/scenes/disk/digest_list.h"
 #include "server/scenes/disk/disk.h"
 #include "server/scenes/uploads/scene_root.h"
 #include "server/scenes/uploads/zip_folder.h"
@@ -45,6 +49,26 @@ fs::path dataset_root(fs::path folder) {
   }
 }
 
+/// Holds the files of an unpacked dataset against their digests.
+///   found  if given: its photos are left out; they are gigabytes, and are read once, right after they came
+Result<void> check_files(const Snapshot& at, const io::Dataset* found) {
+  const DatasetLocation& location = *at.manifest->dataset;
+  if (location.list_digest.empty()) return {};
+  const std::string list_name = dataset_list_name(location), folder = fs::path(location.folder).begin()->string();
+  const auto list =
+      read_digest_list(at.scene->folder->path() / list_name, location.list_digest, stored_name(at, list_name));
+  if (!list) return propagate(list);
+  std::set<fs::path> photos;
+  if (found)
+    for (const io::View& view : found->views) photos.insert(view.photo.lexically_normal());
+  for (const auto& [name, digest] : *list) {
+    const fs::path file = at.scene->folder->path() / folder / name;
+    if (photos.contains(file.lexically_normal())) continue;
+    if (auto sound = check_digest(file, digest, stored_name(at, folder + "/" + name)); !sound) return sound;
+  }
+  return {};
+}
+
 DatasetInfo about(const io::Dataset& found) {
   DatasetInfo about;
   about.kind = found.kind;
@@ -66,8 +90,12 @@ Result<ManifestPtr> Datasets::put_zip(const Snapshot& at, const fs::path& zip, c
   const fs::path root = dataset_root(into);
   const auto found = io::read_dataset(root, {.points = false});
   if (!found) return public_error_(found, into);
+  const auto digests = digests_below(into);
+  if (!digests) return public_error_(digests, into);
   if (auto synced = sync_file_system(into); !synced) return public_error_(synced, staging->folder());
-  return replace(at, *found, {root.lexically_relative(into).string(), false, bytes_below(into)}, into);
+  const std::string list = to_text(*digests);
+  return replace(at, *found, {root.lexically_relative(into).string(), false, bytes_below(into), digest_of(list)}, into,
+                 list);
 }
 
 Result<ManifestPtr> Datasets::put_path(const Snapshot& at, const std::string& path) {
@@ -86,13 +114,14 @@ Result<ManifestPtr> Datasets::put_path(const Snapshot& at, const std::string& pa
                   "path");
   std::error_code error;
   const fs::path relative = folder->lexically_relative(fs::canonical(scene_root, error));
-  return replace(at, *found, {relative.string(), true, 0}, std::nullopt);
+  return replace(at, *found, {relative.string(), true, 0, {}}, std::nullopt, {});
 }
 
 Result<ManifestPtr> Datasets::replace(const Snapshot& at, const io::Dataset& found, DatasetLocation location,
-                                      const std::optional<fs::path>& unpacked) {
+                                      const std::optional<fs::path>& unpacked, const std::string& list) {
   std::shared_ptr<Lease> lease;  // of the new folder; once that is the scene's, of the one before
   std::shared_ptr<Lease> fresh;
+  fs::path list_before;
   auto replaced = catalogue_.change(
       at,
       [&](Manifest& manifest) -> Result<void> {
@@ -103,7 +132,11 @@ Result<ManifestPtr> Datasets::replace(const Snapshot& at, const io::Dataset& fou
           if (auto moved = move_durably(*unpacked, folder); !moved)
             return public_error_(moved, unpacked->parent_path());
           location.folder = (name / location.folder).lexically_normal().string();
+          const fs::path list_file = at.scene->folder->path() / dataset_list_name(location);
+          if (auto written = engine::write_file(list_file, std::as_bytes(std::span(list))); !written)
+            return public_error_(written);
         }
+        if (manifest.dataset) list_before = dataset_list_name(*manifest.dataset);
         ++manifest.next_dataset;
         manifest.dataset = location;
         manifest.scene.dataset = about(found);
@@ -113,6 +146,7 @@ Result<ManifestPtr> Datasets::replace(const Snapshot& at, const io::Dataset& fou
   // After a change that failed, the new one goes, unless the manifest on disk names it: then both stay, since it may
   // still turn out that the old manifest is the one that is left.
   if (lease && (replaced || lease == fresh)) lease->end();
+  if (replaced && !list_before.empty()) remove_quietly(at.scene->folder->path() / list_before);
   memory_.forget(at.scene->id + "/dataset");
   return replaced;
 }
@@ -129,6 +163,8 @@ Result<std::shared_ptr<const io::Dataset>> Datasets::get(const Snapshot& at) {
       folder = std::move(*below);
     }
     auto found = io::read_dataset(folder, {.points = false});
+    // Also where it could not be read: damage is then the likely reason.
+    if (auto sound = check_files(at, found ? &*found : nullptr); !sound) return propagate(sound);
     if (!found) return public_error_(found);
     return BoundedCache::CachedObject{
         std::make_shared<const HeldDataset>(HeldDataset{std::move(*found), at.dataset_folder}), bytes};

@@ -31,7 +31,8 @@ class Datasets {
   ///   errors  those of below_root() and io::read_dataset()
   [[nodiscard]] Result<ManifestPtr> put_path(const Snapshot& at, const std::string& path);
   /// The dataset without its points; null without one.
-  ///   errors  those of io::read_dataset(); busy
+  ///   errors  those of io::read_dataset(); busy; corrupt_data: a file of the dataset, photos apart, is not what was
+  ///           stored
   [[nodiscard]] Result<std::shared_ptr<const engine::io::Dataset>> get(const Snapshot& at);
   /// Notes how near renders come to the photos, PSNR in dB; the new manifest.
   ///   dataset  its number: what is found about one that has been replaced meanwhile is dropped
@@ -42,9 +43,11 @@ class Datasets {
 
  private:
   /// unpacked  if given: a folder, which becomes the scene's and which `location` is relative to
+  /// list      of its files, as text
   [[nodiscard]] Result<ManifestPtr> replace(const Snapshot& at, const engine::io::Dataset& found,
                                             DatasetLocation location,
-                                            const std::optional<std::filesystem::path>& unpacked);
+                                            const std::optional<std::filesystem::path>& unpacked,
+                                            const std::string& list);
 
   const StoreOptions& options_;
   BoundedCache& memory_;

@@ -1,6 +1,13 @@
 #include "server/scenes/uploads/scene_root.h"
 
+#include <fcntl.h>
+#include <linux/openat2.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
 #include <system_error>
 
 namespace server::scenes {
@@ -48,6 +55,32 @@ Result<fs::path> below_root(const fs::path& root, const std::string& path) {
   if (error) return fail(ErrorCode::not_found, "there is no " + path + " below the scene root", "path");
   if (!begins_with(real, real_root)) return leads_out();
   return real;
+}
+
+Result<engine::FileDescriptor> open_below_root(const fs::path& root, const std::string& path) {
+  const auto found = below_root(root, path);
+  if (!found) return engine::propagate(found);
+  std::error_code error;
+  const fs::path real_root = fs::canonical(root, error);
+  const engine::FileDescriptor base(::open(real_root.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
+  open_how how{};
+  how.flags = O_RDONLY | O_CLOEXEC | O_NONBLOCK;                                // a pipe must not make us wait
+  how.resolve = RESOLVE_BENEATH | RESOLVE_NO_SYMLINKS | RESOLVE_NO_MAGICLINKS;  // below_root() has left no links
+  const fs::path relative = found->lexically_relative(real_root);
+  engine::FileDescriptor file(int(::syscall(SYS_openat2, base.get(), relative.c_str(), &how, sizeof how)));
+  const bool is_unknown = file.get() < 0 && (errno == ENOSYS || errno == EPERM);  // before Linux 5.6, or forbidden
+  if (is_unknown) file = engine::FileDescriptor(::open(found->c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW));
+  if (file.get() < 0 && errno == ENOENT)
+    return fail(ErrorCode::not_found, "there is no " + path + " below the scene root", "path");
+  if (file.get() < 0 && (errno == EXDEV || errno == ELOOP)) return leads_out();
+  struct stat about {};
+  if (file.get() < 0 || ::fstat(file.get(), &about) != 0)
+    return fail(ErrorCode::unavailable, "the file cannot be read: " + std::generic_category().message(errno), "path");
+  if (!S_ISREG(about.st_mode))
+    return fail(ErrorCode::invalid_argument, "expected a file, not a folder or a pipe", "path");
+  // Where it is open, says the system itself.
+  if (is_unknown && !lies_below(root, "/proc/self/fd/" + std::to_string(file.get()))) return leads_out();
+  return file;
 }
 
 Result<void> check_links(const fs::path& root, const fs::path& folder, std::size_t max_files) {

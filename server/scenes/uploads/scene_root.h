@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <string>
 
+#include "engine/core/file_descriptor.h"
 #include "engine/core/result.h"
 
 namespace server::scenes {
@@ -16,6 +17,12 @@ using engine::Result;
 ///   errors  invalid_argument: no root, or the path leads out of it, if only through a link; not_found. `where` is
 ///           "path".
 [[nodiscard]] Result<std::filesystem::path> below_root(const std::filesystem::path& root, const std::string& path);
+
+/// The file, open. Whoever may write below the root may put a link in a file's place after below_root() has looked:
+/// what is opened here lies below the root when it is opened.
+///   errors  those of below_root(); invalid_argument: it is no regular file; unavailable
+[[nodiscard]] Result<engine::FileDescriptor> open_below_root(const std::filesystem::path& root,
+                                                             const std::string& path);
 
 /// Does a path, links followed, lie below the root?
 [[nodiscard]] bool lies_below(const std::filesystem::path& root, const std::filesystem::path& path);

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "server/scenes/catalogue/names.h"
+#include "server/scenes/disk/digest.h"
 #include "server/scenes/disk/disk.h"
 #include "server/scenes/disk/scene_format.h"
 #include "server/scenes/uploads/scene_root.h"
@@ -54,6 +55,10 @@ Result<ManifestPtr> Uploads::add_staged(const fs::path& file, const fs::path& st
   manifest.base_disk_bytes = bytes_below(file);
   manifest.base_memory_bytes = memory_bytes(*upload->file);
   manifest.overlay_memory_bytes = {0};
+  manifest.overlay_digests = {""};
+  auto digest = digest_of_file(file);
+  if (!digest) return public_error_(digest, file.parent_path());
+  manifest.base_digest = std::move(*digest);
   SceneInfo& scene = manifest.scene;
   const SceneStatistics measured = statistics(cloud);
   scene.name = *called;
@@ -89,13 +94,16 @@ Result<ManifestPtr> Uploads::add(const fs::path& file, const std::string& filena
 }
 
 Result<ManifestPtr> Uploads::add_path(const std::string& path, const std::string& name) {
-  const auto found = below_root(options_.scene_root, path);
+  const auto found = open_below_root(options_.scene_root, path);
   if (!found) return propagate(found);
   const auto staging = scratch_.make();
   if (!staging) return propagate(staging);
   const fs::path copy = staging->folder() / "copy";
-  if (auto copied = scenes::copy_file(*found, copy); !copied) {
-    if (copied.error().where == found->string()) copied.error().where = "path";
+  const std::string opened = "/proc/self/fd/" + std::to_string(found->get());
+  if (auto copied = scenes::copy_file(opened, copy); !copied) {
+    if (copied.error().where.find(opened) != std::string::npos ||
+        copied.error().message.find(opened) != std::string::npos)
+      return engine::fail(copied.error().code, "the file cannot be read to its end", "path");
     return public_error_(copied, staging->folder());
   }
   return add(copy, fs::path(path).filename().string(), name);

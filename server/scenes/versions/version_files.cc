@@ -17,9 +17,13 @@ constexpr std::uint64_t max_packed_row_bytes = 64;  ///< Of a Gaussian in a .spl
 
 /// A file in a scene's folder that goes when nobody holds it.
 struct HeldFile {
-  HeldFile(std::shared_ptr<Lease> in, const fs::path& path) : scene(std::move(in)), file(path) { file.end(); }
+  HeldFile(std::shared_ptr<Lease> in, const fs::path& path, std::string checksum)
+      : scene(std::move(in)), file(path), digest(std::move(checksum)) {
+    file.end();
+  }
   std::shared_ptr<Lease> scene;
   Lease file;
+  std::string digest;
 };
 
 const char* extension_of(FileFormat format) {
@@ -38,9 +42,14 @@ Result<VersionFile> VersionFiles::get(const Snapshot& at, const std::string& ver
   const std::string extension = extension_of(format);
   const std::string suffix = version == "0" ? "" : (is_preview(version) ? "-" : "-v") + version;
   const std::string download_name = manifest.scene.name + suffix + "." + extension;
-  if (version == "0" && manifest.scene.format == extension)
+  if (version == "0" && manifest.scene.format == extension) {
+    if (auto sound = sound_files_.check(at.scene->folder->path() / manifest.base, manifest.base_digest,
+                                        stored_name(at, manifest.base));
+        !sound)
+      return propagate(sound);
     return VersionFile{at.scene->folder->path() / manifest.base,
                        at.scene->id + "-" + manifest.nonce + "-0-" + extension, download_name, at.scene->folder};
+  }
   auto file = written(at, version, format);
   if (file) file->download_name = download_name;
   return file;
@@ -64,11 +73,18 @@ Result<VersionFile> VersionFiles::written(const Snapshot& at, const std::string&
     if (!reservation) return propagate(reservation);
     const io::SceneFile file{engine::scene::flatten(loaded->cloud), layout};
     if (auto saved = io::write_scene(path, file, to_io(format)); !saved) return public_error_(saved);
-    return BoundedCache::CachedObject{std::make_shared<const HeldFile>(at.scene->folder, path), bytes_below(path)};
+    auto digest = digest_of_file(path);
+    if (!digest) return public_error_(digest);
+    return BoundedCache::CachedObject{std::make_shared<const HeldFile>(at.scene->folder, path, std::move(*digest)),
+                                      bytes_below(path)};
   };
   const std::string name = at.scene->id + "/" + version + "." + extension;
   const std::uint64_t row_bytes = format == FileFormat::ply ? layout.vertex().stride : max_packed_row_bytes;
-  const auto held = files_.get<HeldFile>(name, loaded->cloud.size() * row_bytes, write);
+  auto held = files_.get<HeldFile>(name, loaded->cloud.size() * row_bytes, write);
+  if (held && !sound_files_.check((*held)->file.path(), (*held)->digest, name)) {  // it can be made again
+    files_.forget(name);
+    held = files_.get<HeldFile>(name, loaded->cloud.size() * row_bytes, write);
+  }
   if (!catalogue_.has(at) || (is_preview(version) && !previews_.has(version))) files_.forget(name);
   if (!held) return propagate(held);
   return VersionFile{(*held)->file.path(), loaded->key + "-" + extension, {}, *held};

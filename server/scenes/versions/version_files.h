@@ -8,6 +8,7 @@
 #include "server/scenes/catalogue/catalogue.h"
 #include "server/scenes/catalogue/scene_info.h"
 #include "server/scenes/disk/bounded_cache.h"
+#include "server/scenes/disk/digest.h"
 #include "server/scenes/versions/previews.h"
 #include "server/scenes/versions/versions.h"
 
@@ -28,7 +29,7 @@ class VersionFiles {
         public_error_(public_error) {}
 
   /// The file of a version or preview. Version 0 in its own format is the file as it came, byte for byte.
-  ///   errors  those of Versions::load() and io::write_scene()
+  ///   errors  those of Versions::load() and io::write_scene(); corrupt_data: version 0 is not what was stored
   [[nodiscard]] Result<VersionFile> get(const Snapshot& at, const std::string& version, FileFormat format);
 
  private:
@@ -40,6 +41,7 @@ class VersionFiles {
   Previews& previews_;
   Versions& versions_;
   const PublicErrors& public_error_;
+  SoundFiles sound_files_;
   std::atomic<std::uint64_t> last_{0};
 };
 

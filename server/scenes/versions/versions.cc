@@ -2,12 +2,14 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "engine/core/atomic_file.h"
 #include "engine/core/numbers.h"
 #include "engine/io/overlay_file.h"
 #include "server/scenes/catalogue/names.h"
+#include "server/scenes/disk/digest.h"
 #include "server/scenes/disk/disk.h"
 #include "server/scenes/disk/scene_format.h"
 
@@ -59,10 +61,31 @@ void Versions::forget_if_removed(const Snapshot& at) {
   if (!catalogue_.has(at)) memory_.forget(at.scene->id + "/");
 }
 
+Result<void> Versions::check(const Snapshot& at, int version, RunningDigest& seen) {
+  const Manifest& manifest = *at.manifest;
+  const std::string name = version == 0 ? manifest.base : overlay_name(version);
+  const std::string& digest = version == 0 ? manifest.base_digest : manifest.overlay_digests[std::size_t(version)];
+  const fs::path file = at.scene->folder->path() / name;
+  if (!digest.empty()) return seen.check(file, digest, stored_name(at, name));
+  const auto found = digest_of_file(file);
+  if (!found) return public_error_(found);
+  // Where it cannot be noted now, it is next time.
+  (void)catalogue_.change(at, [&](Manifest& changed) -> Result<void> {
+    (version == 0 ? changed.base_digest : changed.overlay_digests[std::size_t(version)]) = *found;
+    return {};
+  });
+  return {};
+}
+
 Result<std::shared_ptr<const io::SceneFile>> Versions::base(const Snapshot& at) {
   const Manifest& manifest = *at.manifest;
   const auto read = [&]() -> Result<BoundedCache::CachedObject> {
-    auto file = io::read_scene(at.scene->folder->path() / manifest.base, options_.read);
+    RunningDigest seen;
+    io::ReadOptions reading = options_.read;
+    reading.witness = [&](std::uint64_t offset, std::span<const std::byte> bytes) { seen.see(offset, bytes); };
+    auto file = io::read_scene(at.scene->folder->path() / manifest.base, reading);
+    // Also where it could not be read: damage is then the likely reason.
+    if (auto sound = check(at, 0, seen); !sound) return propagate(sound);
     if (!file) return public_error_(file);
     const std::uint64_t bytes = memory_bytes(*file);
     if (file->cloud.size() != manifest.scene.versions[0].gaussians || bytes > manifest.base_memory_bytes)
@@ -78,6 +101,8 @@ Result<std::shared_ptr<const Overlay>> Versions::overlay(const Snapshot& at, int
   if (version == 0) return std::shared_ptr<const Overlay>();
   const std::uint64_t expected = at.manifest->overlay_memory_bytes[std::size_t(version)];
   const auto read = [&]() -> Result<BoundedCache::CachedObject> {
+    RunningDigest seen;
+    if (auto sound = check(at, version, seen); !sound) return propagate(sound);
     auto rows = io::read_overlay(at.scene->folder->path() / overlay_name(version), base);
     if (!rows) return public_error_(rows);
     const std::uint64_t bytes = engine::scene::memory_bytes(*rows);
@@ -139,6 +164,8 @@ Result<int> Versions::add(const Snapshot& at, int parent, const std::string& edi
   const fs::path staged = staging->folder() / "overlay", folder = at.scene->folder->path();
   if (auto written = io::write_overlay(staged, rows, *composed->base); !written)
     return public_error_(written, staging->folder());
+  const auto digest = digest_of_file(staged);
+  if (!digest) return public_error_(digest, staging->folder());
   int number = 0;
   const auto changed = catalogue_.change(at, [&](Manifest& manifest) -> Result<void> {
     if (const auto before = made_by(edit, manifest)) {  // by another thread meanwhile
@@ -157,6 +184,7 @@ Result<int> Versions::add(const Snapshot& at, int parent, const std::string& edi
                                        .gaussians = composed->base->size() - rows.removed.size() + rows.added(),
                                        .disk_bytes = bytes_below(file)});
     manifest.overlay_memory_bytes.push_back(composed->bytes);
+    manifest.overlay_digests.push_back(*digest);
     return {};
   });
   if (!changed) return propagate(changed);

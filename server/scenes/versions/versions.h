@@ -9,6 +9,7 @@
 #include "server/scenes/catalogue/catalogue.h"
 #include "server/scenes/catalogue/store_options.h"
 #include "server/scenes/disk/bounded_cache.h"
+#include "server/scenes/disk/digest.h"
 #include "server/scenes/disk/scratch.h"
 #include "server/scenes/versions/previews.h"
 
@@ -57,6 +58,9 @@ class Versions {
   [[nodiscard]] Result<LoadedVersion> load_preview(const Snapshot& at, const std::string& preview);
   [[nodiscard]] Result<OverBase> over_base(const Snapshot& at, int parent, const engine::scene::Overlay& overlay);
   void forget_if_removed(const Snapshot& at);
+  /// Holds the file of a version against its digest. One that has none, of an earlier release, gets it now.
+  ///   seen  of what has been read of it already
+  [[nodiscard]] Result<void> check(const Snapshot& at, int version, RunningDigest& seen);
 
   const StoreOptions& options_;
   BoundedCache& memory_;

@@ -15,9 +15,10 @@ http::Router all_routes(const RouteDependencies& dependencies) {
                             }});
   add_render_routes(router, {dependencies.scenes, dependencies.views, dependencies.renders, dependencies.selections});
   add_edit_routes(router, dependencies.edits, {.limits = dependencies.edit_limits});
-  add_system_routes(router, {dependencies.guard, dependencies.metrics, dependencies.info,
-                             [&edits = dependencies.edits] { return edits.trouble(); }, page_files(),
-                             contract_files().front().bytes});
+  auto trouble = dependencies.trouble;
+  if (!trouble) trouble = [&edits = dependencies.edits] { return edits.trouble(); };
+  add_system_routes(router, {dependencies.guard, dependencies.metrics, dependencies.info, std::move(trouble),
+                             page_files(), contract_files().front().bytes});
   return router;
 }
 

@@ -1,6 +1,9 @@
 // All routes of the service: what proto/openapi.yaml describes.
 #pragma once
 
+#include <functional>
+#include <optional>
+
 #include "proto/service_info.h"
 #include "server/edits/edit_service.h"
 #include "server/edits/selections.h"
@@ -25,6 +28,8 @@ struct RouteDependencies {
   http::AccessGuard& guard;
   http::Metrics& metrics;
   proto::ServiceInfo info;
+  /// What keeps the service from working, if anything does; empty: what keeps edits from it.
+  std::function<std::optional<engine::Error>()> trouble = {};
 };
 
 /// A router with every path of the contract, and the files of the page.

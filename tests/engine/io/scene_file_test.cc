@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <zstd.h>
 
+#include <span>
+
 #include "engine/io/gzip.h"
 #include "engine/io/ply.h"
 #include "engine/io/splat.h"
@@ -74,6 +76,20 @@ TEST_F(SceneFiles, KnowsAFormatByItsContent) {
     ASSERT_TRUE(scene) << name << ": " << scene.error().message;
     EXPECT_EQ(scene->cloud.size(), count) << name;
     EXPECT_EQ(scene->layout.sh_degree, scene->cloud.sh_degree) << name;
+  }
+}
+
+TEST_F(SceneFiles, ShowsEveryByteThatItTakesIn) {
+  for (const auto& [name, bytes, count] : samples()) {
+    support::write_file(path_, bytes);
+    std::string seen(bytes.size(), '\0');
+    ReadOptions options;
+    options.witness = [&](std::uint64_t offset, std::span<const std::byte> shown) {
+      ASSERT_LE(offset + shown.size(), bytes.size());
+      seen.replace(std::size_t(offset), shown.size(), reinterpret_cast<const char*>(shown.data()), shown.size());
+    };
+    ASSERT_TRUE(read_scene(path_, options)) << name;
+    EXPECT_EQ(seen, bytes) << name;
   }
 }
 

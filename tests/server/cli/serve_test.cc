@@ -106,6 +106,18 @@ TEST_F(Serve, SaysWhereItListensAndEndsWellWhenToldTo) {
   }
 }
 
+TEST_F(Serve, SaysThatItEndsBeforeItDoes) {
+  Program program(first_, arguments({"--unready-seconds", "2"}));
+  const int port = program.port();
+  ASSERT_NE(port, 0) << program.err();
+  EXPECT_EQ(ask(port, "GET", "/readyz").status, 200);
+  program.signal(SIGTERM);
+  for (int i = 0; i < 100 && ask(port, "GET", "/readyz").status == 200; ++i) std::this_thread::sleep_for(10ms);
+  EXPECT_EQ(ask(port, "GET", "/readyz").status, 503);
+  EXPECT_EQ(ask(port, "GET", "/v1/scenes").status, 200) << "it goes on serving meanwhile";
+  EXPECT_EQ(program.wait(), 0);
+}
+
 TEST_F(Serve, SaysEveryLimitItKeeps) {
   Program program(first_, arguments({"--max-json-bytes", "2KiB", "--max-streams", "3", "--max-render-side", "777",
                                      "--max-queued", "5", "--max-upload-bytes", "1MiB", "--threads", "1",

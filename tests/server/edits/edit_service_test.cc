@@ -7,6 +7,7 @@
 
 #include "engine/core/rng.h"
 #include "server/edits/convert.h"
+#include "server/edits/records.h"
 #include "tests/server/edits/service_support.h"
 
 namespace server::edits {
@@ -523,7 +524,7 @@ TEST_F(ServiceTest, RemovingAnEditKeepsItsResult) {
   wait_for_end(*service, id);
   value(service->remove(id));
   EXPECT_EQ(versions(), 2u);
-  EXPECT_TRUE(names_in(dir.path() / "edits/jobs").empty());
+  EXPECT_EQ(names_in(dir.path() / "edits/jobs"), std::set<std::string>{"last_number"});
 }
 
 TEST_F(ServiceTest, ASceneIsKeptAsLongAsAnEditNeedsIt) {
@@ -623,10 +624,53 @@ TEST_F(ServiceTest, ALostJobStoreDoesNotMixUpResults) {
   wait_for_end(*service, submit(move_ball(scene)));
   service.reset();
   fs::remove_all(dir.path() / "edits");
+  const ServiceOptions options{.folder = dir.path() / "edits"};
+  for (int start = 0; start < 2; ++start) {  // it does not begin afresh by being started again either
+    const auto opened = EditService::open(*store, options);
+    ASSERT_EQ(code_of(opened), ErrorCode::corrupt_data);
+    EXPECT_NE(opened.error().message.find("splatdrag admin rebuild"), std::string::npos) << opened.error().message;
+  }
+  EXPECT_TRUE(value(rebuild_records(*store, options.folder)).findings.empty()) << "nothing is left of the edit";
   service = open_service(*store, dir.path());
   const auto id = submit(move_ball(scene, 3));
   EXPECT_EQ(id, "e000002") << "e000001 stands beside version 1";
   EXPECT_EQ(wait_for_end(*service, id).result_version, 2);
+}
+
+TEST_F(ServiceTest, AnEditComesBackAfterItsRecordsWereLost) {
+  const auto ended = submit(move_ball(scene), "key");
+  wait_for_end(*service, ended);
+  const auto id = submit(move_ball_slowly(scene));
+  wait_for_interval(*service, id);
+  service.reset();
+  const fs::path edits = dir.path() / "edits";
+  support::write_file(edits / "jobs.db", "");
+  fs::remove(edits / "jobs.db-wal");
+  EXPECT_FALSE(value(check_records(edits)).damaged.empty());
+  ASSERT_EQ(code_of(EditService::open(*store, {.folder = edits})), ErrorCode::corrupt_data);
+  EXPECT_EQ(value(rebuild_records(*store, edits)).findings.size(), 2u);
+  EXPECT_TRUE(value(check_records(edits)).damaged.empty());
+  service = open_service(*store, dir.path());
+  const auto before = value(service->find(ended));
+  EXPECT_EQ(before.state, "succeeded");
+  EXPECT_EQ(before.result_version, 1);
+  EXPECT_FALSE(value(service->submit(move_ball(scene), "key")).created) << "its key is known still";
+  const auto after = wait_for_end(*service, id);
+  EXPECT_EQ(after.state, "succeeded") << after.stage;
+  EXPECT_EQ(after.result_version, 2);
+}
+
+TEST_F(ServiceTest, ADamagedPictureIsNamedAndNotServed) {
+  const auto id = submit(move_ball(scene));
+  wait_for_end(*service, id);
+  const fs::path file = dir.path() / "edits/jobs" / id / "interval-1-view-0-before.jpg";
+  std::string bytes = support::read_file(file);
+  bytes[bytes.size() / 2] = char(bytes[bytes.size() / 2] ^ 8);
+  support::write_file(file, bytes);
+  const auto picture = service->interval_picture(id, 1, 0, "before");
+  ASSERT_EQ(code_of(picture), ErrorCode::corrupt_data);
+  EXPECT_EQ(picture.error().where, "edits/jobs/" + id + "/interval-1-view-0-before.jpg");
+  EXPECT_TRUE(service->interval_picture(id, 1, 0, "deformed"));
 }
 
 TEST_F(ServiceTest, BetweenTwoNewsNotAByteChanges) {

@@ -38,7 +38,7 @@ class IntervalPicturesTest : public testing::Test {
     return pictures;
   }
   std::string picture(int interval, std::size_t view, const std::string& stage) const {
-    return support::read_file(folder / picture_name(interval, view, stage));
+    return value(read_picture(folder / picture_name(interval, view, stage)));
   }
 
   support::TempDir dir;
@@ -129,6 +129,27 @@ TEST_F(IntervalPicturesTest, TakesWhatViewsThereAre) {
   IntervalPictures none(folder / "none", input, 4);
   value(none.add(moment(1, "before", without(0))));
   EXPECT_TRUE(none.renders_of(1).empty());
+}
+
+TEST_F(IntervalPicturesTest, AreKnownByEveryBitAndEveryCut) {
+  views.resize(1);
+  IntervalPictures pictures(folder, input, 1);
+  value(pictures.add(moment(1, "before", without(0))));
+  const auto file = folder / picture_name(1, 0, "before");
+  const std::string whole = support::read_file(file), jpeg = value(read_picture(file));
+  for (std::size_t bit = 0; bit < 8 * whole.size(); bit += 5) {
+    std::string damaged = whole;
+    damaged[bit / 8] = char(damaged[bit / 8] ^ 1 << bit % 8);
+    support::write_file(file, damaged);
+    ASSERT_EQ(code_of(read_picture(file)), engine::ErrorCode::corrupt_data) << bit;
+  }
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    support::write_file(file, whole.substr(0, size));
+    const auto cut = read_picture(file);
+    ASSERT_TRUE(!cut || *cut == jpeg) << size;
+  }
+  support::write_file(file, jpeg);
+  EXPECT_EQ(value(read_picture(file)), jpeg) << "of an earlier release";
 }
 
 TEST_F(IntervalPicturesTest, AFullDiskIsAnErrorThatSaysWhatToDo) {

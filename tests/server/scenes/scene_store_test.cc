@@ -270,6 +270,13 @@ TEST_F(SceneStoreTest, IsOneAtATime) {
   EXPECT_EQ(second.error().code, ErrorCode::conflict);
 }
 
+TEST_F(SceneStoreTest, IsOneAtATimeEvenIfItsLockFileIsRemoved) {
+  fs::remove(options.folder / ".lock");
+  const auto second = SceneStore::open(options);
+  ASSERT_FALSE(second);
+  EXPECT_EQ(second.error().code, ErrorCode::conflict);
+}
+
 TEST_F(SceneStoreTest, DropsWhatNobodyHoldsToStayWithinItsMemory) {
   const std::string first = add(1000, 1), second = add(1000, 2);
   const std::uint64_t one = store->find(first)->memory_bytes;
@@ -527,7 +534,8 @@ TEST_F(SceneStoreTest, TakesADatasetFromAZipFile) {
     EXPECT_EQ(put->dataset->photos, 0u);
     EXPECT_EQ(store->dataset(id).value()->views.size(), 2u);
   }
-  EXPECT_EQ(entries(options.folder / id), (std::vector<std::string>{"base.ply", "dataset.3", "scene.json"}));
+  EXPECT_EQ(entries(options.folder / id),
+            (std::vector<std::string>{"base.ply", "dataset.3", "dataset.3.xxh3", "scene.json"}));
   EXPECT_EQ(store->find(id)->dataset->number, 3);
   ASSERT_TRUE(store->set_dataset_quality(id, 3, 12.5, 10, "a.png", {"far off"}));
   ASSERT_TRUE(store->set_dataset_quality(id, 2, 30, 20, "b.png", {})) << "about one that has been replaced: dropped";

@@ -24,7 +24,9 @@ Manifest full_manifest() {
   manifest.base = "base.ply";
   manifest.base_disk_bytes = 1, manifest.base_memory_bytes = 2;
   manifest.overlay_memory_bytes = {0, 99};
-  manifest.dataset = DatasetLocation{"dataset.3/chair", false, 1234};
+  manifest.base_digest = "00112233445566ff";
+  manifest.overlay_digests = {"", "0123456789abcdef"};
+  manifest.dataset = DatasetLocation{"dataset.3/chair", false, 1234, "fedcba9876543210"};
   manifest.next_dataset = 4;
   return manifest;
 }
@@ -101,6 +103,41 @@ TEST(Manifest, NamesTheFieldAndSurvivesACut) {
   document["versions"][1]["gaussians"] = -1;
   support::write_file(temp.path() / manifest_name, document.dump());
   EXPECT_TRUE(read_manifest(temp.path()).error().where.ends_with("scene.json:versions[1].gaussians"));
+}
+
+TEST(Manifest, KnowsItselfByEveryBit) {
+  const support::TempDir temp;
+  ASSERT_TRUE(write_manifest(temp.path(), full_manifest()));
+  const std::string whole = support::read_file(temp.path() / manifest_name);
+  for (std::size_t bit = 0; bit < 8 * whole.size(); ++bit) {
+    std::string damaged = whole;
+    damaged[bit / 8] = char(damaged[bit / 8] ^ 1 << bit % 8);
+    support::write_file(temp.path() / manifest_name, damaged);
+    const auto read = read_manifest(temp.path());
+    ASSERT_FALSE(read) << "bit " << bit << " of \"" << damaged.substr(bit / 8, 20) << '"';
+    ASSERT_EQ(read.error().code, ErrorCode::corrupt_data) << bit;
+  }
+}
+
+/// What releases before checksums wrote.
+std::string of_format_1(nlohmann::json document) {
+  document["manifest"] = 1;
+  document.erase("xxh3"), document.erase("base_xxh3"), document["dataset"].erase("xxh3");
+  for (auto& version : document["versions"]) version.erase("xxh3");
+  return document.dump();
+}
+
+TEST(Manifest, OfAnEarlierReleaseHasNoDigests) {
+  const support::TempDir temp;
+  ASSERT_TRUE(write_manifest(temp.path(), full_manifest()));
+  const auto whole = nlohmann::json::parse(support::read_file(temp.path() / manifest_name));
+  support::write_file(temp.path() / manifest_name, of_format_1(whole));
+  const auto read = read_manifest(temp.path());
+  ASSERT_TRUE(read) << read.error().message << read.error().where;
+  EXPECT_EQ(read->base_digest, "");
+  EXPECT_EQ(read->overlay_digests, (std::vector<std::string>{"", ""}));
+  EXPECT_EQ(read->dataset->list_digest, "");
+  EXPECT_EQ(read->scene.versions[1].edit, "e000001");
 }
 
 TEST(Manifest, SaysThatThereIsNone) {

@@ -1,6 +1,11 @@
 #include "server/scenes/uploads/scene_root.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <string>
+#include <thread>
 
 #include "tests/support/data.h"
 
@@ -48,6 +53,44 @@ TEST_F(SceneRoot, RefusesWhatLeadsOut) {
 }
 
 TEST_F(SceneRoot, SaysWhatIsNotThere) { expect_refused("sub/table.ply", ErrorCode::not_found); }
+
+TEST_F(SceneRoot, OpensNothingOutsideWhileFilesAndLinksChangePlaces) {
+  support::write_file(temp.path() / "secret.ply", "secret");
+  const fs::path spot = root / "spot.ply", file = root / "file", link = root / "link";
+  std::atomic<bool> done = false;
+  std::thread swaps([&] {
+    while (!done) {
+      support::write_file(file, "open");
+      fs::rename(file, spot);
+      fs::create_symlink(temp.path() / "secret.ply", link);
+      fs::rename(link, spot);
+    }
+  });
+  int opened = 0, refused = 0;
+  for (int i = 0; i < 3000; ++i) {
+    const auto found = open_below_root(root, "spot.ply");
+    if (!found) {
+      EXPECT_EQ(found.error().where, "path");
+      ++refused;
+      continue;
+    }
+    char bytes[8] = {};
+    EXPECT_GE(::pread(found->get(), bytes, sizeof bytes, 0), 0);
+    EXPECT_NE(std::string(bytes), "secret") << i;
+    ++opened;
+  }
+  done = true;
+  swaps.join();
+  EXPECT_GT(opened, 0);
+  EXPECT_GT(refused, 0);
+}
+
+TEST_F(SceneRoot, OpensFilesOnly) {
+  EXPECT_TRUE(open_below_root(root, "sub/chair.ply"));
+  EXPECT_TRUE(open_below_root(root, "inner.ply")) << "a link that stays below";
+  EXPECT_EQ(open_below_root(root, "sub").error().code, ErrorCode::invalid_argument);
+  EXPECT_EQ(open_below_root(root, "link.ply").error().code, ErrorCode::invalid_argument);
+}
 
 TEST_F(SceneRoot, OpensNothingWithoutARoot) {
   const auto found = below_root("", "chair.ply");

@@ -1,0 +1,152 @@
+#include "server/edits/records.h"
+
+#include <stdlib.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <system_error>
+#include <utility>
+
+#include "engine/core/atomic_file.h"
+#include "engine/core/file_descriptor.h"
+#include "engine/jobs/notes.h"
+#include "engine/jobs/sqlite_store.h"
+
+namespace server::edits {
+namespace {
+
+namespace fs = std::filesystem;
+namespace jobs = engine::jobs;
+using engine::ErrorCode;
+using engine::propagate;
+
+constexpr const char* store_name = "jobs.db";
+constexpr std::array store_files{"jobs.db", "jobs.db-wal", "jobs.db-shm", "jobs.db-journal"};
+
+/// The highest number of an edit that has made a version: with its number given away again, another edit would seem to
+/// have its result already.
+std::int64_t highest_edit(const scenes::SceneStore& scenes) {
+  std::int64_t highest = 0;
+  for (const scenes::SceneInfo& info : scenes.list())
+    for (const scenes::VersionInfo& version : info.versions)
+      highest = std::max(highest, jobs::number_of(version.edit).value_or(0));
+  return highest;
+}
+
+Result<OpenRecords> open_in(const jobs::SqliteOptions& sqlite, const jobs::QueueOptions& options) {
+  auto opened = jobs::SqliteStore::open(sqlite);
+  if (!opened) return propagate(opened);
+  auto queue = jobs::Queue::open(**opened, options);
+  if (!queue) return propagate(queue);
+  return OpenRecords{std::move(*opened), std::move(*queue)};
+}
+
+/// A name that nothing has: "jobs.db.damaged-1", "jobs.db.damaged-2", ...
+fs::path free_name(const fs::path& file) {
+  std::error_code ignored;
+  for (int i = 1;; ++i)
+    if (fs::path name = file.string() + ".damaged-" + std::to_string(i); !fs::exists(name, ignored)) return name;
+}
+
+/// A folder outside of the data folder, gone when this is.
+class TemporaryFolder {
+ public:
+  static Result<TemporaryFolder> make() {
+    std::error_code error;
+    std::string name = (fs::temp_directory_path(error) / "splatdrag-check-XXXXXX").string();
+    if (::mkdtemp(name.data()) == nullptr) return tl::make_unexpected(engine::file_error(errno, "make", name));
+    return TemporaryFolder(name);
+  }
+  TemporaryFolder(TemporaryFolder&& other) noexcept : path_(std::exchange(other.path_, {})) {}
+  TemporaryFolder& operator=(TemporaryFolder&&) = delete;
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    if (!path_.empty()) fs::remove_all(path_, ignored);
+  }
+  [[nodiscard]] const fs::path& path() const { return path_; }
+
+ private:
+  explicit TemporaryFolder(fs::path path) : path_(std::move(path)) {}
+  fs::path path_;
+};
+
+/// What check_records() finds by opening a copy of the records and of the notes as a service would.
+Result<void> check_copy(const fs::path& folder, const jobs::Traces& traces, RecordsCheck& found) {
+  const auto copy = TemporaryFolder::make();
+  if (!copy) return propagate(copy);
+  const fs::path notes = jobs_folder(copy->path());
+  std::error_code error;
+  fs::create_directory(notes, error);
+  for (const char* name : store_files)
+    if (std::error_code absent; !error && fs::exists(folder / name, absent))
+      fs::copy_file(folder / name, copy->path() / name, error);
+  for (const std::string& id : traces.notes)
+    if (!error) fs::copy_file(jobs_folder(folder) / (id + ".job"), notes / (id + ".job"), error);
+  for (const std::string& id : traces.folders)
+    if (!error) fs::create_directory(notes / id, error);
+  if (error) return tl::make_unexpected(engine::file_error(error.value(), "write", copy->path()));
+  const auto opened =
+      open_in({.folder = copy->path(), .must_exist = !traces.notes.empty(), .max_deaths = 0}, {.folder = notes});
+  if (!opened && opened.error().code != ErrorCode::corrupt_data && opened.error().code != ErrorCode::unsupported)
+    return propagate(opened);
+  if (!opened) {
+    found.damaged.push_back({opened.error().code, opened.error().message, std::string("edits/") + store_name});
+    return {};
+  }
+  for (const engine::Error& finding : opened->queue->findings())
+    found.damaged.push_back({finding.code, finding.message, "edits/jobs/" + finding.where});
+  return {};
+}
+
+}  // namespace
+
+Result<OpenRecords> open_records(const scenes::SceneStore& scenes, const ServiceOptions& options) {
+  const auto traces = jobs::find_traces(jobs_folder(options.folder));
+  if (!traces) return propagate(traces);
+  const std::int64_t highest = std::max(traces->highest_number, highest_edit(scenes));
+  auto opened = open_in(
+      {.folder = options.folder, .used_numbers = highest, .must_exist = highest > 0, .max_deaths = options.attempts},
+      {.folder = jobs_folder(options.folder), .max_queued = options.max_queued, .retention = options.retention});
+  if (!opened && opened.error().code == ErrorCode::corrupt_data)
+    opened.error().message +=
+        "; put back a copy of it, or have it made again from the notes beside the edits, by splatdrag admin rebuild";
+  return opened;
+}
+
+Result<Rebuilt> rebuild_records(const scenes::SceneStore& scenes, const fs::path& folder) {
+  Rebuilt rebuilt;
+  for (const char* name : store_files) {
+    std::error_code error;
+    if (!fs::exists(folder / name, error)) continue;
+    const fs::path aside = free_name(folder / name);
+    fs::rename(folder / name, aside, error);
+    if (error) return tl::make_unexpected(engine::file_error(error.value(), "move", folder / name));
+    rebuilt.moved_away.push_back(aside);
+  }
+  const auto traces = jobs::find_traces(jobs_folder(folder));
+  if (!traces) return propagate(traces);
+  const auto opened =
+      open_in({.folder = folder, .used_numbers = std::max(traces->highest_number, highest_edit(scenes))},
+              {.folder = jobs_folder(folder)});
+  if (!opened) return propagate(opened);
+  rebuilt.findings = opened->queue->findings();
+  return rebuilt;
+}
+
+Result<RecordsCheck> check_records(const fs::path& folder) {
+  RecordsCheck found;
+  const auto traces = jobs::find_traces(jobs_folder(folder));
+  if (!traces) return propagate(traces);
+  std::error_code error;
+  for (const char* name : store_files) found.files += fs::exists(folder / name, error) ? 1 : 0;
+  found.files += traces->notes.size();
+  if (found.files == 0 && traces->folders.empty()) return found;
+  if (traces->counter_is_damaged)
+    found.damaged.push_back(
+        {ErrorCode::corrupt_data, "the highest number of an edit cannot be read", "edits/jobs/last_number"});
+  if (auto checked = check_copy(folder, *traces, found); !checked) return propagate(checked);
+  return found;
+}
+
+}  // namespace server::edits

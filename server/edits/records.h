@@ -1,0 +1,51 @@
+// The records of edits on disk: opened, made again from the notes beside the edits, or only looked at.
+//
+//     <data-dir>/edits/jobs.db       the records
+//                      jobs/         a note and a folder for each edit (engine/jobs/notes.h)
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "engine/jobs/queue.h"
+#include "server/edits/edit_service.h"
+#include "server/scenes/scene_store.h"
+
+namespace server::edits {
+
+[[nodiscard]] inline std::filesystem::path jobs_folder(const std::filesystem::path& edits) { return edits / "jobs"; }
+
+struct OpenRecords {
+  std::unique_ptr<engine::jobs::Store> records;
+  std::unique_ptr<engine::jobs::Queue> queue;  ///< Of `records`.
+};
+/// Ids go on above all that a record, a note, a folder or a version of a scene tells of.
+///   errors  corrupt_data: the records are damaged, or absent although there have been edits; the message says how to
+///   go
+///           on. Those of jobs::Store and Queue::open().
+[[nodiscard]] Result<OpenRecords> open_records(const scenes::SceneStore& scenes, const ServiceOptions& options);
+
+struct Rebuilt {
+  std::vector<std::filesystem::path> moved_away;  ///< Where the files that were there are now.
+  std::vector<engine::Error> findings;            ///< What Queue::open() put back, and what it could not.
+};
+/// Moves the records away and makes them again from the notes. For an edit whose note is lost there will be no record;
+/// its folder stays.
+///   folder  <data-dir>/edits
+///   errors  unavailable, no_space
+[[nodiscard]] Result<Rebuilt> rebuild_records(const scenes::SceneStore& scenes, const std::filesystem::path& folder);
+
+struct RecordsCheck {
+  std::vector<engine::Error> damaged;  ///< `where` is the file's path inside the data folder.
+  std::size_t files = 0;               ///< Looked at.
+};
+/// Holds records and notes against their checksums and each other, on a copy: nothing is changed. Nobody else may have
+/// the folder open.
+///   folder  <data-dir>/edits; need not exist
+///   errors  unavailable, no_space
+[[nodiscard]] Result<RecordsCheck> check_records(const std::filesystem::path& folder);
+
+}  // namespace server::edits
