@@ -199,7 +199,7 @@ export function buildRequestPanel(editor) {
       }
       preset.options([["", "default"], ...runPresets(state.info).map((name) => [name, name])]);
       preset.update(state.preset);
-      crumbsField.hidden = state.selection.length === 0;
+      crumbsField.hidden = state.selection.length === 0 || state.mode === "extend";
       crumbs.update(state.crumbs === "move" ? "" : (state.crumbs ?? ""));
       params.update(state.info, state.params, state.preset);
       auto.update(state.autoPreview);

@@ -34,7 +34,7 @@ export function requestOf(state) {
     ...(selection.length ? { selection } : {}),
     ...(heal.length ? { heal } : {}),
     ...(attach ? { attach } : {}),
-    ...(crumbs && selection.length ? { crumbs } : {}), // they are what a selection has left out
+    ...(crumbs && selection.length && mode !== "extend" ? { crumbs } : {}), // of a selection that leaves its place
     ...(region ? { region } : {}),
     ...(given.length ? { params: Object.fromEntries(given) } : {}),
   };

@@ -20,7 +20,7 @@ namespace {
 /// What crumbs there are goes along with the part, or is given up.
 void take_crumbs(const scene::LayeredCloud& scene, const Request& request, std::span<const DVec3> centers,
                  const std::optional<deform::Box>& region, Memory& memory, Taken& taken) {
-  if (request.crumbs == Crumbs::keep) return;
+  if (request.crumbs == Crumbs::keep || request.mode == Mode::extend) return;
   const std::vector<std::uint32_t>& crumbs = memory.crumbs_of(scene, *request.selected);
   if (crumbs.empty()) return;
   // Crumbs outside of the region stay, and where it holds none, that is no error.

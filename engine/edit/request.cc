@@ -71,16 +71,14 @@ Result<void> validate_motion(const Request& request) {
   return {};
 }
 
-/// Crumbs are beside a selection, and go away where a part leaves its place.
+/// Crumbs are beside a selection, and left behind where a part leaves its place.
 Result<void> validate_crumbs(const Request& request) {
   if (request.crumbs == Crumbs::move) return {};
   const std::string asked = "\"" + std::string(name_of(request.crumbs)) + "\" ";
   if (!request.selected)
     return invalid(asked + "is about what a selection has left out: select what moves, or leave this out", "crumbs");
-  if (request.crumbs == Crumbs::remove && departure_of(request) != Mode::move)
-    return invalid(asked + "takes away what the part leaves behind; with mode \"extend\" and params.interpolation \"" +
-                       std::string(name_of(request.params.interpolation)) + "\" it leaves its whole place as it is",
-                   "crumbs");
+  if (request.mode == Mode::extend)
+    return invalid(asked + "is about what a part leaves behind; with mode \"extend\" it does not leave", "crumbs");
   return {};
 }
 

@@ -93,7 +93,7 @@ TEST(Preview, OfCrumbsIsWhatTheEditMakesOfThem) {
     }
 }
 
-TEST(Preview, CrumbsStayWhereNothingMovesAndOutsideOfTheRegion) {
+TEST(Preview, CrumbsStayWhereNothingMovesOutsideOfTheRegionAndWhereThePartIsDrawnOut) {
   const select::BoardOnTable scene;
   Request request = board_without_corner(scene, Crumbs::remove);
   request.handles[0].target = request.handles[0].source;
@@ -102,6 +102,12 @@ TEST(Preview, CrumbsStayWhereNothingMovesAndOutsideOfTheRegion) {
   EXPECT_TRUE(still->overlay.removed.empty());
 
   request = board_without_corner(scene, Crumbs::move);
+  request.mode = Mode::extend;
+  const auto drawn_out = preview(plain(scene.cloud), request);
+  ASSERT_TRUE(drawn_out) << drawn_out.error().message;
+  EXPECT_EQ(drawn_out->crumbs, 0u);
+
+  request.mode = Mode::move;
   request.region = Region{DVec3(1, 1, 0), DVec3(1.5, 1.5, 1)};
   const auto beside = preview(plain(scene.cloud), request);
   ASSERT_TRUE(beside) << beside.error().message;

@@ -71,13 +71,10 @@ TEST(ValidateRequest, CrumbsAreBesideASelectionAndGoWhereAPartLeaves) {
   }
   request.selected = {1, 2};
   EXPECT_TRUE(validate(request));
-  request.crumbs = Crumbs::remove;
-  EXPECT_TRUE(validate(request));
   request.mode = Mode::extend;
-  request.params.interpolation = Interpolation::rigid;
   ASSERT_FALSE(validate(request));
   EXPECT_EQ(validate(request).error().where, "crumbs");
-  request.params.interpolation = Interpolation::arap;
+  request.crumbs = Crumbs::move;
   EXPECT_TRUE(validate(request));
 }
 

@@ -74,6 +74,7 @@ test("crumbs and what holds a part go with a selection, from files as from the s
   assert.deepEqual([asked.crumbs, asked.attach], ["keep", "held"]);
   assert.equal(requestOf({ ...state, selection: [] }).crumbs, undefined, "without one there are none");
   assert.equal(requestOf({ ...state, crumbs: null }).crumbs, undefined, "the service's default");
+  assert.equal(requestOf({ ...state, mode: "extend" }).crumbs, undefined, "nothing is left behind");
   assert.notEqual(previewKey(asked), previewKey({ ...asked, crumbs: "remove" }));
   const read = only(JSON.stringify(asked));
   assert.deepEqual([read.crumbs, read.attach], ["keep", "held"]);
