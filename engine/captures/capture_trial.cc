@@ -93,6 +93,26 @@ Result<ReadyCase> make_ready(const CapturedCase& the_case, const TrainedCase& tr
 
 double CaptureTrial::gain_db() const { return trial.result.edited.psnr_db - deformed.edited.psnr_db; }
 
+double CaptureTrial::least_gain_db() const {
+  double least = gain_db();
+  for (const auto region : {&evaluate::Quality::vacated, &evaluate::Quality::arrived, &evaluate::Quality::outside})
+    if ((deformed.*region).pixels > 0)
+      least = std::min(least, (trial.result.*region).psnr_db - (deformed.*region).psnr_db);
+  return least;
+}
+
+std::optional<double> CaptureTrial::vacated_gain_db() const {
+  if (deformed.vacated.pixels == 0) return std::nullopt;
+  return trial.result.vacated.psnr_db - deformed.vacated.psnr_db;
+}
+
+std::optional<double> CaptureTrial::vacated_share() const {
+  const double way = ceiling.vacated.psnr_db - deformed.vacated.psnr_db;
+  const std::optional<double> gain = vacated_gain_db();
+  if (!gain || !(way > 0)) return std::nullopt;
+  return *gain / way;
+}
+
 std::optional<double> CaptureTrial::share_of_ceiling() const {
   const double way = ceiling.edited.psnr_db - trial.untouched.edited.psnr_db;
   if (!(way > 0)) return std::nullopt;
@@ -124,12 +144,13 @@ Result<CaptureOutcome> carry_out(const ReadyCase& ready, const edit::Request& re
 }
 
 std::string capture_table_head() {
-  return "| case | set | by | corrector | before, dB | deformed, dB | edited, dB | gain, dB | ceiling, dB | share, % "
-         "| beyond, dB | outside, dB | vacated, dB | arrived, dB | SSIM | recall, % | precision, % | recall of shown, "
+  return "| case | set | by | corrector | before, dB | deformed, dB | edited, dB | gain, dB | least gain, dB "
+         "| ceiling, dB | share, % | beyond, dB | outside, dB | vacated, dB | vacated gain, dB | vacated share, % "
+         "| arrived, dB | SSIM | recall, % | precision, % | recall of shown, "
          "% "
          "| precision of shown, % | s |\n"
          "| --- | --- | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: "
-         "| ---: | ---: | ---: | ---: |\n";
+         "| ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n";
 }
 
 std::string capture_table_row(const CaptureTrial& trial) {
@@ -146,13 +167,17 @@ std::string capture_table_row(const CaptureTrial& trial) {
   out << "| " << trial.trial.name << " | " << (trial.is_test ? "test" : "choose") << " | " << trial.by << " | "
       << trial.trial.corrector;
   for (const double db : {trial.trial.untouched.edited.psnr_db, trial.deformed.edited.psnr_db, result.edited.psnr_db,
-                          trial.gain_db(), trial.ceiling.edited.psnr_db})
+                          trial.gain_db(), trial.least_gain_db(), trial.ceiling.edited.psnr_db})
     number(true, db, 2);
   const std::optional<double> share = trial.share_of_ceiling();
   number(share.has_value(), 100 * share.value_or(0), 0);
   number(true, trial.result_beyond_db, 2);
-  for (const evaluate::RegionQuality* region : {&result.outside, &result.vacated, &result.arrived})
-    number(region->pixels > 0, region->psnr_db, 2);
+  number(result.outside.pixels > 0, result.outside.psnr_db, 2);
+  number(result.vacated.pixels > 0, result.vacated.psnr_db, 2);
+  const std::optional<double> vacated_gain = trial.vacated_gain_db(), vacated_share = trial.vacated_share();
+  number(vacated_gain.has_value(), vacated_gain.value_or(0), 2);
+  number(vacated_share.has_value(), 100 * vacated_share.value_or(0), 0);
+  number(result.arrived.pixels > 0, result.arrived.psnr_db, 2);
   number(true, result.edited.ssim, 4);
   for (const Match& match : {trial.match, trial.shown}) {
     number(true, 100 * match.recall, 0);

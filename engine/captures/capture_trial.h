@@ -68,6 +68,12 @@ struct CaptureTrial {
   double fit_seconds = 0;  ///< Of both fits.
 
   [[nodiscard]] double gain_db() const;  ///< Of the edit over deformation alone, in the edited region.
+  /// The same in the region where it gains least, be it edited, vacated, arrived or outside: below zero, it did harm.
+  [[nodiscard]] double least_gain_db() const;
+  /// The same in the vacated region. Nothing where nothing is vacated.
+  [[nodiscard]] std::optional<double> vacated_gain_db() const;
+  /// What of the gain that the ceiling has there the edit has. Nothing also where the ceiling has none.
+  [[nodiscard]] std::optional<double> vacated_share() const;
   /// Of the way from the scene before the edit to the ceiling, in dB of the edited region, the part that the edit goes:
   /// 0 as good as doing nothing, 1 as good as photographing anew. Nothing where the ceiling is no better than that.
   [[nodiscard]] std::optional<double> share_of_ceiling() const;

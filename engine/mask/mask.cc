@@ -86,13 +86,15 @@ scene::Mask dilate(const scene::Mask& mask, int radius_px) {
 
 int blur_radius(int picture_height) { return std::max(1, picture_height / 192); }
 
-scene::Mask opened(const scene::Mask& mask, int radius_px) {
+scene::Mask eroded(const scene::Mask& mask, int radius_px) {
   const auto complement = [](scene::Mask of) {
     for (std::uint8_t& flag : of.data) flag = flag == 0;
     return of;
   };
-  return dilate(complement(dilate(complement(mask), radius_px)), radius_px);
+  return complement(dilate(complement(mask), radius_px));
 }
+
+scene::Mask opened(const scene::Mask& mask, int radius_px) { return dilate(eroded(mask, radius_px), radius_px); }
 
 void unite(scene::Mask& into, const scene::Mask& other) {
   assert(into.width == other.width && into.height == other.height);

@@ -22,6 +22,10 @@ namespace engine::mask {
 /// Exact, O(pixels) for any radius; a radius of 0 or less changes nothing.
 [[nodiscard]] scene::Mask dilate(const scene::Mask& mask, int radius_px);
 
+/// Keeps the pixels whose disc of `radius_px` lies within the mask (and may reach beyond the picture). A radius of 0 or
+/// less changes nothing.
+[[nodiscard]] scene::Mask eroded(const scene::Mask& mask, int radius_px);
+
 /// The union of the discs of `radius_px` that lie within the mask (and may reach beyond the picture): what is thinner
 /// is lost, what is thicker stays as it is but for its corners. A radius of 0 or less changes nothing.
 [[nodiscard]] scene::Mask opened(const scene::Mask& mask, int radius_px);

@@ -1,6 +1,8 @@
 #include "engine/repair/repair.h"
 
 #include <algorithm>
+#include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -8,6 +10,7 @@
 #include "engine/core/rng.h"
 #include "engine/mask/mask.h"
 #include "engine/render/forward.h"
+#include "engine/repair/chart.h"
 #include "engine/repair/seed.h"
 #include "engine/repair/surfaces.h"
 #include "engine/repair/trust.h"
@@ -68,6 +71,10 @@ class OpaqueTrail {
 /// Pixels by which outlines of what has left are widened: they are blurred.
 int rim_px(const scene::Camera& view) { return std::max(1, view.height / 128); }
 
+/// Pixels beside what cannot be relied upon that a chart does without: four times what outlines are blurred by. With
+/// twice, what is left of the rim of a part was taken for its surroundings.
+int chart_rim_px(const scene::Camera& view) { return 4 * mask::blur_radius(view.height); }
+
 /// "512 x 384 x 3": pixels and channels.
 std::string size_text(int width, int height, int channels) {
   return std::to_string(width) + " x " + std::to_string(height) + " x " + std::to_string(channels);
@@ -79,7 +86,7 @@ std::string size_text(const scene::Image& picture) {
 }  // namespace
 
 /// What random choices are made for, in each view of each correction.
-enum class Repair::Purpose : std::uint32_t { surfaces, background, view };
+enum class Repair::Purpose : std::uint32_t { surfaces, background, view, chart };
 
 /// What a view shows now, without the rows that are hidden.
 struct Repair::ViewNow {
@@ -142,9 +149,9 @@ std::uint64_t Repair::seed_for(Purpose purpose, std::size_t v, const Round& roun
 }
 
 Result<scene::Image> Repair::ask_corrector(scene::Image picture, const scene::Mask& mask, scene::Image trust,
-                                           std::size_t v, const Round& round, Purpose purpose) {
-  const correct::CorrectionTask task{std::move(picture), mask, std::move(trust),
-                                     nearest_views(views_, v, most_examples)};
+                                           std::size_t v, std::vector<std::size_t> examples, const Round& round,
+                                           Purpose purpose) {
+  const correct::CorrectionTask task{std::move(picture), mask, std::move(trust), std::move(examples)};
   auto pictures = corrector_.correct(std::span(&task, 1), round.strength, seed_for(purpose, v, round));
   if (!pictures) return propagate(pictures);
   const std::string due = size_text(mask.width, mask.height, 3);
@@ -157,7 +164,7 @@ Result<scene::Image> Repair::ask_corrector(scene::Image picture, const scene::Ma
   return std::move(pictures->front());
 }
 
-scene::Image Repair::surfaces_behind(const ViewNow& now, std::size_t v, const Round& round) const {
+ContinuedSurfaces Repair::surfaces_behind(const ViewNow& now, std::size_t v, const Round& round) const {
   const scene::Camera& view = views_[v];
   SurfaceView surface_view{now.inverse_depth, now.reliable, vacated_[v], scene::Mask(view.width, view.height),
                            now.within};
@@ -168,7 +175,9 @@ scene::Image Repair::surfaces_behind(const ViewNow& now, std::size_t v, const Ro
     const int x = int(pixel.x), y = int(pixel.y);
     const double front = double(unedited_.median_depth[v].at(x, y));
     if (stained_[v].at(x, y) == 0 && inverse_depth * front > 1 - front_depth) return true;
-    return is_free(point_at(view, pixel, inverse_depth), unedited_, views_);
+    // Where a camera looked, there is what it saw, or nothing, whatever hides it from this view.
+    const DVec3 point = point_at(view, pixel, inverse_depth);
+    return (stained_[v].at(x, y) == 0 && witnesses_.saw(point)) || is_free(point, unedited_, views_);
   };
   return continued_surfaces(surface_view, is_free_at, seed_for(Purpose::surfaces, v, round));
 }
@@ -203,20 +212,19 @@ void Repair::doubt_unseen(const WorkingScene& working, const Rows& rows, std::si
   }
 }
 
-void Repair::clear_unseen(WorkingScene& working, Rows& rows, std::size_t v, const scene::Image& surface) {
-  const scene::Camera& view = views_[v];
+void Repair::clear_unseen(WorkingScene& working, Rows& rows, const scene::Camera& camera, const scene::Image& surface,
+                          const std::function<bool(DVec2 pixel, double z)>& is_within) {
   const std::size_t before = rows.gone.size();
   for (const std::uint32_t row : unseen_) {
     if (working.role()[row] != Role::frozen) continue;
-    const DVec3 p = view.cam_from_world(working.cloud().mean.get(row));
+    const DVec3 p = camera.cam_from_world(working.cloud().mean.get(row));
     if (!(p.z > 0)) continue;
-    const DVec2 pixel = view.pixel_from_cam(p);
-    if (!(pixel.x >= 0 && pixel.y >= 0 && pixel.x < view.width && pixel.y < view.height)) continue;
+    const DVec2 pixel = camera.pixel_from_cam(p);
+    if (!(pixel.x >= 0 && pixel.y >= 0 && pixel.x < camera.width && pixel.y < camera.height)) continue;
     const double inverse_depth = double(surface.at(int(pixel.x), int(pixel.y)));
     if (!(inverse_depth > 0) || p.z * inverse_depth > 1 + off_surface) continue;
-    // What lies deeper than the part did, and not on the surface either, is the inside of something else.
-    const bool is_within = p.z <= double(far_side_[v].at(int(pixel.x), int(pixel.y)));
-    if (!is_within && p.z * inverse_depth < 1 - off_surface) continue;
+    // What lies where the part was not, and not on the surface either, is the inside of something else.
+    if (p.z * inverse_depth < 1 - off_surface && !is_within(pixel, p.z)) continue;
     working.give_up(row);
     rows.gone.push_back(row), rows.dragged.push_back(row);
   }
@@ -225,19 +233,53 @@ void Repair::clear_unseen(WorkingScene& working, Rows& rows, std::size_t v, cons
   std::sort(rows.dragged.begin(), rows.dragged.end());
 }
 
-std::size_t Repair::most_telling_view(const WorkingScene& working, const Rows& rows, const Round& round) {
-  std::size_t best = 0;
+Repair::Telling Repair::most_telling_view(const WorkingScene& working, const Rows& rows, const Round& round) {
+  Telling best;
   std::ptrdiff_t most = 0;
   if (rows.gone.empty()) return best;
   for (std::size_t v = 0; v < views_.size(); ++v) {
     ViewNow now = look(working, rows.dragged, v);
     doubt_unseen(working, rows, v, now);
-    const scene::Image surface = surfaces_behind(now, v, round);
-    const auto shown =
-        std::count_if(surface.data.begin(), surface.data.end(), [](float inverse_depth) { return inverse_depth > 0; });
-    if (shown > most) most = shown, best = v;
+    ContinuedSurfaces surfaces = surfaces_behind(now, v, round);
+    const std::vector<float>& found = surfaces.inverse_depth.data;
+    const auto shown = std::count_if(found.begin(), found.end(), [](float inverse_depth) { return inverse_depth > 0; });
+    if (shown > most) most = shown, best = {v, std::move(surfaces)};
   }
   return best;
+}
+
+Result<std::size_t> Repair::complete_chart(WorkingScene& working, Rows& rows, const Telling& telling,
+                                           const Round& round) {
+  std::optional<Chart> chart = chart_of(views_[telling.view], telling.surfaces);
+  if (!chart) return 0;
+  for (std::size_t v = 0; v < views_.size(); ++v) {
+    ViewNow now = look(working, rows.dragged, v);
+    doubt_unseen(working, rows, v, now);
+    add_view(*chart, views_[v], {now.color, now.inverse_depth, mask::eroded(now.reliable, chart_rim_px(views_[v]))});
+  }
+  // Where a surface ends, a view that shows what is beyond its edge tells more than a chart, which has the surface
+  // alone (the old case `lift` by a chart: 26.7 -> 22.4 dB).
+  if (!is_surrounded(*chart, chart_rim_px(views_[telling.view]))) return 0;
+  const int side = chart->camera.width;
+  correct::Example known{picture_of(*chart), scene::Mask(side, side), {0, 0, side, side}};
+  scene::Image surface = chart->inverse_depth, trust(side, side, 1);
+  for (std::size_t i = 0; i < trust.data.size(); ++i) {
+    trust.data[i] = chart->weights.data[i] > 0 ? 1.0f : 0.0f;
+    known.excluded.data[i] = trust.data[i] == 0;
+    if (chart->goes_on.data[i] == 0) surface.data[i] = 0;
+  }
+
+  if (auto tuned = corrector_.fine_tune(std::span(&known, 1), 0); !tuned) return propagate(tuned);
+  auto picture =
+      ask_corrector(known.picture, known.excluded, std::move(trust), telling.view, {0}, round, Purpose::chart);
+  if (!picture) return propagate(picture);
+  const std::size_t seeds = add_seeds(working, chart->camera, surface, *picture, *originals_);
+  double front = std::numeric_limits<double>::infinity();  // of what has left
+  for (const std::uint32_t row : open_)
+    front = std::min(front, chart->camera.cam_from_world(original_.mean.get(row)).z);
+  clear_unseen(working, rows, chart->camera, surface, [&](DVec2, double z) { return z >= front; });
+  trust_.resize(working.size(), 1.0f);  // what has been decided stays
+  return seeds;
 }
 
 Result<Repair::Background> Repair::complete_background(WorkingScene& working, Rows& rows, std::size_t v,
@@ -245,19 +287,21 @@ Result<Repair::Background> Repair::complete_background(WorkingScene& working, Ro
   const scene::Camera& view = views_[v];
   ViewNow now = look(working, rows.dragged, v);
   doubt_unseen(working, rows, v, now);
-  const scene::Image surface = surfaces_behind(now, v, round);
+  const scene::Image surface = surfaces_behind(now, v, round).inverse_depth;
   Background background{{}, scene::Mask(view.width, view.height), 0};
   bool goes_on = false;
   for (std::size_t i = 0; i < surface.data.size(); ++i) {
     if (surface.data[i] > 0) now.trust.data[i] = 0, goes_on = true;
     background.filled.data[i] = vacated_[v].data[i] != 0 && now.trust.data[i] < correct::trusted;
   }
-  auto picture = ask_corrector(std::move(now.color), vacated_[v], std::move(now.trust), v, round, Purpose::background);
+  auto picture = ask_corrector(std::move(now.color), vacated_[v], std::move(now.trust), v,
+                               nearest_views(views_, v, most_examples), round, Purpose::background);
   if (!picture) return propagate(picture);
   background.picture = std::move(*picture);
   if (goes_on) {
     background.seeds = add_seeds(working, view, surface, background.picture, *originals_);
-    clear_unseen(working, rows, v, surface);
+    clear_unseen(working, rows, view, surface,
+                 [&](DVec2 pixel, double z) { return z <= double(far_side_[v].at(int(pixel.x), int(pixel.y))); });
   }
   trust_.resize(working.size(), 1.0f);  // what has been decided stays
   return background;
@@ -280,7 +324,8 @@ Result<scene::Image> Repair::correct_view(const WorkingScene& working, const Row
     }
   }
   for (float& trust : now.trust.data) trust = std::min(trust / half_seen, 1.0f);
-  return ask_corrector(std::move(now.color), mask, std::move(now.trust), v, round, Purpose::view);
+  return ask_corrector(std::move(now.color), mask, std::move(now.trust), v, nearest_views(views_, v, most_examples),
+                       round, Purpose::view);
 }
 
 Result<Corrected> Repair::correct(WorkingScene& working, std::span<const scene::Mask> masks, const Round& round,
@@ -290,10 +335,14 @@ Result<Corrected> Repair::correct(WorkingScene& working, std::span<const scene::
   give_up_healed(working);
   Rows rows = rows_of(working);
   note_vacated(working, rows, masks);
-  if (auto tuned = corrector_.fine_tune(buffer_, 0); !tuned) return propagate(tuned);
   trust_ = trust_of_rows(working, observed_, mode_);
   const OpaqueTrail opaque(working, original_, mode_);
-  const std::vector<std::size_t> order = outward(views_, most_telling_view(working, rows, round));
+  const Telling telling = most_telling_view(working, rows, round);
+  auto charted = complete_chart(working, rows, telling, round);
+  if (!charted) return propagate(charted);
+  corrected.seeds += *charted;
+  if (auto tuned = corrector_.fine_tune(buffer_, 0); !tuned) return propagate(tuned);
+  const std::vector<std::size_t> order = outward(views_, telling.view);
   for (std::size_t k = 0; k < order.size(); ++k) {
     const std::size_t v = order[k];
     Background background;
@@ -330,13 +379,13 @@ Repair::Rows Repair::rows_of(const WorkingScene& working) const {
 void Repair::note_vacated(const WorkingScene& working, const Rows& rows, std::span<const scene::Mask> masks) {
   vacated_.resize(views_.size());
   far_side_.resize(views_.size());
-  const std::vector<std::uint32_t> open = rows_left_open(original_, rows.vacating, working, rows.moved);
+  open_ = rows_left_open(original_, rows.vacating, working, rows.moved);
   for (std::size_t v = 0; v < views_.size(); ++v) {
     const scene::Image share = working::footprint(original_, rows.vacating, views_[v], workspace_);
-    const scene::Image open_share = working::footprint(original_, open, views_[v], workspace_);
+    const scene::Image open_share = working::footprint(original_, open_, views_[v], workspace_);
     vacated_[v] = mask::dilate(mask::mask2d(open_share), rim_px(views_[v]));
     mask::unite(vacated_[v], stained_[v]);
-    far_side_[v] = far_side(original_, open, views_[v]);
+    far_side_[v] = far_side(original_, open_, views_[v]);
     buffer_[v].excluded = mask::mask2d(share, trace);
     buffer_[v].box = scene::bounding_box(masks[v]);
   }

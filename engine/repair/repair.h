@@ -15,6 +15,7 @@
 #include "engine/correct/corrector.h"
 #include "engine/neighbours/point_index.h"
 #include "engine/render/forward.h"
+#include "engine/repair/surfaces.h"
 #include "engine/repair/unedited_views.h"
 #include "engine/repair/witnesses.h"
 #include "engine/scene/camera.h"
@@ -79,6 +80,11 @@ class Repair {
     std::size_t seeds = 0;  ///< Rows appended.
   };
 
+  struct Telling {
+    std::size_t view = 0;
+    ContinuedSurfaces surfaces;  ///< In it.
+  };
+
   [[nodiscard]] Rows rows_of(const WorkingScene& working) const;
   /// Notes in each view what has been left so far, and keeps it from being learned from.
   void note_vacated(const WorkingScene& working, const Rows& rows, std::span<const scene::Mask> masks);
@@ -88,14 +94,19 @@ class Repair {
                                                   const Background& background, const scene::Mask& mask, std::size_t v,
                                                   const Round& round);
   [[nodiscard]] Result<scene::Image> ask_corrector(scene::Image picture, const scene::Mask& mask, scene::Image trust,
-                                                   std::size_t v, const Round& round, Purpose purpose);
+                                                   std::size_t v, std::vector<std::size_t> examples, const Round& round,
+                                                   Purpose purpose);
   /// The seed of these choices; a corrector counts up from it.
   [[nodiscard]] std::uint64_t seed_for(Purpose purpose, std::size_t v, const Round& round) const;
-  /// Inverse depth of the surfaces that go on behind the dragged part in view v; 0 where none does.
-  [[nodiscard]] scene::Image surfaces_behind(const ViewNow& now, std::size_t v, const Round& round) const;
+  /// The surfaces that go on behind the dragged part in view v.
+  [[nodiscard]] ContinuedSurfaces surfaces_behind(const ViewNow& now, std::size_t v, const Round& round) const;
   /// The view that shows most of what can be completed, and is to decide what is there: at an outline of what goes on,
   /// little of it is seen. The first one if nothing is to be completed.
-  [[nodiscard]] std::size_t most_telling_view(const WorkingScene& working, const Rows& rows, const Round& round);
+  [[nodiscard]] Telling most_telling_view(const WorkingScene& working, const Rows& rows, const Round& round);
+  /// Completes the surface that goes on at most pixels in a chart of it, before any view does, if enough around it is
+  /// known: returns the number of seeds.
+  [[nodiscard]] Result<std::size_t> complete_chart(WorkingScene& working, Rows& rows, const Telling& telling,
+                                                   const Round& round);
   /// Lays what goes on behind the dragged part into the working scene as seeds.
   [[nodiscard]] Result<Background> complete_background(WorkingScene& working, Rows& rows, std::size_t v,
                                                        const Round& round);
@@ -104,8 +115,11 @@ class Repair {
   /// Takes the trust of what view v shows in vacated pixels and no camera has seen, and of what lay right under a
   /// stain.
   void doubt_unseen(const WorkingScene& working, const Rows& rows, std::size_t v, ViewNow& now);
-  /// Rows that nobody has seen leave where a surface was completed in view v, if they would hide it.
-  void clear_unseen(WorkingScene& working, Rows& rows, std::size_t v, const scene::Image& surface);
+  /// Rows that nobody has seen leave where a surface was completed, if they would hide it.
+  ///   surface    [1] inverse depth of it in the camera; 0: nothing was completed
+  ///   is_within  was the dragged part there, at this pixel and depth?
+  void clear_unseen(WorkingScene& working, Rows& rows, const scene::Camera& camera, const scene::Image& surface,
+                    const std::function<bool(DVec2 pixel, double z)>& is_within);
 
   scene::GaussianCloud original_;
   std::vector<scene::Camera> views_;
@@ -119,6 +133,7 @@ class Repair {
   std::vector<std::uint32_t> unseen_;  ///< Rows of the input that no camera has seen, ascending.
   UneditedViews unedited_;
   std::vector<correct::Example> buffer_;
+  std::vector<std::uint32_t> open_;     ///< Rows of the input whose place is empty now, ascending.
   std::vector<scene::Mask> vacated_;    ///< Per view: what the part has left.
   std::vector<scene::Image> far_side_;  ///< Per view: of what the part has left. See far_side().
   render::Workspace workspace_;

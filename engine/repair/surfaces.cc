@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <optional>
+#include <utility>
 
 #include "engine/core/parallel.h"
 #include "engine/core/rng.h"
@@ -166,6 +167,10 @@ class Surroundings {
     return {(x + 0.5 - (rect_.x0 + rect_.x1) / 2.0) * scale_, (y + 0.5 - (rect_.y0 + rect_.y1) / 2.0) * scale_,
             inverse_depth};
   }
+  /// Inverse depth of a surface at a pixel position.
+  [[nodiscard]] double value(const Surface& surface, DVec2 pixel) const {
+    return surface((pixel.x - (rect_.x0 + rect_.x1) / 2.0) * scale_, (pixel.y - (rect_.y0 + rect_.y1) / 2.0) * scale_);
+  }
   [[nodiscard]] bool holds(int x, int y) const {
     return x >= rect_.x0 && y >= rect_.y0 && x < rect_.x1 && y < rect_.y1;
   }
@@ -248,12 +253,13 @@ scene::Image without_crumbs(const scene::Image& found) {
 
 }  // namespace
 
-scene::Image continued_surfaces(const SurfaceView& view, const IsFree& is_free, std::uint64_t seed) {
+ContinuedSurfaces continued_surfaces(const SurfaceView& view, const IsFree& is_free, std::uint64_t seed) {
   const int width = view.inverse_depth.width, height = view.inverse_depth.height;
   scene::Image out(width, height, 1);
-  if (view.vacated.area() == 0) return out;
+  if (view.vacated.area() == 0) return {std::move(out), {}, {}};
   const Surroundings near(view.vacated);
-  for (const Surface& surface : find_surfaces(points_of(view, near), near.pixel(), seed)) {
+  const std::vector<Surface> surfaces = find_surfaces(points_of(view, near), near.pixel(), seed);
+  for (const Surface& surface : surfaces) {
     const std::vector<std::uint8_t> met = directions_met(view, near, surface);
     parallel_for(std::size_t(height), 4, [&](std::size_t begin, std::size_t end) {
       for (int y = int(begin); y < int(end); ++y)
@@ -272,7 +278,20 @@ scene::Image continued_surfaces(const SurfaceView& view, const IsFree& is_free, 
         }
     });
   }
-  return without_crumbs(out);
+  out = without_crumbs(out);
+  ContinuedSurfaces continued{std::move(out), {}, near.rect()};
+  std::size_t most = 0;
+  for (const Surface& surface : surfaces) {
+    std::size_t on = 0;
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x)
+        if (const float here = continued.inverse_depth.at(x, y); here > 0)
+          on += lies_on(surface, near.point(x, y, double(here))) ? 1 : 0;
+    if (on <= most) continue;
+    most = on;
+    continued.main = [surface, near](DVec2 pixel) { return near.value(surface, pixel); };
+  }
+  return continued;
 }
 
 }  // namespace engine::repair

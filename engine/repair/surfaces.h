@@ -28,8 +28,15 @@ struct SurfaceView {
 /// Is the point (pixel position, inverse depth) in space that some view has looked through?
 using IsFree = std::function<bool(DVec2 pixel, double inverse_depth)>;
 
-/// Inverse depth of the surface that goes on at each vacated pixel; 0 where none does.
+/// The surfaces that go on in one view.
+struct ContinuedSurfaces {
+  scene::Image inverse_depth;  ///< [1] Of the surface that goes on at each vacated pixel; 0 where none does.
+  /// Inverse depth of the one that goes on at most pixels, at any pixel position. None: nothing goes on.
+  std::function<double(DVec2 pixel)> main;
+  scene::Rect known;  ///< Pixels around the place from which surfaces are known; farther out they are guesses.
+};
+
 ///   seed  of the random choices
-[[nodiscard]] scene::Image continued_surfaces(const SurfaceView& view, const IsFree& is_free, std::uint64_t seed);
+[[nodiscard]] ContinuedSurfaces continued_surfaces(const SurfaceView& view, const IsFree& is_free, std::uint64_t seed);
 
 }  // namespace engine::repair

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iomanip>
+#include <limits>
 #include <optional>
 #include <set>
 #include <sstream>
@@ -39,6 +40,12 @@ constexpr const char* how =
     "the\n"
     "  edit goes. **beyond**: *edited* at the cameras outside the orbit only.\n"
     "- **outside**, **vacated**, **arrived**, **SSIM** (of the edited region): of the edit.\n"
+    "- **least gain**: over deformation alone in the region that gains least, be it edited, vacated, arrived or "
+    "outside:\n"
+    "  below zero, the repair did harm there. **vacated gain**: in the vacated region; **vacated share**: that in "
+    "parts "
+    "of\n"
+    "  what the ceiling gains there. Of means, *least gain* is the least of all cases.\n"
     "- **recall**, **precision**: of what the request takes along with what moves, by opacity times area; **of "
     "shown**:\n"
     "  by what the photos show, without the undersides and insides that nobody has seen.\n"
@@ -54,8 +61,8 @@ std::optional<double> gain_over_bare_balls(std::span<const CaptureTrial> trials,
 }
 
 struct Mean {
-  int count = 0, beside_bare = 0;
-  double over_bare = 0;
+  int count = 0, beside_bare = 0, vacating = 0, shared = 0;
+  double over_bare = 0, least_gain = std::numeric_limits<double>::infinity(), vacated_gain = 0, vacated_share = 0;
   double gain = 0, deformed = 0, edited = 0, ceiling = 0, share = 0, outside = 0, recall = 0, precision = 0,
          shown_recall = 0, shown_precision = 0;
 };
@@ -72,8 +79,12 @@ Mean mean_of(std::span<const CaptureTrial> trials, bool is_test, const std::stri
     mean.recall += trial.match.recall, mean.precision += trial.match.precision;
     mean.shown_recall += trial.shown.recall, mean.shown_precision += trial.shown.precision;
     if (const auto gain = gain_over_bare_balls(trials, trial)) ++mean.beside_bare, mean.over_bare += *gain;
+    mean.least_gain = std::min(mean.least_gain, trial.least_gain_db());
+    if (const auto gain = trial.vacated_gain_db()) ++mean.vacating, mean.vacated_gain += *gain;
+    if (const auto share = trial.vacated_share()) ++mean.shared, mean.vacated_share += *share;
   }
   mean.over_bare /= std::max(1, mean.beside_bare);
+  mean.vacated_gain /= std::max(1, mean.vacating), mean.vacated_share /= std::max(1, mean.shared);
   for (double* sum : {&mean.gain, &mean.deformed, &mean.edited, &mean.ceiling, &mean.share, &mean.outside, &mean.recall,
                       &mean.precision, &mean.shown_recall, &mean.shown_precision})
     *sum /= std::max(1, mean.count);
@@ -82,18 +93,21 @@ Mean mean_of(std::span<const CaptureTrial> trials, bool is_test, const std::stri
 
 std::string means(std::span<const CaptureTrial> trials, const BenchOptions& options) {
   std::ostringstream out;
-  out << "| set | by | corrector | cases | deformed, dB | edited, dB | gain, dB | ceiling, dB | share, % | outside, dB "
-         "| "
+  out << "| set | by | corrector | cases | deformed, dB | edited, dB | gain, dB | least gain, dB | ceiling, dB | "
+         "share, % "
+         "| outside, dB | vacated gain, dB | vacated share, % | "
          "recall, % | precision, % | recall of shown, % | precision of shown, % | over bare, dB |\n"
-         "| --- | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n"
+         "| --- | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: "
+         "| ---: | ---: |\n"
       << std::fixed;
   const auto add = [&](bool is_test, const std::string& by, const std::string& corrector) {
     const Mean mean = mean_of(trials, is_test, by, corrector);
     if (mean.count == 0) return;
     out << "| " << (is_test ? "test" : "choose") << " | " << by << " | " << corrector << " | " << mean.count
         << std::setprecision(2) << " | " << mean.deformed << " | " << mean.edited << " | " << mean.gain << " | "
-        << mean.ceiling << " | " << std::setprecision(0) << 100 * mean.share << std::setprecision(2) << " | "
-        << mean.outside << std::setprecision(0) << " | " << 100 * mean.recall << " | " << 100 * mean.precision << " | "
+        << mean.least_gain << " | " << mean.ceiling << " | " << std::setprecision(0) << 100 * mean.share
+        << std::setprecision(2) << " | " << mean.outside << " | " << mean.vacated_gain << std::setprecision(0) << " | "
+        << 100 * mean.vacated_share << " | " << 100 * mean.recall << " | " << 100 * mean.precision << " | "
         << 100 * mean.shown_recall << " | " << 100 * mean.shown_precision << " | ";
     if (mean.beside_bare > 0)
       out << std::setprecision(2) << mean.over_bare;

@@ -31,6 +31,25 @@ TEST(CaptureTrial, TheShareOfTheCeilingIsAPartOfTheWay) {
   EXPECT_FALSE(trial.share_of_ceiling()) << "nowhere to go";
 }
 
+TEST(CaptureTrial, HarmIsSeenInTheRegionWhereItIs) {
+  CaptureTrial trial;
+  const auto in = [](evaluate::Quality& quality, double edited, double vacated, double outside) {
+    quality.edited = {edited, 0, 10}, quality.vacated = {vacated, 0, 10}, quality.outside = {outside, 0, 10};
+  };
+  in(trial.deformed, 20, 18, 33);
+  in(trial.trial.result, 21, 22, 32.5);
+  in(trial.ceiling, 30, 26, 35);
+  EXPECT_DOUBLE_EQ(trial.least_gain_db(), -0.5) << "outside; nothing has arrived anywhere, which is no region";
+  EXPECT_DOUBLE_EQ(trial.vacated_gain_db().value(), 4);
+  EXPECT_DOUBLE_EQ(trial.vacated_share().value(), 0.5);
+  trial.trial.result.edited.psnr_db = 19;
+  EXPECT_DOUBLE_EQ(trial.least_gain_db(), -1);
+  trial.ceiling.vacated.psnr_db = 18;
+  EXPECT_FALSE(trial.vacated_share()) << "nothing to gain";
+  trial.deformed.vacated.pixels = 0;
+  EXPECT_FALSE(trial.vacated_gain_db());
+}
+
 TEST(CaptureTrial, ATinyOneFromPhotosToFigures) {
   const support::TempDir folder;
   const CapturedCase the_case = make_captured_case("mug").value();

@@ -234,11 +234,16 @@ TEST(EditWithACorrector, GivesTheSameBytesForAnyNumberOfThreads) {
 /// Standard deviations of the new Gaussians along their longest axes, on the mean.
 double mean_extent(const Outcome& outcome) {
   double sum = 0;
-  for (std::size_t row = outcome.overlay.changed.size(); row < outcome.overlay.rows.size(); ++row) {
-    const Vec3 log_scale = outcome.overlay.rows.log_scale.get(row);
+  std::size_t count = 0;
+  const scene::GaussianCloud& rows = outcome.overlay.rows;
+  for (std::size_t row = outcome.overlay.changed.size(); row < rows.size(); ++row) {
+    const auto sh = rows.sh_row(row);
+    if (sh[0] < sh[2 * scene::sh_coefficients(rows.sh_degree)]) continue;  // of the floor, which is blue: a seed
+    const Vec3 log_scale = rows.log_scale.get(row);
     sum += std::exp(double(std::max({log_scale.x, log_scale.y, log_scale.z})));
+    ++count;
   }
-  return sum / double(outcome.overlay.added());
+  return sum / double(count);
 }
 
 TEST(EditWithACorrector, WhatIsStretchedIsDrawnOutOncePerInterval) {
@@ -363,7 +368,7 @@ TEST(EditWithACorrector, AnErrorOfTheCorrectorEndsTheEdit) {
 /// Gives back so many times this picture, whatever it is asked for.
 class Careless final : public correct::Corrector {
  public:
-  Careless(std::size_t pictures, scene::Image picture) : pictures_(pictures, std::move(picture)) {}
+  Careless(std::size_t pictures, const scene::Image& picture) : pictures_(pictures, picture) {}
   Result<void> fine_tune(std::span<const correct::Example>, int) override { return {}; }
   Result<std::vector<scene::Image>> correct(std::span<const correct::CorrectionTask>, double, std::uint64_t) override {
     return pictures_;

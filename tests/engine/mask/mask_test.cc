@@ -88,6 +88,18 @@ TEST(Dilate, IsTheSameForAnyNumberOfThreads) {
   EXPECT_EQ(one, four);
 }
 
+TEST(Eroded, KeepsWhatIsFarFromAllElse) {
+  Mask mask(7, 5);
+  for (int y = 1; y < 5; ++y)
+    for (int x = 1; x < 6; ++x) mask.at(x, y) = 1;
+  Mask inner(7, 5);
+  for (int y = 2; y < 5; ++y)
+    for (int x = 2; x < 5; ++x) inner.at(x, y) = 1;
+  EXPECT_EQ(eroded(mask, 1), inner) << "the picture's rim is no end";
+  EXPECT_EQ(eroded(mask, 0), mask);
+  EXPECT_EQ(eroded(mask, 9), Mask(7, 5));
+}
+
 TEST(Opened, LosesWhatIsThinAndKeepsTheRest) {
   Mask mask(20, 12);
   for (int y = 2; y < 9; ++y)

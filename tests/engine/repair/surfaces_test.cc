@@ -36,6 +36,10 @@ SurfaceView plane_with(scene::Rect gap, double seen_in_gap = far_behind) {
 
 bool nowhere_free(DVec2, double) { return false; }
 
+scene::Image inverse_depth_of(const SurfaceView& view, const IsFree& is_free, std::uint64_t seed) {
+  return continued_surfaces(view, is_free, seed).inverse_depth;
+}
+
 std::size_t count(const scene::Image& surface) {
   return std::size_t(std::count_if(surface.data.begin(), surface.data.end(), [](float value) { return value != 0; }));
 }
@@ -52,8 +56,20 @@ void expect_goes_on(const scene::Image& surface, double tolerance = 0.01) {
 }
 
 TEST(ContinuedSurfaces, APlaneGoesOnAcrossAHole) {
-  expect_goes_on(continued_surfaces(plane_with(hole), nowhere_free, 1), 1e-4);
-  expect_goes_on(continued_surfaces(plane_with(hole, /*nothing is seen*/ 0), nowhere_free, 1), 1e-4);
+  expect_goes_on(inverse_depth_of(plane_with(hole), nowhere_free, 1), 1e-4);
+  expect_goes_on(inverse_depth_of(plane_with(hole, /*nothing is seen*/ 0), nowhere_free, 1), 1e-4);
+}
+
+TEST(ContinuedSurfaces, TheMainOneIsKnownAroundTheHole) {
+  const ContinuedSurfaces surfaces = continued_surfaces(plane_with(hole), nowhere_free, 1);
+  ASSERT_TRUE(surfaces.main);
+  for (const auto& [x, y] : {std::pair{3, 5}, {30, 30}, {70, 50}})
+    EXPECT_NEAR(surfaces.main({x + 0.5, y + 0.5}), tilted(x, y), 1e-4);
+  EXPECT_LT(surfaces.known.x0, hole.x0);
+  EXPECT_LT(surfaces.known.y0, hole.y0);
+  EXPECT_GT(surfaces.known.x1, hole.x1);
+  EXPECT_GT(surfaces.known.y1, hole.y1);
+  EXPECT_FALSE(continued_surfaces(plane_with({36, 0, width, height}), nowhere_free, 1).main) << "nothing goes on";
 }
 
 TEST(ContinuedSurfaces, NoiseAndOtherThingsAroundDoNotMatter) {
@@ -66,7 +82,7 @@ TEST(ContinuedSurfaces, NoiseAndOtherThingsAroundDoNotMatter) {
         float& value = view.inverse_depth.data[i];
         value = rng.below(10) < 3 ? rng.uniform(0.1f, 0.25f) : value * (1 + 0.002f * rng.normal());
       }
-    expect_goes_on(continued_surfaces(view, nowhere_free, seed));
+    expect_goes_on(inverse_depth_of(view, nowhere_free, seed));
   }
 }
 
@@ -80,7 +96,7 @@ TEST(ContinuedSurfaces, StopsWhereSomebodyHasLookedThrough) {
         all_on_plane && pixel.x - std::floor(pixel.x) == 0.5 && std::abs(inverse_depth - expected) < 0.01 * expected;
     return pixel.x < 40;
   };
-  const scene::Image surface = continued_surfaces(plane_with(hole), left_is_free, 1);
+  const scene::Image surface = inverse_depth_of(plane_with(hole), left_is_free, 1);
   EXPECT_TRUE(all_on_plane) << "it asks for the point at the middle of a pixel, on the plane";
   for (int y = hole.y0; y < hole.y1; ++y)
     for (int x = hole.x0; x < hole.x1; ++x) ASSERT_EQ(surface.at(x, y) != 0, x >= 40) << x << ", " << y;
@@ -98,19 +114,19 @@ TEST(ContinuedSurfaces, AThingThatCoversLittleOfThePictureGoesOnAsWell) {
       view.shows_surface.at(x, y) = !inside(gap, x, y);
       view.vacated.at(x, y) = inside(gap, x, y);
     }
-  const scene::Image surface = continued_surfaces(view, nowhere_free, 1);
+  const scene::Image surface = inverse_depth_of(view, nowhere_free, 1);
   EXPECT_EQ(count(surface), 400u);
   EXPECT_NEAR(surface.at(210, 160), tilted(210, 160), 0.01 * tilted(210, 160));
 }
 
 TEST(ContinuedSurfaces, ItDoesNotGoOnBeyondItsEnd) {
   // The surface is in one half only: what is missing beside it, or below it, is not amid it.
-  EXPECT_EQ(count(continued_surfaces(plane_with({36, 0, width, height}), nowhere_free, 1)), 0u);
-  EXPECT_EQ(count(continued_surfaces(plane_with({0, 40, width, height}), nowhere_free, 1)), 0u);
+  EXPECT_EQ(count(inverse_depth_of(plane_with({36, 0, width, height}), nowhere_free, 1)), 0u);
+  EXPECT_EQ(count(inverse_depth_of(plane_with({0, 40, width, height}), nowhere_free, 1)), 0u);
 }
 
 TEST(ContinuedSurfaces, WhatIsOpenToTheRimOfThePictureMayAsWellEndThere) {
-  const scene::Image surface = continued_surfaces(plane_with({50, 20, width, 42}), nowhere_free, 1);
+  const scene::Image surface = inverse_depth_of(plane_with({50, 20, width, 42}), nowhere_free, 1);
   for (int y = 28; y < 34; ++y) EXPECT_EQ(surface.at(width - 1, y), 0) << "five directions of eight meet the plane";
 }
 
@@ -119,31 +135,31 @@ TEST(ContinuedSurfaces, CrumbsAreNoSurface) {
   view.vacated = scene::Mask(width, height);
   const int x = (hole.x0 + hole.x1) / 2, y = (hole.y0 + hole.y1) / 2;
   for (int row = 0; row < 3; ++row) {
-    EXPECT_EQ(count(continued_surfaces(view, nowhere_free, 1)), 0u) << row << " pixels wide";
+    EXPECT_EQ(count(inverse_depth_of(view, nowhere_free, 1)), 0u) << row << " pixels wide";
     for (int i = 0; i < 7; ++i) view.vacated.at(x + i - 3, y + row) = 1;
   }
-  EXPECT_EQ(count(continued_surfaces(view, nowhere_free, 1)), 21u);
+  EXPECT_EQ(count(inverse_depth_of(view, nowhere_free, 1)), 21u);
 }
 
 TEST(ContinuedSurfaces, WhatIsSeenInFrontHidesIt) {
-  EXPECT_EQ(count(continued_surfaces(plane_with(hole, 0.8), nowhere_free, 1)), 0u);
+  EXPECT_EQ(count(inverse_depth_of(plane_with(hole, 0.8), nowhere_free, 1)), 0u);
 }
 
 TEST(ContinuedSurfaces, WhereItIsSeenItselfItOnlyReplacesWhatIsDoubtful) {
   SurfaceView view = plane_with(hole);
   for (int y = hole.y0; y < hole.y1; ++y)
     for (int x = hole.x0; x < hole.x1; ++x) view.inverse_depth.at(x, y) = float(tilted(x, y));
-  EXPECT_EQ(count(continued_surfaces(view, nowhere_free, 1)), 0u);
+  EXPECT_EQ(count(inverse_depth_of(view, nowhere_free, 1)), 0u);
   view.doubtful = view.vacated;
-  expect_goes_on(continued_surfaces(view, nowhere_free, 1));
+  expect_goes_on(inverse_depth_of(view, nowhere_free, 1));
 }
 
 TEST(ContinuedSurfaces, WhatNobodySawWithinWhatLeftHidesNothing) {
   SurfaceView view = plane_with(hole, 0.8);
   view.doubtful = view.vacated;
-  EXPECT_EQ(count(continued_surfaces(view, nowhere_free, 1)), 0u);
+  EXPECT_EQ(count(inverse_depth_of(view, nowhere_free, 1)), 0u);
   view.within = view.vacated;
-  expect_goes_on(continued_surfaces(view, nowhere_free, 1), 1e-4);
+  expect_goes_on(inverse_depth_of(view, nowhere_free, 1), 1e-4);
 }
 
 TEST(ContinuedSurfaces, WhatIsCurvedGoesOnCurved) {
@@ -157,7 +173,7 @@ TEST(ContinuedSurfaces, WhatIsCurvedGoesOnCurved) {
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x)
       if (!inside(hole, x, y)) view.inverse_depth.at(x, y) = float(ball(x, y) * (1 + 0.001 * rng.normal()));
-  const scene::Image surface = continued_surfaces(view, nowhere_free, 1);
+  const scene::Image surface = inverse_depth_of(view, nowhere_free, 1);
   for (int y = hole.y0; y < hole.y1; ++y)
     for (int x = hole.x0; x < hole.x1; ++x)
       ASSERT_NEAR(surface.at(x, y), ball(x, y), 0.012 * ball(x, y)) << x << " " << y;
@@ -166,7 +182,7 @@ TEST(ContinuedSurfaces, WhatIsCurvedGoesOnCurved) {
 TEST(ContinuedSurfaces, OnlyWherePartsHaveLeft) {
   SurfaceView view = plane_with(hole);
   view.vacated = scene::Mask(width, height);
-  EXPECT_EQ(count(continued_surfaces(view, nowhere_free, 1)), 0u);
+  EXPECT_EQ(count(inverse_depth_of(view, nowhere_free, 1)), 0u);
 }
 
 TEST(ContinuedSurfaces, OfTwoTheNearerGoesOnAndTheFartherWhereThatCannotBe) {
@@ -177,9 +193,9 @@ TEST(ContinuedSurfaces, OfTwoTheNearerGoesOnAndTheFartherWhereThatCannotBe) {
     for (int y = 0; y < height; ++y)
       for (int x = 0; x < width; ++x)
         if (!inside(frame, x, y)) view.inverse_depth.at(x, y) = float(far_plane);
-    expect_goes_on(continued_surfaces(view, nowhere_free, 1));
+    expect_goes_on(inverse_depth_of(view, nowhere_free, 1));
     const auto near_is_free = [](DVec2, double inverse_depth) { return inverse_depth > 0.25; };
-    const scene::Image surface = continued_surfaces(view, near_is_free, 1);
+    const scene::Image surface = inverse_depth_of(view, near_is_free, 1);
     for (int y = hole.y0; y < hole.y1; ++y)
       for (int x = hole.x0; x < hole.x1; ++x) ASSERT_NEAR(surface.at(x, y), far_plane, 0.002) << x << ", " << y;
   }
@@ -188,19 +204,19 @@ TEST(ContinuedSurfaces, OfTwoTheNearerGoesOnAndTheFartherWhereThatCannotBe) {
 TEST(ContinuedSurfaces, AFewPixelsAreNoSurface) {
   SurfaceView view = plane_with(hole);
   view.shows_surface = scene::Mask(width, height);
-  EXPECT_EQ(count(continued_surfaces(view, nowhere_free, 1)), 0u) << "none at all";
+  EXPECT_EQ(count(inverse_depth_of(view, nowhere_free, 1)), 0u) << "none at all";
   for (int i = 0; i < 8; ++i) view.shows_surface.at(5 + 8 * i, 10) = view.shows_surface.at(5 + 8 * i, 50) = 1;
-  EXPECT_EQ(count(continued_surfaces(view, nowhere_free, 1)), 0u);
+  EXPECT_EQ(count(inverse_depth_of(view, nowhere_free, 1)), 0u);
 }
 
 TEST(ContinuedSurfaces, GivesTheSameBytesForAnyNumberOfThreads) {
   SurfaceView view = plane_with(hole);
   Rng rng(3);
   for (float& value : view.inverse_depth.data) value *= 1 + 0.002f * rng.normal();
-  const scene::Image first = continued_surfaces(view, nowhere_free, 7);
+  const scene::Image first = inverse_depth_of(view, nowhere_free, 7);
   EXPECT_GT(count(first), 0u);
   for (const int threads : {1, 2, 4})
-    WorkArena(threads).run([&] { EXPECT_EQ(continued_surfaces(view, nowhere_free, 7), first) << threads; });
+    WorkArena(threads).run([&] { EXPECT_EQ(inverse_depth_of(view, nowhere_free, 7), first) << threads; });
 }
 
 }  // namespace
