@@ -10,6 +10,7 @@
 #include "engine/io/cameras_json.h"
 #include "engine/io/colmap.h"
 #include "engine/io/image_file.h"
+#include "engine/io/json_fields.h"
 #include "engine/io/ply_points.h"
 #include "engine/io/read_bytes.h"
 
@@ -195,6 +196,8 @@ Result<Dataset> read_transforms(const fs::path& file, const DatasetOptions& opti
                   "the photo " + *checked + " is missing, and the file gives no w and h to do without it", name);
     return picture_size(root / photo);
   };
+  const auto memory = take_from(options.memory, json_tree_bytes(*bytes), name);
+  if (!memory) return propagate(memory);
   auto capture = parse_transforms_json(*bytes, name, options.transforms_world, size_of);
   if (!capture) return propagate(capture);
   auto views = to_views(*capture, {root, false});
@@ -206,6 +209,8 @@ Result<Dataset> read_inria(const fs::path& file, const DatasetOptions& options) 
   const fs::path root = file.parent_path();
   const auto bytes = read_bytes(file, max_json_bytes);
   if (!bytes) return propagate(bytes);
+  const auto memory = take_from(options.memory, json_tree_bytes(*bytes), file.filename().string());
+  if (!memory) return propagate(memory);
   const auto shots = parse_cameras_json(*bytes, file.filename().string());
   if (!shots) return propagate(shots);
   auto views = to_views(*shots, image_folder(root, options));
@@ -254,14 +259,33 @@ std::vector<scene::Camera> cameras_of(const Dataset& dataset) {
   return cameras;
 }
 
-Result<scene::Image> load_photo(const View& view) {
+namespace {
+
+/// Of the photo as it is stored.
+std::uint64_t photo_pixels(const View& view) {
+  return view.lens ? std::uint64_t(view.lens->width) * std::uint64_t(view.lens->height)
+                   : std::uint64_t(view.camera.width) * std::uint64_t(view.camera.height);
+}
+
+}  // namespace
+
+Result<scene::Image> load_photo(const View& view, MemoryBudget* memory) {
   if (view.photo.empty())
     return fail(ErrorCode::not_found, "view " + view.camera.name + " has no photo", view.camera.name);
-  auto photo = read_image(view.photo, {.orientation = Orientation::as_stored});
-  if (!photo) return photo;
+  std::error_code unknown;
+  const auto file_bytes = fs::file_size(view.photo, unknown);
+  const std::uint64_t pixels = photo_pixels(view);
+  // Interleaved and by channel, four floats each; what the library unpacks from; and the photo without its distortion.
+  constexpr std::uint64_t pixel_bytes = 16 + 16 + 8 + 12;
+  const auto share =
+      take_from(memory, (unknown ? 0 : std::uint64_t{file_bytes}) + pixel_bytes * pixels, view.camera.name);
+  if (!share) return propagate(share);
+  // About the size that was counted, with up to 8 channels, or none: it may have been exchanged meanwhile.
+  auto photo = read_image(view.photo, {.orientation = Orientation::as_stored, .max_pixels = 2 * pixels});
+  if (!photo && photo.error().code != ErrorCode::too_large) return photo;
   const int width = view.lens ? view.lens->width : view.camera.width;
   const int height = view.lens ? view.lens->height : view.camera.height;
-  if (photo->width != width || photo->height != height)
+  if (!photo || photo->width != width || photo->height != height)
     return fail(ErrorCode::corrupt_data,
                 "the photo of view " + view.camera.name + " has changed its size since the dataset was read",
                 view.camera.name);

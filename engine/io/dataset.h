@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/core/memory_budget.h"
 #include "engine/core/result.h"
 #include "engine/io/shot.h"
 #include "engine/io/transforms_json.h"
@@ -36,6 +37,7 @@ struct DatasetOptions {
   std::string image_folder = {};  ///< Below the dataset, for COLMAP and INRIA; by default the first of images,
                                   ///< images_2, images_4 and images_8 that exists.
   TransformsWorld transforms_world = TransformsWorld::as_in_file;
+  MemoryBudget* memory = nullptr;  ///< Lends what parsing JSON takes; null: nobody counts it.
 };
 
 /// Reads the cameras of a folder; photos are only looked for and measured. Recognised, in this order:
@@ -59,7 +61,9 @@ struct DatasetOptions {
 [[nodiscard]] std::vector<scene::Camera> cameras_of(const Dataset& dataset);
 
 /// The view's photo, undistorted: camera.width x camera.height, 3 channels. Reads the file each time it is called.
-///   errors  not_found: the view has no photo; those of read_image(); corrupt_data: it changed its size meanwhile
-[[nodiscard]] Result<scene::Image> load_photo(const View& view);
+///   memory  lends what decoding takes, as long as it takes; null: nobody counts it
+///   errors  not_found: the view has no photo; those of read_image(); corrupt_data: it changed its size meanwhile;
+///           those of MemoryBudget::take()
+[[nodiscard]] Result<scene::Image> load_photo(const View& view, MemoryBudget* memory = nullptr);
 
 }  // namespace engine::io

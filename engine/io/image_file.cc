@@ -111,6 +111,26 @@ tl::unexpected<Error> undecodable(const std::string& name) {
               name);
 }
 
+/// Bytes that a file may unpack to: what deflate makes of zeros, 1030 times its size, twice over, and some for small
+/// pictures of one colour. Headers are believed that far and no further: 16 KB of EXR may ask for seconds of filling
+/// gigabytes with nothing.
+std::uint64_t believable_bytes(std::uint64_t file_bytes) { return (std::uint64_t{16} << 20) + 2048 * file_bytes; }
+
+/// Bytes of the pixels as the file holds them. Tiles are decoded whole, however little of them is in the picture.
+std::uint64_t unpacked_bytes(const OIIO::ImageSpec& spec) {
+  const auto covered = [](int side, int tile) {
+    const auto whole = std::uint64_t(side), step = std::uint64_t(std::max(tile, 1));
+    return (whole + step - 1) / step * step;
+  };
+  std::uint64_t channel_bytes = spec.format.size();
+  for (const auto& format : spec.channelformats) channel_bytes = std::max<std::uint64_t>(channel_bytes, format.size());
+  const std::uint64_t columns = covered(spec.width, spec.tile_width), rows = covered(spec.height, spec.tile_height);
+  constexpr auto all = std::numeric_limits<std::uint64_t>::max();
+  const std::uint64_t pixels = columns > all / rows ? all : columns * rows;
+  const std::uint64_t pixel_bytes = std::uint64_t(spec.nchannels) * channel_bytes;
+  return pixels > all / pixel_bytes ? all : pixels * pixel_bytes;
+}
+
 /// A reader that is open on `source`; its size is within the limits.
 Result<std::unique_ptr<OIIO::ImageInput>> open_reader(std::span<const std::byte> first_bytes,
                                                       Filesystem::IOProxy& source, const std::string& name,
@@ -139,6 +159,11 @@ Result<std::unique_ptr<OIIO::ImageInput>> open_reader(std::span<const std::byte>
   if (pixels > options.max_pixels || pixels * std::uint64_t(spec.nchannels) > 4 * options.max_pixels)
     return fail(ErrorCode::too_large,
                 found + "the limit is " + std::to_string(options.max_pixels) + " pixels of 4 channels", name);
+  if (unpacked_bytes(spec) > believable_bytes(source.size()))
+    return fail(ErrorCode::corrupt_data,
+                found + "a file of " + std::to_string(source.size()) +
+                    " bytes cannot hold them: it is incomplete, copy or download it again, or save it anew",
+                name);
   return reader;
 }
 

@@ -44,7 +44,8 @@ struct PictureSize {
 /// and are taken to be display-referred. Limits hold before memory is allocated.
 ///   name    for error addresses
 ///   errors  unsupported: not one of the formats, or no R, G, B among the channels;
-///           corrupt_data: damaged, cut short, NaN or infinity;  too_large: names the limit
+///           corrupt_data: damaged, cut short, NaN or infinity, or a header that promises more than 16 MiB and 2048
+///           times the file's size;  too_large: names the limit
 [[nodiscard]] Result<scene::Image> decode_image(std::span<const std::byte> bytes, const std::string& name,
                                                 const ImageOptions& options = {});
 /// The same from a file; errors of InputFile besides.

@@ -6,6 +6,8 @@
 #include <functional>
 #include <span>
 
+#include "engine/core/memory_budget.h"
+
 namespace engine::io {
 
 /// Is shown what is read of a file, as it is read: the place of the first byte, and the bytes. Some may be shown twice,
@@ -24,7 +26,8 @@ struct ReadOptions {
   std::uint64_t max_memory_bytes = std::uint64_t(16)
                                    << 30;  ///< Size of the scene in memory; more is refused (too_large).
   SpzFrame spz_frame = SpzFrame::rub;
-  ReadWitness witness = {};  ///< Of a scene's file: for a checksum that costs no reading of its own.
+  ReadWitness witness = {};        ///< Of a scene's file: for a checksum that costs no reading of its own.
+  MemoryBudget* memory = nullptr;  ///< Lends what unpacking takes beside the scene; null: nobody counts it.
 };
 
 }  // namespace engine::io

@@ -47,6 +47,7 @@ struct Header {
 /// The attributes of all Gaussians, in the order of the file.
 struct Attributes {
   Bytes positions, alphas, colors, scales, rotations, sh;
+  MemoryBudget::Share memory = {};  ///< That they take.
 };
 
 struct AttributeRow {
@@ -107,6 +108,13 @@ Result<void> check_limits(const Header& header, const ReadOptions& options, cons
   return check_limits(header.count, cloud_row_bytes(header.sh_degree) + packed_row_bytes(header), options, file);
 }
 
+Result<void> lend(const Header& header, const ReadOptions& options, const std::string& file, Attributes& attributes) {
+  auto share = take_from(options.memory, header.count * packed_row_bytes(header), file);
+  if (!share) return propagate(share);
+  attributes.memory = std::move(*share);
+  return {};
+}
+
 /// Versions 1 to 3: header and attributes in one gzip stream.
 Result<Header> unpack_gzip(std::span<const std::byte> bytes, const std::string& file, const ReadOptions& options,
                            Attributes& attributes) {
@@ -125,6 +133,7 @@ Result<Header> unpack_gzip(std::span<const std::byte> bytes, const std::string& 
     return damaged("the header announces " + std::to_string(header->count) + " Gaussians, more than " +
                        std::to_string(bytes.size()) + " bytes can unpack to",
                    file + ":header");
+  if (auto lent = lend(*header, options, file, attributes); !lent) return propagate(lent);
   for (const auto& row : attribute_rows(*header)) {
     Bytes& unpacked = attributes.*row.bytes;
     unpacked.resize(header->count * row.size);
@@ -156,6 +165,7 @@ Result<Header> unpack_zstd(std::span<const std::byte> bytes, const std::string& 
     return damaged("expected " + std::to_string(present.size()) + " streams, found " + std::to_string(header->streams),
                    where);
 
+  if (auto lent = lend(*header, options, file, attributes); !lent) return propagate(lent);
   ByteReader table(bytes.subspan(toc_offset));  // extensions, if any, lie before it
   constexpr std::uint64_t entry_bytes = 16;
   ByteReader streams = table;
@@ -289,6 +299,17 @@ bool looks_like_spz(std::span<const std::byte> bytes) {
            std::equal(start.begin(), start.end(), bytes.begin(), [](int a, std::byte b) { return std::byte(a) == b; });
   };
   return begins({0x1f, 0x8b}) || begins({'N', 'G', 'S', 'P'});
+}
+
+std::uint64_t expected_spz_bytes(std::span<const std::byte> start, std::uint64_t file_bytes) {
+  std::array<std::byte, header_bytes> unpacked{};
+  const bool plain = !start.empty() && start[0] == std::byte{'N'};
+  if (!plain && !GzipReader(start).read(unpacked)) return file_bytes;
+  const auto header = parse_header(plain ? start.first(std::min(start.size(), header_bytes)) : unpacked, 1, 4, "");
+  if (!header) return file_bytes;
+  // Zstandard knows no such ratio, but names the sizes in frames that are checked before room is made for them.
+  if (!plain && header->count * packed_row_bytes(*header) / max_deflate_ratio > file_bytes) return file_bytes;
+  return std::max(file_bytes, header->count * cloud_row_bytes(header->sh_degree));
 }
 
 Result<scene::GaussianCloud> decode_spz(std::span<const std::byte> bytes, const std::string& file,

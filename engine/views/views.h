@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -44,6 +45,13 @@ struct VirtualCameraOptions {
   double near_plane = 0.2;   ///< World units: what is closer to a camera along its axis is not drawn.
   double radius = 0;         ///< Of the handles' spheres, world units: what lies so close to a point is edited, and is
                              ///< no geometry in front of it. 0: an eighth of the radius that a camera frames.
+  /// Most Gaussians that are looked at, evenly spread over the rows, each of which then stands for those between it and
+  /// the next; 0: all. With a bound the work is bounded, whatever the cloud is.
+  std::size_t max_gaussians = 0;
+  /// Works on the calling thread alone, and leaves the others to whoever is in a greater hurry. The result is the same.
+  bool on_one_thread = false;
+  /// Asked before each direction, by the threads that work; true: nobody wants the cameras any more. Empty: never.
+  std::function<bool()> cancelled = {};
 };
 
 /// A dome of cameras "virtual_00", "virtual_01", ... around the handles, for a scene without a dataset.
@@ -58,9 +66,10 @@ struct VirtualCameraOptions {
 ///   points   sources and targets of the handles, world units, finite
 ///   returns  options.count cameras; fewer where the handles are walled in on most sides. If they are on all, the
 ///            cameras that see most are returned, so that an edit always has something to look through.
-///            None for no points or count < 1.
+///            None for no points or count < 1, or once cancelled.
 /// Deterministic. All lengths are relative to the points: a scene 1e6 units from the origin gets the same dome.
-/// Costs O(directions tried * Gaussians), about a second for 5 million Gaussians.
+/// Costs O(directions tried * Gaussians looked at). Up to 8 times `count` directions are tried: 50 cameras in a dense
+/// cloud of a million Gaussians take 11 s, by 50,000 of them less than two.
 [[nodiscard]] std::vector<scene::Camera> virtual_cameras(const scene::GaussianCloud& cloud,
                                                          std::span<const DVec3> points,
                                                          const VirtualCameraOptions& options = {});

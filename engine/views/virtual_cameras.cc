@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
@@ -33,6 +34,20 @@ DMat3 unit_from_world(const scene::GaussianCloud& cloud, std::size_t row) {
   return glm::transpose(world_from_local);
 }
 
+/// The rows that are looked at: all, or `count` of them, evenly spread.
+class Sample {
+ public:
+  Sample(std::size_t rows, std::size_t most) : rows_(rows), count_(most > 0 ? std::min(rows, most) : rows) {}
+
+  [[nodiscard]] std::size_t size() const { return count_; }
+  [[nodiscard]] std::size_t row(std::size_t i) const { return count_ == rows_ ? i : std::size_t(double(i) * share()); }
+  /// How many Gaussians each of them stands for.
+  [[nodiscard]] double share() const { return double(rows_) / double(std::max<std::size_t>(count_, 1)); }
+
+ private:
+  std::size_t rows_, count_;
+};
+
 double sigmoid(double x) { return 1.0 / (1.0 + std::exp(-x)); }
 
 /// What the dome is built around; lengths in world units.
@@ -42,15 +57,17 @@ struct Subject {
   double points_radius = 0;   ///< Largest distance of a point from the centre.
   double far = 0, near = 0;   ///< Largest and smallest distance of a camera from the centre.
   double fov_y_rad = 0;
+  double share = 1;                 ///< Gaussians that each obstacle stands for.
   double clear = 0;                 ///< Geometry this close to a point is not in front of it.
   std::vector<Obstacle> obstacles;  ///< Within reach of the dome.
 };
 
 /// Median distance of the visible Gaussians from the centre, at least three sigmas of the smallest scene there is.
-double cloud_scale(const scene::GaussianCloud& cloud, DVec3 centre) {
+double cloud_scale(const scene::GaussianCloud& cloud, const Sample& sample, DVec3 centre) {
   std::vector<double> distance;
   double widest = 0;
-  for (std::size_t i = 0; i < cloud.size(); ++i) {
+  for (std::size_t k = 0; k < sample.size(); ++k) {
+    const std::size_t i = sample.row(k);
     if (sigmoid(cloud.opacity_logit[i]) < 0.05) continue;
     distance.push_back(glm::length(DVec3(cloud.mean.get(i)) - centre));
     const Vec3 s = cloud.log_scale.get(i);
@@ -63,7 +80,7 @@ double cloud_scale(const scene::GaussianCloud& cloud, DVec3 centre) {
   return *middle > 0 ? *middle : 3 * widest;
 }
 
-Subject subject_of(const scene::GaussianCloud& cloud, std::span<const DVec3> points,
+Subject subject_of(const scene::GaussianCloud& cloud, const Sample& sample, std::span<const DVec3> points,
                    const VirtualCameraOptions& options) {
   Subject subject;
   DVec3 low = points[0], high = points[0];
@@ -75,7 +92,7 @@ Subject subject_of(const scene::GaussianCloud& cloud, std::span<const DVec3> poi
   for (std::size_t k = 0; k < kept; ++k) subject.points.push_back(points[k * points.size() / kept] - subject.centre);
 
   const double dragged = subject.points_radius + options.radius;
-  double framed = std::max(1.5 * dragged, 0.5 * cloud_scale(cloud, subject.centre));
+  double framed = std::max(1.5 * dragged, 0.5 * cloud_scale(cloud, sample, subject.centre));
   // Nothing has a size. A millionth of the coordinates is about what float means can still tell apart.
   if (!(framed > 0)) framed = std::max(1.0, 1e-6 * glm::length(subject.centre));
   const double smaller_side = std::min(options.width, options.height);
@@ -89,8 +106,10 @@ Subject subject_of(const scene::GaussianCloud& cloud, std::span<const DVec3> poi
   subject.fov_y_rad = 2 * std::atan(std::tan(half_fov) * options.height / smaller_side);
   subject.clear = options.radius > 0 ? options.radius : framed / 8;
 
+  subject.share = sample.share();
   const double reach_of_dome = 1.1 * subject.far;
-  for (std::size_t i = 0; i < cloud.size(); ++i) {
+  for (std::size_t k = 0; k < sample.size(); ++k) {
+    const std::size_t i = sample.row(k);
     Obstacle o{DVec3(cloud.mean.get(i)) - subject.centre, 0, sigmoid(cloud.opacity_logit[i]), std::uint32_t(i)};
     if (o.opacity < 0.05) continue;  // fog: it dims, but it hides nothing
     const Vec3 s = cloud.log_scale.get(i);
@@ -128,7 +147,7 @@ bool within(std::span<const Shape> shapes, DVec3 eye) {
 }
 
 /// Does a ray from the eye arrive at the point with at least half of its light?
-bool can_see(std::span<const Shape> shapes, DVec3 eye, DVec3 point, double clear) {
+bool can_see(std::span<const Shape> shapes, DVec3 eye, DVec3 point, double clear, double share) {
   const double length = glm::length(point - eye);
   const DVec3 direction = (point - eye) / length;
   double transmittance = 1;
@@ -139,7 +158,8 @@ bool can_see(std::span<const Shape> shapes, DVec3 eye, DVec3 point, double clear
     const double along = -glm::dot(o, d) / glm::dot(d, d);  // world units: where the Gaussian is densest on the ray
     if (along <= 0 || along >= length - clear) continue;
     const DVec3 sigmas = o + along * d;
-    transmittance *= 1 - std::min(0.99, g.opacity * std::exp(-0.5 * glm::dot(sigmas, sigmas)));
+    const double passes = 1 - std::min(0.99, g.opacity * std::exp(-0.5 * glm::dot(sigmas, sigmas)));
+    transmittance *= share == 1 ? passes : std::pow(passes, share);
     if (transmittance < 0.5) return false;
   }
   return true;
@@ -147,8 +167,9 @@ bool can_see(std::span<const Shape> shapes, DVec3 eye, DVec3 point, double clear
 
 Sight look(const Subject& subject, std::span<const Shape> shapes, DVec3 eye) {
   if (within(shapes, eye)) return {.inside = true};
-  const auto seen = std::count_if(subject.points.begin(), subject.points.end(),
-                                  [&](DVec3 point) { return can_see(shapes, eye, point, subject.clear); });
+  const auto seen = std::count_if(subject.points.begin(), subject.points.end(), [&](DVec3 point) {
+    return can_see(shapes, eye, point, subject.clear, subject.share);
+  });
   return {.inside = false, .seen = double(seen) / double(subject.points.size())};
 }
 
@@ -202,11 +223,17 @@ std::vector<DVec3> dome(int n, DVec3 pole) {
 }
 
 std::vector<Placement> place_all(const scene::GaussianCloud& cloud, const Subject& subject,
-                                 const std::vector<DVec3>& directions) {
+                                 const std::vector<DVec3>& directions, const VirtualCameraOptions& options) {
   std::vector<Placement> placements(directions.size());
-  parallel_for(directions.size(), 4, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) placements[i] = place(cloud, subject, directions[i]);
+  std::atomic<bool> cancelled = false;
+  const std::size_t grain = options.on_one_thread ? directions.size() : 4;
+  parallel_for(directions.size(), grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end && !cancelled; ++i) {
+      if (options.cancelled && options.cancelled()) cancelled = true;
+      placements[i] = place(cloud, subject, directions[i]);
+    }
   });
+  if (cancelled) return {};
   return placements;
 }
 
@@ -215,14 +242,16 @@ std::vector<Placement> place_all(const scene::GaussianCloud& cloud, const Subjec
 std::vector<scene::Camera> virtual_cameras(const scene::GaussianCloud& cloud, std::span<const DVec3> points,
                                            const VirtualCameraOptions& options) {
   if (points.empty() || options.count < 1) return {};
-  const Subject subject = subject_of(cloud, points, options);
+  const Sample sample(cloud.size(), options.max_gaussians);
+  const Subject subject = subject_of(cloud, sample, points, options);
   const DVec3 up = unit_up(options.up);
   const std::size_t wanted = std::size_t(options.count);
 
   std::vector<Placement> tried;
   std::vector<std::size_t> free;
   for (int density = 1; density <= 8 && free.size() < wanted; density *= 2) {
-    tried = place_all(cloud, subject, dome(density * options.count, up));
+    tried = place_all(cloud, subject, dome(density * options.count, up), options);
+    if (tried.empty()) return {};  // cancelled
     free.clear();
     for (std::size_t i = 0; i < tried.size(); ++i)
       if (tried[i].sight.free()) free.push_back(i);

@@ -28,7 +28,7 @@ struct ServeCommandOptions : ServeOptions {
 };
 
 Result<void> run(const ServeCommandOptions& given, Terminal& terminal) {
-  service::EndSignals signals;  // before any thread is started
+  service::EndSignals signals(/*hangup=*/!given.token_file.empty());  // before any thread is started
   ServeOptions options = given;
   const auto format = given.log_format == "text" ? http::LogFormat::text : http::LogFormat::json;
   const auto logger = http::make_logger(terminal.err, given.log_level, format);
@@ -75,6 +75,9 @@ void add_http_options(CLI::App& command, http::ServerOptions& options, http::Acc
                   "Requests whose Origin is this one are taken, as those of the service's own page are: for a proxy "
                   "that puts the service under another name (https://name); several may be given")
       ->type_name("ORIGIN");
+  command.add_flag("--trust-proxy", access.trust_proxy,
+                   "Believe the last entries of X-Forwarded-For and X-Forwarded-Proto: for a service that is reached "
+                   "through a proxy alone. Behind TLS its cookie is then Secure");
   add_count(command, "--max-connections", options.threads, "Connections served at a time");
   add_count(command, "--max-waiting", options.max_waiting, "Connections that may wait; more are turned away", 0);
   add_count(command, "--max-streams", options.dispatcher.max_streams, "Streams of events at a time", 0);
@@ -98,6 +101,10 @@ void add_store_options(CLI::App& command, ServeOptions& options) {
   options.edits.memory_bytes = edits::usual_edit_memory();
   add_bytes(command, "--edit-memory", options.edits.memory_bytes,
             "What one edit may take, by its estimate; usually half of what the machine and its control group have");
+  options.work_memory_bytes = edits::usual_work_memory();
+  add_bytes(command, "--work-memory", options.work_memory_bytes,
+            "What renders, and the reading of uploads, may take together at a time, beside scenes and edits; usually a "
+            "quarter of what the machine and its control group have");
   add_count(command, "--max-gaussians", options.scenes.read.max_gaussians, "Gaussians of a scene");
   add_count(command, "--max-scenes", options.scenes.max_scenes, "Scenes held");
   add_count(command, "--max-previews", options.scenes.max_previews, "Previews in memory");
@@ -128,8 +135,10 @@ void add_serve_command(CLI::App& program, Action& action) {
   add_http_options(*command, options->http, options->access);
   add_store_options(*command, *options);
   command
-      ->add_option("--token-file", options->token_file,
-                   "File with a token that every request must carry (\"Authorization: Bearer ...\")")
+      ->add_option(
+          "--token-file", options->token_file,
+          "File with a token that every request must carry (\"Authorization: Bearer ...\"); SIGHUP has it read "
+          "again")
       ->type_name("FILE");
   command->add_flag("--insecure", options->insecure, "Listen to other machines without a token");
   add_count(*command, "--drain-seconds", options->drain_seconds,

@@ -216,6 +216,7 @@ class Run {
     for (const std::string& warning : report.warnings) keeper_.warn(warning);
     stopped_early_ = outcome.stopped_early;
     keeper_.finish();
+    if (workshop_.timed) workshop_.timed(keeper_.record().timings);
     return {};
   }
 

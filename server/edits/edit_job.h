@@ -3,9 +3,13 @@
 
 #include <spdlog/logger.h>
 
+#include <functional>
+#include <vector>
+
 #include "engine/core/parallel.h"
 #include "engine/jobs/worker.h"
 #include "engine/optim/perceptual.h"
+#include "proto/edit_status.h"
 #include "server/edits/named_locks.h"
 #include "server/scenes/scene_store.h"
 
@@ -20,6 +24,8 @@ struct Workshop {
   spdlog::logger* logger = nullptr;                     ///< May be null.
   int pictured_views = 4;                               ///< Of each interval.
   engine::optim::PerceptualLoss* perceptual = nullptr;  ///< As in engine::edit::run().
+  /// Is told how long an edit took that has made its version, by stages. Empty: nobody is.
+  std::function<void(const std::vector<proto::StageSeconds>&)> timed = {};
 };
 
 /// The version of a scene that an edit has made; nothing if it has not made one.

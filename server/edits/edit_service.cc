@@ -150,7 +150,7 @@ struct EditService::Impl {
     for (const engine::Error& finding : queue->findings())
       if (options.logger != nullptr) options.logger->log(spdlog::level::warn, finding.message);
     worker.emplace(*queue, [workshop = Workshop{scenes, arena, results, options.logger, options.pictured_views,
-                                                options.perceptual}](jobs::JobContext& context) {
+                                                options.perceptual, options.timed}](jobs::JobContext& context) {
       return carry_out(context, workshop);
     });
     return {};
@@ -400,6 +400,17 @@ std::map<std::string, std::size_t> EditService::counts() {
   if (!found) return counts;
   for (const jobs::Job& job : *found) ++counts[std::string(to_string(job.state))];
   return counts;
+}
+
+double EditService::oldest_queued_seconds() {
+  const auto found = impl_->queue->list({.active_only = true, .limit = all_jobs});
+  double oldest = 0;
+  if (!found) return oldest;
+  const auto now = std::chrono::system_clock::now();
+  for (const jobs::Job& job : *found)
+    if (job.state == jobs::JobState::queued)
+      oldest = std::max(oldest, std::chrono::duration<double>(now - job.created).count());
+  return oldest;
 }
 
 void EditService::drain(std::chrono::milliseconds grace) { impl_->worker->drain(grace); }

@@ -36,6 +36,9 @@ struct ServiceOptions {
   std::uint64_t memory_bytes = 0;    ///< What one edit may be estimated to take; 0: any amount.
   int threads = 0;                   ///< 0: as many as the machine has cores.
   spdlog::logger* logger = nullptr;  ///< Is told what becomes of edits; outlives the service. Null: nobody is.
+  /// Is told how long an edit took that has made its version: by stages, in seconds. Called by the worker's thread;
+  /// those of an edit that was resumed are of all its runs. Empty: nobody is.
+  std::function<void(const std::vector<proto::StageSeconds>&)> timed = {};
   /// The loss inside masks; outlives the service. Null: the engine's own.
   engine::optim::PerceptualLoss* perceptual = nullptr;
   /// Where previews find what their selection selects; outlives the service. Null: it keeps its own.
@@ -101,6 +104,8 @@ class EditService {
   [[nodiscard]] std::optional<engine::Error> trouble() const;
   /// How many edits are in each state, by its name.
   [[nodiscard]] std::map<std::string, std::size_t> counts();
+  /// Since the edit was accepted that has waited longest for its turn; 0 where none waits.
+  [[nodiscard]] double oldest_queued_seconds();
   /// Takes no more edits up; the running one ends at its next interval, or when `grace` is over, and goes on after the
   /// next start.
   void drain(std::chrono::milliseconds grace);

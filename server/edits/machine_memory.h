@@ -19,4 +19,8 @@ namespace server::edits {
 /// limits nothing, where nobody says how much there is.
 [[nodiscard]] inline std::uint64_t usual_edit_memory() { return memory_of_machine() / 2; }
 
+/// What renders and the reading of uploads may take together unless somebody says otherwise: half of the other half. 0
+/// as above.
+[[nodiscard]] inline std::uint64_t usual_work_memory() { return memory_of_machine() / 4; }
+
 }  // namespace server::edits

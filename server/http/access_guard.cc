@@ -93,11 +93,46 @@ std::optional<Refusal> AccessGuard::check_origin(const RequestHead& head) const 
   return std::nullopt;
 }
 
-bool AccessGuard::is_token(std::string_view authorization) const {
+bool AccessGuard::is_token(std::string_view given) const {
+  const std::lock_guard lock(mutex_);
+  return needs_token() && same_secret(given, token_);
+}
+
+std::optional<Refusal> AccessGuard::check_token(std::string_view authorization, const std::string& client) const {
+  const Refusal wanted{401, "unauthorized", "this service wants its token: \"Authorization: Bearer ...\"", ""};
   constexpr std::string_view scheme = "bearer ";
   if (authorization.size() < scheme.size() || !same_ignoring_case(authorization.substr(0, scheme.size()), scheme))
-    return false;
-  return needs_token() && same_secret(trim(authorization.substr(scheme.size())), options_.token);
+    return wanted;
+  if (const auto seconds = brake_.must_wait(client))
+    return Refusal{429, "busy",
+                   "too many wrong tokens came from your address: try again in " + std::to_string(*seconds) + " s", "",
+                   *seconds};
+  const std::string given(trim(authorization.substr(scheme.size())));
+  if (is_token(given)) {
+    brake_.forget(client);
+    return std::nullopt;
+  }
+  brake_.count_wrong(client, given);
+  return wanted;
+}
+
+void AccessGuard::replace_token(std::string token) {
+  const std::lock_guard lock(mutex_);
+  if (token == token_) return;
+  token_ = std::move(token);
+  sessions_.clear();
+}
+
+std::string AccessGuard::address_of(const std::string& peer, std::string_view forwarded_for) const {
+  if (!options_.trust_proxy) return peer;
+  const auto names =
+      split_list(forwarded_for, ',');  // the last is the proxy's own word, those before came with the request
+  return names.empty() || names.back().empty() ? peer : std::string(names.back());
+}
+
+bool AccessGuard::is_secure(std::string_view forwarded_proto) const {
+  const auto names = split_list(forwarded_proto, ',');
+  return options_.trust_proxy && !names.empty() && same_ignoring_case(names.back(), "https");
 }
 
 bool AccessGuard::has_session(std::string_view cookies) const {
@@ -110,8 +145,9 @@ bool AccessGuard::has_session(std::string_view cookies) const {
   return found;
 }
 
-bool AccessGuard::admits(const RequestHead& head) const {
-  return !needs_token() || is_token(head.header("authorization")) || has_session(head.header("cookie"));
+std::optional<Refusal> AccessGuard::check_access(const RequestHead& head, const std::string& client) const {
+  if (!needs_token() || has_session(head.header("cookie"))) return std::nullopt;
+  return check_token(head.header("authorization"), client);
 }
 
 std::string AccessGuard::open_session() {

@@ -38,6 +38,7 @@ class HttpCall final : public Call {
   explicit HttpCall(Fields fields) : fields_(std::move(fields)) {}
 
   [[nodiscard]] const std::string& request_id() const override { return fields_.request_id; }
+  [[nodiscard]] std::string peer() const override { return fields_.connection.client(); }
   [[nodiscard]] const std::string& path(std::string_view name) const override;
   [[nodiscard]] std::optional<std::string> query(std::string_view name) const override;
   [[nodiscard]] std::string header(std::string_view name) const override;
@@ -46,6 +47,7 @@ class HttpCall final : public Call {
   [[nodiscard]] bool is_json() const override { return fields_.is_json; }
   [[nodiscard]] Result<UploadInfo> receive(const std::filesystem::path& file) const override;
   [[nodiscard]] bool has(const std::string& etag) const override;
+  [[nodiscard]] bool gone() const override { return fields_.connection.closed_by_client(); }
   [[nodiscard]] bool accepts(std::string_view media_type) const override;
 
  private:

@@ -259,6 +259,12 @@ bool Connection::write(std::string_view bytes) {
   return true;
 }
 
+bool Connection::closed_by_client() const {
+  if (stopping()) return true;
+  pollfd peer{socket_, POLLRDHUP, 0};
+  return ::poll(&peer, 1, 0) != 0;
+}
+
 bool Connection::open() const {
   if (stopping()) return false;
   pollfd peer{socket_, 0, 0};  // POLLERR and POLLHUP come unasked

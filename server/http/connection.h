@@ -66,6 +66,8 @@ class Connection {
   /// Whether the client is still there and the server is not stopping. A client that has only finished sending is
   /// there; one that has closed is found out by the first bytes it no longer takes.
   [[nodiscard]] bool open() const;
+  /// Whether the client has closed its end, at least for sending, or the server is stopping.
+  [[nodiscard]] bool closed_by_client() const;
   /// Ends the answer, and waits up to a second for the client to take it: closing on unread bytes would make the system
   /// drop what is still on its way.
   void linger();

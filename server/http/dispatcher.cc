@@ -79,6 +79,7 @@ Answer Dispatcher::refused(const Refusal& refusal, const std::string& request_id
   Reply reply = Reply::refusal(refusal, request_id);
   Answer answer;
   answer.status = reply.status;
+  answer.refusal = refusal.code;
   answer.headers = std::move(reply.headers);
   answer.headers.emplace_back("Content-Type", std::move(reply.media_type));
   answer.body = std::move(reply.body);
@@ -86,15 +87,16 @@ Answer Dispatcher::refused(const Refusal& refusal, const std::string& request_id
   return answer;
 }
 
-tl::expected<Dispatcher::CheckedRequest, Refusal> Dispatcher::check(const RequestHead& head, Answer& answer) const {
+tl::expected<Dispatcher::CheckedRequest, Refusal> Dispatcher::check(const RequestHead& head, const std::string& client,
+                                                                    Answer& answer) const {
   if (auto refusal = guard_.check_origin(head)) return tl::make_unexpected(std::move(*refusal));
   const auto segments = split_path(head.path);
   CheckedRequest request;
   if (segments) request.match = routes_.find(head.method, *segments);
   // Whoever has no token learns nothing about routes but those that are open to all.
   const bool open = request.match.route != nullptr && request.match.route->access == Access::open;
-  if (!open && !guard_.admits(head))
-    return refuse(401, "unauthorized", "this service wants a token: \"Authorization: Bearer ...\"");
+  if (!open)
+    if (auto refusal = guard_.check_access(head, client)) return tl::make_unexpected(std::move(*refusal));
   if (!segments) return tl::make_unexpected(refusal_of(segments.error()));
   if (request.match.route == nullptr && !request.match.allow.empty()) {
     answer.headers.emplace_back("Allow", request.match.allow);
@@ -228,7 +230,7 @@ Answer Dispatcher::answer(const RequestHead& head, const std::string& request_id
     return refusing;
   };
   try {
-    const auto request = check(head, answer);
+    const auto request = check(head, guard_.address_of(connection.client(), head.header("x-forwarded-for")), answer);
     if (!request) return refuse_with(request.error());
     auto reply = handle(*request, head, request_id, connection, form);
     if (!reply && connection.body_failure() == Connection::BodyFailure::too_slow)

@@ -54,6 +54,7 @@ struct Answer {
   std::optional<FilePart> file;
   std::function<void(EventSink&)> events;
   std::shared_ptr<const void> hold;  ///< Lives until the answer is sent.
+  std::string refusal;               ///< Code of the error that this answer tells of; "" where it tells of none.
   std::string route = "-";           ///< Path of the route as declared; "-" if no route was found.
 };
 
@@ -77,7 +78,8 @@ class Dispatcher {
  private:
   struct CheckedRequest;
 
-  [[nodiscard]] tl::expected<CheckedRequest, Refusal> check(const RequestHead& head, Answer& answer) const;
+  [[nodiscard]] tl::expected<CheckedRequest, Refusal> check(const RequestHead& head, const std::string& client,
+                                                            Answer& answer) const;
   [[nodiscard]] tl::expected<void, Refusal> check_body(const RequestHead& head, const Route& route) const;
   [[nodiscard]] Result<Reply> handle(const CheckedRequest& request, const RequestHead& head,
                                      const std::string& request_id, Connection& connection, FormReader& form) const;

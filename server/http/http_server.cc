@@ -221,6 +221,8 @@ class ConnectionServer final : private httplib::Server {
     }
     const Underway underway(*this);
     const bool keep = answer_to(*head, last);
+    const bool is_upload = head->has_body() && media_type_of(head->header("content-type")) != "application/json";
+    if (is_upload && !answer_.refusal.empty()) metrics_.count_refused_upload(answer_.refusal);
     report(request_id_, counted_method(head->method), answer_.route, answer_.status, began);
     return keep;
   }

@@ -19,6 +19,12 @@ const prometheus::Histogram::BucketBoundaries& buckets() {
   return seconds;
 }
 
+/// Seconds: of edits, from a removal at once to an afternoon.
+const prometheus::Histogram::BucketBoundaries& long_buckets() {
+  static const prometheus::Histogram::BucketBoundaries seconds{0.1, 0.5, 2, 10, 30, 60, 300, 900, 3600};
+  return seconds;
+}
+
 struct ComputedGauge {
   std::string name, help, label;
   std::function<std::map<std::string, double>()> values;
@@ -63,6 +69,10 @@ struct Metrics::Impl {
                                      .Help("Connections turned away because too many waited.")
                                      .Register(registry)
                                      .Add({});
+  prometheus::Family<prometheus::Counter>& refused_uploads = prometheus::BuildCounter()
+                                                                 .Name("splatdrag_uploads_refused_total")
+                                                                 .Help("Uploads refused, by the code of the error.")
+                                                                 .Register(registry);
   mutable std::mutex mutex;  ///< Guards computed_gauges.
   std::vector<ComputedGauge> computed_gauges;
 };
@@ -75,6 +85,21 @@ void Metrics::count_request(std::string_view method, std::string_view route, int
       .Add({{"method", std::string(method)}, {"route", std::string(route)}, {"status", std::to_string(status)}})
       .Increment();
   impl_->seconds.Add({{"route", std::string(route)}}, buckets()).Observe(seconds);
+}
+
+void Metrics::observe(const std::string& name, const std::string& help, const std::string& label,
+                      const std::string& value, double seconds) {
+  const prometheus::Labels labels = label.empty() ? prometheus::Labels{} : prometheus::Labels{{label, value}};
+  prometheus::BuildHistogram()
+      .Name(name)
+      .Help(help)
+      .Register(impl_->registry)
+      .Add(labels, long_buckets())
+      .Observe(seconds);
+}
+
+void Metrics::count_refused_upload(std::string_view reason) {
+  impl_->refused_uploads.Add({{"reason", std::string(reason)}}).Increment();
 }
 
 void Metrics::add_in_flight(int change) { impl_->in_flight.Increment(change); }

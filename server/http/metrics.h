@@ -23,6 +23,16 @@ class Metrics {
   /// A connection was turned away because too many others waited.
   void count_refused_connection();
 
+  /// Observes a duration in a histogram, which the first call makes.
+  ///   name     "splatdrag_edit_seconds", with its help
+  ///   label    told apart by; its values are few, and no client's whim
+  ///   seconds  up to an hour is told apart
+  void observe(const std::string& name, const std::string& help, const std::string& label, const std::string& value,
+               double seconds);
+  /// An upload was refused.
+  ///   reason  code of its error
+  void count_refused_upload(std::string_view reason);
+
   /// A gauge whose value is computed whenever somebody reads the metrics.
   ///   name   "splatdrag_scenes"
   ///   value  called on a thread of the server; what it refers to outlives the metrics

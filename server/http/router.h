@@ -33,6 +33,8 @@ class Call {
   virtual ~Call() = default;
 
   [[nodiscard]] virtual const std::string& request_id() const = 0;
+  /// Address of the connection's other end: of the client, or of a proxy.
+  [[nodiscard]] virtual std::string peer() const { return {}; }
   /// The part of the path that stands for {name} in the route.
   [[nodiscard]] virtual const std::string& path(std::string_view name) const = 0;
   /// Query parameters by name; one given twice, or not declared by the route, has been refused already.
@@ -53,6 +55,10 @@ class Call {
   /// Whether a GET names this entity tag as one that its client has (If-None-Match): then Reply::not_modified() saves
   /// the work.
   [[nodiscard]] virtual bool has(const std::string& etag) const = 0;
+  /// Whether nobody waits for the answer any more, or the server is stopping; for work that takes long. A client that
+  /// has closed its end has gone; so is one taken to be that has only said that it sends no more, for the two look the
+  /// same from here.
+  [[nodiscard]] virtual bool gone() const { return false; }
   /// Whether the Accept header takes this media type (none given: all).
   [[nodiscard]] virtual bool accepts(std::string_view media_type) const = 0;
 };

@@ -44,8 +44,9 @@ std::vector<std::string> warnings_about(const PhotoComparison& found, std::size_
 
 }  // namespace
 
-Result<double> psnr_against_photo(const io::View& view, const engine::scene::Image& color) {
-  auto photo = io::load_photo(view);
+Result<double> psnr_against_photo(const io::View& view, const engine::scene::Image& color,
+                                  engine::MemoryBudget* memory) {
+  auto photo = io::load_photo(view, memory);
   if (!photo) return propagate(photo);
   if (photo->width != color.width || photo->height != color.height) {
     photo = io::resized(*photo, color.width, color.height);
@@ -55,8 +56,8 @@ Result<double> psnr_against_photo(const io::View& view, const engine::scene::Ima
 }
 
 Result<PhotoComparison> compare_with_photos(
-    const io::Dataset& dataset,
-    const std::function<Result<engine::scene::Image>(const engine::scene::Camera&)>& render) {
+    const io::Dataset& dataset, const std::function<Result<engine::scene::Image>(const engine::scene::Camera&)>& render,
+    engine::MemoryBudget* memory) {
   std::vector<const io::View*> with_photo;
   for (const io::View& view : dataset.views)
     if (!view.photo.empty()) with_photo.push_back(&view);
@@ -67,7 +68,7 @@ Result<PhotoComparison> compare_with_photos(
     const io::View& view = *with_photo[i];
     const auto color = render(engine::scene::fit_within(view.camera, max_compared_side));
     if (!color) return propagate(color);
-    const auto psnr = psnr_against_photo(view, *color);
+    const auto psnr = psnr_against_photo(view, *color, memory);
     if (!psnr) {
       unreadable.push_back("the photo " + view.camera.name + " cannot be read: " + psnr.error().message);
       continue;

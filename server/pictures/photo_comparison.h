@@ -15,8 +15,8 @@ namespace server::pictures {
 
 /// PSNR in dB of a rendering of the view against its photo, which is scaled to the rendering's size.
 ///   errors  those of io::load_photo()
-[[nodiscard]] engine::Result<double> psnr_against_photo(const engine::io::View& view,
-                                                        const engine::scene::Image& color);
+[[nodiscard]] engine::Result<double> psnr_against_photo(const engine::io::View& view, const engine::scene::Image& color,
+                                                        engine::MemoryBudget* memory = nullptr);
 
 // The three are choices, not measurements: 64 photos of this size take a few seconds to compare.
 constexpr std::size_t max_compared_photos = 64;
@@ -33,9 +33,11 @@ struct PhotoComparison {
 
 /// Compares at most max_compared_photos of the dataset's photos, evenly spread over its views.
 ///   render  colours through a camera
+///   memory  lends what decoding a photo takes; null: nobody counts it
 ///   errors  those of `render`; a photo that cannot be read is a warning
 [[nodiscard]] engine::Result<PhotoComparison> compare_with_photos(
     const engine::io::Dataset& dataset,
-    const std::function<engine::Result<engine::scene::Image>(const engine::scene::Camera&)>& render);
+    const std::function<engine::Result<engine::scene::Image>(const engine::scene::Camera&)>& render,
+    engine::MemoryBudget* memory = nullptr);
 
 }  // namespace server::pictures

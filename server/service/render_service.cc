@@ -23,6 +23,19 @@ using Clock = std::chrono::steady_clock;
 /// megapixels hold any window of the page; a choice.
 constexpr std::int64_t max_kept_pixels = std::int64_t{1} << 22;
 
+/// The same of Gaussians: what a canvas keeps is not counted, so it must be little. A gigabyte; a choice.
+constexpr std::size_t max_kept_rows = std::size_t{1} << 23;
+
+std::size_t rows_of(const scenes::LoadedVersion& version) {
+  return version.cloud.base->size() + (version.cloud.overlay ? version.cloud.overlay->rows.size() : 0);
+}
+
+/// Bytes while a picture is made, about: its splats with their places in tiles, from the 13.8 GB that two renders of 50
+/// million Gaussians took; its layers, in floats and encoded.
+std::uint64_t picture_bytes(std::size_t rows, const Camera& camera) {
+  return 140 * std::uint64_t{rows} + 64 * std::uint64_t(camera.width) * std::uint64_t(camera.height);
+}
+
 double milliseconds_since(Clock::time_point begin) {
   return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
 }
@@ -95,10 +108,14 @@ Result<void> RenderService::run_in_turn(const std::function<void()>& work) {
   return {};
 }
 
-Result<void> RenderService::on_canvas(const Camera& camera, const std::function<void(Canvas&)>& work) {
+Result<void> RenderService::on_canvas(const scenes::LoadedVersion& version, const Camera& camera,
+                                      const std::function<void(Canvas&)>& work) {
   if (auto sound = check(camera); !sound) return sound;
   const auto slot = slots_.acquire();
   if (!slot) return propagate(slot);
+  const std::size_t rows = rows_of(version);
+  const auto share = engine::take_from(options_.memory, picture_bytes(rows, camera), "version");
+  if (!share) return propagate(share);
   std::unique_ptr<Canvas> canvas;
   {
     const std::lock_guard lock(mutex_);
@@ -113,7 +130,7 @@ Result<void> RenderService::on_canvas(const Camera& camera, const std::function<
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::too_large, "the picture does not fit into the memory of the machine: ask for a smaller one");
   }
-  if (std::int64_t{camera.width} * camera.height > max_kept_pixels) return {};
+  if (std::int64_t{camera.width} * camera.height > max_kept_pixels || rows > max_kept_rows) return {};
   const std::lock_guard lock(mutex_);
   canvases_.push_back(std::move(canvas));
   return {};
@@ -127,7 +144,7 @@ Result<Picture> RenderService::render(const scenes::LoadedVersion& version, cons
   forward.depth = pictures::needs_depth(order.content, order.format);
   Picture picture;
   Result<std::vector<std::byte>> encoded;
-  auto done = on_canvas(order.camera, [&](Canvas& canvas) {
+  auto done = on_canvas(version, order.camera, [&](Canvas& canvas) {
     const auto begin = Clock::now();
     arena_.run([&] {
       const render::DrawnVersion drawn(version.cloud);
@@ -153,7 +170,7 @@ Result<Picture> RenderService::render(const scenes::LoadedVersion& version, cons
 
 Result<engine::scene::Image> RenderService::colors(const scenes::LoadedVersion& version, const Camera& camera) {
   engine::scene::Image colors;
-  auto done = on_canvas(camera, [&](Canvas& canvas) {
+  auto done = on_canvas(version, camera, [&](Canvas& canvas) {
     arena_.run([&] {
       const render::DrawnVersion drawn(version.cloud);
       render::forward(drawn.layers(), camera, {}, {}, canvas.workspace, canvas.rendering);
@@ -167,7 +184,7 @@ Result<engine::scene::Image> RenderService::colors(const scenes::LoadedVersion& 
 Result<std::optional<render::PixelHit>> RenderService::pick(const scenes::LoadedVersion& version, const Camera& camera,
                                                             engine::DVec2 pixel) {
   std::optional<render::PixelHit> hit;
-  auto done = on_canvas(camera, [&](Canvas& canvas) {
+  auto done = on_canvas(version, camera, [&](Canvas& canvas) {
     arena_.run([&] {
       const render::DrawnVersion drawn(version.cloud);
       hit = render::pick(drawn.layers(), camera, pixel, canvas.workspace);

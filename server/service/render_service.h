@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/core/memory_budget.h"
 #include "engine/core/parallel.h"
 #include "engine/core/result.h"
 #include "engine/core/vec.h"
@@ -28,10 +29,11 @@ using pictures::PictureContent;
 
 /// Limits of the renders that people wait for.
 struct RenderServiceOptions {
-  int threads = 0;               ///< Pictures made at a time; 0: as many as the machine has cores.
-  std::size_t max_waiting = 64;  ///< Requests that may wait for their turn; more are busy.
-  int max_side = 4096;           ///< Most pixels of a side of a picture.
-  std::string program = {};      ///< Release of the program: another one may make other bytes.
+  int threads = 0;                         ///< Pictures made at a time; 0: as many as the machine has cores.
+  std::size_t max_waiting = 64;            ///< Requests that may wait for their turn; more are busy.
+  int max_side = 4096;                     ///< Most pixels of a side of a picture.
+  engine::MemoryBudget* memory = nullptr;  ///< Lends what a picture takes while it is made; null: nobody counts it.
+  std::string program = {};                ///< Release of the program: another one may make other bytes.
 };
 
 /// What a picture is to show, and how.
@@ -61,7 +63,7 @@ class RenderService {
   [[nodiscard]] std::string etag(const scenes::LoadedVersion& version, const PictureOrder& order) const;
 
   /// Makes the picture.
-  ///   errors  invalid_argument: a camera that is none; too_large: names the limit; busy
+  ///   errors  invalid_argument: a camera that is none; too_large: names the limit; busy; those of MemoryBudget::take()
   [[nodiscard]] Result<Picture> render(const scenes::LoadedVersion& version, const PictureOrder& order);
 
   /// Linear floats of the version's colours. Errors as render().
@@ -89,8 +91,9 @@ class RenderService {
   };
 
   Result<void> check(const engine::scene::Camera& camera) const;
-  /// Calls `work` with a canvas that nobody else uses.
-  Result<void> on_canvas(const engine::scene::Camera& camera, const std::function<void(Canvas&)>& work);
+  /// Calls `work` with a canvas that nobody else uses, in memory for a picture of that version.
+  Result<void> on_canvas(const scenes::LoadedVersion& version, const engine::scene::Camera& camera,
+                         const std::function<void(Canvas&)>& work);
 
   const RenderServiceOptions options_;
   engine::WorkArena arena_;

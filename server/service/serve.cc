@@ -8,6 +8,7 @@
 #include <thread>
 #include <utility>
 
+#include "engine/core/memory_budget.h"
 #include "engine/render/forward.h"
 #include "proto/edit_request.h"
 #include "server/http/log.h"
@@ -63,7 +64,8 @@ double resident_bytes() {
   return resident * double(::sysconf(_SC_PAGESIZE));
 }
 
-void add_gauges(http::Metrics& metrics, scenes::SceneStore& scenes, edits::EditService& edits, RenderService& renders) {
+void add_gauges(http::Metrics& metrics, scenes::SceneStore& scenes, edits::EditService& edits, RenderService& renders,
+                const std::filesystem::path& data_dir) {
   metrics.add_gauge("process_resident_memory_bytes", "Resident memory of the process.", resident_bytes);
   metrics.add_gauge("splatdrag_scenes", "Scenes held.", [&] { return double(scenes.usage().scenes); });
   metrics.add_gauge("splatdrag_scenes_damaged", "Scenes on disk that cannot be used.",
@@ -75,11 +77,47 @@ void add_gauges(http::Metrics& metrics, scenes::SceneStore& scenes, edits::EditS
                     [&] { return double(scenes.usage().memory_budget); });
   metrics.add_gauge("splatdrag_renders_waiting", "Renders that wait for a thread.",
                     [&] { return double(renders.waiting()); });
+  metrics.add_gauge("splatdrag_oldest_queued_edit_seconds", "Time that the edit has waited that waits longest.",
+                    [&] { return edits.oldest_queued_seconds(); });
+  const auto space = [data_dir] {
+    std::error_code error;
+    const auto found = std::filesystem::space(data_dir, error);
+    return error ? std::filesystem::space_info{} : found;
+  };
+  metrics.add_gauge("splatdrag_disk_free_bytes", "Bytes of the data folder's file system that the service may use.",
+                    [space] { return double(space().available); });
+  metrics.add_gauge("splatdrag_disk_used_bytes", "Bytes of the data folder's file system that are used, by anybody.",
+                    [space] { return double(space().capacity - space().free); });
   metrics.add_gauges("splatdrag_edits", "Edits on record, by state.", "state", [&] {
     std::map<std::string, double> values;
     for (const auto& [state, count] : edits.counts()) values[state] = double(count);
     return values;
   });
+}
+
+/// Reads the token again. Where that fails the old one stays: a service that is set up wrong locks nobody in or out.
+void reload_token(const std::filesystem::path& file, http::AccessGuard& guard, spdlog::logger& logger) {
+  std::string warning;
+  auto token = read_token(file, warning);
+  if (!warning.empty()) http::log(logger, spdlog::level::warn, warning);
+  if (!token) {
+    http::log(logger, spdlog::level::err, "the old token stays: " + token.error().message,
+              {{"where", token.error().where}});
+    return;
+  }
+  guard.replace_token(std::move(*token));
+  http::log(logger, spdlog::level::info, "the token has been read again");
+}
+
+void observe_edit(http::Metrics& metrics, const std::vector<proto::StageSeconds>& timings) {
+  double all = 0;
+  for (const auto& [stage, seconds] : timings) {
+    metrics.observe("splatdrag_edit_stage_seconds", "Time that a finished edit spent in a stage.", "stage", stage,
+                    seconds);
+    all += seconds;
+  }
+  metrics.observe("splatdrag_edit_seconds", "Time that a finished edit took, without its wait in the queue.", "", "",
+                  all);
 }
 
 /// Tells the parts what they have to know of the whole.
@@ -117,6 +155,9 @@ Result<void> check_token(ServeOptions& options, spdlog::logger& logger) {
 
 Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& logger, std::ostream& out) {
   share_out(options, logger);
+  engine::MemoryBudget work_memory(options.work_memory_bytes, "--work-memory");
+  options.scenes.read.memory = &work_memory;
+  options.renders.memory = &work_memory;
   auto scenes = scenes::SceneStore::open(options.scenes);
   if (!scenes && scenes.error().code == ErrorCode::conflict)  // another service has it
     return engine::fail(ErrorCode::unavailable, scenes.error().message, options.data_dir.string());
@@ -125,15 +166,16 @@ Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& lo
     http::log(logger, spdlog::level::err, "a scene cannot be used: " + damage.message, {{"where", damage.where}});
   for (const engine::Error& damage : (*scenes)->recovered())
     http::log(logger, spdlog::level::warn, damage.message, {{"where", damage.where}});
+  http::Metrics metrics;
+  options.edits.timed = [&metrics](const std::vector<proto::StageSeconds>& timings) { observe_edit(metrics, timings); };
   edits::Selections selections(**scenes);
   options.edits.selections = &selections;
   auto edits = edits::EditService::open(**scenes, options.edits);
   if (!edits) return propagate(edits);
   RenderService renders(options.renders);
-  SceneViews views(**scenes, renders);
+  SceneViews views(**scenes);
   http::AccessGuard guard(options.access);
-  http::Metrics metrics;
-  add_gauges(metrics, **scenes, **edits, renders);
+  add_gauges(metrics, **scenes, **edits, renders, options.data_dir);
   Readiness readiness(options.data_dir, [&] { return (*edits)->trouble(); });
   http::Router router = routes::all_routes({**scenes, **edits, selections, options.edit_limits, renders, views, guard,
                                             metrics, service_info(options), [&] { return readiness.trouble(); }});
@@ -146,7 +188,8 @@ Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& lo
              {"simd", options.simd},
              {"threads", std::int64_t{options.threads_here}},
              {"data_dir", options.data_dir.string()}});
-  const std::string signal = signals.wait();
+  std::string signal = signals.wait();
+  for (; signal == "SIGHUP"; signal = signals.wait()) reload_token(options.token_file, guard, logger);
   http::log(logger, spdlog::level::info, "stopping", {{"signal", signal}});
   readiness.end();
   // Whoever sends requests here has time to hear of it; what is on its way, such as downloads, has it, too.

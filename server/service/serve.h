@@ -32,6 +32,8 @@ struct ServeOptions {
   edits::ServiceOptions edits;
   routes::EditLimits edit_limits;
   RenderServiceOptions renders;
+  /// Bytes that pictures, uploads and what is read of them may take at a time beside scenes and edits; 0: no limit.
+  std::uint64_t work_memory_bytes = 0;
   int threads = 0;       ///< Threads of edits and renders; 0: one per core.
   int threads_here = 0;  ///< `threads` on this machine, as /v1/info says it.
   std::string simd;      ///< Instruction set in use, as /v1/info says it.

@@ -50,7 +50,10 @@ std::uint64_t expected_memory_bytes(const std::filesystem::path& path) {
   const auto start = file->read_at(0, std::min<std::uint64_t>(file->size(), 64));
   if (!start) return 0;
   if (is_ply(*start)) return expected_of_ply(*file);
-  if (io::looks_like_spz(*start)) return file->size();
+  if (io::looks_like_spz(*start)) {
+    const auto more = file->read_at(0, std::min<std::uint64_t>(file->size(), 4096));
+    return more ? io::expected_spz_bytes(*more, file->size()) + column_bytes(io::inria_layout(3)) : 0;
+  }
   return file->size() / io::splat_record_bytes * io::cloud_row_bytes(0) + file->size() +
          column_bytes(io::inria_layout(0));
 }

@@ -20,9 +20,8 @@ struct SceneFormat {
 ///   errors  those of InputFile
 [[nodiscard]] Result<SceneFormat> detect_format(const std::filesystem::path& file);
 
-/// Bytes that reading a scene file will take, judged by its header: no less than memory_bytes() of what is read, except
-/// for an .spz file, whose header is packed like the rest of it and whose own size is given. 0 for a file that cannot
-/// be read.
+/// Bytes that reading a scene file will take, judged by its header: no less than memory_bytes() of what is read. 0 for
+/// a file that cannot be read.
 [[nodiscard]] std::uint64_t expected_memory_bytes(const std::filesystem::path& file);
 
 /// Bytes that a scene holds, its file's layout included.

@@ -88,7 +88,7 @@ Result<ManifestPtr> Datasets::put_zip(const Snapshot& at, const fs::path& zip, c
   if (auto unpacked = unzip(zip, safe_file_name(filename), into, limits); !unpacked)
     return public_error_(unpacked, into);
   const fs::path root = dataset_root(into);
-  const auto found = io::read_dataset(root, {.points = false});
+  const auto found = io::read_dataset(root, {.points = false, .memory = options_.read.memory});
   if (!found) return public_error_(found, into);
   const auto digests = digests_below(into);
   if (!digests) return public_error_(digests, into);
@@ -103,7 +103,7 @@ Result<ManifestPtr> Datasets::put_path(const Snapshot& at, const std::string& pa
   const auto folder = below_root(scene_root, path);
   if (!folder) return propagate(folder);
   if (auto links = check_links(scene_root, *folder, options_.max_dataset_files); !links) return propagate(links);
-  auto found = io::read_dataset(*folder, {.points = false});
+  auto found = io::read_dataset(*folder, {.points = false, .memory = options_.read.memory});
   if (!found) {
     if (found.error().where == folder->string()) found.error().where = "path";
     return public_error_(found);
@@ -162,7 +162,7 @@ Result<std::shared_ptr<const io::Dataset>> Datasets::get(const Snapshot& at) {
       if (!below) return fail(below.error().code, "the dataset cannot be read: " + below.error().message, "dataset");
       folder = std::move(*below);
     }
-    auto found = io::read_dataset(folder, {.points = false});
+    auto found = io::read_dataset(folder, {.points = false, .memory = options_.read.memory});
     // Also where it could not be read: damage is then the likely reason.
     if (auto sound = check_files(at, found ? &*found : nullptr); !sound) return propagate(sound);
     if (!found) return public_error_(found);

@@ -27,7 +27,7 @@ Result<Uploads::Upload> Uploads::read(const fs::path& file) {
   const std::uint64_t expected = expected_memory_bytes(file);
   auto reservation = std::make_optional(memory_.reserve(expected));
   if (!*reservation) return no_room(reservation->error());
-  // One at a time: what an .spz file unpacks to shows only when it is there.
+  // One at a time: a reader takes more than what is left of it, and the file is in memory, too.
   const std::lock_guard one_at_a_time(reading_);
   auto scene = io::read_scene(file, options_.read);
   if (!scene) return public_error_(scene, file.parent_path());

@@ -87,7 +87,7 @@ Result<Reply> render(const Call& call, const Dependencies& dependencies, const p
     return Reply::refusal({406, "not_acceptable",
                            "pictures are image/jpeg, image/png or image/x-exr; Accept takes none of them", "Accept"},
                           call.request_id());
-  auto camera = dependencies.views.resolve(id, request.viewpoint, where);
+  auto camera = dependencies.views.resolve(id, request.viewpoint, where, [&call] { return call.gone(); });
   if (!camera) return propagate(camera);
   const auto version = dependencies.store.load(id, call.path("v"));
   if (!version) return propagate(version);
@@ -167,8 +167,9 @@ bool is_nameable(engine::DVec3 point) {
 }
 
 Result<proto::PickResult> pick_pixel(const std::string& id, const Dependencies& dependencies,
-                                     const LoadedVersion& version, const proto::PickRequest& request) {
-  const auto camera = dependencies.views.resolve(id, *request.viewpoint, "camera.");
+                                     const LoadedVersion& version, const proto::PickRequest& request,
+                                     const SceneViews::Gone& gone) {
+  const auto camera = dependencies.views.resolve(id, *request.viewpoint, "camera.", gone);
   if (!camera) return propagate(camera);
   if (auto inside = check_pixel(request, *camera); !inside) return propagate(inside);
   // The limit is one of pictures, and nobody asked for one: a smaller camera sees the same point.
@@ -198,8 +199,9 @@ Result<Reply> post_pick(const Call& call, const Dependencies& dependencies) {
   const std::string& id = call.path("id");
   const auto version = dependencies.store.load(id, call.path("v"));
   if (!version) return propagate(version);
-  const auto result =
-      request->point ? pick_point(dependencies, *version, *request) : pick_pixel(id, dependencies, *version, *request);
+  const auto result = request->point
+                          ? pick_point(dependencies, *version, *request)
+                          : pick_pixel(id, dependencies, *version, *request, [&call] { return call.gone(); });
   if (!result) return propagate(result);
   return Reply::json(proto::to_json(*result));
 }

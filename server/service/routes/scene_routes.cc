@@ -122,7 +122,8 @@ Result<pictures::PhotoComparison> compare_photos(const SceneInfo& scene, const S
   const auto version = dependencies.store.load(scene.id, "0");
   if (!version) return propagate(version);
   return pictures::compare_with_photos(
-      **dataset, [&](const engine::scene::Camera& camera) { return dependencies.renders.colors(*version, camera); });
+      **dataset, [&](const engine::scene::Camera& camera) { return dependencies.renders.colors(*version, camera); },
+      dependencies.renders.options().memory);
 }
 
 /// Notes how well renders of version 0 agree with the photos of a dataset that has just been put. Put it is, whatever
@@ -171,7 +172,7 @@ Result<Reply> put_dataset(const Call& call, const SceneRouteDependencies& depend
 }
 
 Result<Reply> get_views(const Call& call, SceneViews& views) {
-  const auto set = views.views_of(call.path("id"));
+  const auto set = views.views_of(call.path("id"), [&call] { return call.gone(); });
   if (!set) return propagate(set);
   std::vector<proto::View> out;
   for (const SceneView& view : (*set)->views)

@@ -57,11 +57,11 @@ void add_session(http::Router& router, http::AccessGuard& guard) {
   const auto open = [&guard](const Call& call) -> Result<Reply> {
     Reply reply = Reply::no_content();
     if (!guard.needs_token()) return reply;
-    if (!guard.is_token(call.header("authorization")))
-      return Reply::refusal(
-          {401, "unauthorized", "that is not this service's token (\"Authorization: Bearer ...\")", ""},
-          call.request_id());
-    reply.headers.emplace_back("Set-Cookie", cookie(guard.open_session(), ""));
+    const std::string client = guard.address_of(call.peer(), call.header("x-forwarded-for"));
+    if (const auto refusal = guard.check_token(call.header("authorization"), client))
+      return Reply::refusal(*refusal, call.request_id());
+    const bool secure = guard.is_secure(call.header("x-forwarded-proto"));
+    reply.headers.emplace_back("Set-Cookie", cookie(guard.open_session(), secure ? "; Secure" : ""));
     return reply;
   };
   const auto close = [&guard](const Call& call) -> Result<Reply> {

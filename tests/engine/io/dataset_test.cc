@@ -180,6 +180,32 @@ TEST_F(ColmapFolder, WithoutViewsIsRefused) {
   EXPECT_EQ(read_dataset(root()).error().code, ErrorCode::unprocessable);
 }
 
+TEST_F(ColmapFolder, DecodesPhotosInMemoryThatIsCounted) {
+  const auto dataset = read_dataset(root());
+  ASSERT_TRUE(dataset);
+  MemoryBudget enough(1 << 20), little(50'000);  // 64 x 48 pixels of 52 bytes, and the file
+  EXPECT_TRUE(load_photo(dataset->views[1], &enough));
+  EXPECT_EQ(enough.lent(), 0u);
+  EXPECT_EQ(load_photo(dataset->views[1], &little).error().code, ErrorCode::too_large);
+}
+
+// 3 bytes of text are 150 of tree: 58 KB of a zip file became 3 GB.
+TEST(Dataset, CountsATreeOfJsonBeforeItIsBuilt) {
+  support::TempDir folder;
+  std::string text = "{\"frames\":[{}";
+  for (int i = 0; i < 100'000; ++i) text += ",{}";
+  for (const char* name : {"transforms.json", "cameras.json"}) {
+    support::write_file(folder.path() / name, text + "]}");
+    MemoryBudget little(1 << 20), enough(std::uint64_t{1} << 30);
+    const auto refused = read_dataset(folder.path() / name, {.memory = &little});
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::too_large) << refused.error().message;
+    EXPECT_EQ(refused.error().where, name);
+    EXPECT_EQ(read_dataset(folder.path() / name, {.memory = &enough}).error().code, ErrorCode::corrupt_data);
+    EXPECT_EQ(enough.lent(), 0u);
+  }
+}
+
 TEST_F(ColmapFolder, NoticesAPhotoThatIsDamagedOrReplaced) {
   const auto dataset = read_dataset(root());
   ASSERT_TRUE(dataset);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -385,6 +386,66 @@ TEST(Resized, HalvingAveragesFourPixels) {
                            4;
         EXPECT_NEAR(half->at(x, y, c), mean, 1e-6f);
       }
+}
+
+std::string little(std::uint32_t value, int bytes = 4) {
+  std::string text;
+  for (int i = 0; i < bytes; ++i) text += char(value >> 8 * i & 255);
+  return text;
+}
+
+std::string attribute(const std::string& name, const std::string& type, const std::string& value) {
+  return name + '\0' + type + '\0' + little(std::uint32_t(value.size())) + value;
+}
+
+/// An EXR file whose header promises a picture that its bytes cannot hold.
+///   compression  0: none, 3: zip, 4: piz, 9: dwab
+///   tile_side    0: scan lines
+std::vector<std::byte> promising_exr(std::uint32_t width, std::uint32_t height, int compression,
+                                     std::uint32_t tile_side, int channels, std::size_t total_bytes) {
+  const std::string window = little(0) + little(0) + little(width - 1) + little(height - 1);
+  std::string list;
+  for (int c = 0; c < channels; ++c)
+    list += (channels == 1 ? std::string("Y") : "c" + std::to_string(1000 + c)) + '\0' + little(1) + little(0) +
+            little(1) + little(1);
+  std::string text = "\x76\x2f\x31\x01" + little(tile_side > 0 ? 0x202 : 2);
+  text += attribute("channels", "chlist", list + '\0');
+  text += attribute("compression", "compression", std::string(1, char(compression)));
+  text += attribute("dataWindow", "box2i", window) + attribute("displayWindow", "box2i", window);
+  text += attribute("lineOrder", "lineOrder", std::string(1, '\0'));
+  text += attribute("pixelAspectRatio", "float", little(0x3f800000));
+  text += attribute("screenWindowCenter", "v2f", little(0) + little(0));
+  text += attribute("screenWindowWidth", "float", little(0x3f800000));
+  if (tile_side > 0) text += attribute("tiles", "tiledesc", little(tile_side) + little(tile_side) + '\0');
+  text += '\0';
+  text.resize(std::max(text.size(), total_bytes), '\0');
+  const auto* first = reinterpret_cast<const std::byte*>(text.data());
+  return {first, first + text.size()};
+}
+
+// 16 KB with tiles of 8192x8192 took half a second; larger ones were reported to take 2 to 8.
+TEST(DecodeImage, BelievesNoHeaderThatPromisesMoreThanItsBytesCanHold) {
+  for (const int compression : {0, 3, 4, 9})
+    for (const std::uint32_t tile : {0u, 8192u, 16384u, 0x40000000u})
+      for (const std::uint32_t width : {16384u, 1448u}) {
+        SCOPED_TRACE(std::to_string(compression) + " " + std::to_string(tile) + " " + std::to_string(width));
+        const auto begin = std::chrono::steady_clock::now();
+        const auto image = decode_image(promising_exr(width, width / 2, compression, tile, 1, 16384), "a.exr", {});
+        EXPECT_LT(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), 1);
+        ASSERT_FALSE(image);
+        EXPECT_EQ(image.error().code, ErrorCode::corrupt_data) << image.error().message;
+      }
+  const auto promised = decode_image(promising_exr(16384, 8192, 3, 0, 1, 16384), "a.exr", {});
+  EXPECT_NE(promised.error().message.find("16384x8192 pixels and 1 channels; a file of 16384 bytes cannot hold them"),
+            std::string::npos)
+      << promised.error().message;
+}
+
+TEST(DecodeImage, BelievesPicturesOfOneColour) {
+  const auto bytes = encode_image(Image(3600, 2400, 3), ImageFormat::png);
+  ASSERT_TRUE(bytes);
+  EXPECT_LT(bytes->size(), std::size_t{40'000});  // near the most that deflate can do
+  EXPECT_TRUE(decode_image(*bytes, "black.png", {}));
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <numbers>
 
+#include "engine/io/checks.h"
 #include "engine/io/gzip.h"
 #include "engine/io/quantised.h"
 #include "tests/engine/io/samples.h"
@@ -140,6 +141,30 @@ double colour(const float* sh, DVec3 d) {
   double sum = 0;
   for (std::size_t k = 0; k < 16; ++k) sum += sh[k] * basis[k];
   return sum;
+}
+
+TEST(Spz, CountsWhatItUnpacksToBeforeItDoes) {
+  Parts parts;
+  parts.count = 1'000'000;
+  parts.attributes = {std::string(9'000'000, '\0'), std::string(1'000'000, '\0'), std::string(3'000'000, '\0'),
+                      std::string(3'000'000, '\0'), std::string(3'000'000, '\0'), ""};
+  const std::string unpacked = parts.unpacked();
+  const auto bytes = gzip(std::as_bytes(std::span(unpacked)));
+  EXPECT_LT(bytes.size(), std::size_t{50'000});
+  const auto start = std::span(bytes).first(4096);
+  EXPECT_EQ(expected_spz_bytes(start, bytes.size()), 1'000'000 * cloud_row_bytes(0));
+  EXPECT_EQ(expected_spz_bytes(start, 1'000), 1'000u) << "no 1,000 bytes unpack to that";
+  EXPECT_EQ(expected_spz_bytes(start.first(8), bytes.size()), bytes.size());
+  MemoryBudget little(10 << 20), enough(20 << 20);
+  ReadOptions reading;
+  reading.memory = &little;
+  const auto refused = decode_spz(bytes, "a.spz", reading);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::too_large);
+  EXPECT_EQ(refused.error().where, "a.spz");
+  reading.memory = &enough;
+  EXPECT_TRUE(decode_spz(bytes, "a.spz", reading));
+  EXPECT_EQ(enough.lent(), 0u);
 }
 
 TEST(Spz, TheTwoFramesShowTheSameSceneTurned) {

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cmath>
 
 #include "engine/core/parallel.h"
@@ -73,6 +74,59 @@ TEST(VirtualCameras, HoldAllHandlesInThePictureAndStayInsideTheRoom) {
     EXPECT_LT(eye.y, -0.3);
     EXPECT_GT(eye.y, -2.95);
   }
+}
+
+/// A dense ball of Gaussians around the points: from no side can they be seen, so that all directions are tried.
+GaussianCloud ball(std::size_t count) {
+  GaussianCloud cloud;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double turn = 2.399963 * double(i), height = 1 - 2 * (double(i) + 0.5) / double(count);
+    const double ring = std::sqrt(1 - height * height), radius = 0.6 + 0.4 * double(i * 7919 % count) / double(count);
+    add(cloud, DVec3(ring * std::cos(turn), height, ring * std::sin(turn)) * radius, 0.05);
+  }
+  return cloud;
+}
+
+TEST(VirtualCameras, LookAtNoMoreGaussiansThanTheyMay) {
+  const std::vector<DVec3> points{{0, 0, 0}, {0.1, 0, 0}};
+  const GaussianCloud many = ball(400'000);
+  const auto seconds = [&](std::size_t most) {
+    const auto begin = std::chrono::steady_clock::now();
+    EXPECT_FALSE(virtual_cameras(many, points, {.count = 20, .radius = 0.05, .max_gaussians = most}).empty());
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  };
+  const double bounded = seconds(5'000), all = seconds(0);
+  EXPECT_LT(bounded, all / 10);
+}
+
+TEST(VirtualCameras, AreMuchTheSameFromASample) {
+  const GaussianCloud cloud = room();
+  const std::vector<DVec3> points{{0.2, -0.3, 0.1}, {0.9, -0.3, -0.4}};
+  const VirtualCameraOptions sampled{.count = 24, .radius = 0.35, .max_gaussians = cloud.size() / 3};
+  const auto cameras = virtual_cameras(cloud, points, sampled);
+  ASSERT_EQ(cameras.size(), 24u);
+  expect_usable(cameras, points);
+  for (const Camera& camera : cameras) {
+    EXPECT_LT(std::abs(camera.centre().x), 1.95) << camera.name;
+    EXPECT_LT(std::abs(camera.centre().z), 1.95) << camera.name;
+  }
+  // At least as many as there are is all of them, to the bit.
+  const auto same = virtual_cameras(cloud, points, {.count = 9, .radius = 0.35});
+  const auto all_of_them = virtual_cameras(cloud, points, {.count = 9, .radius = 0.35, .max_gaussians = cloud.size()});
+  const auto alone = virtual_cameras(cloud, points, {.count = 9, .radius = 0.35, .on_one_thread = true});
+  for (std::size_t k = 0; k < same.size(); ++k) {
+    EXPECT_EQ(all_of_them[k].translation, same[k].translation);
+    EXPECT_EQ(alone[k].translation, same[k].translation);
+  }
+}
+
+TEST(VirtualCameras, AreGivenUpOnceNobodyWantsThem) {
+  int asked = 0;
+  const auto cameras =
+      virtual_cameras(room(), std::vector<DVec3>{{0.2, -0.3, 0.1}},
+                      {.count = 24, .radius = 0.35, .on_one_thread = true, .cancelled = [&] { return ++asked == 3; }});
+  EXPECT_TRUE(cameras.empty());
+  EXPECT_EQ(asked, 3);
 }
 
 TEST(VirtualCameras, AreNamedInOrderAndHaveTheWantedPicture) {

@@ -106,6 +106,25 @@ TEST_F(Serve, SaysWhereItListensAndEndsWellWhenToldTo) {
   }
 }
 
+TEST_F(Serve, CountsWhatAnOperatorWatches) {
+  Program program(first_, arguments());
+  const int port = program.port();
+  ASSERT_NE(port, 0) << program.err();
+  EXPECT_EQ(ask(port, "POST", "/v1/scenes", "Content-Type: application/octet-stream\r\n", "ply\nnonsense\n").status,
+            422);
+  std::string metrics;  // an answer is counted once it has been sent
+  const std::string refused = "\nsplatdrag_uploads_refused_total{reason=\"corrupt_data\"} 1\n";
+  for (int i = 0; i < 100 && metrics.find(refused) == std::string::npos; ++i)
+    metrics = ask(port, "GET", "/metrics").body;
+  for (const std::string& expected : {refused, std::string("\nsplatdrag_oldest_queued_edit_seconds 0\n")})
+    EXPECT_NE(metrics.find(expected), std::string::npos) << metrics;
+  for (const std::string name : {"\nsplatdrag_disk_free_bytes ", "\nsplatdrag_disk_used_bytes "}) {
+    const auto at = metrics.find(name);
+    ASSERT_NE(at, std::string::npos) << metrics;
+    EXPECT_GT(std::atof(metrics.c_str() + at + name.size()), 0) << name;
+  }
+}
+
 TEST_F(Serve, SaysThatItEndsBeforeItDoes) {
   Program program(first_, arguments({"--unready-seconds", "2"}));
   const int port = program.port();
@@ -115,6 +134,37 @@ TEST_F(Serve, SaysThatItEndsBeforeItDoes) {
   for (int i = 0; i < 100 && ask(port, "GET", "/readyz").status == 200; ++i) std::this_thread::sleep_for(10ms);
   EXPECT_EQ(ask(port, "GET", "/readyz").status, 503);
   EXPECT_EQ(ask(port, "GET", "/v1/scenes").status, 200) << "it goes on serving meanwhile";
+  EXPECT_EQ(program.wait(), 0);
+}
+
+TEST_F(Serve, ReadsItsTokenAgainOnHangup) {
+  const auto file = first_.path() / "token";
+  support::write_file(file, "first\n");
+  Program program(second_, arguments({"--token-file", file.string(), "--trust-proxy", "--log-format", "text"}));
+  const int port = program.port();
+  ASSERT_NE(port, 0) << program.err();
+  const auto status_with = [&](const std::string& token) {
+    return ask(port, "GET", "/v1/scenes", "Authorization: Bearer " + token + "\r\n").status;
+  };
+  const auto hang_up_until = [&](const std::string& said) {
+    program.signal(SIGHUP);
+    for (int i = 0; i < 500 && program.err().find(said) == std::string::npos; ++i) std::this_thread::sleep_for(20ms);
+  };
+  EXPECT_EQ(status_with("first"), 200);
+  support::write_file(file, "second\n");
+  hang_up_until("read again");
+  EXPECT_EQ(status_with("first"), 401);
+  EXPECT_EQ(status_with("second"), 200);
+  support::write_file(file, "");
+  hang_up_until("the old token stays");
+  EXPECT_EQ(status_with("second"), 200) << program.err();
+  const auto open = [&](const std::string& proto) {
+    return ask(port, "POST", "/v1/session", "Authorization: Bearer second\r\nX-Forwarded-Proto: " + proto + "\r\n")
+        .header("set-cookie");
+  };
+  EXPECT_TRUE(open("https").ends_with("; Path=/; Secure")) << open("https");
+  EXPECT_TRUE(open("http").ends_with("; Path=/"));
+  program.signal(SIGTERM);
   EXPECT_EQ(program.wait(), 0);
 }
 

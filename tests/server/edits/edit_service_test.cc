@@ -49,6 +49,25 @@ TEST_F(ServiceTest, AnEditBecomesANewVersionOfItsScene) {
   EXPECT_EQ(version.gaussians, done.gaussians->output);
 }
 
+TEST_F(ServiceTest, TellsAnOperatorHowLongStagesTook) {
+  service.reset();
+  std::vector<proto::StageSeconds> told;
+  service = value(
+      EditService::open(*store, {.folder = dir.path() / "edits",
+                                 .threads = 1,
+                                 .timed = [&](const std::vector<proto::StageSeconds>& timings) { told = timings; }}));
+  EXPECT_EQ(service->oldest_queued_seconds(), 0);
+  const auto accepted = value(service->submit(move_ball(scene), ""));
+  const auto done = wait_for_end(*service, accepted.status.id);
+  ASSERT_EQ(done.state, "succeeded");
+  ASSERT_EQ(told.size(), done.timings.size());
+  for (std::size_t i = 0; i < told.size(); ++i) {
+    EXPECT_EQ(told[i].stage, done.timings[i].stage);
+    EXPECT_NEAR(told[i].seconds, done.timings[i].seconds, 1e-3);  // an answer's are rounded
+  }
+  service.reset();
+}
+
 TEST_F(ServiceTest, FillsInTheRequestFromTheStart) {
   proto::EditRequest request = move_ball(scene);
   request.params.intervals = std::nullopt;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <thread>
@@ -316,6 +317,29 @@ TEST_F(HttpServerTest, AnswersAClientThatHasFinishedSending) {
   client.finish_sending();
   EXPECT_EQ(client.answer().value_or(RawAnswer{}).body, "name=one q=(none) body=");
   EXPECT_EQ(client.answer().value_or(RawAnswer{}).body, "name=two q=(none) body=");
+}
+
+TEST(HttpServer, TellsAHandlerThatItsClientHasGone) {
+  std::atomic<int> waiting = 0, gone = 0;
+  Router routes;
+  routes.add({.method = "GET",
+              .path = "/long",
+              .handler = [&](const Call& call) -> Result<Reply> {
+                EXPECT_FALSE(call.gone());
+                ++waiting;
+                for (int i = 0; i < 2000 && !call.gone(); ++i) std::this_thread::sleep_for(1ms);
+                if (call.gone()) ++gone;
+                return Reply::no_content();
+              },
+              .queries = {}});
+  TestServer server(std::move(routes));
+  {
+    RawClient client(server.port());
+    client.send(request(server.port(), "GET", "/long"));
+    while (waiting == 0) std::this_thread::sleep_for(1ms);
+  }
+  for (int i = 0; i < 2000 && gone == 0; ++i) std::this_thread::sleep_for(1ms);
+  EXPECT_EQ(gone, 1);
 }
 
 TEST_F(HttpServerTest, KeepsTheConnectionAfterARefusalWhoseBodyIsThere) {

@@ -5,6 +5,20 @@
 namespace server::http {
 namespace {
 
+TEST(Metrics, KeepDurationsAndReasons) {
+  Metrics metrics;
+  for (const double seconds : {0.2, 5.0, 40.0})
+    metrics.observe("splatdrag_edit_stage_seconds", "Time in a stage.", "stage", "deform", seconds);
+  metrics.observe("splatdrag_edit_seconds", "Time.", "", "", 7);
+  metrics.count_refused_upload("too_large");
+  const std::string text = metrics.text();
+  for (const std::string expected :
+       {"splatdrag_edit_stage_seconds_count{stage=\"deform\"} 3\n",
+        "splatdrag_edit_stage_seconds_bucket{stage=\"deform\",le=\"10\"} 2\n", "splatdrag_edit_seconds_sum 7\n",
+        "splatdrag_uploads_refused_total{reason=\"too_large\"} 1\n"})
+    EXPECT_NE(text.find(expected), std::string::npos) << expected << text;
+}
+
 TEST(Metrics, AskForGaugesWhenSomebodyLooks) {
   Metrics metrics;
   double scenes = 1;

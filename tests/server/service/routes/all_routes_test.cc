@@ -43,7 +43,7 @@ TEST(AllRoutes, AreThoseOfTheContract) {
   auto edits = edits::EditService::open(**scenes, edit_options);
   ASSERT_TRUE(edits) << edits.error().message;
   RenderService renders({});
-  SceneViews views(**scenes, renders);
+  SceneViews views(**scenes);
   http::AccessGuard guard({});
   http::Metrics metrics;
   const http::Router router = all_routes({**scenes, **edits, selections, {}, renders, views, guard, metrics, {}});

@@ -40,6 +40,22 @@ TEST_F(RenderRoutes, SendAPictureWithItsTagAndTiming) {
   EXPECT_GT(image.at(32, 24, 2), 0.9f) << "the wall is blue";
 }
 
+TEST_F(RenderRoutes, MakePicturesInMemoryThatIsCounted) {
+  const FakeCall request = from_front(about(add_wall()));
+  const std::uint64_t needed = 140 * 441 + 64 * 64 * 48;
+  const auto answer_with = [&](std::uint64_t bytes, std::uint64_t others) {
+    engine::MemoryBudget budget(bytes, "--work-memory", std::chrono::milliseconds(20));
+    const auto held = budget.take(others, "others");
+    RenderService counted({.threads = 2, .max_side = 256, .memory = &budget});
+    router = {};
+    add_render_routes(router, {*store, *views, counted, *selections});
+    return call("GET", render_path, request);
+  };
+  EXPECT_TRUE(answer_with(needed, 0));
+  EXPECT_EQ(answer_with(needed - 1, 0).error().code, engine::ErrorCode::too_large);
+  EXPECT_EQ(answer_with(needed, 1).error().code, engine::ErrorCode::unavailable);
+}
+
 TEST_F(RenderRoutes, AnswerAKnownTagWithoutAPicture) {
   FakeCall request = from_front(about(add_wall()));
   const auto first = call("GET", render_path, request);

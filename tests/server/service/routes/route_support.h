@@ -40,6 +40,8 @@ struct FakeCall : http::Call {
     return http::UploadInfo{upload_name, upload.size()};
   }
   bool has(const std::string& etag) const override { return etag == known_etag; }
+  std::function<bool()> has_gone = {};
+  bool gone() const override { return has_gone && has_gone(); }
   bool accepts(std::string_view media_type) const override { return http::accepts(accept, media_type); }
 };
 
@@ -51,7 +53,7 @@ struct RouteFixture : scenes::StoreFixture {
 
   RouteFixture() { connect(); }
   void connect() {
-    views = std::make_unique<SceneViews>(*store, renders);
+    views = std::make_unique<SceneViews>(*store);
     selections = std::make_unique<edits::Selections>(*store);
     router = {};
     add_scene_routes(router,

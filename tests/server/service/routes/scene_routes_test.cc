@@ -1,5 +1,9 @@
 #include "server/service/routes/scene_routes.h"
 
+#include <atomic>
+#include <chrono>
+#include <thread>
+
 #include "engine/io/image_file.h"
 #include "tests/server/service/routes/route_support.h"
 
@@ -109,6 +113,30 @@ TEST_F(SceneRoutes, ShowFiftyVirtualViewsOfASceneWithoutDataset) {
   EXPECT_EQ(all["views"][0]["name"], "virtual_00");
   EXPECT_EQ(all["views"][0]["photo"], false);
   EXPECT_EQ(call("GET", "/v1/scenes/{id}/views", about(id))->body, reply->body);
+}
+
+TEST_F(SceneRoutes, FindViewsForWhoeverIsStillThere) {
+  const std::string id = add_wall();
+  FakeCall first = about(id);
+  std::atomic<bool> begun = false, left = false;
+  first.has_gone = [&] {
+    begun = true;
+    while (!left) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    return true;
+  };
+  engine::Result<http::Reply> of_first, of_second;
+  std::thread one([&] { of_first = call("GET", "/v1/scenes/{id}/views", first); });
+  while (!begun) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  std::thread two([&] { of_second = call("GET", "/v1/scenes/{id}/views", about(id)); });
+  // Nothing else waits for them.
+  EXPECT_EQ(renders.waiting(), 0u);
+  EXPECT_TRUE(renders.run_in_turn([] {}));
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));  // the second now waits for the first
+  left = true;
+  one.join(), two.join();
+  EXPECT_EQ(of_first.error().code, ErrorCode::cancelled);
+  ASSERT_TRUE(of_second) << of_second.error().message;
+  EXPECT_EQ(json::parse(of_second->body)["views"].size(), 50u);
 }
 
 /// A photo of the wall as the camera of transforms_json() sees it, which looks from z = 4 in OpenGL's axes.
