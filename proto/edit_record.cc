@@ -43,6 +43,16 @@ FinishedInterval decode_interval(const ordered_json& object) {
   return finished;
 }
 
+/// Requests are kept without their selection, which may be long and is kept once, with the job. A removal may have
+/// nothing else that says what goes, and would be refused: any selection stands in for its own while it is read.
+EditRequest decode_request(ordered_json object) {
+  const bool lacks_handles = object.at("handles").empty();
+  if (lacks_handles) object["selection"] = ordered_json::array({{{"invert", true}}});
+  EditRequest request = parse_edit_request(object.dump()).value();
+  if (lacks_handles) request.selection.reset();
+  return request;
+}
+
 ordered_json encode(const std::optional<GaussianCounts>& counts) {
   if (!counts) return nullptr;
   return {counts->input, counts->output, counts->removed, counts->copies, counts->changeable, counts->crumbs};
@@ -63,8 +73,7 @@ EditRecord decode(const ordered_json& object) {
   if (const auto parts = object.find("parts"); parts != object.end())  // records of earlier versions have none
     for (const ordered_json& part : *parts)
       record.parts.push_back({part.at(0).get<int>(), part.at(1).get<std::string>(), part.at(2).get<std::string>()});
-  if (const ordered_json& request = object.at("request"); !request.is_null())
-    record.request = parse_edit_request(request.dump()).value();
+  if (const ordered_json& request = object.at("request"); !request.is_null()) record.request = decode_request(request);
   for (const ordered_json& timing : object.at("timings"))
     record.timings.push_back({timing.at(0).get<std::string>(), timing.at(1).get<double>()});
   if (const auto n = optional_at<std::vector<std::size_t>>(object, "gaussians"))

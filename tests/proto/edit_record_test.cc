@@ -43,6 +43,16 @@ TEST(EditRecord, ComesBackAsItWasWritten) {
   EXPECT_EQ(to_json(*back), text) << "every field";
 }
 
+TEST(EditRecord, OfARemovalOfWhatIsSelectedComesBackWithoutItsSelection) {
+  EditRecord record = full_record();
+  record.request->mode = Mode::remove;
+  record.request->handles.clear();
+  const auto back = parse_edit_record(to_json(record));
+  ASSERT_TRUE(back) << back.error().message;
+  EXPECT_EQ(back->request, record.request);
+  EXPECT_EQ(back->result_version, 7);
+}
+
 TEST(EditRecord, OfAnEditThatHasJustBegunIsMostlyEmpty) {
   const auto back = parse_edit_record(to_json(EditRecord{}));
   ASSERT_TRUE(back) << back.error().message;

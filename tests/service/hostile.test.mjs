@@ -564,6 +564,7 @@ describe('a service with a token', () => {
         if (id === 'endSession' && response.status === 204) continue;  // giving back a cookie needs no right
         assert.equal(response.status, 401, `${method} ${real} with ${authorization}`);
         assert.match(response.headers['www-authenticate'], /^Bearer/);
+        await guarded.client.get('/v1/info');  // so that these do not count as guesses in a row
       }
     }
     stranger.close();
@@ -586,6 +587,21 @@ describe('a service with a token', () => {
     await page.request('DELETE', '/v1/session', { headers: { cookie }, expect: 204 });
     await page.get('/v1/info', { headers: { cookie }, expect: 401 });
     page.close();
+  });
+
+  test('slows down who guesses, and lets in who waits', async () => {
+    const guesser = new Client(guarded.url);
+    const guess = async (n) => guesser.request('GET', '/v1/info', { headers: { authorization: `Bearer ${token}${n}` } });
+    for (let n = 0; n < 6; ++n) assert.equal((await guess(n)).status, 401, `guess ${n}`);
+    const refused = await guess(6);
+    assert.equal(refused.status, 429);
+    const seconds = Number(refused.headers['retry-after']);
+    assert.ok(seconds >= 1 && seconds <= 2, `${seconds}`);
+    assert.equal((await guesser.request('GET', '/healthz')).status, 200);
+    await new Promise((resolve) => { setTimeout(resolve, 1000 * seconds + 100); });
+    await guarded.client.get('/v1/info');
+    assert.equal((await guess(7)).status, 401, 'and all is forgotten');
+    guesser.close();
   });
 });
 

@@ -133,6 +133,18 @@ describe('an edit', () => {
       await editedByCommandLine(path.join(demo.folder, 'scene.ply'), demo.folder, asked)));
   });
 
+  test('removes what is selected, without a handle', async () => {
+    const asked = { scene: scene.id, version: 0, preset: 'preview', mode: 'remove', selection: [{ sphere: ball }] };
+    const { count } = await select(asked.selection);
+    const edit = await client.succeeded((await client.submit(asked)).id);
+    assert.deepEqual(edit.request.handles, []);
+    assert.deepEqual(edit.request.selection, asked.selection);
+    assert.ok(edit.gaussians.removed >= count);
+    assert.equal(edit.gaussians.output, scene.gaussians - edit.gaussians.removed);
+    assert.ok(edit.result_version >= 1 && edit.timings.length > 0);
+    await client.file(scene.id, edit.result_version);
+  });
+
   test('goes on to the same bytes after a kill', async () => {
     const asked = request([{ sphere: ball }], { params: { intervals: 8, views: 12, max_image_side: 320 } });
     const whole = await client.succeeded((await client.submit(asked)).id);
