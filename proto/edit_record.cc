@@ -53,6 +53,12 @@ EditRequest decode_request(ordered_json object) {
   return request;
 }
 
+Uncovered decode_uncovered(const ordered_json& list) {
+  Uncovered uncovered{list.at(0).get<std::string>(), list.at(1).get<double>(), list.at(2).get<double>(), {}};
+  if (!list.at(3).is_null()) uncovered.open_box = list.at(3).get<std::array<double, 4>>();
+  return uncovered;
+}
+
 ordered_json encode(const std::optional<GaussianCounts>& counts) {
   if (!counts) return nullptr;
   return {counts->input, counts->output, counts->removed, counts->copies, counts->changeable, counts->crumbs};
@@ -79,6 +85,8 @@ EditRecord decode(const ordered_json& object) {
   if (const auto n = optional_at<std::vector<std::size_t>>(object, "gaussians"))
     record.gaussians = {n->at(0), n->at(1), n->at(2),
                         n->at(3), n->at(4), n->size() > 5 ? n->at(5) : 0};  // records of earlier versions have five
+  if (const auto views = object.find("uncovered"); views != object.end())   // records of earlier versions have none
+    for (const ordered_json& view : *views) record.uncovered.push_back(decode_uncovered(view));
   record.warnings = object.at("warnings").get<std::vector<std::string>>();
   record.result_version = optional_at<int>(object, "result_version");
   record.simd = object.at("simd").get<std::string>();
@@ -89,10 +97,12 @@ EditRecord decode(const ordered_json& object) {
 
 std::string to_json(const EditRecord& record) {
   ordered_json finished = ordered_json::array(), handles = ordered_json::array(), timings = ordered_json::array(),
-               parts = ordered_json::array();
+               parts = ordered_json::array(), uncovered = ordered_json::array();
   for (const FinishedInterval& interval : record.finished_intervals) finished.push_back(encode(interval));
   for (const HandleCount& handle : record.handles) handles.push_back(handle.gaussians);
   for (const Part& part : record.parts) parts.push_back({part.group, part.how, part.why});
+  for (const Uncovered& view : record.uncovered)
+    uncovered.push_back({view.view, view.area, view.open, or_null(view.open_box)});
   for (const StageSeconds& timing : record.timings) timings.push_back({timing.stage, timing.seconds});
   ordered_json out{{"stage", record.stage},
                    {"progress", record.progress},
@@ -107,6 +117,7 @@ std::string to_json(const EditRecord& record) {
                    {"request", nullptr},
                    {"timings", std::move(timings)},
                    {"gaussians", encode(record.gaussians)},
+                   {"uncovered", std::move(uncovered)},
                    {"warnings", record.warnings},
                    {"result_version", or_null(record.result_version)},
                    {"simd", record.simd}};

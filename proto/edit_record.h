@@ -25,6 +25,7 @@ struct EditRecord {
   std::optional<EditRequest> request;
   std::vector<StageSeconds> timings;
   std::optional<GaussianCounts> gaussians;
+  std::vector<Uncovered> uncovered;
   std::vector<std::string> warnings;
   std::optional<int> result_version;
   std::string simd;

@@ -37,6 +37,13 @@ ordered_json encode(const GaussianCounts& counts) {
           {"copies", counts.copies}, {"changeable", counts.changeable}, {"crumbs", counts.crumbs}};
 }
 
+ordered_json encode(const Uncovered& uncovered) {
+  return {{"view", uncovered.view},
+          {"area", uncovered.area},
+          {"open", uncovered.open},
+          {"open_box", or_null(uncovered.open_box)}};
+}
+
 ordered_json encode(const HandleCount& handle) { return {{"gaussians", handle.gaussians}}; }
 
 ordered_json encode(const engine::Error& error) {
@@ -109,6 +116,7 @@ ordered_json encode(const EditStatus& status) {
                                          return ordered_json{{"stage", timing.stage}, {"seconds", timing.seconds}};
                                        })},
                    {"gaussians", nullptr},
+                   {"uncovered", list_of(status.uncovered, [](const auto& view) { return encode(view); })},
                    {"warnings", status.warnings},
                    {"result_version", or_null(status.result_version)},
                    {"error", nullptr},

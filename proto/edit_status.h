@@ -1,6 +1,7 @@
 // What the service says about edits: their state, their estimate, their preview. Structs here, JSON in the .cc.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -51,6 +52,15 @@ struct GaussianCounts {
   std::size_t input = 0, output = 0, removed = 0, copies = 0, changeable = 0, crumbs = 0;
 };
 
+/// What one view showed of the place that a moved part has left. Fractions of the picture.
+struct Uncovered {
+  std::string view;
+  double area = 0;  ///< What the part has left.
+  double open = 0;  ///< What of that no camera has seen, and no surface goes on to.
+  std::optional<std::array<double, 4>>
+      open_box;  ///< Left, top, right and bottom of the box around it, if there is some.
+};
+
 /// Everything about one edit. Times are RFC 3339, UTC, milliseconds.
 struct EditStatus {
   std::string id;
@@ -72,6 +82,7 @@ struct EditStatus {
   EditRequest request;  ///< As the client sent it; with every parameter filled in once the edit has started.
   std::vector<StageSeconds> timings;
   std::optional<GaussianCounts> gaussians;  ///< Only of an edit that succeeded.
+  std::vector<Uncovered> uncovered;         ///< By a move that was repaired: views that show what the part has left.
   std::vector<std::string> warnings;
   std::optional<int> result_version;
   std::optional<engine::Error> error;

@@ -226,6 +226,9 @@ function factsOf(edit) {
     const { input, output, removed, copies } = edit.gaussians;
     facts.push(["Gaussians", `${count(input)} → ${count(output)} (${count(removed)} removed, ${count(copies)} new)`]);
   }
+  const left = edit.uncovered.reduce((sum, { area }) => sum + area, 0);
+  const open = edit.uncovered.reduce((sum, view) => sum + view.open, 0);
+  if (left > 0) facts.push(["Completed", `${Math.floor(100 * (1 - open / left))} % of the place that was left`]);
   for (const { stage, seconds } of edit.timings) facts.push([STAGES[stage] ?? stage, duration(seconds)]);
   const { mode, preset, params = {} } = edit.request;
   const { selection = [] } = edit.request;

@@ -18,7 +18,7 @@ using working::Members;
 using working::Role;
 
 constexpr std::string_view magic = "SDCHKPNT";
-constexpr std::uint32_t version = 5;
+constexpr std::uint32_t version = 6;
 
 // Each part is written and read by a pair of functions that name the same fields in the same order.
 
@@ -50,6 +50,8 @@ void write(ByteWriter& out, const HandleReport& handle);
 void read(ByteReader& in, HandleReport& handle);
 void write(ByteWriter& out, const ViewReport& view);
 void read(ByteReader& in, ViewReport& view);
+void write(ByteWriter& out, const Uncovered& uncovered);
+void read(ByteReader& in, Uncovered& uncovered);
 void write(ByteWriter& out, const StageTime& time);
 void read(ByteReader& in, StageTime& time);
 void write(ByteWriter& out, const scene::Camera& camera);
@@ -179,6 +181,19 @@ void read(ByteReader& in, HandleReport& handle) {
 void write(ByteWriter& out, const ViewReport& view) { write(out, view.name), out.write(view.mask_area); }
 void read(ByteReader& in, ViewReport& view) { read(in, view.name), view.mask_area = in.read<double>(); }
 
+void write(ByteWriter& out, const Uncovered& uncovered) {
+  write(out, uncovered.view);
+  for (const double value : {uncovered.area, uncovered.open, uncovered.open_from.x, uncovered.open_from.y,
+                             uncovered.open_to.x, uncovered.open_to.y})
+    out.write(value);
+}
+void read(ByteReader& in, Uncovered& uncovered) {
+  read(in, uncovered.view);
+  for (double* value : {&uncovered.area, &uncovered.open, &uncovered.open_from.x, &uncovered.open_from.y,
+                        &uncovered.open_to.x, &uncovered.open_to.y})
+    *value = in.read<double>();
+}
+
 void write(ByteWriter& out, const StageTime& time) { out.write(std::uint8_t(time.stage)), out.write(time.seconds); }
 void read(ByteReader& in, StageTime& time) {
   read(in, time.stage, names<Stage>.back().value), time.seconds = in.read<double>();
@@ -188,6 +203,7 @@ void write(ByteWriter& out, const Report& report) {
   write(out, report.resolved);
   write_list(out, report.handles);
   write_list(out, report.views);
+  write_list(out, report.uncovered);
   for (const std::size_t count : {report.input_gaussians, report.output_gaussians, report.changeable, report.copies,
                                   report.seeds, report.removed, report.crumbs})
     out.write(std::uint64_t(count));
@@ -200,6 +216,7 @@ void read(ByteReader& in, Report& report) {
   read(in, report.resolved);
   read_list(in, report.handles);
   read_list(in, report.views);
+  read_list(in, report.uncovered);
   for (std::size_t* count : {&report.input_gaussians, &report.output_gaussians, &report.changeable, &report.copies,
                              &report.seeds, &report.removed, &report.crumbs})
     *count = std::size_t(in.read<std::uint64_t>());

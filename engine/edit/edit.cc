@@ -102,6 +102,7 @@ Result<Outcome> finish(State state, Edit& edit) {
   Report& report = state.report;
   report.output_gaussians = edit.input.size() - overlay.removed.size() + overlay.added();
   if (report.output_gaussians == 0) return tl::make_unexpected(leaves_nothing());
+  if (std::string open = left_open(report.uncovered); !open.empty()) report.warnings.push_back(std::move(open));
   if (published.faint > 0) report.warnings.push_back(faint_left_out(published.faint));
   std::vector<scene::Mask> masks = dilated(state.masks);
   for (std::size_t v = 0; v < state.views.size(); ++v)

@@ -1,6 +1,15 @@
 #include "engine/edit/messages.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace engine::edit {
+namespace {
+
+/// Part of what is uncovered that may stay open unsaid: rims leave a few pixels everywhere. A choice.
+constexpr double worth_saying = 0.1;
+
+}  // namespace
 
 std::string nothing_moves() { return "nothing moves: every target is where its handle is"; }
 
@@ -16,6 +25,17 @@ std::string handle_lost(std::size_t handle, int interval) {
 std::string anchor_is_idle(std::size_t handle) {
   return "handle " + std::to_string(handle + 1) +
          " is an anchor that holds nothing: nothing that moves is within its radius of it";
+}
+
+std::string left_open(std::span<const Uncovered> views) {
+  double area = 0, open = 0;
+  for (const Uncovered& view : views) area += view.area, open += view.open;
+  if (!(open > worth_saying * area)) return {};
+  const Uncovered& worst = *std::ranges::max_element(views, {}, &Uncovered::open);
+  return std::to_string(std::lround(100 * open / area)) +
+         " % of the place that was left could not be completed: no camera has seen what is there, and no surface goes "
+         "on there; most of it shows in view \"" +
+         worst.view + "\"";
 }
 
 std::string faint_left_out(std::size_t copies) {

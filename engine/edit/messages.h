@@ -3,9 +3,11 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <string>
 
 #include "engine/core/result.h"
+#include "engine/edit/report.h"
 
 namespace engine::edit {
 
@@ -16,6 +18,9 @@ namespace engine::edit {
 [[nodiscard]] std::string faint_left_out(std::size_t copies);
 /// unprocessable, `where` is "handles".
 [[nodiscard]] Error leaves_nothing();
+
+/// What could not be completed of what a part has left. Empty: hardly anything.
+[[nodiscard]] std::string left_open(std::span<const Uncovered> views);
 
 /// An anchor of an elastic body that grips nothing of it.
 [[nodiscard]] std::string anchor_is_idle(std::size_t handle);

@@ -26,6 +26,17 @@ struct ViewReport {
   double mask_area = 0;  ///< Union of its 2D masks over all intervals, fraction of the picture, 0..1.
 };
 
+/// What one view showed of the place that the part has left, at the end of the last correction. Lengths and areas are
+/// fractions of the picture.
+struct Uncovered {
+  std::string view;
+  double area = 0;  ///< What the part has left.
+  /// What of that could not be completed: no camera has seen what is there, and no surface was found to go on. It was
+  /// painted as it may look from this view alone.
+  double open = 0;
+  DVec2 open_from{0.0}, open_to{0.0};  ///< Corners of the box around it, x to the right and y down.
+};
+
 /// Wall time of one stage, seconds.
 struct StageTime {
   Stage stage = Stage::assign;
@@ -39,6 +50,7 @@ struct Report {
   std::size_t crumbs = 0;         ///< Rows that the selection has left out, and that went along or away.
   std::vector<Attachment> parts;  ///< Of Interpolation::arap: how each group moves, and why.
   std::vector<ViewReport> views;
+  std::vector<Uncovered> uncovered;  ///< By a move that a corrector has repaired: views that show what the part left.
   std::size_t input_gaussians = 0;
   std::size_t output_gaussians = 0;
   std::size_t changeable = 0;  ///< Size of the 3D mask M at the end.

@@ -33,6 +33,16 @@ repair::Repair make_repair(const State& state, const Edit& edit) {
           departure_of(edit.request),        edit.params().seed,        *edit.corrector};
 }
 
+Uncovered uncovered_in(const scene::Camera& view, const repair::Uncovered& seen) {
+  const double width = view.width, height = view.height, pixels = width * height;
+  const scene::Rect& box = seen.open_box;
+  return {view.name,
+          double(seen.pixels) / pixels,
+          double(seen.open) / pixels,
+          {box.x0 / width, box.y0 / height},
+          {box.x1 / width, box.y1 / height}};
+}
+
 /// Without a corrector I_e is what the scene shows before the optimisation. In a move that is without what has left: a
 /// picture with the originals in it, however faint, would ask for them, and where there are many they came back.
 class Uncorrected {
@@ -154,7 +164,12 @@ Result<repair::Corrected> correct(State& state, Edit& edit, std::span<const scen
   if (auto going = edit.progress.enter(Stage::correct, round.interval); !going) return propagate(going);
   auto corrected =
       edit.repair->correct(state.scene, masks, round, [&](double part) { return edit.progress.advance(part); });
-  if (corrected) state.report.seeds += corrected->seeds;
+  if (!corrected) return corrected;
+  state.report.seeds += corrected->seeds;
+  state.report.uncovered.clear();
+  for (std::size_t v = 0; v < corrected->uncovered.size(); ++v)
+    if (corrected->uncovered[v].pixels > 0)
+      state.report.uncovered.push_back(uncovered_in(state.views[v], corrected->uncovered[v]));
   return corrected;
 }
 

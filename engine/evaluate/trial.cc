@@ -54,6 +54,7 @@ Result<CarriedOut> carry_out(const Case& the_case, const edit::Request& request,
   trial.gaussians = the_case.before.size();
   trial.part = the_case.part_before.size();
   trial.seeds = outcome->report.seeds;
+  for (const edit::Uncovered& view : outcome->report.uncovered) trial.uncovered += view.area, trial.open += view.open;
   trial.intervals = outcome->report.resolved.intervals;
   trial.untouched = judge(the_case, the_case.before);
   trial.result = judge(the_case, done.edited);

@@ -30,6 +30,7 @@ struct Trial {
   bool textured = true;                 ///< See Case.
   std::size_t gaussians = 0, part = 0;  ///< Of the scene; of the part that moves.
   std::size_t seeds = 0;                ///< Seeds that the repair has placed.
+  double uncovered = 0, open = 0;       ///< Of the edit's views in sum, fractions of a picture. See edit::Uncovered.
   int intervals = 0;                    ///< T of the edit.
   Quality untouched;                    ///< Quality of the scene before the edit: what doing nothing would come to.
   Quality result;                       ///< Quality of the edited scene.

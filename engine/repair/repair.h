@@ -15,6 +15,7 @@
 #include "engine/correct/corrector.h"
 #include "engine/neighbours/point_index.h"
 #include "engine/render/forward.h"
+#include "engine/repair/closure.h"
 #include "engine/repair/surfaces.h"
 #include "engine/repair/unedited_views.h"
 #include "engine/repair/witnesses.h"
@@ -29,11 +30,21 @@ namespace engine::repair {
 using working::Mode;
 using working::WorkingScene;
 
+/// What one view shows of the place that the part has left.
+struct Uncovered {
+  std::size_t pixels = 0;  ///< What the part covered there, and covers no more.
+  /// Those of them that show what no camera has seen, and where no surface was found to go on: what is there was
+  /// painted in this view alone.
+  std::size_t open = 0;
+  scene::Rect open_box;  ///< Around them.
+};
+
 /// What the optimisation should reach.
 struct Corrected {
   std::vector<scene::Image> pictures;  ///< I_e of each view, in its size. Empty: there was no corrector.
   std::vector<float> trust;            ///< [rows of the working scene] 0 to 1: the more, the slower a row may change.
   std::size_t seeds = 0;               ///< Rows that the correction appended.
+  std::vector<Uncovered> uncovered;    ///< Of each view; empty in `extend`, where nothing leaves its place.
 };
 
 /// Which correction it is.
@@ -78,6 +89,7 @@ class Repair {
     scene::Image picture;
     scene::Mask filled;     ///< Pixels that were made up.
     std::size_t seeds = 0;  ///< Rows appended.
+    Uncovered uncovered;
   };
 
   struct Telling {
@@ -107,6 +119,12 @@ class Repair {
   /// known: returns the number of seeds.
   [[nodiscard]] Result<std::size_t> complete_chart(WorkingScene& working, Rows& rows, const Telling& telling,
                                                    const Round& round);
+  /// What has left, and rows that nobody has seen: without them shows what is known.
+  [[nodiscard]] std::vector<std::uint32_t> left_out(const Rows& rows) const;
+  /// What closes the place in view v where no surface goes on: [1] inverse depth; 0: nothing does.
+  ///   surface  the same of those that go on
+  [[nodiscard]] scene::Image closing(const WorkingScene& working, const Rows& rows, std::size_t v,
+                                     const scene::Image& surface);
   /// Lays what goes on behind the dragged part into the working scene as seeds.
   [[nodiscard]] Result<Background> complete_background(WorkingScene& working, Rows& rows, std::size_t v,
                                                        const Round& round);
@@ -135,6 +153,7 @@ class Repair {
   std::vector<correct::Example> buffer_;
   std::vector<std::uint32_t> open_;     ///< Rows of the input whose place is empty now, ascending.
   std::vector<scene::Mask> vacated_;    ///< Per view: what the part has left.
+  std::optional<Closure> closure_;      ///< Of what the part has left.
   std::vector<scene::Image> far_side_;  ///< Per view: of what the part has left. See far_side().
   render::Workspace workspace_;
   std::vector<float> trust_;                         ///< Of the rows of the working scene, in the correction at hand.

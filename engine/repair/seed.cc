@@ -14,6 +14,7 @@ namespace engine::repair {
 namespace {
 
 constexpr double sigma_px = 0.6;       // of a seed, in the distance of seeds: no gaps between them, and little blur
+constexpr double steepest = 8;         // seeds are not drawn out to more than so many pixels, wherever depth jumps
 constexpr double flatness = 0.1;       // thickness over width
 constexpr double seed_opacity = 0.95;  // the optimisation can still move it
 constexpr std::size_t most_seeds = 20000;
@@ -71,6 +72,9 @@ std::vector<Seed> seeds_on(const scene::Camera& camera, const scene::Image& inve
       seed.mean = point_at(camera, pixel, here);
       seed.along_x = double(every) * (point_at(camera, pixel + DVec2(1, 0), here + slope.x) - seed.mean);
       seed.along_y = double(every) * (point_at(camera, pixel + DVec2(0, 1), here + slope.y) - seed.mean);
+      const double across = 1 / (here * std::min(camera.fx, camera.fy)) * every;
+      for (DVec3* side : {&seed.along_x, &seed.along_y})
+        if (const double length = glm::length(*side); length > steepest * across) *side *= steepest * across / length;
       seed.color = {picture.at(x, y, 0), picture.at(x, y, 1), picture.at(x, y, 2)};
     }
   return seeds;

@@ -29,6 +29,9 @@ class Witnesses {
   /// are needed: one alone may err there.
   [[nodiscard]] bool saw(DVec3 point) const;
 
+  [[nodiscard]] const std::vector<scene::Camera>& cameras() const { return cameras_; }
+  [[nodiscard]] const std::vector<scene::Image>& depth() const { return depth_; }  ///< See below.
+
  private:
   std::vector<scene::Camera> cameras_;
   std::vector<scene::Image> depth_;  ///< [1] Per camera: median depth, world units; 0: nothing is there.

@@ -57,6 +57,8 @@ ordered_json encode(const evaluate::Trial& trial) {
           {"gaussians", trial.gaussians},
           {"part", trial.part},
           {"seeds", trial.seeds},
+          {"uncovered", trial.uncovered},
+          {"open", trial.open},
           {"intervals", trial.intervals},
           {"untouched", encode(trial.untouched)},
           {"result", encode(trial.result)},
@@ -81,6 +83,8 @@ void decode(const ordered_json& from, evaluate::Trial& trial) {
   from.at("gaussians").get_to(trial.gaussians);
   from.at("part").get_to(trial.part);
   from.at("seeds").get_to(trial.seeds);
+  from.at("uncovered").get_to(trial.uncovered);
+  from.at("open").get_to(trial.open);
   from.at("intervals").get_to(trial.intervals);
   decode(from.at("untouched"), trial.untouched);
   decode(from.at("result"), trial.result);

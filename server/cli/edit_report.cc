@@ -18,6 +18,13 @@ ordered_json encode(const engine::edit::HandleReport& handle) {
   return {{"gaussians", handle.gaussians}, {"positions", std::move(positions)}};
 }
 
+ordered_json encode(const engine::edit::Uncovered& uncovered) {
+  ordered_json out{{"view", uncovered.view}, {"area", uncovered.area}, {"open", uncovered.open}, {"open_box", nullptr}};
+  if (uncovered.open > 0)
+    out["open_box"] = {uncovered.open_from.x, uncovered.open_from.y, uncovered.open_to.x, uncovered.open_to.y};
+  return out;
+}
+
 ordered_json encode(const ViewPictures& pictures) {
   ordered_json out{{"view", pictures.view},
                    {"before", pictures.before},
@@ -62,6 +69,7 @@ std::string to_json(const EditReport& report) {
                         [](const auto& view) {
                           return ordered_json{{"name", view.name}, {"mask_area", view.mask_area}};
                         })},
+      {"uncovered", list_of(edit.uncovered, [](const auto& view) { return encode(view); })},
       {"losses", edit.losses},
       {"pictures", list_of(report.pictures, [](const auto& pictures) { return encode(pictures); })},
       {"seconds", report.seconds},

@@ -100,6 +100,15 @@ std::vector<proto::Part> to_parts(const std::vector<edit::Attachment>& attachmen
   return parts;
 }
 
+std::vector<proto::Uncovered> to_uncovered(const std::vector<edit::Uncovered>& views) {
+  std::vector<proto::Uncovered> out;
+  for (const edit::Uncovered& view : views) {
+    proto::Uncovered& shown = out.emplace_back(proto::Uncovered{view.view, view.area, view.open, {}});
+    if (view.open > 0) shown.open_box = std::array{view.open_from.x, view.open_from.y, view.open_to.x, view.open_to.y};
+  }
+  return out;
+}
+
 std::vector<std::string> fields_without_effect(const proto::EditRequest& request) {
   std::vector<std::string> fields;
   if (request.prompt) fields.emplace_back("prompt");  // no corrector of this build reads it

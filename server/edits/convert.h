@@ -53,6 +53,9 @@ namespace server::edits {
 /// How each group moves, for clients.
 [[nodiscard]] std::vector<proto::Part> to_parts(const std::vector<engine::edit::Attachment>& attachments);
 
+/// What views show of the place that a part has left, for clients.
+[[nodiscard]] std::vector<proto::Uncovered> to_uncovered(const std::vector<engine::edit::Uncovered>& views);
+
 /// Fields of the request that are given, but without effect on this edit.
 [[nodiscard]] std::vector<std::string> fields_without_effect(const proto::EditRequest& request);
 

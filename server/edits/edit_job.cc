@@ -213,6 +213,7 @@ class Run {
     record.result_version = *version;
     record.gaussians = {report.input_gaussians, report.output_gaussians, report.removed,
                         report.copies,          report.changeable,       report.crumbs};
+    record.uncovered = to_uncovered(report.uncovered);
     for (const std::string& warning : report.warnings) keeper_.warn(warning);
     stopped_early_ = outcome.stopped_early;
     keeper_.finish();

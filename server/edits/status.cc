@@ -53,6 +53,7 @@ void fill_in(proto::EditStatus& status, proto::EditRecord record, const jobs::Jo
   }
   status.timings = std::move(record.timings);
   status.warnings = std::move(record.warnings);
+  status.uncovered = std::move(record.uncovered);
   status.simd = std::move(record.simd);
   if (succeeded) {
     status.gaussians = record.gaussians;

@@ -45,6 +45,7 @@ EditStatus succeeded() {
   status.handles = {{17}};
   status.timings = {{"mask", 1.5}};
   status.gaussians = GaussianCounts{10, 12, 1, 3, 4, 5};
+  status.uncovered = {{"0001.jpg", 0.25, 0.125, {{0.5, 0.25, 0.75, 1}}}, {"0002.jpg", 0.5, 0, {}}};
   status.warnings = {"careful"};
   status.result_version = 2;
   status.started = "2026-11-21T11:09:39.000Z";
@@ -66,7 +67,7 @@ TEST(EditStatus, OfAWaitingEditHasEveryFieldAndNullsWhereNothingIsKnown) {
   for (const char* name :
        {"stage", "eta_seconds", "loss", "gaussians", "result_version", "error", "started", "ended", "simd"})
     EXPECT_TRUE(edit.at(name).is_null()) << name;
-  for (const char* name : {"finished_intervals", "handles", "parts", "timings", "warnings"})
+  for (const char* name : {"finished_intervals", "handles", "parts", "timings", "uncovered", "warnings"})
     EXPECT_EQ(edit.at(name), json::array()) << name;
   EXPECT_EQ(edit.at("created"), "2026-11-21T11:09:38.123Z");
   EXPECT_EQ(edit.at("links"), json::parse(R"({"self": "/v1/edits/e000001", "events": "/v1/edits/e000001/events",
@@ -95,6 +96,9 @@ TEST(EditStatus, OfASuccessLinksItsResultAndItsPictures) {
   EXPECT_EQ(edit.at("timings"), json::parse(R"([{"stage": "mask", "seconds": 1.5}])"));
   EXPECT_EQ(edit.at("gaussians"),
             json::parse(R"({"input": 10, "output": 12, "removed": 1, "copies": 3, "changeable": 4, "crumbs": 5})"));
+  EXPECT_EQ(edit.at("uncovered"), json::parse(R"([
+    {"view": "0001.jpg", "area": 0.25, "open": 0.125, "open_box": [0.5, 0.25, 0.75, 1.0]},
+    {"view": "0002.jpg", "area": 0.5, "open": 0.0, "open_box": null}])"));
   EXPECT_EQ(edit.at("simd"), "AVX2");
   EXPECT_EQ(edit.at("stopped_early"), true);
 }

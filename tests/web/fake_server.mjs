@@ -432,6 +432,7 @@ export function start({ port = 0, token = null, slow = 0, empty = false, tick = 
           eta_seconds: null,
           result_version: version,
           gaussians: { input: points.length, output: points.length, removed: 120, copies: 120, changeable: 240, crumbs: 0 },
+          uncovered: [{ view: "view 1", area: 0.04, open: 0.01, open_box: [0.4, 0.5, 0.6, 0.75] }],
           timings: [
             { stage: "assign", seconds: 0.02 },
             { stage: "deform", seconds: 1.7 },
@@ -687,6 +688,7 @@ export function start({ port = 0, token = null, slow = 0, empty = false, tick = 
           request,
           timings: [],
           gaussians: null,
+          uncovered: [],
           warnings: [],
           result_version: null,
           error: null,

@@ -44,6 +44,7 @@ struct Sample {
     report.resolved.intervals = resolved_intervals(request);
     report.handles = {{6, {DVec3(0.1, 0.2, 0.3), DVec3(1, 2, 3)}}};
     report.views = {{"view_0", 0.25}};
+    report.uncovered = {{"view_0", 0.25, 0.125, DVec2(0.5, 0.25), DVec2(0.75, 1)}};
     report.input_gaussians = input.size();
     report.output_gaussians = 1, report.changeable = 2;
     report.copies = 3, report.seeds = 5, report.removed = 4, report.crumbs = 6;
@@ -83,6 +84,9 @@ TEST(Checkpoint, IsReadAsItWasWritten) {
   EXPECT_EQ(read->report.resolved.seed, written.report.resolved.seed);
   EXPECT_EQ(read->report.resolved.rotation, Rotation::none);
   EXPECT_EQ(read->report.handles[0].relocated, written.report.handles[0].relocated);
+  ASSERT_EQ(read->report.uncovered.size(), 1u);
+  EXPECT_EQ(read->report.uncovered[0].view, "view_0");
+  EXPECT_EQ(read->report.uncovered[0].open_to, DVec2(0.75, 1));
   EXPECT_EQ(read->report.losses, written.report.losses);
   EXPECT_EQ(read->report.warnings, written.report.warnings);
   ASSERT_EQ(read->report.times.size(), 1u);

@@ -92,6 +92,31 @@ TEST(EditWithACorrector, RowsThatWereSeenStayTheInputs) {
   EXPECT_LE(outcome.report.seeds + 512, outcome.report.copies + 20) << "the block's copies, seeds, their children";
 }
 
+TEST(EditWithACorrector, SaysHowMuchOfThePlaceCouldNotBeCompleted) {
+  BlockScene block;
+  const Outcome completed = run_with_scene_corrector(block);
+  ASSERT_EQ(completed.report.uncovered.size(), completed.report.views.size());
+  for (const Uncovered& view : completed.report.uncovered) {
+    EXPECT_GT(view.area, 0.0) << view.view;
+    EXPECT_LE(view.open, 0.1 * view.area) << view.view;
+  }
+  EXPECT_TRUE(completed.report.warnings.empty());
+
+  std::vector<std::uint8_t> keep(block.cloud.size(), 1);
+  std::fill_n(keep.begin(), block.floor_rows, std::uint8_t(0));  // behind the block is nothing
+  block.cloud = scene::select(block.cloud, keep);
+  block.floor_rows = 0;
+  const Outcome open = run_with_scene_corrector(block);
+  for (const Uncovered& view : open.report.uncovered) {
+    EXPECT_GT(view.open, 0.5 * view.area) << view.view;
+    EXPECT_GE(view.open_from.x, 0.0) << view.view;
+    EXPECT_LT(view.open_from.y, view.open_to.y) << view.view;
+    EXPECT_LE(view.open_to.x, 1.0) << view.view;
+  }
+  ASSERT_EQ(open.report.warnings.size(), 1u);
+  EXPECT_NE(open.report.warnings[0].find("could not be completed"), std::string::npos) << open.report.warnings[0];
+}
+
 /// The block scene, but the block is removed, by its ball.
 BlockScene removing_the_block() {
   BlockScene block;
