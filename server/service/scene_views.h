@@ -20,8 +20,8 @@ using engine::Result;
 /// Number of cameras around a scene without a dataset. A choice: as many as an edit looks through by default.
 constexpr std::size_t virtual_view_count = 50;
 
-/// Gaussians that are looked at to find them, of all that the scene has. A choice: ten million take as long as a hundred
-/// thousand, at most 1.6 s as measured, and the dome is as free.
+/// Gaussians that are looked at to find them, of all that the scene has. A choice: ten million take as long as a
+/// hundred thousand, at most 1.6 s as measured, and the dome is as free.
 constexpr std::size_t looked_at_for_views = 50'000;
 
 /// A camera of a scene.
