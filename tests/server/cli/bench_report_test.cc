@@ -90,8 +90,9 @@ TEST(BenchReport, HasTheFieldsThatOthersRead) {
   std::vector<std::string> names;
   for (const auto& [name, value] : written.items()) names.push_back(name);
   EXPECT_EQ(names, (std::vector<std::string>{"case", "what", "corrector", "textured", "gaussians", "part", "seeds",
-                                             "intervals", "untouched", "result", "corrected_views_agree", "seconds",
-                                             "stages", "peak_memory_bytes", "warnings"}));
+                                             "uncovered", "open", "intervals", "untouched", "result",
+                                             "corrected_views_agree", "seconds", "stages", "peak_memory_bytes",
+                                             "warnings"}));
 }
 
 TEST(CachedResult, IsNotFoundAgain) {

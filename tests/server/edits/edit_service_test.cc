@@ -146,7 +146,9 @@ TEST_F(ServiceTest, ShowsWhatACorrectedIntervalWasCorrectedTo) {
   EXPECT_NE(optimised, deformed);
   EXPECT_EQ(value(service->interval_picture(id, 2, 0, "before")), optimised) << "not what was only aimed at";
   EXPECT_EQ(done.request.params.corrector, proto::Corrector::scene);
-  EXPECT_TRUE(done.warnings.empty());
+  for (const std::string& warning : done.warnings)
+    EXPECT_NE(warning.find("could not be completed"), std::string::npos)
+        << "of a wall of tufts, no two pictures tell the same: " << warning;
   EXPECT_EQ(std::count_if(done.timings.begin(), done.timings.end(),
                           [](const auto& timing) { return timing.stage == "correct"; }),
             1);
@@ -173,7 +175,7 @@ TEST_F(ServiceTest, ACorrectedEditGoesOnToTheSameBytes) {
   reopen();
   const auto resumed = wait_for_end(*service, id);
   ASSERT_EQ(resumed.state, "succeeded");
-  EXPECT_TRUE(resumed.warnings.empty()) << resumed.warnings.front();
+  EXPECT_EQ(resumed.warnings, whole.warnings);
   EXPECT_EQ(version_bytes(*store, scene, *resumed.result_version), version_bytes(*store, scene, *whole.result_version));
 }
 
