@@ -7,7 +7,9 @@
 #include <utility>
 
 #include "engine/core/median.h"
+#include "engine/core/rows.h"
 #include "engine/neighbours/point_index.h"
+#include "engine/select/exposed.h"
 #include "engine/select/similarity.h"
 
 namespace engine::select {
@@ -43,14 +45,21 @@ float reach_of(const scene::GaussianCloud& part) {
 
 }  // namespace
 
-Around look_around(const scene::LayeredCloud& scene, std::span<const std::uint32_t> rows, std::size_t k) {
+Around look_around(const scene::LayeredCloud& scene, std::span<const std::uint32_t> rows, std::size_t k, Which which) {
   assert(!rows.empty());
   Around around;
   around.rows = rows_around(scene::means(scene), rows, reach_of(scene::gather(scene, rows)));
   around.cloud = scene::gather(scene, around.rows);
+  if (which == Which::exposed) {
+    std::vector<std::uint32_t> shown;
+    for (const std::uint32_t i : marked_rows(exposed_rows(around.cloud))) shown.push_back(around.rows[i]);
+    around.rows = std::move(shown);
+    around.cloud = scene::gather(scene, around.rows);
+  }
   std::vector<std::uint32_t> all(around.size());
   std::iota(all.begin(), all.end(), 0u);
-  const std::vector<float> points = neighbours::points_of(around.cloud.mean, all, DVec3(around.cloud.mean.get(0)));
+  const std::vector<float> points =
+      neighbours::points_of(around.cloud.mean, all, all.empty() ? DVec3(0.0) : DVec3(around.cloud.mean.get(0)));
   around.graph = neighbours::join_nearest(points, neighbours::PointIndex(points, 3), k);
   around.alike = similarity_of_edges(around.cloud, all, around.graph);
   return around;

@@ -25,10 +25,14 @@ struct Around {
   }
 };
 
+/// Which of the rows around: all, or those that show from outside (exposed.h).
+enum class Which : std::uint8_t { all, exposed };
+
 /// About a second for 250,000 rows in the box, with eight neighbours each.
 ///   rows  of the scene, ascending, at least one (asserted)
 ///   k     neighbours that each is joined to
-[[nodiscard]] Around look_around(const scene::LayeredCloud& scene, std::span<const std::uint32_t> rows, std::size_t k);
+[[nodiscard]] Around look_around(const scene::LayeredCloud& scene, std::span<const std::uint32_t> rows, std::size_t k,
+                                 Which which = Which::all);
 
 /// [n] 1 for each of the rows around that is among the given ones (ascending).
 [[nodiscard]] std::vector<std::uint8_t> marked(const Around& around, std::span<const std::uint32_t> rows);

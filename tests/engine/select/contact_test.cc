@@ -69,6 +69,40 @@ TEST(ContactOf, TouchesNothingAcrossAGapNorWhatIsSelectedToo) {
   EXPECT_EQ(count(contact_of(shared(cloud), right, both), Touch::nothing), right.size());
 }
 
+TEST(ContactOf, DoesNotAskWhatNobodySeesWithinAThing) {
+  // A box on a floor. Within it lies what a trainer leaves there, tufts of the box's colour, of which half is selected.
+  constexpr Vec3 color(0.9f, 0.9f, 0.9f);
+  scene::GaussianCloud cloud;
+  add_sheet(cloud, {0, 0, 0.2f}, 40, 0.1f, {0.1f, 0.2f, 0.5f});
+  const auto floor = std::uint32_t(cloud.size());
+  for (int face = 0; face < 5; ++face)
+    for (int v = 0; v < 16; ++v)
+      for (int u = 0; u < 16; ++u) {
+        const float a = 0.1f * (float(u) - 7.5f), b = 0.1f * (float(v) - 7.5f), half = 0.8f;
+        const Vec3 faces[] = {
+            {a, b, -1.6f}, {a, half, b - 0.8f}, {a, -half, b - 0.8f}, {half, a, b - 0.8f}, {-half, a, b - 0.8f}};
+        add_at(cloud, faces[face], 6, std::log(0.08f), color);
+      }
+  const auto box = std::uint32_t(cloud.size());
+  for (int z = -10; z <= -1; ++z)
+    for (int y = -5; y <= 5; ++y)
+      for (int x = -5; x <= 5; ++x) add_at(cloud, 0.14f * Vec3(float(x), float(y), float(z)), 4, std::log(0.1f), color);
+  std::vector<std::uint32_t> rows(box - floor);
+  std::iota(rows.begin(), rows.end(), floor);
+  for (std::uint32_t row = box; row < cloud.size(); ++row)
+    if (cloud.mean.get(row).z < -0.8f) rows.push_back(row);
+  const auto touches = contact_of(shared(cloud), rows, rows);
+  EXPECT_EQ(count(touches, Touch::grows_out), 0u);
+  EXPECT_GT(count(touches, Touch::stands), 0u);
+}
+
+TEST(ContactOf, OfRowsThatNothingShowsIsNone) {
+  scene::GaussianCloud cloud = cloud_at({{0, 0, 0}, {0.1f, 0, 0}, {0.2f, 0, 0}});
+  for (float& logit : cloud.opacity_logit) logit = -30;
+  const std::vector<std::uint32_t> rows{0, 1};
+  EXPECT_EQ(contact_of(shared(cloud), rows, rows), std::vector<Touch>(2, Touch::nothing));
+}
+
 TEST(ContactOf, OfASceneOfOneRowIsNone) {
   const auto touches =
       contact_of(shared(cloud_at({{1, 2, 3}})), std::vector<std::uint32_t>{0}, std::vector<std::uint32_t>{0});
