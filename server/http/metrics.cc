@@ -64,9 +64,19 @@ struct Metrics::Impl {
                                    .Help("Streams of events open now.")
                                    .Register(registry)
                                    .Add({});
+  prometheus::Gauge& connections = prometheus::BuildGauge()
+                                       .Name("splatdrag_http_connections_open")
+                                       .Help("Connections open now.")
+                                       .Register(registry)
+                                       .Add({});
+  prometheus::Gauge& waiting = prometheus::BuildGauge()
+                                   .Name("splatdrag_http_requests_waiting")
+                                   .Help("Requests that wait for a thread.")
+                                   .Register(registry)
+                                   .Add({});
   prometheus::Counter& refused = prometheus::BuildCounter()
                                      .Name("splatdrag_http_connections_refused_total")
-                                     .Help("Connections turned away because too many waited.")
+                                     .Help("Connections and requests turned away because there were too many.")
                                      .Register(registry)
                                      .Add({});
   prometheus::Family<prometheus::Counter>& refused_uploads = prometheus::BuildCounter()
@@ -105,6 +115,10 @@ void Metrics::count_refused_upload(std::string_view reason) {
 void Metrics::add_in_flight(int change) { impl_->in_flight.Increment(change); }
 
 void Metrics::add_stream(int change) { impl_->streams.Increment(change); }
+
+void Metrics::add_connection(int change) { impl_->connections.Increment(change); }
+
+void Metrics::add_waiting(int change) { impl_->waiting.Increment(change); }
 
 void Metrics::count_refused_connection() { impl_->refused.Increment(); }
 
