@@ -1,7 +1,9 @@
 #include "server/service/serve.h"
 
+#include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <fstream>
 #include <map>
@@ -120,6 +122,16 @@ void observe_edit(http::Metrics& metrics, const std::vector<proto::StageSeconds>
                   all);
 }
 
+/// Connections take descriptors, and shells give a program fewer of them than the system lets it have.
+void allow_descriptors(std::size_t connections) {
+  constexpr rlim_t others = 512;  // files of scenes and edits; a choice
+  rlimit limit{};
+  const rlim_t wanted = rlim_t(connections) + others;
+  if (::getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur >= wanted) return;
+  limit.rlim_cur = std::min(limit.rlim_max, wanted);
+  ::setrlimit(RLIMIT_NOFILE, &limit);
+}
+
 /// Tells the parts what they have to know of the whole.
 void share_out(ServeOptions& options, spdlog::logger& logger) {
   options.scenes.folder = options.data_dir / "scenes";
@@ -155,6 +167,7 @@ Result<void> check_token(ServeOptions& options, spdlog::logger& logger) {
 
 Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& logger, std::ostream& out) {
   share_out(options, logger);
+  allow_descriptors(options.http.lobby.max_connections);
   engine::MemoryBudget work_memory(options.work_memory_bytes, "--work-memory");
   options.scenes.read.memory = &work_memory;
   options.renders.memory = &work_memory;
