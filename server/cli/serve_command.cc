@@ -99,6 +99,8 @@ void add_http_options(CLI::App& command, http::ServerOptions& options, http::Acc
   add_bytes(command, "--max-json-bytes", options.dispatcher.max_json_bytes, "JSON body of a request, up to 1MiB")
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{proto::JsonLimits().max_bytes}));
   add_bytes(command, "--max-upload-bytes", options.dispatcher.max_upload_bytes, "Uploaded file");
+  add_bytes(command, "--max-unsent-bytes", options.lobby.max_unsent_bytes,
+            "Answers in memory that clients are slow to take; beyond, who has taken nothing for longest is cut off");
   add_count(command, "--min-bytes-per-second", options.lobby.connection.min_bytes_per_second,
             "Slower clients are cut off, after ten seconds of patience", 0);
 }

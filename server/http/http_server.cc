@@ -60,7 +60,9 @@ LobbyHooks HttpServer::Impl::hooks() {
             // Nothing was read of it: the connection itself is refused.
             if (visit.requests == 0 && !visit.connection.head_has_begun()) metrics.count_refused_connection();
             refuse(visit, refusal, metrics, logger);
-          }};
+          },
+          [this] { metrics.count_cut_connection(); },
+          [this](const std::string& what) { log(logger, spdlog::level::err, "a connection is lost: " + what); }};
 }
 
 /// A visit from the lobby: what it waited for there has come.

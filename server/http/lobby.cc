@@ -11,6 +11,7 @@
 #include <array>
 #include <cerrno>
 #include <cstdint>
+#include <exception>
 #include <tuple>
 
 #include "server/http/network.h"
@@ -85,6 +86,19 @@ int Lobby::milliseconds_to_wait() const {
   return int(std::clamp<std::int64_t>(left.count(), 0, 3'600'000));
 }
 
+/// Does something that may run out of memory: whom that meets loses the connection, and the others go on.
+template <class Step>
+void Lobby::survive(const Step& step) const {
+  try {
+    step();
+  } catch (const std::exception& failure) {
+    try {
+      hooks_.complain(failure.what());
+    } catch (const std::exception&) {  // there is not even memory to say so
+    }
+  }
+}
+
 void Lobby::run() {
   std::array<epoll_event, 64> events{};
   for (;;) {
@@ -97,19 +111,20 @@ void Lobby::run() {
       } else if (descriptor == stop_fd_) {
         close_doors();
       } else if (descriptor == listening_.get()) {
-        accept_some();
+        survive([&] { accept_some(); });
       } else {
-        serve(descriptor);
+        survive([&] { serve(descriptor); });
       }
     }
     // Also where something always happens: a client that always has a byte more gains no time by it.
-    end_those_whose_time_is_over();
+    survive([&] { end_those_whose_time_is_over(); });
     take_those_handed_in();
     const std::lock_guard lock(mutex_);
     if (cut_ || ended_) {
       cut_ = false;
       guests_.clear();
       by_due_.clear();
+      unsent_bytes_ = 0;
     }
     if (ended_) {
       handed_in_.clear();
@@ -125,7 +140,7 @@ void Lobby::take_those_handed_in() {
     const std::lock_guard lock(mutex_);
     visits.swap(handed_in_);
   }
-  for (auto& visit : visits) let_in(std::move(visit));
+  for (auto& visit : visits) survive([&] { let_in(std::move(visit)); });
 }
 
 /// The server stops: only those go on whose request is under way.
@@ -197,8 +212,23 @@ bool Lobby::make_room(const std::string& network) {
     claim = own_claim;
   }
   if (least == guests_.end()) return false;
-  const auto ended = unseat(least);
+  cut_off(least);
   return true;
+}
+
+/// Has those go whose clients take the least, where too much waits for too many: first whoever has taken nothing for
+/// longest. One answer is always held, however large.
+///   newest  socket of the guest that has just come
+void Lobby::bound_unsent_bytes(int newest) {
+  while (unsent_bytes_ > options_.max_unsent_bytes) {
+    auto longest = guests_.end();
+    for (auto guest = guests_.begin(); guest != guests_.end(); ++guest) {
+      if (guest->first == newest || guest->second.visit->connection.bytes_unsent() == 0) continue;
+      if (longest == guests_.end() || guest->second.since < longest->second.since) longest = guest;
+    }
+    if (longest == guests_.end()) return;
+    cut_off(longest);
+  }
 }
 
 /// Posts the refusal, and waits for the client to take it.
@@ -237,9 +267,12 @@ void Lobby::let_in(std::unique_ptr<Visit> visit) {
     case Next::read_body:
       connection.begin_wait();
       return seat(std::move(visit), EPOLLIN, connection.body_due());
-    case Next::send_on:
+    case Next::send_on: {
       connection.begin_wait();
-      return seat(std::move(visit), EPOLLOUT, connection.answer_due());
+      const int socket = connection.socket();
+      seat(std::move(visit), EPOLLOUT, connection.answer_due());
+      return bound_unsent_bytes(socket);
+    }
     case Next::begin_upload:  // the workers' business
     case Next::end:
       return;
@@ -249,6 +282,7 @@ void Lobby::let_in(std::unique_ptr<Visit> visit) {
 void Lobby::seat(std::unique_ptr<Visit> visit, unsigned events, Clock::time_point due) {
   const int socket = visit->connection.socket();
   const bool head_has_begun = visit->next == Next::read_head && visit->connection.head_has_begun();
+  unsent_bytes_ += visit->connection.bytes_unsent();
   guests_.emplace(socket, Guest{std::move(visit), Clock::now(), due, head_has_begun});
   by_due_.emplace(due, socket);
   watch(socket, events);
@@ -264,8 +298,15 @@ std::unique_ptr<Visit> Lobby::unseat(Guests::iterator guest) {
   watch_no_more(guest->first);
   by_due_.erase({guest->second.due, guest->first});
   auto visit = std::move(guest->second.visit);
+  unsent_bytes_ -= visit->connection.bytes_unsent();  // which nobody has changed since
   guests_.erase(guest);
   return visit;
+}
+
+/// Ends a visit to make room.
+void Lobby::cut_off(Guests::iterator guest) {
+  const auto ended = unseat(guest);
+  hooks_.count_cut();
 }
 
 void Lobby::serve(int socket) {
@@ -317,7 +358,11 @@ void Lobby::read_body(Guests::iterator guest) {
 
 void Lobby::end_those_whose_time_is_over() {
   const auto now = Clock::now();
-  while (!by_due_.empty() && by_due_.begin()->first <= now) end_wait(guests_.find(by_due_.begin()->second));
+  while (!by_due_.empty() && by_due_.begin()->first <= now) {
+    const auto guest = guests_.find(by_due_.begin()->second);
+    if (guest == guests_.end()) return void(by_due_.erase(by_due_.begin()));  // it was lost for want of memory
+    end_wait(guest);
+  }
   if (accept_again_ > now) return;
   accept_again_ = Clock::time_point::max();
   watch(listening_.get(), EPOLLIN);

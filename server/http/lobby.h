@@ -24,8 +24,9 @@
 namespace server::http {
 
 struct LobbyOptions {
-  std::size_t max_connections = 1024;            ///< Open at a time, with those of the workers.
-  std::size_t max_connections_per_client = 256;  ///< Of one network; 0: no limit but the other one.
+  std::size_t max_connections = 1024;                         ///< Open at a time, with those of the workers.
+  std::size_t max_connections_per_client = 256;               ///< Of one network; 0: no limit but the other one.
+  std::uint64_t max_unsent_bytes = std::uint64_t{512} << 20;  ///< Of answers in memory that clients are slow to take.
   ConnectionLimits connection = {};
 };
 
@@ -35,6 +36,8 @@ struct LobbyHooks {
   std::function<void(std::unique_ptr<Visit>)> ready;
   /// Posts an answer to a request that could not be read, or a connection that there is no place for.
   std::function<void(Visit&, const Refusal&)> refuse;
+  std::function<void()> count_cut;                   ///< Called for each that is ended to make room for others.
+  std::function<void(const std::string&)> complain;  ///< Of what should not happen.
 };
 
 class Lobby {
@@ -77,6 +80,8 @@ class Lobby {
         hooks_(std::move(hooks)) {}
 
   void run();
+  template <class Step>
+  void survive(const Step& step) const;
   [[nodiscard]] int milliseconds_to_wait() const;
   void watch(int descriptor, unsigned events) const;
   void watch_no_more(int descriptor) const;
@@ -85,10 +90,12 @@ class Lobby {
   void accept_some();
   void accept(int socket);
   [[nodiscard]] bool make_room(const std::string& network);
+  void bound_unsent_bytes(int newest);
   void let_in(std::unique_ptr<Visit> visit);
   void seat(std::unique_ptr<Visit> visit, unsigned events, Clock::time_point due);
   void set_due(Guests::iterator guest, Clock::time_point due);
   [[nodiscard]] std::unique_ptr<Visit> unseat(Guests::iterator guest);
+  void cut_off(Guests::iterator guest);
   void refuse(std::unique_ptr<Visit> visit, const Refusal& refusal);
   void go_on_with(std::unique_ptr<Visit> visit, const HeadText& text);
   void serve(int socket);
@@ -106,6 +113,7 @@ class Lobby {
   engine::FileDescriptor epoll_, wake_;
   Guests guests_;
   std::set<std::pair<Clock::time_point, int>> by_due_;
+  std::uint64_t unsent_bytes_ = 0;                             ///< Of the guests' answers.
   Clock::time_point accept_again_ = Clock::time_point::max();  ///< Out of descriptors until then.
   bool doors_closed_ = false;
 

@@ -24,6 +24,8 @@ class Metrics {
   void add_waiting(int change);  ///< Requests that wait for a thread.
   /// A connection, or a request, was turned away because there were too many.
   void count_refused_connection();
+  /// A connection whose client was waited for was ended to make room for others.
+  void count_cut_connection();
 
   /// Observes a duration in a histogram, which the first call makes.
   ///   name     "splatdrag_edit_seconds", with its help

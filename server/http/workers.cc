@@ -1,6 +1,7 @@
 #include "server/http/workers.h"
 
 #include <algorithm>
+#include <exception>
 #include <iterator>
 #include <system_error>
 #include <utility>
@@ -146,7 +147,10 @@ void Workers::serve(Errand errand, const Serve& server, std::unique_lock<std::mu
   visit.stepped_aside = false;
   forget_if_none(errand.load);
   lock.unlock();
-  hand_on_(std::move(errand.visit));
+  try {
+    hand_on_(std::move(errand.visit));
+  } catch (const std::exception&) {  // no memory to remember it by: it has ended
+  }
   lock.lock();
 }
 

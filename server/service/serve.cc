@@ -126,7 +126,7 @@ void observe_edit(http::Metrics& metrics, const std::vector<proto::StageSeconds>
 void allow_descriptors(std::size_t connections) {
   constexpr rlim_t others = 512;  // files of scenes and edits; a choice
   rlimit limit{};
-  const rlim_t wanted = rlim_t(connections) + others;
+  const rlim_t wanted = 2 * rlim_t(connections) + others;  // a download has its file open besides
   if (::getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur >= wanted) return;
   limit.rlim_cur = std::min(limit.rlim_max, wanted);
   ::setrlimit(RLIMIT_NOFILE, &limit);

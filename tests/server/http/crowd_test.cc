@@ -56,7 +56,11 @@ class Gate {
   int let_through_ = 0;
 };
 
-/// The sample routes, /healthz, /gate, which waits there, and /swallow, which reads an upload and says how long it was.
+/// Bytes of an answer that no socket holds.
+constexpr std::size_t large_bytes = 20'000'000;
+
+/// The sample routes, /healthz, /large, /gate, which waits there, and /swallow, which reads an upload and says how long
+/// it was.
 Router routes_with(Gate& gate, const std::filesystem::path& folder) {
   Router routes = sample_routes(folder);
   const auto well = [](const Call&) -> Result<Reply> { return Reply::json("{}"); };
@@ -65,6 +69,8 @@ Router routes_with(Gate& gate, const std::filesystem::path& folder) {
     gate.pass(call.header("X-Name"));
     return Reply::json("{}");
   };
+  const auto large = [](const Call&) -> Result<Reply> { return Reply::json(std::string(large_bytes, '1')); };
+  routes.add({"GET", "/large", large, Body::none, {}, Access::open});
   routes.add({"GET", "/gate", wait, Body::none, {}, Access::open});
   const auto swallow = [folder, number = std::make_shared<std::atomic<int>>(0)](const Call& call) -> Result<Reply> {
     const auto file = folder / ("upload" + std::to_string(++*number));
@@ -247,6 +253,20 @@ TEST_F(Crowd, ReadersThatTakeNothingHoldNoThread) {
   for (std::size_t i = 0; i < 3; ++i) EXPECT_TRUE(slow[i]->answer().value_or(RawAnswer{}).body == large) << i;
 }
 
+TEST_F(Crowd, AnswersThatNobodyTakesAreBoundedInMemory) {
+  ServerOptions options;
+  options.lobby.max_unsent_bytes = large_bytes + large_bytes / 2;
+  start(options);
+  const std::string ask_for_much = request(port(), "GET", "/large");
+  RawClient first(port()), second(port());
+  first.send(ask_for_much);
+  ASSERT_TRUE(says("splatdrag_http_requests_in_flight 1"));
+  second.send(ask_for_much);
+  ASSERT_TRUE(says("splatdrag_http_connections_cut_total 1"));
+  EXPECT_FALSE(first.answer()) << "it broke off";
+  EXPECT_EQ(second.answer().value_or(RawAnswer{}).body.size(), large_bytes);
+}
+
 TEST_F(Crowd, StreamsOfEventsHaveThreadsOfTheirOwn) {
   ServerOptions options;
   options.workers.threads = 1;
@@ -322,6 +342,7 @@ TEST_F(Crowd, AnAddressWithTooManyConnectionsLosesTheOneThatWaitsLongest) {
   ASSERT_TRUE(says("splatdrag_http_connections_open 4"));
   EXPECT_EQ(status("/json"), 200);
   EXPECT_TRUE(idle[0]->is_closed_within(patience));
+  EXPECT_TRUE(says("splatdrag_http_connections_cut_total 1"));
   idle[2]->send(request(port(), "GET", "/json"));
   EXPECT_EQ(idle[2]->answer().value_or(RawAnswer{}).status, 200) << "another one is still there";
   elsewhere.send(request(port(), "GET", "/json"));
