@@ -5,7 +5,6 @@
 #include <poll.h>
 #include <sys/sendfile.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -49,10 +48,8 @@ std::string address_of_peer(int socket) {
 
 }  // namespace
 
-Connection::Connection(int socket, const ConnectionLimits& limits, int stop_fd)
-    : socket_(socket), limits_(limits), stop_fd_(stop_fd), client_(address_of_peer(socket)) {}
-
-Connection::~Connection() { ::close(socket_); }
+Connection::Connection(engine::FileDescriptor socket, const ConnectionLimits& limits, int stop_fd)
+    : socket_(std::move(socket)), limits_(limits), stop_fd_(stop_fd), client_(address_of_peer(socket_.get())) {}
 
 bool Connection::stopping() const {
   pollfd stop{stop_fd_, POLLIN, 0};
@@ -60,7 +57,7 @@ bool Connection::stopping() const {
 }
 
 Connection::Wait Connection::wait(short events, Clock::time_point until) const {
-  pollfd watched{socket_, events, 0};
+  pollfd watched{socket_.get(), events, 0};
   // Time that is over is over even if there is something to read: a client that always has a byte more gains none.
   while (Clock::now() < until) {
     const int ready = ::poll(&watched, 1, milliseconds_until(until));
@@ -77,7 +74,7 @@ std::ptrdiff_t Connection::receive(std::size_t max_bytes) {
   }
   const std::size_t before = input_.size();
   input_.resize(before + max_bytes);
-  const ssize_t got = ::recv(socket_, input_.data() + before, max_bytes, 0);
+  const ssize_t got = ::recv(socket_.get(), input_.data() + before, max_bytes, 0);
   const int error = errno;
   input_.resize(before + std::size_t(std::max<ssize_t>(got, 0)));
   errno = error;
@@ -270,7 +267,7 @@ Connection::Sending Connection::stopped_sending() {
 /// Sends of `bytes` what the client takes, and leaves there what it does not.
 Connection::Sending Connection::send_some(std::string_view& bytes) {
   while (!bytes.empty()) {
-    const ssize_t sent = ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    const ssize_t sent = ::send(socket_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
     if (sent < 0 && errno == EINTR) continue;
     if (sent < 0) return stopped_sending();
     written_ += std::uint64_t(sent);
@@ -304,7 +301,7 @@ Connection::Sending Connection::send_now(std::uint64_t max_bytes) {
   while (file_left_ > 0 && max_bytes > 0) {
     off_t offset = off_t(file_offset_);  // there is no MSG_NOSIGNAL here: httplib has the process ignore SIGPIPE
     const std::size_t piece = std::size_t(std::min({file_left_, max_bytes, std::uint64_t{file_piece}}));
-    const ssize_t sent = ::sendfile(socket_, file_->get(), &offset, piece);
+    const ssize_t sent = ::sendfile(socket_.get(), file_->get(), &offset, piece);
     if (sent < 0 && errno == EINTR) continue;
     if (sent < 0) return stopped_sending();
     // A file that has become shorter cannot be sent as promised; breaking off says so.
@@ -334,24 +331,24 @@ bool Connection::write(std::string_view bytes) {
 
 bool Connection::closed_by_client() const {
   if (stopping()) return true;
-  pollfd peer{socket_, POLLRDHUP, 0};
+  pollfd peer{socket_.get(), POLLRDHUP, 0};
   return ::poll(&peer, 1, 0) != 0;
 }
 
 bool Connection::open() const {
   if (stopping()) return false;
-  pollfd peer{socket_, 0, 0};  // POLLERR and POLLHUP come unasked
+  pollfd peer{socket_.get(), 0, 0};  // POLLERR and POLLHUP come unasked
   return ::poll(&peer, 1, 0) == 0;
 }
 
-void Connection::end_sending() { ::shutdown(socket_, SHUT_WR); }
+void Connection::end_sending() { ::shutdown(socket_.get(), SHUT_WR); }
 
 bool Connection::discard_now() {
   std::array<char, 16 * 1024> discarded;
-  const ssize_t got = ::recv(socket_, discarded.data(), discarded.size(), 0);
+  const ssize_t got = ::recv(socket_.get(), discarded.data(), discarded.size(), 0);
   return got > 0 || (got < 0 && (would_block() || errno == EINTR));
 }
 
-void Connection::cut() { ::shutdown(socket_, SHUT_RDWR); }
+void Connection::cut() { ::shutdown(socket_.get(), SHUT_RDWR); }
 
 }  // namespace server::http

@@ -34,12 +34,11 @@ class Connection {
   using Clock = std::chrono::steady_clock;
 
   ///   stop_fd  becomes readable when the server stops
-  Connection(int socket, const ConnectionLimits& limits, int stop_fd);
-  ~Connection();
+  Connection(engine::FileDescriptor socket, const ConnectionLimits& limits, int stop_fd);
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
 
-  [[nodiscard]] int socket() const { return socket_; }
+  [[nodiscard]] int socket() const { return socket_.get(); }
   [[nodiscard]] const std::string& client() const { return client_; }  ///< The client's address.
 
   /// Takes what has arrived, up to a few KiB; never waits.
@@ -130,7 +129,7 @@ class Connection {
   [[nodiscard]] bool too_slow(Clock::duration waited, std::uint64_t bytes) const;
   [[nodiscard]] Clock::time_point due(Clock::duration waited, std::uint64_t bytes) const;
 
-  const int socket_;
+  const engine::FileDescriptor socket_;
   const ConnectionLimits limits_;
   const int stop_fd_;
   const std::string client_;

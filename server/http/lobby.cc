@@ -87,14 +87,17 @@ int Lobby::milliseconds_to_wait() const {
 }
 
 /// Does something that may run out of memory: whom that meets loses the connection, and the others go on.
+///   socket  of the guest that it is about, if it is about one
 template <class Step>
-void Lobby::survive(const Step& step) const {
+void Lobby::survive(const Step& step, int socket) {
   try {
     step();
   } catch (const std::exception& failure) {
+    if (const auto guest = guests_.find(socket); guest != guests_.end()) const auto ended = unseat(guest);
     try {
       hooks_.complain(failure.what());
-    } catch (const std::exception&) {  // there is not even memory to say so
+      // NOLINTNEXTLINE(bugprone-empty-catch): there is not even memory to say so
+    } catch (const std::exception&) {
     }
   }
 }
@@ -113,7 +116,7 @@ void Lobby::run() {
       } else if (descriptor == listening_.get()) {
         survive([&] { accept_some(); });
       } else {
-        survive([&] { serve(descriptor); });
+        survive([&] { serve(descriptor); }, descriptor);
       }
     }
     // Also where something always happens: a client that always has a byte more gains no time by it.
@@ -179,7 +182,7 @@ void Lobby::accept(int socket) {
   // Bounds what the system holds for a client that takes nothing, and has a slow one be heard of while it is slow: it
   // is writable again when half of this has gone, not a third of megabytes.
   ::setsockopt(socket, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &unsent_bytes, sizeof unsent_bytes);
-  auto visit = std::make_unique<Visit>(socket, options_.connection, stop_fd_, places_);
+  auto visit = std::make_unique<Visit>(engine::FileDescriptor(socket), options_.connection, stop_fd_, places_);
   const std::string& network = visit->place.network();
   const std::size_t limit = options_.max_connections_per_client;
   if (limit > 0 && places_.taken_by(network) > limit && !make_room(network))

@@ -81,7 +81,7 @@ class Lobby {
 
   void run();
   template <class Step>
-  void survive(const Step& step) const;
+  void survive(const Step& step, int socket = -1);
   [[nodiscard]] int milliseconds_to_wait() const;
   void watch(int descriptor, unsigned events) const;
   void watch_no_more(int descriptor) const;

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "server/http/connection.h"
 #include "server/http/dispatcher.h"
@@ -26,8 +27,8 @@ enum class Next {
 
 /// Belongs to one thread at a time: the lobby's, or that of the worker who serves it.
 struct Visit {
-  Visit(int socket, const ConnectionLimits& limits, int stop_fd, Places& places)
-      : connection(socket, limits, stop_fd), place(places, network_of(connection.client())) {}
+  Visit(engine::FileDescriptor socket, const ConnectionLimits& limits, int stop_fd, Places& places)
+      : connection(std::move(socket), limits, stop_fd), place(places, network_of(connection.client())) {}
 
   /// Forgets the request, and gives back what its answer held.
   void end_request() {

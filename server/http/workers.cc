@@ -149,7 +149,8 @@ void Workers::serve(Errand errand, const Serve& server, std::unique_lock<std::mu
   lock.unlock();
   try {
     hand_on_(std::move(errand.visit));
-  } catch (const std::exception&) {  // no memory to remember it by: it has ended
+    // NOLINTNEXTLINE(bugprone-empty-catch): there was no memory to remember it by, and so it has ended
+  } catch (const std::exception&) {
   }
   lock.lock();
 }
