@@ -126,6 +126,7 @@ engine::Result<std::unique_ptr<HttpServer>> HttpServer::start(const ServerOption
   auto opened = Lobby::open(std::move(listening), impl->stopping.get(), lobby, impl->places, impl->hooks());
   if (!opened) return engine::propagate(opened);
   impl->lobby = std::move(*opened);
+  impl->lobby->start();
   return std::unique_ptr<HttpServer>(new HttpServer(std::move(impl)));
 }
 

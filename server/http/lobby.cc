@@ -36,8 +36,11 @@ engine::Result<std::unique_ptr<Lobby>> Lobby::open(engine::FileDescriptor listen
   if (lobby->epoll_.get() < 0 || lobby->wake_.get() < 0)
     return engine::fail(engine::ErrorCode::unavailable, "this process may open no more files");
   for (const int descriptor : {lobby->listening_.get(), stop_fd, lobby->wake_.get()}) lobby->watch(descriptor, EPOLLIN);
-  lobby->thread_ = std::thread([raw = lobby.get()] { raw->run(); });
   return lobby;
+}
+
+void Lobby::start() {
+  thread_ = std::thread([this] { run(); });
 }
 
 Lobby::~Lobby() { end(); }

@@ -44,7 +44,7 @@ class Lobby {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// Serves from now on, until the stop.
+  /// A lobby that serves from start() on, until the stop.
   ///   listening  socket, non-blocking
   ///   stop_fd    when it becomes readable, nobody new is let in, and only those go on whose request is under way
   ///   places     outlives the lobby and all visits
@@ -54,6 +54,8 @@ class Lobby {
                                                                    LobbyHooks hooks);
   ~Lobby();
 
+  /// To be called once, when what the hooks use is there: they may use the lobby.
+  void start();
   /// Has a visit wait for what its `next` says. From any thread. After end(), it ends.
   void take(std::unique_ptr<Visit> visit);
   /// Ends all visits that wait here.

@@ -255,6 +255,7 @@ TEST_F(Crowd, ReadersThatTakeNothingHoldNoThread) {
 
 TEST_F(Crowd, AnswersThatNobodyTakesAreBoundedInMemory) {
   ServerOptions options;
+  options.workers.threads = 1;  // so that the first waits for its reader before the second does
   options.lobby.max_unsent_bytes = large_bytes + large_bytes / 2;
   start(options);
   const std::string ask_for_much = request(port(), "GET", "/large");
