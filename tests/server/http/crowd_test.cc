@@ -370,21 +370,22 @@ TEST_F(Crowd, WhereAllPlacesAreTakenOneThatWaitsMakesRoom) {
   start(options);
   const Clients idle = clients(4, "");
   ASSERT_TRUE(says("splatdrag_http_connections_open 4"));
-  for (int i = 0; i < 5; ++i) EXPECT_EQ(status("/json"), 200);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(status("/json"), 200);
   EXPECT_TRUE(idle[0]->is_closed_within(patience));
 }
 
 TEST_F(Crowd, AReaderThatIsSlowIsLastToMakeRoom) {
   std::ofstream(folder.path() / "file.bin") << std::string(20'000'000, 'x');
   ServerOptions options;
-  options.lobby.max_connections = 3;
+  options.lobby.max_connections = 5;
   start(options);
   RawClient reader(port());
   reader.send(request(port(), "GET", "/file"));
   ASSERT_TRUE(says("splatdrag_http_requests_in_flight 1"));
-  const Clients idle = clients(2, "");
-  ASSERT_TRUE(says("splatdrag_http_connections_open 3"));
-  for (int i = 0; i < 5; ++i) EXPECT_EQ(status("/json"), 200);
+  const Clients idle = clients(4, "");
+  ASSERT_TRUE(says("splatdrag_http_connections_open 5"));
+  // As many as wait without a request: a connection whose answer has just been taken may still be a worker's.
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(status("/json"), 200);
   EXPECT_EQ(reader.answer().value_or(RawAnswer{}).body.size(), 20'000'000u) << "it goes on";
 }
 
