@@ -3,7 +3,11 @@
 //
 //     splatdrag serve --port 8080 --data-dir data &
 //     service_load --url http://127.0.0.1:8080 --scene s000001 --edit drag.json --pid $! --markdown
+#include <arpa/inet.h>
 #include <httplib.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -37,6 +41,7 @@ struct Options {
   int clients = 16;
   double seconds = 120;
   int pid = 0;
+  int dripping = 0;
   int width = 640, height = 360;
   bool markdown = false;
 };
@@ -104,6 +109,54 @@ json new_camera(const Options& options, const SceneExtent& extent, std::size_t n
   return {{"eye", eye},      {"target", extent.centre}, {"up", extent.up},
           {"fov_y_deg", 50}, {"width", options.width},  {"height", options.height}};
 }
+
+/// Clients that send a byte of a request's head now and then, and never come to its end.
+class Drippers {
+ public:
+  explicit Drippers(const Options& options) {
+    const std::size_t colon = options.url.rfind(':');
+    const bool is_local = options.url.substr(0, colon) == "http://127.0.0.1";
+    if (options.dripping > 0 && !is_local) throw std::runtime_error("--dripping is for http://127.0.0.1:PORT alone");
+    address_.sin_family = AF_INET;
+    address_.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    if (is_local) address_.sin_port = htons(std::uint16_t(std::stoi(options.url.substr(colon + 1))));
+    for (int i = 0; i < options.dripping; ++i) sockets_.push_back(connect());
+  }
+  ~Drippers() {
+    for (const int socket : sockets_) ::close(socket);
+  }
+  Drippers(const Drippers&) = delete;
+  Drippers& operator=(const Drippers&) = delete;
+
+  void drip_until(Clock::time_point end) {
+    while (!sockets_.empty() && Clock::now() < end) {
+      for (int& socket : sockets_) {
+        if (::send(socket, "x", 1, MSG_NOSIGNAL | MSG_DONTWAIT) == 1) continue;
+        ::close(socket);
+        socket = connect();
+        ++cut_off_;
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    }
+  }
+  [[nodiscard]] std::size_t cut_off() const { return cut_off_; }
+
+ private:
+  /// -1 where that fails; it is tried again.
+  [[nodiscard]] int connect() const {
+    const int socket = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    constexpr std::string_view begin = "GET /v1/info HTTP/1.1\r\nX: ";
+    if (::connect(socket, reinterpret_cast<const sockaddr*>(&address_), sizeof address_) == 0 &&
+        ::send(socket, begin.data(), begin.size(), MSG_NOSIGNAL) > 0)
+      return socket;
+    ::close(socket);
+    return -1;
+  }
+
+  sockaddr_in address_{};
+  std::vector<int> sockets_;
+  std::size_t cut_off_ = 0;
+};
 
 /// Which edit is in work; its id is empty while there is none.
 class CurrentEdit {
@@ -271,7 +324,7 @@ float quantile(const std::vector<float>& sorted, double q) {
 }
 
 std::string row(const std::vector<std::string>& cells, bool markdown) {
-  constexpr std::array<int, 7> widths{18, 9, 8, 10, 10, 10, 11};
+  constexpr std::array<int, 8> widths{18, 9, 8, 10, 10, 10, 10, 11};
   std::ostringstream out;
   for (std::size_t i = 0; i < cells.size(); ++i) {
     if (markdown) {
@@ -290,8 +343,9 @@ std::string fixed(double value, int digits) {
 }
 
 void print_waits(const std::vector<Tally>& tallies, double seconds, bool markdown) {
-  std::cout << row({"request", "answers", "errors", "p50 ms", "p95 ms", "p99 ms", "answers/s"}, markdown) << '\n';
-  if (markdown) std::cout << "| --- | ---: | ---: | ---: | ---: | ---: | ---: |\n";
+  std::cout << row({"request", "answers", "errors", "p50 ms", "p95 ms", "p99 ms", "max ms", "answers/s"}, markdown)
+            << '\n';
+  if (markdown) std::cout << "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n";
   for (int kind = 0; kind < kinds; ++kind) {
     std::vector<float> all;
     std::size_t errors = 0;
@@ -303,18 +357,21 @@ void print_waits(const std::vector<Tally>& tallies, double seconds, bool markdow
     std::sort(all.begin(), all.end());
     std::cout << row({kind_names[std::size_t(kind)], std::to_string(all.size()), std::to_string(errors),
                       fixed(quantile(all, 0.5), 1), fixed(quantile(all, 0.95), 1), fixed(quantile(all, 0.99), 1),
-                      fixed(double(all.size()) / seconds, 1)},
+                      fixed(quantile(all, 1), 1), fixed(double(all.size()) / seconds, 1)},
                      markdown)
               << '\n';
   }
 }
 
 void print_report(const Options& options, const std::vector<Tally>& tallies, const Edits& edits,
-                  const std::vector<double>& memory, double seconds) {
+                  const std::vector<double>& memory, const Drippers& drippers, double seconds) {
   print_waits(tallies, seconds, options.markdown);
   std::cout << '\n'
             << options.clients << " clients, " << fixed(seconds, 0) << " s, renders of " << options.width << "x"
             << options.height << ".\n";
+  if (options.dripping > 0)
+    std::cout << options.dripping << " clients dripped meanwhile; " << drippers.cut_off()
+              << " times one was cut off, and came again.\n";
   if (!options.edit.empty())
     std::cout << "Edits meanwhile: " << edits.succeeded << " succeeded"
               << (edits.succeeded > 0 ? ", " + fixed(edits.seconds / double(edits.succeeded), 2) + " s each" : "")
@@ -344,6 +401,7 @@ bool run(const Options& options) {
   const auto start = Clock::now();
   const auto end = start + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(options.seconds));
 
+  Drippers drippers(options);
   CurrentEdit current;
   Edits edits;
   std::vector<double> memory;
@@ -355,6 +413,7 @@ bool run(const Options& options) {
   {
     std::vector<std::jthread> threads;
     for (std::size_t i = 0; i < clients.size(); ++i) threads.emplace_back([&, i] { clients[i]->run_until(end, i); });
+    threads.emplace_back([&] { drippers.drip_until(end); });
     threads.emplace_back([&] { memory = watch_memory(options, end); });
     if (!options.edit.empty())
       threads.emplace_back([&] {
@@ -368,7 +427,7 @@ bool run(const Options& options) {
   const double seconds = seconds_since(start);
   std::vector<Tally> tallies;
   for (const auto& client : clients) tallies.push_back(client->tally());
-  print_report(options, tallies, edits, memory, seconds);
+  print_report(options, tallies, edits, memory, drippers, seconds);
   if (!edit_failure.empty()) std::cerr << edit_failure << '\n';
   const bool clean =
       std::all_of(tallies.begin(), tallies.end(), [](const Tally& tally) { return tally.complaints.empty(); });
@@ -388,6 +447,9 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   program.add_option("--seconds", options.seconds, "How long")->check(CLI::PositiveNumber)->capture_default_str();
+  program.add_option("--dripping", options.dripping, "Connections that send a head without end, besides")
+      ->check(CLI::Range(0, 1000))
+      ->capture_default_str();
   program.add_option("--edit", options.edit, "Edit request (JSON) to keep in work all the while; its scene is --scene");
   program.add_option("--pid", options.pid, "Process of the service, to read its memory from /proc; else from /metrics");
   program.add_option("--token", options.token, "Bearer token");

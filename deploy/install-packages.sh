@@ -3,7 +3,7 @@
 #
 #   install-packages.sh          to build and run it
 #   install-packages.sh tests    to run all tests, too: a browser, and Node.js to drive it
-#   install-packages.sh lint     to check the sources, too: clang-format and clang-tidy
+#   install-packages.sh lint     to check the sources, too: clang-format, clang-tidy, and yamllint for the contract
 set -euo pipefail
 
 packages=(
@@ -27,7 +27,7 @@ if [[ "${1:-}" == tests ]]; then
   fi
 elif [[ "${1:-}" == lint ]]; then
   # Named by version: what is clean for one is not for the next. clang-tidy before 17 cannot read this C++20.
-  packages+=(clang-format-14 clang-tidy-19)
+  packages+=(clang-format-14 clang-tidy-19 yamllint)
 elif (($# > 0)); then
   echo "usage: install-packages.sh [tests|lint]" >&2
   exit 2

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Checks the sources without running them: their layout by clang-format, and what .clang-tidy asks for. Prints the place
-# of each finding, and on the last line how many there are; fails if there is one. Installs what is missing and asks
-# nothing.
+# Checks the sources without running them: their layout by clang-format, what .clang-tidy asks for, and of the contract
+# what .yamllint asks for. Prints the place of each finding, and on the last line how many there are; fails if there is
+# one. Installs what is missing and asks nothing.
 #
 #   lint.sh             every tracked source; of the tests only the layout, for they would double the time
 #   lint.sh FILE ...    these files only
-#   lint.sh --layout    clang-format alone, over every tracked source: seconds in place of ten minutes
+#   lint.sh --layout    clang-format and yamllint alone, over every tracked source: seconds in place of ten minutes
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 root=$(pwd -P)  # as clang-tidy writes it, where a checkout is reached by a link
@@ -55,8 +55,12 @@ if ((${#units[@]} > 0)); then
 fi
 touch "$work/tidy"
 
-cat "$work/format" "$work/tidy"
+mapfile -t contracts < <(git ls-files '*.yaml' '*.yml')
+yamllint --strict --format parsable --config-file .yamllint "${contracts[@]}" >"$work/yaml" || true
+
+cat "$work/format" "$work/yaml" "$work/tidy"
 layout=$(wc -l <"$work/format")
+yaml=$(wc -l <"$work/yaml")
 findings=$(wc -l <"$work/tidy")
-echo "lint: clang-format ${#sources[@]} files, $layout findings; clang-tidy ${#units[@]} files, $findings findings"
-((layout + findings == 0))
+echo "lint: clang-format ${#sources[@]} files, $layout findings; yamllint ${#contracts[@]} files, $yaml findings; clang-tidy ${#units[@]} files, $findings findings"
+((layout + yaml + findings == 0))

@@ -1,6 +1,7 @@
 // Typed fields of JSON that nobody has checked yet. For the .cc files of this room.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -68,6 +69,7 @@ class JsonFields {
   }
   /// `count` numbers.
   void numbers(double* out, std::size_t count) const {
+    std::fill_n(out, count, 0.0);
     if (size() != count) return note("an array of " + std::to_string(count) + " numbers");
     for (std::size_t i = 0; i < count; ++i) out[i] = at(i).number();
   }

@@ -105,8 +105,8 @@ Result<Shot> parse_frame(const JsonFields& frame, const JsonFields& file, const 
                   scope.find("k4")->at("k4").where());
   }
 
-  DMat3 world_from_gl;
-  DVec3 centre;
+  DMat3 world_from_gl(0.0);  // and that is what it stays where the field is not as asked for
+  DVec3 centre(0.0);
   const JsonFields matrix = frame.at("transform_matrix");
   parse_rows(matrix, 4, world_from_gl, centre);
   // Into the world before the change: linear^-1 (x / scale - offset).

@@ -78,15 +78,30 @@ void add_http_options(CLI::App& command, http::ServerOptions& options, http::Acc
   command.add_flag("--trust-proxy", access.trust_proxy,
                    "Believe the last entries of X-Forwarded-For and X-Forwarded-Proto: for a service that is reached "
                    "through a proxy alone. Behind TLS its cookie is then Secure");
-  add_count(command, "--max-connections", options.threads, "Connections served at a time");
-  add_count(command, "--max-waiting", options.max_waiting, "Connections that may wait; more are turned away", 0);
-  add_count(command, "--max-streams", options.dispatcher.max_streams, "Streams of events at a time", 0);
+  add_count(command, "--max-connections", options.lobby.max_connections,
+            "Connections open at a time; one that is waited for makes room for a new one");
+  add_count(
+      command, "--max-connections-per-client", options.lobby.max_connections_per_client,
+      "Connections from one address (of IPv6: its /64) at a time; not with --trust-proxy, where all come from the "
+      "proxy. 0: any number",
+      0);
+  add_count(command, "--max-requests", options.workers.threads, "Requests answered at a time");
+  add_count(command, "--max-waiting", options.workers.max_waiting,
+            "Requests that may wait for their turn, and as many uploads; more are turned away", 0);
+  add_count(command, "--max-requests-per-client", options.workers.max_per_client,
+            "Requests of one client that are answered or wait; with --trust-proxy, of one forwarded address");
+  add_count(command, "--max-uploads", options.workers.max_uploads,
+            "Requests at a time whose bodies are still to come, of those answered; one client may have half of them");
+  add_count(command, "--max-streams", options.dispatcher.max_streams,
+            "Streams of events at a time, beside the requests", 0);
   add_count(command, "--max-sessions", access.max_sessions, "Pages signed in at a time; the oldest makes room");
-  add_bytes(command, "--max-header-bytes", options.connection.max_head_bytes, "Head of a request");
+  add_bytes(command, "--max-header-bytes", options.lobby.connection.max_head_bytes, "Head of a request");
   add_bytes(command, "--max-json-bytes", options.dispatcher.max_json_bytes, "JSON body of a request, up to 1MiB")
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{proto::JsonLimits().max_bytes}));
   add_bytes(command, "--max-upload-bytes", options.dispatcher.max_upload_bytes, "Uploaded file");
-  add_count(command, "--min-bytes-per-second", options.connection.min_bytes_per_second,
+  add_bytes(command, "--max-unsent-bytes", options.lobby.max_unsent_bytes,
+            "Answers in memory that clients are slow to take; beyond, who has taken nothing for longest is cut off");
+  add_count(command, "--min-bytes-per-second", options.lobby.connection.min_bytes_per_second,
             "Slower clients are cut off, after ten seconds of patience", 0);
 }
 

@@ -55,6 +55,7 @@ class AccessGuard {
   /// Replaces the token by another one, neither empty; sessions that were opened with the old one end.
   void replace_token(std::string token);
 
+  [[nodiscard]] bool trusts_proxy() const { return options_.trust_proxy; }
   /// The address of the client: that of its connection, or what a trusted proxy says it is.
   ///   peer           address of the connection
   ///   forwarded_for  header X-Forwarded-For

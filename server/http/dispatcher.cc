@@ -60,12 +60,6 @@ bool names_other_charset(const std::string& content_type) {
 
 }  // namespace
 
-/// A request that has passed the guards: its route is there, its query parameters are known.
-struct Dispatcher::CheckedRequest {
-  RouteMatch match;
-  std::map<std::string, std::string, std::less<>> query;
-};
-
 std::string request_id_of(const RequestHead& head) {
   const std::string given = head.header("x-request-id");
   const bool sane = !given.empty() && given.size() <= 64 && std::all_of(given.begin(), given.end(), [](char c) {
@@ -87,34 +81,44 @@ Answer Dispatcher::refused(const Refusal& refusal, const std::string& request_id
   return answer;
 }
 
-tl::expected<Dispatcher::CheckedRequest, Refusal> Dispatcher::check(const RequestHead& head, const std::string& client,
-                                                                    Answer& answer) const {
+bool Dispatcher::is_vital(const RequestHead& head) const {
+  if (!head.only_reads() || head.has_body()) return false;
+  const auto segments = split_path(head.path);
+  const Route* const route = segments ? routes_.find(head.method, *segments).route : nullptr;
+  return route != nullptr && route->vital;
+}
+
+CheckedRequest Dispatcher::check(const RequestHead& head, const std::string& client) const {
+  CheckedRequest request;
+  if (auto checked = check_into(request, head, client); !checked) request.refusal = std::move(checked.error());
+  return request;
+}
+
+tl::expected<void, Refusal> Dispatcher::check_into(CheckedRequest& request, const RequestHead& head,
+                                                   const std::string& client) const {
   if (auto refusal = guard_.check_origin(head)) return tl::make_unexpected(std::move(*refusal));
   const auto segments = split_path(head.path);
-  CheckedRequest request;
-  if (segments) request.match = routes_.find(head.method, *segments);
+  RouteMatch match;
+  if (segments) match = routes_.find(head.method, *segments);
   // Whoever has no token learns nothing about routes but those that are open to all.
-  const bool open = request.match.route != nullptr && request.match.route->access == Access::open;
+  const bool open = match.route != nullptr && match.route->access == Access::open;
   if (!open)
     if (auto refusal = guard_.check_access(head, client)) return tl::make_unexpected(std::move(*refusal));
   if (!segments) return tl::make_unexpected(refusal_of(segments.error()));
-  if (request.match.route == nullptr && !request.match.allow.empty()) {
-    answer.headers.emplace_back("Allow", request.match.allow);
+  request.match = std::move(match);
+  const Route* const route = request.match.route;
+  if (route == nullptr && !request.match.allow.empty())
     return refuse(405, "method_not_allowed", "this address takes " + request.match.allow);
-  }
-  if (request.match.route == nullptr) return refuse(404, "not_found", "there is no such address in this service");
-  answer.route = request.match.route->path;
+  if (route == nullptr) return refuse(404, "not_found", "there is no such address in this service");
   const auto query = parse_query(head.query);
   if (!query) return tl::make_unexpected(refusal_of(query.error()));
-  const auto& known = request.match.route->queries;
   for (const auto& [name, value] : *query) {
-    if (std::find(known.begin(), known.end(), name) == known.end())
+    if (std::find(route->queries.begin(), route->queries.end(), name) == route->queries.end())
       return refuse(400, "invalid_argument", "this address has no such query parameter", name);
     if (!request.query.emplace(name, value).second)
       return refuse(400, "invalid_argument", "this query parameter is given twice", name);
   }
-  if (const auto body = check_body(head, *request.match.route); !body) return tl::make_unexpected(body.error());
-  return request;
+  return check_body(head, *route);
 }
 
 tl::expected<void, Refusal> Dispatcher::check_body(const RequestHead& head, const Route& route) const {
@@ -219,20 +223,21 @@ tl::expected<void, Refusal> Dispatcher::fill(Answer& answer, Reply reply, const 
   return {};
 }
 
-Answer Dispatcher::answer(const RequestHead& head, const std::string& request_id, Connection& connection,
-                          FormReader& form) {
+Answer Dispatcher::answer(const CheckedRequest& request, const RequestHead& head, const std::string& request_id,
+                          Connection& connection, FormReader& form) {
   Answer answer;
+  if (request.match.route != nullptr) answer.route = request.match.route->path;
   const auto refuse_with = [&](const Refusal& refusal) {
     Answer refusing = refused(refusal, request_id);
     refusing.route = answer.route;
     for (auto& header : answer.headers)
-      if (header.first == "Allow" || header.first == "Content-Range") refusing.headers.push_back(std::move(header));
+      if (header.first == "Content-Range") refusing.headers.push_back(std::move(header));
+    if (refusal.status == 405) refusing.headers.emplace_back("Allow", request.match.allow);
     return refusing;
   };
   try {
-    const auto request = check(head, guard_.address_of(connection.client(), head.header("x-forwarded-for")), answer);
-    if (!request) return refuse_with(request.error());
-    auto reply = handle(*request, head, request_id, connection, form);
+    if (request.refusal) return refuse_with(*request.refusal);
+    auto reply = handle(request, head, request_id, connection, form);
     if (!reply && connection.body_failure() == Connection::BodyFailure::too_slow)
       return refuse_with({408, "request_timeout", "the request's body arrived too slowly", ""});
     if (!reply) {

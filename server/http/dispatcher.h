@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -58,6 +59,13 @@ struct Answer {
   std::string route = "-";           ///< Path of the route as declared; "-" if no route was found.
 };
 
+/// A request that was held against the guards: its route and what its query says, or why it is refused.
+struct CheckedRequest {
+  std::optional<Refusal> refusal;
+  RouteMatch match;
+  std::map<std::string, std::string, std::less<>> query;
+};
+
 /// Safe to call from any thread. The guard and the logger outlive it.
 class Dispatcher {
  public:
@@ -69,17 +77,21 @@ class Dispatcher {
         options_(options),
         count_stream_(std::move(count_stream)) {}
 
-  /// Never throws what a handler threw: that is logged as a bug and answered by 500.
-  [[nodiscard]] Answer answer(const RequestHead& head, const std::string& request_id, Connection& connection,
-                              FormReader& form);
+  /// Whether a head asks for a route that is answered although all else waits. Waits for nothing itself.
+  [[nodiscard]] bool is_vital(const RequestHead& head) const;
+  /// Holds a head against the guards; to be called once for each: wrong tokens are counted.
+  ///   client  address that the client goes by
+  [[nodiscard]] CheckedRequest check(const RequestHead& head, const std::string& client) const;
+  /// Answers what was checked; reads its body, if it is let in. Never throws what a handler threw: that is logged as a
+  /// bug and answered by 500.
+  [[nodiscard]] Answer answer(const CheckedRequest& request, const RequestHead& head, const std::string& request_id,
+                              Connection& connection, FormReader& form);
   /// The answer that tells a client of a refusal.
   [[nodiscard]] static Answer refused(const Refusal& refusal, const std::string& request_id);
 
  private:
-  struct CheckedRequest;
-
-  [[nodiscard]] tl::expected<CheckedRequest, Refusal> check(const RequestHead& head, const std::string& client,
-                                                            Answer& answer) const;
+  [[nodiscard]] tl::expected<void, Refusal> check_into(CheckedRequest& request, const RequestHead& head,
+                                                       const std::string& client) const;
   [[nodiscard]] tl::expected<void, Refusal> check_body(const RequestHead& head, const Route& route) const;
   [[nodiscard]] Result<Reply> handle(const CheckedRequest& request, const RequestHead& head,
                                      const std::string& request_id, Connection& connection, FormReader& form) const;

@@ -1,25 +1,11 @@
 #include "server/http/guess_brake.h"
 
-#include <arpa/inet.h>
-
 #include <algorithm>
-#include <array>
 #include <functional>
 
+#include "server/http/network.h"
+
 namespace server::http {
-namespace {
-
-/// What one client may have addresses of: an IPv4 address, or the 64 bits that name a network of IPv6.
-std::string network_of(const std::string& address) {
-  std::array<char, 16> bytes{};
-  if (::inet_pton(AF_INET6, address.c_str(), bytes.data()) != 1) return address;
-  constexpr std::array<char, 12> mapped{0, 0, 0, 0, 0, 0, 0, 0, 0, 0, char(0xff), char(0xff)};
-  const bool is_ipv4 = std::equal(mapped.begin(), mapped.end(), bytes.begin());
-  return "v6:" + std::string(bytes.data(), is_ipv4 ? bytes.size() : bytes.size() / 2);
-}
-
-}  // namespace
-
 std::optional<int> GuessBrake::must_wait(const std::string& address, Clock::time_point now) const {
   const std::lock_guard lock(mutex_);
   const auto found = by_network_.find(network_of(address));

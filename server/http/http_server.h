@@ -1,19 +1,20 @@
-// The HTTP server: listens, guards, answers. One thread per connection, of a bounded set; every wait has an end.
+// The HTTP server: listens, guards, answers. Connections wait without a thread; requests are answered by a bounded set
+// of them. Every wait has an end.
 #pragma once
 
 #include <spdlog/logger.h>
 
 #include <chrono>
-#include <cstddef>
 #include <memory>
 #include <string>
 
 #include "engine/core/result.h"
 #include "server/http/access_guard.h"
-#include "server/http/connection.h"
 #include "server/http/dispatcher.h"
+#include "server/http/lobby.h"
 #include "server/http/metrics.h"
 #include "server/http/router.h"
+#include "server/http/workers.h"
 
 namespace server::http {
 
@@ -21,11 +22,10 @@ namespace server::http {
 struct ServerOptions {
   std::string host = "127.0.0.1";
   int port = 8080;                         ///< TCP port; 0: any that is free.
-  std::size_t threads = 64;                ///< Connections served at a time.
-  std::size_t max_waiting = 128;           ///< Connections that may wait for a thread; more are turned away with 503.
-  int max_requests = 1000;                 ///< Requests on one connection; then it ends.
+  int requests_per_connection = 1000;      ///< Then it ends.
   std::chrono::milliseconds grace{5'000};  ///< Time that answers under way get when the server stops.
-  ConnectionLimits connection = {};
+  LobbyOptions lobby = {};
+  WorkerLimits workers = {};
   DispatcherOptions dispatcher = {};
 };
 
@@ -43,8 +43,8 @@ class HttpServer {
   [[nodiscard]] int port() const;
   /// "http://127.0.0.1:8080"
   [[nodiscard]] std::string url() const;
-  /// Takes no more connections, ends streams, lets answers under way finish for `grace`, then cuts connections and
-  /// waits for their handlers. Idempotent.
+  /// Takes no more connections, ends streams, lets answers under way finish for `grace`, those of requests that wait
+  /// included, then cuts connections and waits for their handlers. Idempotent.
   void stop();
 
  private:

@@ -64,11 +64,27 @@ struct Metrics::Impl {
                                    .Help("Streams of events open now.")
                                    .Register(registry)
                                    .Add({});
+  prometheus::Gauge& connections = prometheus::BuildGauge()
+                                       .Name("splatdrag_http_connections_open")
+                                       .Help("Connections open now.")
+                                       .Register(registry)
+                                       .Add({});
+  prometheus::Gauge& waiting = prometheus::BuildGauge()
+                                   .Name("splatdrag_http_requests_waiting")
+                                   .Help("Requests that wait for a thread.")
+                                   .Register(registry)
+                                   .Add({});
   prometheus::Counter& refused = prometheus::BuildCounter()
                                      .Name("splatdrag_http_connections_refused_total")
-                                     .Help("Connections turned away because too many waited.")
+                                     .Help("Connections and requests turned away because there were too many.")
                                      .Register(registry)
                                      .Add({});
+  prometheus::Counter& cut =
+      prometheus::BuildCounter()
+          .Name("splatdrag_http_connections_cut_total")
+          .Help("Connections ended, while their clients were waited for, to make room for others.")
+          .Register(registry)
+          .Add({});
   prometheus::Family<prometheus::Counter>& refused_uploads = prometheus::BuildCounter()
                                                                  .Name("splatdrag_uploads_refused_total")
                                                                  .Help("Uploads refused, by the code of the error.")
@@ -106,7 +122,13 @@ void Metrics::add_in_flight(int change) { impl_->in_flight.Increment(change); }
 
 void Metrics::add_stream(int change) { impl_->streams.Increment(change); }
 
+void Metrics::add_connection(int change) { impl_->connections.Increment(change); }
+
+void Metrics::add_waiting(int change) { impl_->waiting.Increment(change); }
+
 void Metrics::count_refused_connection() { impl_->refused.Increment(); }
+
+void Metrics::count_cut_connection() { impl_->cut.Increment(); }
 
 void Metrics::add_gauge(std::string name, std::string help, std::function<double()> value) {
   add_gauges(std::move(name), std::move(help), "", [value = std::move(value)] {

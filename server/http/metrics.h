@@ -20,8 +20,12 @@ class Metrics {
   void count_request(std::string_view method, std::string_view route, int status, double seconds);
   void add_in_flight(int change);
   void add_stream(int change);
-  /// A connection was turned away because too many others waited.
+  void add_connection(int change);
+  void add_waiting(int change);  ///< Requests that wait for a thread.
+  /// A connection, or a request, was turned away because there were too many.
   void count_refused_connection();
+  /// A connection whose client was waited for was ended to make room for others.
+  void count_cut_connection();
 
   /// Observes a duration in a histogram, which the first call makes.
   ///   name     "splatdrag_edit_seconds", with its help

@@ -119,6 +119,8 @@ struct Route {
   Body body = Body::none;
   std::vector<std::string> queries;  ///< Names of the query parameters that the route knows.
   Access access = Access::protected_;
+  /// Answered although all threads are busy, on one that does nothing else: a GET whose handler waits for nobody.
+  bool vital = false;
 };
 
 /// The routes of the service, in the order they were added.

@@ -1,7 +1,9 @@
 #include "server/service/serve.h"
 
+#include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <fstream>
 #include <map>
@@ -120,6 +122,24 @@ void observe_edit(http::Metrics& metrics, const std::vector<proto::StageSeconds>
                   all);
 }
 
+/// Connections take descriptors. Shells give a program fewer than the system lets it have; where that is still too few,
+/// there are fewer connections: what files need is left to them.
+void share_descriptors(std::size_t& connections, spdlog::logger& logger) {
+  constexpr rlim_t files = 512, least_files = 128;  // of scenes and edits; a choice
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
+  const rlim_t wanted = 2 * rlim_t(connections) + files;  // a download has its file open besides
+  if (limit.rlim_cur < wanted) {
+    limit.rlim_cur = std::min(limit.rlim_max, wanted);
+    if (::setrlimit(RLIMIT_NOFILE, &limit) != 0) ::getrlimit(RLIMIT_NOFILE, &limit);
+  }
+  const rlim_t there_are = std::max<rlim_t>(limit.rlim_cur, 2 * least_files) - least_files;
+  if (connections <= there_are) return;
+  connections = std::size_t(there_are);
+  http::log(logger, spdlog::level::warn, "this process may open few files: --max-connections is lowered",
+            {{"files", std::int64_t(limit.rlim_cur)}, {"connections", std::int64_t(connections)}});
+}
+
 /// Tells the parts what they have to know of the whole.
 void share_out(ServeOptions& options, spdlog::logger& logger) {
   options.scenes.folder = options.data_dir / "scenes";
@@ -155,6 +175,7 @@ Result<void> check_token(ServeOptions& options, spdlog::logger& logger) {
 
 Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& logger, std::ostream& out) {
   share_out(options, logger);
+  share_descriptors(options.http.lobby.max_connections, logger);
   engine::MemoryBudget work_memory(options.work_memory_bytes, "--work-memory");
   options.scenes.read.memory = &work_memory;
   options.renders.memory = &work_memory;

@@ -486,6 +486,23 @@ describe('a client that is rude', () => {
     await unharmed();
   });
 
+  test('two hundred heads that drip keep nobody waiting', async () => {
+    const sockets = await Promise.all(Array.from({ length: 200 }, () => open()));
+    let ended = 0;
+    for (const socket of sockets) {
+      socket.on('error', () => {});
+      socket.on('close', () => ++ended);
+      socket.write('GET /v1/scenes HTTP/1.1\r\nX: ');
+    }
+    const drip = setInterval(() => sockets.forEach((socket) => socket.write('x')), 20);
+    for (let i = 0; i < 10; ++i)
+      for (const target of ['/healthz', '/readyz', '/v1/scenes', `/v1/scenes/${scene.id}/versions/0/render?view=view_00.png&max_side=64`]) await client.get(target);
+    assert.equal(ended, 0, 'they drip still');
+    clearInterval(drip);
+    for (const socket of sockets) socket.destroy();
+    await unharmed();
+  });
+
   test('pictures asked for and not waited for, again and again', async () => {
     const target = `/v1/scenes/${scene.id}/versions/0/render?eye=0,-1,-4&target=0,0,0&width=${limits.side}&height=${limits.side}`;
     for (let i = 0; i < 30; ++i) {

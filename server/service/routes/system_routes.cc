@@ -77,14 +77,14 @@ void add_session(http::Router& router, http::AccessGuard& guard) {
 }  // namespace
 
 void add_system_routes(http::Router& router, const SystemRouteDependencies& dependencies) {
-  get(
-      router, "/healthz", [](const Call&) -> Result<Reply> { return Reply::json(R"({"status":"ok"})"); }, Access::open);
+  const auto healthy = [](const Call&) -> Result<Reply> { return Reply::json(R"({"status":"ok"})"); };
+  router.add({"GET", "/healthz", healthy, Body::none, {}, Access::open, /*vital=*/true});
   const auto ready = [trouble = dependencies.trouble](const Call&) -> Result<Reply> {
     if (const auto error = trouble())
       return engine::fail(engine::ErrorCode::unavailable, "the service cannot work: " + error->message, error->where);
     return Reply::json(R"({"ready":true})");
   };
-  get(router, "/readyz", ready, Access::open);
+  router.add({"GET", "/readyz", ready, Body::none, {}, Access::open, /*vital=*/true});
   const auto metrics = [&metrics = dependencies.metrics](const Call&) -> Result<Reply> {
     Reply reply;
     reply.media_type = http::Metrics::media_type;

@@ -2,6 +2,7 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -23,7 +24,8 @@ using namespace std::chrono_literals;
 /// A running program; killed with the object if it still runs.
 class Program {
  public:
-  Program(const support::TempDir& folder, std::vector<std::string> arguments)
+  ///   descriptors  that it may open; null: as many as this program
+  Program(const support::TempDir& folder, std::vector<std::string> arguments, const rlimit* descriptors = nullptr)
       : out_(folder.path() / "stdout"), err_(folder.path() / "stderr") {
     arguments.insert(arguments.begin(), SPLATDRAG_PROGRAM);
     std::vector<char*> pointers;
@@ -34,6 +36,7 @@ class Program {
     if (pid_ != 0) return;
     for (const auto& [file, target] : {std::pair{out_, STDOUT_FILENO}, std::pair{err_, STDERR_FILENO}})
       ::dup2(::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), target);
+    if (descriptors != nullptr) ::setrlimit(RLIMIT_NOFILE, descriptors);
     ::execv(pointers.front(), pointers.data());
     ::_exit(127);
   }
@@ -104,6 +107,16 @@ TEST_F(Serve, SaysWhereItListensAndEndsWellWhenToldTo) {
     const std::string log = program.err();
     EXPECT_EQ(json::parse(log.substr(0, log.find('\n')))["message"], "listening") << log;
   }
+}
+
+TEST_F(Serve, LeavesFilesTheirShareOfFewDescriptors) {
+  const rlimit few{300, 300};
+  Program program(first_, arguments({"--log-format", "text"}), &few);
+  const int port = program.port();
+  ASSERT_NE(port, 0) << program.err();
+  EXPECT_NE(program.err().find("--max-connections is lowered files=300 connections=172"), std::string::npos)
+      << program.err();
+  EXPECT_EQ(ask(port, "GET", "/healthz").status, 200);
 }
 
 TEST_F(Serve, CountsWhatAnOperatorWatches) {

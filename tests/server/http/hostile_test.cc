@@ -136,7 +136,7 @@ TEST_F(Hostile, EmptyLinesBuyNoTime) {
 
 TEST_F(Dawdler, AHeadThatAlwaysHasAByteMoreIsCutOffToo) {
   ServerOptions options = impatient();
-  options.connection.max_head_bytes = std::size_t{1} << 30;
+  options.lobby.connection.max_head_bytes = std::size_t{1} << 30;
   TestServer roomy(sample_routes(folder.path()), options);
   RawClient client(roomy.port());
   const auto began = Clock::now();
@@ -232,50 +232,10 @@ TEST_F(Hostile, AClientThatLeavesDoesNoHarm) {
   EXPECT_EQ(send(request(server.port(), "GET", "/json")).status, 200);
 }
 
-TEST(HostileCrowd, MoreConnectionsThanItTakesAreTurnedAway) {
-  support::TempDir folder;
-  ServerOptions options = impatient();
-  options.threads = 2;
-  options.max_waiting = 2;
-  options.connection.idle_timeout = 3s;
-  TestServer server(sample_routes(folder.path()), options);
-  std::vector<std::unique_ptr<RawClient>> holders;
-  for (int i = 0; i < 4; ++i) {
-    holders.push_back(std::make_unique<RawClient>(server.port()));
-    std::this_thread::sleep_for(30ms);
-  }
-  RawClient one_too_many(server.port());
-  one_too_many.send(request(server.port(), "GET", "/json"));
-  const auto answer = one_too_many.answer();
-  ASSERT_TRUE(answer);
-  EXPECT_EQ(answer->status, 503);
-  EXPECT_EQ(answer->header("retry-after"), "1");
-  EXPECT_NE(server.metrics.text().find("splatdrag_http_connections_refused_total 1"), std::string::npos);
-  holders.clear();
-  const auto left = Clock::now();  // once it has noticed
-  while (ask(server.port(), "GET", "/json").status != 200 && Clock::now() - left < 10s)
-    std::this_thread::sleep_for(20ms);
-  EXPECT_EQ(ask(server.port(), "GET", "/json").status, 200) << "and then it serves again";
-}
-
-TEST(HostileCrowd, AnIdleConnectionMakesRoomForOneThatWaits) {
-  support::TempDir folder;
-  ServerOptions options;
-  options.threads = 1;
-  options.connection.idle_timeout = 5s;
-  TestServer server(sample_routes(folder.path()), options);
-  RawClient idle(server.port());
-  idle.send(request(server.port(), "GET", "/json"));
-  EXPECT_EQ(idle.answer().value_or(RawAnswer{}).status, 200);
-  const auto began = Clock::now();
-  EXPECT_EQ(ask(server.port(), "GET", "/json").status, 200);
-  EXPECT_LT(Clock::now() - began, 2s);
-}
-
 TEST(HostileCrowd, ManyClientsAtOnceAreAllAnswered) {
   support::TempDir folder;
   ServerOptions options;
-  options.threads = 8;
+  options.workers.threads = 8;
   TestServer server(sample_routes(folder.path()), options);
   std::atomic<int> answered = 0;
   std::vector<std::thread> clients;

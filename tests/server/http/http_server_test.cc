@@ -342,6 +342,16 @@ TEST(HttpServer, TellsAHandlerThatItsClientHasGone) {
   EXPECT_EQ(gone, 1);
 }
 
+TEST_F(HttpServerTest, SaysHowLongAConnectionIsKept) {
+  RawClient client(server.port());
+  client.send(request(server.port(), "GET", "/json"));
+  EXPECT_EQ(client.answer().value_or(RawAnswer{}).header("keep-alive"), "timeout=15");
+  client.send(request(server.port(), "GET", "/json", "Connection: close\r\n"));
+  const auto last = client.answer().value_or(RawAnswer{});
+  EXPECT_EQ(last.header("keep-alive"), "");
+  EXPECT_EQ(last.header("connection"), "close");
+}
+
 TEST_F(HttpServerTest, KeepsTheConnectionAfterARefusalWhoseBodyIsThere) {
   RawClient client(server.port());
   for (int i = 0; i < 2; ++i) {

@@ -21,7 +21,8 @@ struct RawAnswer {
 
 class RawClient {
  public:
-  explicit RawClient(int port);
+  ///   from  the client's own address, one of the loopback network
+  explicit RawClient(int port, const std::string& from = "127.0.0.1");
   ~RawClient();
   RawClient(const RawClient&) = delete;
   RawClient& operator=(const RawClient&) = delete;

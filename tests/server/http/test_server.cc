@@ -19,10 +19,10 @@ TestServer::TestServer(Router routes, ServerOptions options, AccessOptions acces
 
 ServerOptions impatient() {
   ServerOptions options;
-  options.connection.head_timeout = 400ms;
-  options.connection.idle_timeout = 400ms;
-  options.connection.stall_timeout = 400ms;
-  options.connection.rate_grace = 600ms;
+  options.lobby.connection.head_timeout = 400ms;
+  options.lobby.connection.idle_timeout = 400ms;
+  options.lobby.connection.stall_timeout = 400ms;
+  options.lobby.connection.rate_grace = 600ms;
   options.grace = 2s;
   return options;
 }

@@ -37,16 +37,18 @@ export class Service {
   /// Starts it and waits until it answers.
   ///   dataDir  kept between starts; a new one by default
   ///   args     more options
-  static async start({ dataDir = temporaryFolder(), args = [], token } = {}) {
+  ///   within   a command that starts it, and what belongs to that: ['prlimit', '--as=2147483648']
+  static async start({ dataDir = temporaryFolder(), args = [], token, within = [] } = {}) {
     const service = new Service();
-    Object.assign(service, { dataDir, args, token });
+    Object.assign(service, { dataDir, args, token, within });
     await service.#spawn();
     return service;
   }
 
   async #spawn() {
     const args = ['serve', '--host', '127.0.0.1', '--port', '0', '--data-dir', this.dataDir, ...this.args];
-    this.process = spawn(program, args, { env: environment, stdio: ['ignore', 'pipe', 'pipe'] });
+    const [command, ...rest] = [...this.within, program, ...args];
+    this.process = spawn(command, rest, { env: environment, stdio: ['ignore', 'pipe', 'pipe'] });
     const child = this.process;
     atEnd(() => child.kill('SIGKILL'));
     this.log = '';
