@@ -13,8 +13,8 @@ packages=(
   libflann-dev liblz4-dev                              # nearest neighbours
   libeigen3-dev                                        # sparse equations
   nlohmann-json3-dev libtomlplusplus-dev libcli11-dev
-  zlib1g-dev libzstd-dev                               # compressed scenes
-  libsqlite3-dev libzip-dev libxxhash-dev              # job records, datasets as zip files, checksums of stored files
+  zlib1g-dev libzstd-dev libwebp-dev                   # compressed scenes
+  libsqlite3-dev libzip-dev libxxhash-dev              # job records, zip files, checksums of stored files
   libcpp-httplib-dev libspdlog-dev prometheus-cpp-dev  # the service: HTTP, logs, metrics
   libgtest-dev libbenchmark-dev                        # tests and benchmarks
   curl jq                                              # the demo talks to the service
