@@ -31,6 +31,7 @@ constexpr std::size_t rows_per_task = 4096;  // of a parallel task: a choice
 constexpr std::size_t header_bytes = 16;
 constexpr std::size_t max_deflate_ratio = 1032;  // of deflate: 258 bytes for every 2 bits
 constexpr double colour_scale = 0.15;            // of this format; wider than sh_c0 to keep colours beyond 0..1
+constexpr double farthest_fixed = 8388608;       // steps, of a position in 24 bits
 constexpr std::uint8_t flag_antialiased = 1, flag_extensions = 2;
 constexpr std::uint32_t v4_header_bytes = 32;
 constexpr std::uint32_t axes_extension = 0xADBE0003;     // SPZ_ADOBE_coordinate_system: 4 bytes, an index as below
@@ -331,8 +332,9 @@ void pack_row(const scene::GaussianCloud& cloud, std::size_t i, const Header& he
   const std::size_t coefficients = scene::sh_coefficients(cloud.sh_degree);
   const Vec3 mean = cloud.mean.get(i), log_scale = cloud.log_scale.get(i);
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const auto fixed =
-        std::uint32_t(std::int32_t(std::lround(std::ldexp(double(mean[int(axis)]), header.fractional_bits))));
+    const double steps = std::round(std::ldexp(double(mean[int(axis)]), header.fractional_bits));
+    // 24 bits reach one step farther down than up; a turn may put what came from there at the other end.
+    const auto fixed = std::uint32_t(std::int32_t(std::clamp(steps, -farthest_fixed, farthest_fixed - 1)));
     for (std::size_t b = 0; b < 3; ++b) out.positions[9 * at + 3 * axis + b] = std::byte(fixed >> 8 * b & 255u);
     out.scales[3 * at + axis] = std::byte(nearest_byte((double(log_scale[int(axis)]) + 10.0) * 16.0));
   }
@@ -393,10 +395,10 @@ Result<int> fractional_bits_for(const scene::GaussianCloud& cloud, const std::st
   for (const auto* axis : {&cloud.mean.x, &cloud.mean.y, &cloud.mean.z})
     for (const float x : *axis) farthest = std::max(farthest, std::abs(double(x)));
   for (int bits = 12; bits >= 0; --bits)
-    if (std::round(std::ldexp(farthest, bits)) <= 8388607.0) return bits;
+    if (std::round(std::ldexp(farthest, bits)) <= farthest_fixed) return bits;
   return fail(ErrorCode::unprocessable,
               "a Gaussian lies " + std::to_string(farthest) +
-                  " units from the origin; .spz reaches 8388607: write a .ply, or move the scene to the origin",
+                  " units from the origin; .spz reaches 8388608: write a .ply, or move the scene to the origin",
               file);
 }
 

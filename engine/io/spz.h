@@ -48,7 +48,7 @@ struct SpzOptions {
 
 /// Rows in their order, rounded to what the format holds: position to 1/4096 (coarser only if a mean lies beyond
 /// +-2048), log scale to 1/16 in [-10, 5.9375], SH to 1/128 in [-1, 1].
-///   errors  unprocessable: a mean beyond +-8 388 607, the farthest the format reaches; invalid_argument: the axes
+///   errors  unprocessable: a mean beyond +-8 388 608, the farthest the format reaches; invalid_argument: the axes
 [[nodiscard]] Result<std::vector<std::byte>> encode_spz(const scene::GaussianCloud& cloud, const std::string& file,
                                                         const SpzOptions& options = {});
 

@@ -119,6 +119,7 @@ Result<UnpackedFile> ZipArchive::read(const std::string& name, std::uint64_t mos
 
 Result<std::vector<std::byte>> make_zip(std::span<const NamedFile> files) {
   const auto broken = [] { return fail(ErrorCode::internal, "the zip file could not be made"); };
+  if (files.empty()) return fail(ErrorCode::invalid_argument, "a zip file without files is no file");  // to libzip
   zip_error_t error;
   zip_error_init(&error);
   Source sink(zip_source_buffer_create(nullptr, 0, 0, &error));
@@ -145,7 +146,8 @@ Result<std::vector<std::byte>> make_zip(std::span<const NamedFile> files) {
   (void)archive.release();
   zip_stat_t stat;
   zip_stat_init(&stat);
-  if (zip_source_stat(sink.get(), &stat) != 0 || zip_source_open(sink.get()) != 0) return broken();
+  if (zip_source_stat(sink.get(), &stat) != 0 || (stat.valid & ZIP_STAT_SIZE) == 0 || zip_source_open(sink.get()) != 0)
+    return broken();
   std::vector<std::byte> bytes(std::size_t(stat.size));
   const auto got = zip_source_read(sink.get(), bytes.data(), bytes.size());
   zip_source_close(sink.get());

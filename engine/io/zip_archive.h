@@ -60,7 +60,7 @@ struct NamedFile {
 };
 
 /// A zip file of these files in their order, stored as they are: the same bytes every time, with one date for all.
-///   errors  internal: libzip fails
+///   errors  invalid_argument: no files; internal: libzip fails
 [[nodiscard]] Result<std::vector<std::byte>> make_zip(std::span<const NamedFile> files);
 
 }  // namespace engine::io

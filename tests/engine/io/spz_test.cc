@@ -262,6 +262,25 @@ TEST(Spz, SpendsFewerFractionalBitsOnAWideScene) {
   EXPECT_EQ(refused.error().code, ErrorCode::unprocessable);
 }
 
+// Found by tests/fuzz: -2^23 steps were read and could not be written.
+TEST(Spz, WritesTheFarthestThatItReads) {
+  for (const std::uint32_t axes : {4u, 6u, 12u}) {
+    Parts parts = one_gaussian(3, 0);
+    parts.fractional_bits = 0, parts.flags = 2;
+    parts.extensions = declares_axes(axes);
+    parts.attributes[0] = fixed24({-8388608, 8388607, -8388608});
+    const std::string packed = zipped(parts.unpacked());
+    const auto scene = decode_spz(as_span(packed), "a.spz", {});
+    ASSERT_TRUE(scene);
+    for (const char* written : {"RUB", "RDF", "RFU"}) {
+      const auto bytes = encode_spz(scene->cloud, "a.spz", {.axes = written});
+      ASSERT_TRUE(bytes) << bytes.error().message;
+      const scene::GaussianCloud back = cloud_of(*bytes);
+      for (int c = 0; c < 3; ++c) EXPECT_LE(std::abs(back.mean.get(0)[c] - scene->cloud.mean.get(0)[c]), 1.0f);
+    }
+  }
+}
+
 TEST(Spz, KeepsUnknownExtensionsOfEveryVersion) {
   for (std::uint32_t version = 1; version <= 4; ++version) {
     SCOPED_TRACE(version);
