@@ -4,6 +4,7 @@
 #   install-packages.sh          to build and run it
 #   install-packages.sh tests    to run all tests, too: a browser, and Node.js to drive it
 #   install-packages.sh lint     to check the sources, too: clang-format and clang-tidy
+#   install-packages.sh fuzz     to fuzz the readers, too: clang and its runtime
 set -euo pipefail
 
 packages=(
@@ -28,8 +29,10 @@ if [[ "${1:-}" == tests ]]; then
 elif [[ "${1:-}" == lint ]]; then
   # Named by version: what is clean for one is not for the next. clang-tidy before 17 cannot read this C++20.
   packages+=(clang-format-14 clang-tidy-19)
+elif [[ "${1:-}" == fuzz ]]; then
+  packages+=(clang-19 libclang-rt-19-dev)  # before 16, clang cannot read GCC 12's ranges
 elif (($# > 0)); then
-  echo "usage: install-packages.sh [tests|lint]" >&2
+  echo "usage: install-packages.sh [tests|lint|fuzz]" >&2
   exit 2
 fi
 
