@@ -12,5 +12,6 @@ void fuzz::run(std::span<const std::byte> bytes) {
 
 std::vector<std::string> fuzz::seeds() {
   const std::vector<engine::io::NamedFile> files{{"a.txt", std::vector<std::byte>(10)}, {"b/c.txt", {}}};
-  return {text_of(*engine::io::make_zip(files)), std::string("PK\5\6") + std::string(18, '\0')};  // with files, and without
+  return {text_of(*engine::io::make_zip(files)),
+          std::string("PK\5\6") + std::string(18, '\0')};  // with files, and without
 }

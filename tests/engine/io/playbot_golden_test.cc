@@ -219,6 +219,27 @@ TEST_F(Playbot, AStreamedSceneIsItsFinestLevelOrTheOneAskedFor) {
   EXPECT_EQ(none.error().where, "streamed:lod-meta.json:lodLevels");
 }
 
+TEST_F(Playbot, CutAnywhereItIsAnErrorWithAnAddress) {
+  REQUIRE_SHARED(there);
+  MemoryFile file;
+  for (const char* name : {"playbot_31k.compressed.ply", "playbot_31k.sog", "playbot_31k.glb", "playbot_31k.spz",
+                           "playbot_31k_v3.spz", "spz-ext/v3_with_trailer.spz", "spz-ext/v4_declares_rdf.spz"}) {
+    const std::string bytes = support::read_file(there / name);
+    Rng rng(7);
+    for (int k = 0; k < 300; ++k) {
+      // The heads and tails byte by byte, and places in between.
+      const std::size_t size = k < 100   ? std::size_t(k)
+                               : k < 200 ? bytes.size() - 1 - std::size_t(k - 100)
+                                         : std::size_t(rng.below(std::uint32_t(bytes.size())));
+      file.set(bytes.substr(0, size));
+      const auto scene = read_scene(file.path());
+      ASSERT_FALSE(scene) << name << " cut at byte " << size;
+      ASSERT_FALSE(scene.error().message.empty());
+      ASSERT_FALSE(scene.error().where.empty()) << name << " cut at byte " << size << ": " << scene.error().message;
+    }
+  }
+}
+
 TEST_F(Playbot, WhatWeWriteComesBackWithinItsBitsAndThenToTheByte) {
   REQUIRE_SHARED(there);
   const support::TempDir folder;

@@ -1,6 +1,7 @@
 #include "engine/io/sog.h"
 
 #include <gtest/gtest.h>
+#include <zip.h>
 
 #include <nlohmann/json.hpp>
 
@@ -231,6 +232,33 @@ TEST(Sog, APictureThatIsTooLargeForItsGaussiansIsNotDecoded) {
   EXPECT_EQ(budget.lent(), 0u);
 }
 
+/// A zip file of one file of `size` zero bytes, deflated.
+Bytes deflated_zeros(const char* name, std::size_t size) {
+  const support::TempDir folder;
+  const auto path = folder.path() / "a.zip";
+  const std::string zeros(size, '\0');
+  int error = 0;
+  zip_t* const archive = zip_open(path.c_str(), ZIP_CREATE, &error);
+  const auto index = zip_file_add(archive, name, zip_source_buffer(archive, zeros.data(), zeros.size(), 0), 0);
+  zip_set_file_compression(archive, zip_uint64_t(index), ZIP_CM_DEFLATE, 9);
+  EXPECT_EQ(zip_close(archive), 0);
+  return bytes_of(support::read_file(path));
+}
+
+TEST(Sog, AFileThatUnpacksToTooMuchIsNotUnpacked) {
+  const Bytes bomb = deflated_zeros("meta.json", std::size_t(64) << 20);
+  EXPECT_LT(bomb.size(), 100'000u);
+  const auto scene = decode(bomb);
+  ASSERT_FALSE(scene);
+  EXPECT_EQ(scene.error().code, ErrorCode::too_large);
+  EXPECT_EQ(scene.error().where, "a.sog:meta.json");
+  // Within what a meta.json may have, the budget counts it.
+  MemoryBudget little(1 << 20);
+  ReadOptions options;
+  options.memory = &little;
+  EXPECT_EQ(decode(deflated_zeros("meta.json", 3 << 20), options).error().code, ErrorCode::too_large);
+}
+
 TEST(Sog, AZipFileWithinAZipFileIsNoScene) {
   const Bytes inner = Parts::of(random_cloud(3, 0, 35)).zip();
   const auto named = [&](const char* name) { return decode(make_zip(std::vector<NamedFile>{{name, inner}}).value()); };
@@ -240,6 +268,21 @@ TEST(Sog, AZipFileWithinAZipFileIsNoScene) {
   ASSERT_FALSE(meta);
   EXPECT_EQ(meta.error().code, ErrorCode::corrupt_data);
   EXPECT_EQ(meta.error().where, "a.sog:meta.json");
+}
+
+TEST(Sog, AStreamedSceneMayBeZipped) {
+  const Parts parts = Parts::of(random_cloud(20, 1, 40));
+  const json lod = {{"lodLevels", 1},
+                    {"filenames", {"0_0/meta.json"}},
+                    {"tree", {{"lods", {{"0", {{"file", 0}, {"offset", 5}, {"count", 10}}}}}}}};
+  std::vector<NamedFile> files{{"lod-meta.json", bytes_of(lod.dump())}, {"0_0/meta.json", bytes_of(parts.meta.dump())}};
+  for (const auto& [name, bytes] : parts.files) files.push_back({"0_0/" + name, bytes});
+  const Bytes zip = make_zip(files).value();
+  const auto scene = decode(zip), whole = decode(parts.zip());
+  ASSERT_TRUE(scene) << scene.error().message << scene.error().where;
+  ASSERT_EQ(scene->cloud.size(), 10u);
+  EXPECT_EQ(scene->cloud.mean.get(0), whole->cloud.mean.get(5));
+  EXPECT_GE(expected_sog_bytes(zip), 10 * cloud_row_bytes(1));
 }
 
 struct SogFolder : testing::Test {
