@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "engine/core/checksum.h"
+#include "engine/edit/drag.h"
 #include "engine/edit/handles.h"
 #include "tests/engine/edit/samples.h"
 #include "tests/fuzz/fuzz.h"
