@@ -28,8 +28,9 @@ find_package(prometheus-cpp REQUIRED)        # metrics (its package states no ve
 # HTTP. Debian compiles the library; pkg-config knows the definitions it was compiled with, which change its classes.
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(httplib REQUIRED IMPORTED_TARGET cpp-httplib>=0.11)
-# Datasets sent as zip files. Debian's CMake package also wants libzip's programs installed; pkg-config does not.
+# Scenes in SOG, and datasets sent as zip files. Debian's CMake package also wants libzip's programs installed; pkg-config does not.
 pkg_check_modules(libzip REQUIRED IMPORTED_TARGET libzip>=1.7)
+pkg_check_modules(libwebp REQUIRED IMPORTED_TARGET libwebp>=1.2)  # SOG's pictures, to the bit
 # Checksums of stored files. XXH3's output is fixed since 0.8.0.
 pkg_check_modules(libxxhash REQUIRED IMPORTED_TARGET libxxhash>=0.8)
 if(SPLATDRAG_TESTS)

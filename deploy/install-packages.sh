@@ -4,6 +4,7 @@
 #   install-packages.sh          to build and run it
 #   install-packages.sh tests    to run all tests, too: a browser, and Node.js to drive it
 #   install-packages.sh lint     to check the sources, too: clang-format, clang-tidy, and yamllint for the contract
+#   install-packages.sh fuzz     to fuzz the readers, too: clang and its runtime
 set -euo pipefail
 
 packages=(
@@ -13,8 +14,8 @@ packages=(
   libflann-dev liblz4-dev                              # nearest neighbours
   libeigen3-dev                                        # sparse equations
   nlohmann-json3-dev libtomlplusplus-dev libcli11-dev
-  zlib1g-dev libzstd-dev                               # compressed scenes
-  libsqlite3-dev libzip-dev libxxhash-dev              # job records, datasets as zip files, checksums of stored files
+  zlib1g-dev libzstd-dev libwebp-dev                   # compressed scenes
+  libsqlite3-dev libzip-dev libxxhash-dev              # job records, zip files, checksums of stored files
   libcpp-httplib-dev libspdlog-dev prometheus-cpp-dev  # the service: HTTP, logs, metrics
   libgtest-dev libbenchmark-dev                        # tests and benchmarks
   curl jq                                              # the demo talks to the service
@@ -28,8 +29,10 @@ if [[ "${1:-}" == tests ]]; then
 elif [[ "${1:-}" == lint ]]; then
   # Named by version: what is clean for one is not for the next. clang-tidy before 17 cannot read this C++20.
   packages+=(clang-format-14 clang-tidy-19 yamllint)
+elif [[ "${1:-}" == fuzz ]]; then
+  packages+=(clang-19 libclang-rt-19-dev)  # before 16, clang cannot read GCC 12's ranges
 elif (($# > 0)); then
-  echo "usage: install-packages.sh [tests|lint]" >&2
+  echo "usage: install-packages.sh [tests|lint|fuzz]" >&2
   exit 2
 fi
 

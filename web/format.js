@@ -61,5 +61,5 @@ export function when(rfc3339, now = new Date()) {
 
 /** The name of a scene for an uploaded file: "chair.compressed.ply" -> "chair". */
 export function nameOfFile(filename) {
-  return filename.replace(/\.(compressed\.ply|ply|splat|spz)$/i, "") || filename;
+  return filename.replace(/\.(compressed\.ply|ply|splat|spz|sog|glb)$/i, "") || filename;
 }

@@ -222,7 +222,7 @@ function listenToDrops() {
       store.set({ tab: "drag" });
       return importFile(editor, file, document.querySelector("[data-testid=import-problem]"));
     }
-    say(`${file?.name ?? "This"} is none of: .ply, .splat, .spz${inScene() ? ", .zip, .json" : ""}.`, { kind: "bad" });
+    say(`${file?.name ?? "This"} is none of: .ply, .splat, .spz, .sog, .glb${inScene() ? ", .zip, .json" : ""}.`, { kind: "bad" });
   });
 }
 

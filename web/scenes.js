@@ -6,14 +6,14 @@ import { asking, h, keyedList, problemPlace, showProblem, text } from "./dom.js"
 import { bytes, count, counted, gaussians, nameOfFile, when } from "./format.js";
 import { pathForm, showUpload } from "./uploads.js";
 
-export const SCENE_FILES = /\.(ply|splat|spz)$/i;
+export const SCENE_FILES = /\.(ply|splat|spz|sog|glb)$/i;
 
 /** The page.  open(id): go to a scene. */
 export function buildScenes(home, { store, memory, open }) {
   const file = h("input", {
     type: "file",
     multiple: true,
-    accept: ".ply,.splat,.spz",
+    accept: ".ply,.splat,.spz,.sog,.glb",
     hidden: true,
     testid: "scene-file",
     "aria-label": "Scene file",
@@ -60,7 +60,7 @@ export function buildScenes(home, { store, memory, open }) {
     "div",
     { class: "drop-area" },
     h("p", { class: "lead" }, "Drop a scene here"),
-    h("p", { class: "muted" }, "A trained 3D Gaussian Splatting scene: .ply, compressed .ply, .splat or .spz", limit),
+    h("p", { class: "muted" }, "A trained 3D Gaussian Splatting scene: .ply, compressed .ply, .splat, .spz, .sog or .glb", limit),
     h(
       "button",
       { type: "button", class: "primary", testid: "upload-button", onclick: () => file.click() },

@@ -184,7 +184,7 @@ function row(editor, number) {
       if (links.children.length === 0)
         links.append(
           h("span", { class: "muted" }, "Download"),
-          ...["ply", "splat", "spz"].map((format) =>
+          ...["ply", "splat", "spz", "sog", "glb"].map((format) =>
             h(
               "a",
               { href: api.fileUrl(scene.id, number, format), download: "", testid: `download-${number}-${format}` },

@@ -3,7 +3,7 @@
 #include <cassert>
 
 #include "engine/core/parallel.h"
-#include "engine/deform/rotate_sh.h"
+#include "engine/scene/rotate_sh.h"
 #include "engine/scene/stretch.h"
 
 namespace engine::deform {
@@ -88,10 +88,10 @@ void apply(const Deformation& deformation, std::size_t k, bool with_sh, scene::G
   if (turn.w == 1 && turn.x == 0 && turn.y == 0 && turn.z == 0) return;  // also -0.0 in the quaternion stays
   if (!stretches) cloud.rotation.set(row, deformation.rotation.get(k));
   if (!with_sh || cloud.sh_degree == 0) return;
-  const ShRotation rotation = sh_rotation(turn);
+  const scene::ShRotation rotation = scene::sh_rotation(turn);
   const std::size_t count = scene::sh_coefficients(cloud.sh_degree);
   for (std::size_t channel = 0; channel < 3; ++channel)
-    rotate_sh(rotation, cloud.sh_row(row).subspan(channel * count, count));
+    scene::rotate_sh(rotation, cloud.sh_row(row).subspan(channel * count, count));
 }
 
 }  // namespace engine::deform

@@ -11,7 +11,6 @@
 
 #include "engine/core/half_axes.h"
 #include "engine/core/rng.h"
-#include "engine/deform/rotate_sh.h"
 #include "engine/evaluate/named_cases.h"
 #include "engine/evaluate/studio.h"
 #include "engine/procedural/demo_scene.h"
@@ -20,6 +19,7 @@
 #include "engine/procedural/objects.h"
 #include "engine/procedural/surfels.h"
 #include "engine/render/largest_weight.h"
+#include "engine/scene/rotate_sh.h"
 #include "engine/scene/sh.h"
 
 namespace engine::evaluate {
@@ -269,14 +269,14 @@ void widen_row(scene::GaussianCloud& cloud, std::size_t i, const Motion& motion)
 }
 
 /// Row i of the cloud, carried along by the motion.
-void move_row(scene::GaussianCloud& cloud, std::size_t i, const Motion& motion, const deform::ShRotation& sh) {
+void move_row(scene::GaussianCloud& cloud, std::size_t i, const Motion& motion, const scene::ShRotation& sh) {
   assert(motion.widen == 0 || motion.turn == DQuat(1, 0, 0, 0));
   if (motion.widen != 0) widen_row(cloud, i, motion);
   cloud.mean.set(i, Vec3(motion(DVec3(cloud.mean.get(i)))));
   if (motion.turn == DQuat(1, 0, 0, 0)) return;
   cloud.rotation.set(i, Quat(motion.turn * DQuat(cloud.rotation.get(i))));
   const std::size_t coefficients = scene::sh_coefficients(cloud.sh_degree);
-  for (std::size_t c = 0; c < 3; ++c) deform::rotate_sh(sh, cloud.sh_row(i).subspan(c * coefficients, coefficients));
+  for (std::size_t c = 0; c < 3; ++c) scene::rotate_sh(sh, cloud.sh_row(i).subspan(c * coefficients, coefficients));
 }
 
 std::vector<std::uint32_t> range(std::size_t first, std::size_t last) {
@@ -326,8 +326,8 @@ Case carry_out(const std::string& name, const Plan& plan) {
     if (!plan.parts[moved.object[i]].only_after) there_before.push_back(std::uint32_t(i));
   scene::GaussianCloud whole = around.cloud;
   scene::append_rows(whole, moved.cloud, there_before);
-  std::vector<deform::ShRotation> sh;
-  for (const Part& part : plan.parts) sh.push_back(deform::sh_rotation(part.motion.turn));
+  std::vector<scene::ShRotation> sh;
+  for (const Part& part : plan.parts) sh.push_back(scene::sh_rotation(part.motion.turn));
   for (std::size_t i = 0; i < rows_moved; ++i)
     move_row(out.truth, rows_around + i, plan.parts[moved.object[i]].motion, sh[moved.object[i]]);
 

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <glm/common.hpp>
+#include <limits>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -219,7 +221,118 @@ class CompressedPly {
   std::array<std::size_t, 4> word_offsets_{};
 };
 
+constexpr float most_log_scale = 20.0f;  // as PlayCanvas' writer: beyond it, the engine saturates
+
+std::uint32_t pack_unorm(double value, double low, double high, int bits) {
+  const double most = double((1u << bits) - 1u);
+  if (!(high > low)) return 0;
+  return std::uint32_t(std::clamp(std::round((value - low) / (high - low) * most), 0.0, most));
+}
+
+std::uint32_t pack_11_10_11(Vec3 value, Vec3 low, Vec3 high) {
+  const auto packed = [&](int c, int bits) {
+    return pack_unorm(double(value[c]), double(low[c]), double(high[c]), bits);
+  };
+  return packed(0, 11) << 21 | packed(1, 10) << 11 | packed(2, 11);
+}
+
+std::uint32_t pack_rotation_once(Quat rotation) {
+  std::array<double, 4> q = {rotation.w, rotation.x, rotation.y, rotation.z};
+  double square = 0;
+  for (const double c : q) square += c * c;
+  if (square == 0) q = {square = 1, 0, 0, 0};  // no rotation to speak of: the identity
+  std::size_t largest = 0;
+  for (std::size_t c = 1; c < 4; ++c)
+    if (std::abs(q[c]) > std::abs(q[largest])) largest = c;
+  const double scale = (q[largest] < 0 ? -1.0 : 1.0) / std::sqrt(square);
+  auto word = std::uint32_t(largest);
+  for (std::size_t c = 0; c < 4; ++c)
+    if (c != largest) word = word << 10 | pack_unorm(q[c] * scale / std::numbers::sqrt2 + 0.5, 0, 1, 10);
+  return word;
+}
+
+std::uint32_t pack_rotation(Quat rotation) { return stable_rotation(rotation, pack_rotation_once, unpack_rotation); }
+
+float f_dc_of(float colour) { return float((double(colour) - 0.5) / sh_c0); }
+float colour_of(float f_dc) { return float(0.5 + sh_c0 * double(f_dc)); }
+
+/// The end of a range of colours, moved by a rounding or two to one that reading and writing again leaves where it is.
+float stable_colour(float colour) {
+  for (int tries = 0; tries < 8 && colour_of(f_dc_of(colour)) != colour; ++tries) colour = colour_of(f_dc_of(colour));
+  return colour;
+}
+
+/// What the rows of a chunk lie between.
+Range range_of(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows) {
+  constexpr float most = std::numeric_limits<float>::max();
+  Range range{Vec3(most), Vec3(-most), Vec3(most), Vec3(-most), Vec3(most), Vec3(-most)};
+  const std::size_t coefficients = scene::sh_coefficients(cloud.sh_degree);
+  for (const std::uint32_t i : rows) {
+    const Vec3 scale = glm::clamp(cloud.log_scale.get(i), -most_log_scale, most_log_scale);
+    Vec3 colour;
+    for (int c = 0; c < 3; ++c) colour[c] = colour_of(cloud.sh_row(i)[std::size_t(c) * coefficients]);
+    range.low_position = glm::min(range.low_position, cloud.mean.get(i));
+    range.high_position = glm::max(range.high_position, cloud.mean.get(i));
+    range.low_log_scale = glm::min(range.low_log_scale, scale),
+    range.high_log_scale = glm::max(range.high_log_scale, scale);
+    range.low_colour = glm::min(range.low_colour, colour), range.high_colour = glm::max(range.high_colour, colour);
+  }
+  for (int c = 0; c < 3; ++c)
+    range.low_colour[c] = stable_colour(range.low_colour[c]),
+    range.high_colour[c] = stable_colour(range.high_colour[c]);
+  return range;
+}
+
 }  // namespace
+
+std::vector<std::byte> encode_compressed_ply(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> order) {
+  const std::size_t n = order.size(), chunks = (n + chunk_rows - 1) / chunk_rows;
+  const std::size_t coefficients = scene::sh_coefficients(cloud.sh_degree), rest = 3 * (coefficients - 1);
+  std::string header = "ply\nformat binary_little_endian 1.0\nelement chunk " + std::to_string(chunks) + "\n";
+  for (const char* name : range_names) header += "property float " + std::string(name) + "\n";
+  header += "element vertex " + std::to_string(n) + "\n";
+  for (const char* name : word_names) header += "property uint " + std::string(name) + "\n";
+  if (rest > 0) header += "element sh " + std::to_string(n) + "\n";
+  for (std::size_t k = 0; k < rest; ++k) header += "property uchar f_rest_" + std::to_string(k) + "\n";
+  header += "end_header\n";
+
+  constexpr std::size_t chunk_bytes = range_names.size() * sizeof(float), word_bytes = word_names.size() * 4;
+  const std::size_t first_word = header.size() + chunks * chunk_bytes, first_sh = first_word + n * word_bytes;
+  std::vector<std::byte> bytes(first_sh + n * rest);
+  std::memcpy(bytes.data(), header.data(), header.size());
+  parallel_for(chunks, 16, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t chunk = begin; chunk < end; ++chunk) {
+      const std::size_t first = chunk * chunk_rows;
+      const auto rows = order.subspan(first, std::min(chunk_rows, n - first));
+      const Range range = range_of(cloud, rows);
+      std::size_t at = header.size() + chunk * chunk_bytes;
+      for (const Vec3& ends : {range.low_position, range.high_position, range.low_log_scale, range.high_log_scale,
+                               range.low_colour, range.high_colour})
+        for (int c = 0; c < 3; ++c, at += sizeof(float)) std::memcpy(bytes.data() + at, &ends[c], sizeof(float));
+      for (std::size_t k = 0; k < rows.size(); ++k) {
+        const std::uint32_t i = rows[k];
+        const auto sh = cloud.sh_row(i);
+        std::uint32_t colour = 0;
+        for (int c = 0; c < 3; ++c)
+          colour = colour << 8 | pack_unorm(double(colour_of(sh[std::size_t(c) * coefficients])),
+                                            double(range.low_colour[c]), double(range.high_colour[c]), 8);
+        const std::array<std::uint32_t, 4> words = {
+            pack_11_10_11(cloud.mean.get(i), range.low_position, range.high_position),
+            pack_rotation(cloud.rotation.get(i)),
+            pack_11_10_11(glm::clamp(cloud.log_scale.get(i), -most_log_scale, most_log_scale), range.low_log_scale,
+                          range.high_log_scale),
+            colour << 8 | byte_of_logit(cloud.opacity_logit[i])};
+        std::memcpy(bytes.data() + first_word + (first + k) * word_bytes, words.data(), word_bytes);
+        for (std::size_t j = 0; j < rest; ++j) {
+          const double value = double(sh[j / (coefficients - 1) * coefficients + j % (coefficients - 1) + 1]);
+          bytes[first_sh + (first + k) * rest + j] =
+              std::byte(std::uint8_t(std::clamp(std::trunc((value / 8 + 0.5) * 256), 0.0, 255.0)));
+        }
+      }
+    }
+  });
+  return bytes;
+}
 
 bool is_compressed_ply(const PlyHeader& header) {
   const PlyElement* vertex = header.find("vertex");

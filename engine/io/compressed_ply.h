@@ -2,6 +2,11 @@
 // Source: PlayCanvas, "Compressed PLY format", 2023-2024.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
 #include "engine/core/result.h"
 #include "engine/io/input_file.h"
 #include "engine/io/ply_header.h"
@@ -19,5 +24,12 @@ namespace engine::io {
 ///           unsupported: ASCII, big-endian; unprocessable; too_large
 [[nodiscard]] Result<scene::GaussianCloud> read_compressed_ply(const InputFile& file, const PlyHeader& header,
                                                                const ReadOptions& options);
+
+/// 16 bytes per Gaussian and one for each SH coefficient beyond DC, in chunks of 256. Rounded to 11, 10 and 11 bits of
+/// a chunk's range for position and log scale (within +-20), 10 bits for rotations, 8 for colours (of the chunk's
+/// range), opacity and SH (within +-4). A cloud that was read gives the same bytes again, if its order is kept.
+///   order  of the rows, all of them
+[[nodiscard]] std::vector<std::byte> encode_compressed_ply(const scene::GaussianCloud& cloud,
+                                                           std::span<const std::uint32_t> order);
 
 }  // namespace engine::io

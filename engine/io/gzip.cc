@@ -19,7 +19,10 @@ GzipReader::GzipReader(std::span<const std::byte> bytes) : bytes_(bytes) {
 
 GzipReader::~GzipReader() { inflateEnd(&stream_); }
 
-bool GzipReader::read(std::span<std::byte> into) {
+bool GzipReader::read(std::span<std::byte> into) { return read_some(into) == into.size(); }
+
+std::size_t GzipReader::read_some(std::span<std::byte> into) {
+  const std::size_t asked = into.size();
   while (ok_ && !ended_ && !into.empty()) {
     if (stream_.avail_in == 0) {
       const auto piece = bytes_.first(std::min(bytes_.size(), step));
@@ -35,7 +38,7 @@ bool GzipReader::read(std::span<std::byte> into) {
     ended_ = status == Z_STREAM_END;
     ok_ = ended_ || status == Z_OK;  // Z_BUF_ERROR: no input left
   }
-  return ok_ && into.empty();
+  return asked - into.size();
 }
 
 bool GzipReader::at_end() {

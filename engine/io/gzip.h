@@ -19,6 +19,8 @@ class GzipReader {
 
   /// Fills `into`; false if the stream is damaged or ends first.
   [[nodiscard]] bool read(std::span<std::byte> into);
+  /// Fills as much of `into` as the stream has left, and says how much that is.
+  [[nodiscard]] std::size_t read_some(std::span<std::byte> into);
   /// True if the stream ends here, its checksum is right and no byte follows it.
   [[nodiscard]] bool at_end();
 

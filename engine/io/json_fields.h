@@ -28,6 +28,9 @@ class JsonFields {
   [[nodiscard]] const std::string& where() const { return where_; }
   [[nodiscard]] bool has(const char* key) const { return value_->is_object() && value_->contains(key); }
 
+  [[nodiscard]] bool has_value(const char* key) const { return has(key) && !(*value_)[key].is_null(); }
+  [[nodiscard]] bool is_array() const { return value_->is_array(); }
+
   [[nodiscard]] JsonFields at(const char* key) const {
     if (!value_->is_object()) note("an object");
     JsonFields member(has(key) ? (*value_)[key] : nothing(), where_ + separator() + key, *error_);

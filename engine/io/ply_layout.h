@@ -10,6 +10,7 @@
 
 #include "engine/core/result.h"
 #include "engine/io/ply_header.h"
+#include "engine/io/scene_origin.h"
 #include "engine/scene/gaussian_cloud.h"
 
 namespace engine::io {
@@ -43,6 +44,7 @@ struct PlyLayout {
 struct SceneFile {
   scene::GaussianCloud cloud;
   PlyLayout layout;
+  SceneOrigin origin = {};
 };
 
 /// Number of the Gaussian property of that name.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "engine/core/vec.h"
 #include "engine/scene/opacity.h"
 #include "engine/scene/sh.h"
 
@@ -20,5 +21,23 @@ inline std::uint8_t nearest_byte(double value) { return std::uint8_t(std::clamp(
 inline float logit_of_byte(std::uint8_t u) { return float(scene::logit(std::clamp(double(u), 0.25, 254.75) / 255.0)); }
 
 inline std::uint8_t byte_of_logit(float logit) { return nearest_byte(255.0 / (1.0 + std::exp(-double(logit)))); }
+
+/// A packed rotation that gives itself again when it is unpacked and packed, so that a scene that was read and is
+/// written again has the same bytes. Where two components are nearly the largest, or none of the four is left out,
+/// rounding may make a neighbour of it; then the neighbour is taken, or the lower one of two that give each other.
+///   pack    bytes or a word of a rotation;  unpack: a rotation of them
+template <class Pack, class Unpack>
+auto stable_rotation(Quat rotation, Pack&& pack, Unpack&& unpack) {
+  constexpr int most_tries = 16;
+  auto packed = pack(rotation);
+  auto before = packed;
+  for (int tries = 0; tries < most_tries; ++tries) {
+    const auto again = pack(unpack(packed));
+    if (again == packed) return packed;
+    if (again == before) return std::min(again, packed);
+    before = packed, packed = again;
+  }
+  return packed;
+}
 
 }  // namespace engine::io

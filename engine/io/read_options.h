@@ -14,9 +14,10 @@ namespace engine::io {
 /// or not at all, where a reader has no use for them.
 using ReadWitness = std::function<void(std::uint64_t offset, std::span<const std::byte> bytes)>;
 
-/// The frame an .spz file is taken to be in; its header does not tell.
+/// The frame an .spz file is taken to be in.
 enum class SpzFrame {
-  rub,       ///< Right, up, back, as the format's own library writes; turned into right, down, forward as in a .ply.
+  declared,  ///< What an extension declares, else right, up, back, as the format's own library writes; turned into
+             ///< right, down, front as in a .ply.
   as_stored  ///< Numbers as they are, for tools that write .spz without converting.
 };
 
@@ -25,7 +26,8 @@ struct ReadOptions {
   std::uint64_t max_gaussians = 50'000'000;  ///< Larger files are refused (too_large).
   std::uint64_t max_memory_bytes = std::uint64_t(16)
                                    << 30;  ///< Size of the scene in memory; more is refused (too_large).
-  SpzFrame spz_frame = SpzFrame::rub;
+  SpzFrame spz_frame = SpzFrame::declared;
+  int level = 0;                   ///< Of detail, of a streamed SOG: 0 is the finest.
   ReadWitness witness = {};        ///< Of a scene's file: for a checksum that costs no reading of its own.
   MemoryBudget* memory = nullptr;  ///< Lends what unpacking takes beside the scene; null: nobody counts it.
 };

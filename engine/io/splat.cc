@@ -27,7 +27,7 @@ Record record_at(std::span<const std::byte> bytes, std::size_t i) {
   return record;
 }
 
-float log_scale_of(float sigma) { return std::max(std::log(sigma), -20.0f); }
+float log_scale_of(float sigma) { return std::max(float(std::log(double(sigma))), -20.0f); }
 
 Quat rotation_of(const std::array<std::uint8_t, 4>& bytes) {
   std::array<double, 4> q;
@@ -41,7 +41,7 @@ Quat rotation_of(const std::array<std::uint8_t, 4>& bytes) {
   return {float(q[0] / length), float(q[1] / length), float(q[2] / length), float(q[3] / length)};
 }
 
-std::array<std::uint8_t, 4> rotation_bytes(Quat rotation) {
+std::array<std::uint8_t, 4> rotation_bytes_once(Quat rotation) {
   const std::array<double, 4> q = {rotation.w, rotation.x, rotation.y, rotation.z};
   double square = 0;
   for (const double c : q) square += c * c;
@@ -49,6 +49,10 @@ std::array<std::uint8_t, 4> rotation_bytes(Quat rotation) {
   std::array<std::uint8_t, 4> bytes;
   for (std::size_t c = 0; c < 4; ++c) bytes[c] = nearest_byte(q[c] / std::sqrt(square) * 128.0 + 128.0);
   return bytes;
+}
+
+std::array<std::uint8_t, 4> rotation_bytes(Quat rotation) {
+  return stable_rotation(rotation, rotation_bytes_once, rotation_of);
 }
 
 bool believable(const Record& record) {

@@ -4,13 +4,19 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <new>
 #include <numbers>
+#include <numeric>
+#include <string_view>
 
 #include "engine/core/byte_reader.h"
+#include "engine/core/byte_writer.h"
 #include "engine/core/parallel.h"
+#include "engine/io/axes.h"
 #include "engine/io/checks.h"
 #include "engine/io/gzip.h"
 #include "engine/io/quantised.h"
@@ -25,11 +31,18 @@ constexpr std::size_t rows_per_task = 4096;  // of a parallel task: a choice
 constexpr std::size_t header_bytes = 16;
 constexpr std::size_t max_deflate_ratio = 1032;  // of deflate: 258 bytes for every 2 bits
 constexpr double colour_scale = 0.15;            // of this format; wider than sh_c0 to keep colours beyond 0..1
-constexpr std::uint8_t flag_extensions = 2;
+constexpr double farthest_fixed = 8388608;       // steps, of a position in 24 bits
+constexpr std::uint8_t flag_antialiased = 1, flag_extensions = 2;
+constexpr std::uint32_t v4_header_bytes = 32;
+constexpr std::uint32_t axes_extension = 0xADBE0003;     // SPZ_ADOBE_coordinate_system: 4 bytes, an index as below
+constexpr std::uint64_t max_extension_bytes = 1u << 20;  // of all records: a choice; those known take 12 and 20
+constexpr int zstd_level = 9;                            // a choice: beyond it, seconds buy a percent or two
+constexpr std::string_view usual_axes = "RUB";           // of a file that declares none
 
-/// SH coefficients that change sign when both y and z are negated: an odd power of exactly one of them.
-constexpr std::array<bool, 16> flips_sh = {false, true, true,  false, true, false, false, true,
-                                           false, true, false, true,  true, false, true,  false};
+/// What the axes extension counts; 0 is "unspecified". The format's library has had 9 to 16 in another order for some
+/// weeks before the extension was released; files hold this one.
+constexpr std::array<std::string_view, 17> axes_by_number = {
+    "", "LDB", "RDB", "LUB", "RUB", "LDF", "RDF", "LUF", "RUF", "LFD", "RFD", "LFU", "RFU", "LBD", "RBD", "LBU", "RBU"};
 
 struct Header {
   std::uint32_t version = 0;
@@ -115,19 +128,38 @@ Result<void> lend(const Header& header, const ReadOptions& options, const std::s
   return {};
 }
 
-/// Versions 1 to 3: header and attributes in one gzip stream.
+/// Records of a type, a length and that many bytes, one after the other. The axes go to origin.axes, all else is kept.
+Result<void> read_extensions(std::span<const std::byte> bytes, const std::string& where, SceneOrigin& origin) {
+  ByteReader in(bytes);
+  while (in.remaining() > 0) {
+    const auto type = in.read<std::uint32_t>(), size = in.read<std::uint32_t>();
+    const auto payload = in.take(size);
+    if (!in.ok()) return damaged("the last extension is longer than the room it has", where);
+    if (type != axes_extension) {
+      origin.spz_extensions.push_back({type, {payload.begin(), payload.end()}});
+      continue;
+    }
+    ByteReader value(payload);
+    const auto number = value.read<std::uint32_t>();
+    if (!value.ok() || value.remaining() > 0)
+      return damaged("the extension that declares the axes has 4 bytes, not " + std::to_string(size), where);
+    if (number >= axes_by_number.size())
+      return fail(ErrorCode::unsupported,
+                  "the file declares its axes as number " + std::to_string(number) + "; 0 to 16 are known", where);
+    origin.axes_declared = number != 0;
+    origin.axes = number == 0 ? usual_axes : axes_by_number[number];
+  }
+  return {};
+}
+
+/// Versions 1 to 3: header, attributes and, with a flag, extensions in one gzip stream.
 Result<Header> unpack_gzip(std::span<const std::byte> bytes, const std::string& file, const ReadOptions& options,
-                           Attributes& attributes) {
+                           Attributes& attributes, SceneOrigin& origin) {
   GzipReader in(bytes);
   std::array<std::byte, header_bytes> start;
   if (!in.read(start)) return damaged("no .spz header could be unpacked", file + ":header");
   auto header = parse_header(start, 1, 3, file + ":header");
   if (!header) return header;
-  if (header->flags & flag_extensions)
-    return fail(ErrorCode::unsupported,
-                "the file holds extensions, which have no fixed place before .spz version 4: export as version 4, or "
-                "without extensions",
-                file + ":header");
   if (auto checked = check_limits(*header, options, file); !checked) return propagate(checked);
   if (const auto needed = header->count * packed_row_bytes(*header); needed / max_deflate_ratio > bytes.size())
     return damaged("the header announces " + std::to_string(header->count) + " Gaussians, more than " +
@@ -142,22 +174,41 @@ Result<Header> unpack_gzip(std::span<const std::byte> bytes, const std::string& 
           std::string(row.name) + " of " + std::to_string(header->count) + " Gaussians could not be unpacked",
           file + ":" + row.name);
   }
+  if (header->flags & flag_extensions) {
+    Bytes records(max_extension_bytes + 1);
+    records.resize(in.read_some(records));
+    if (records.size() > max_extension_bytes)
+      return fail(ErrorCode::too_large,
+                  "extensions of more than " + std::to_string(max_extension_bytes) + " bytes follow the last Gaussian",
+                  file + ":extensions");
+    if (auto read = read_extensions(records, file + ":extensions", origin); !read) return propagate(read);
+  }
   if (!in.at_end()) return damaged("the file does not end after the last Gaussian", file);
   return header;
 }
 
 /// Version 4: a plain header, a table of sizes, one zstd stream per attribute that is not empty.
 Result<Header> unpack_zstd(std::span<const std::byte> bytes, const std::string& file, const ReadOptions& options,
-                           Attributes& attributes) {
+                           Attributes& attributes, SceneOrigin& origin) {
   const std::string where = file + ":header";
   ByteReader in(bytes);
   auto header = parse_header(in.take(std::min(header_bytes, bytes.size())), 4, 4, where);
   if (!header) return header;
   if (auto checked = check_limits(*header, options, file); !checked) return propagate(checked);
   const auto toc_offset = in.read<std::uint32_t>();
-  constexpr std::uint32_t v4_header_bytes = 32;
   if (!in.ok() || toc_offset < v4_header_bytes || toc_offset > bytes.size())
     return damaged("the table of contents lies outside the file", where);
+  if (const auto zone = bytes.subspan(v4_header_bytes, toc_offset - v4_header_bytes); header->flags & flag_extensions) {
+    if (zone.size() > max_extension_bytes)
+      return fail(ErrorCode::too_large,
+                  "the extensions take " + std::to_string(zone.size()) + " bytes; the limit is " +
+                      std::to_string(max_extension_bytes),
+                  file + ":extensions");
+    if (auto read = read_extensions(zone, file + ":extensions", origin); !read) return propagate(read);
+  } else if (!zone.empty()) {
+    origin.left_out.push_back(std::to_string(zone.size()) +
+                              " bytes before the table of contents, which the header does not call extensions");
+  }
   std::vector<AttributeRow> present;
   for (const auto& row : attribute_rows(*header))
     if (row.size > 0) present.push_back(row);
@@ -194,6 +245,12 @@ Result<Header> unpack_zstd(std::span<const std::byte> bytes, const std::string& 
 }
 
 std::uint32_t byte_at(const Bytes& bytes, std::size_t i) { return std::to_integer<std::uint32_t>(bytes[i]); }
+
+std::uint32_t word_at(const Bytes& bytes, std::size_t i) {
+  std::uint32_t word;
+  std::memcpy(&word, bytes.data() + 4 * i, sizeof word);
+  return word;
+}
 
 float half_to_float(std::uint32_t half) {
   const int exponent = int(half >> 10 & 31u);
@@ -233,9 +290,7 @@ Quat rotation_first_three(const Bytes& bytes, std::size_t i) {
 }
 
 /// Versions 3 and 4: the three smallest of (x, y, z, w) in 10 bits each, the largest from the unit length.
-Quat rotation_smallest_three(const Bytes& bytes, std::size_t i) {
-  std::uint32_t word;
-  std::memcpy(&word, bytes.data() + 4 * i, sizeof word);
+Quat rotation_smallest_three(std::uint32_t word) {
   const std::size_t largest = word >> 30;
   std::array<double, 4> q{};
   double square = 0;
@@ -249,7 +304,7 @@ Quat rotation_smallest_three(const Bytes& bytes, std::size_t i) {
   return {float(q[3]), float(q[0]), float(q[1]), float(q[2])};
 }
 
-std::uint32_t packed_rotation(Quat rotation) {
+std::uint32_t packed_rotation_once(Quat rotation) {
   std::array<double, 4> q = {rotation.x, rotation.y, rotation.z, rotation.w};
   double square = 0;
   for (const double c : q) square += c * c;
@@ -268,14 +323,70 @@ std::uint32_t packed_rotation(Quat rotation) {
   return word;
 }
 
-/// RUB <-> RDF, one row; its own inverse.
-void flip_row(scene::GaussianCloud& cloud, std::size_t i) {
-  cloud.mean.y[i] = -cloud.mean.y[i], cloud.mean.z[i] = -cloud.mean.z[i];
-  cloud.rotation.y[i] = -cloud.rotation.y[i], cloud.rotation.z[i] = -cloud.rotation.z[i];
+std::uint32_t packed_rotation(Quat rotation) {
+  return stable_rotation(rotation, packed_rotation_once, rotation_smallest_three);
+}
+
+/// One row of a cloud that is in the file's frame, as row `at` of the file.
+void pack_row(const scene::GaussianCloud& cloud, std::size_t i, const Header& header, Attributes& out, std::size_t at) {
   const std::size_t coefficients = scene::sh_coefficients(cloud.sh_degree);
-  for (std::size_t c = 0; c < 3; ++c)
+  const Vec3 mean = cloud.mean.get(i), log_scale = cloud.log_scale.get(i);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double steps = std::round(std::ldexp(double(mean[int(axis)]), header.fractional_bits));
+    // 24 bits reach one step farther down than up; a turn may put what came from there at the other end.
+    const auto fixed = std::uint32_t(std::int32_t(std::clamp(steps, -farthest_fixed, farthest_fixed - 1)));
+    for (std::size_t b = 0; b < 3; ++b) out.positions[9 * at + 3 * axis + b] = std::byte(fixed >> 8 * b & 255u);
+    out.scales[3 * at + axis] = std::byte(nearest_byte((double(log_scale[int(axis)]) + 10.0) * 16.0));
+  }
+  out.alphas[at] = std::byte(byte_of_logit(cloud.opacity_logit[i]));
+  const std::uint32_t rotation = packed_rotation(cloud.rotation.get(i));
+  std::memcpy(out.rotations.data() + 4 * at, &rotation, sizeof rotation);
+  const auto sh = cloud.sh_row(i);
+  for (std::size_t c = 0; c < 3; ++c) {
+    out.colors[3 * at + c] = std::byte(nearest_byte((double(sh[c * coefficients]) * colour_scale + 0.5) * 255.0));
+    // All 8 bits of each coefficient: Niantic's writer keeps 4 or 5 to pack better, which costs quality.
     for (std::size_t k = 1; k < coefficients; ++k)
-      if (flips_sh[k]) cloud.sh_row(i)[c * coefficients + k] = -cloud.sh_row(i)[c * coefficients + k];
+      out.sh[(at * (coefficients - 1) + k - 1) * 3 + c] =
+          std::byte(nearest_byte(double(sh[c * coefficients + k]) * 128.0 + 128.0));
+  }
+}
+
+void write_header(ByteWriter& out, const Header& header) {
+  out.write(magic), out.write(header.version), out.write(header.count);
+  out.write(std::uint8_t(header.sh_degree)), out.write(std::uint8_t(header.fractional_bits));
+  out.write(header.flags), out.write(header.streams);
+}
+
+Bytes pack_gzip(const Header& header, const Attributes& attributes, std::span<const std::byte> extensions) {
+  ByteWriter out;
+  write_header(out, header);
+  for (const auto& row : attribute_rows(header)) out.write_all(std::span(attributes.*row.bytes));
+  out.write_all(extensions);
+  return gzip(out.bytes());
+}
+
+Bytes pack_zstd(Header header, const Attributes& attributes, std::span<const std::byte> extensions) {
+  std::vector<Bytes> streams;
+  ByteWriter table;
+  for (const auto& row : attribute_rows(header)) {
+    const Bytes& bytes = attributes.*row.bytes;
+    if (bytes.empty()) continue;
+    Bytes& packed = streams.emplace_back(ZSTD_compressBound(bytes.size()));
+    const std::size_t size = ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), zstd_level);
+    if (ZSTD_isError(size)) throw std::bad_alloc();  // all that can go wrong where there is room for the worst case
+    packed.resize(size);
+    table.write(std::uint64_t(packed.size())), table.write(std::uint64_t(bytes.size()));
+  }
+  header.streams = std::uint8_t(streams.size());
+  ByteWriter out;
+  write_header(out, header);
+  out.write(std::uint32_t(v4_header_bytes + extensions.size()));
+  for (int reserved = 0; reserved < 3; ++reserved) out.write(std::uint32_t{0});
+  out.write_all(extensions);
+  out.write_all(table.bytes());
+  for (const Bytes& stream : streams) out.write_all(std::span(stream));
+  const auto bytes = out.bytes();
+  return {bytes.begin(), bytes.end()};
 }
 
 /// Fractional bits with which every mean fits 24 bits: 12 as everybody writes, fewer for scenes beyond +-2048.
@@ -284,10 +395,10 @@ Result<int> fractional_bits_for(const scene::GaussianCloud& cloud, const std::st
   for (const auto* axis : {&cloud.mean.x, &cloud.mean.y, &cloud.mean.z})
     for (const float x : *axis) farthest = std::max(farthest, std::abs(double(x)));
   for (int bits = 12; bits >= 0; --bits)
-    if (std::round(std::ldexp(farthest, bits)) <= 8388607.0) return bits;
+    if (std::round(std::ldexp(farthest, bits)) <= farthest_fixed) return bits;
   return fail(ErrorCode::unprocessable,
               "a Gaussian lies " + std::to_string(farthest) +
-                  " units from the origin; .spz reaches 8388607: write a .ply, or move the scene to the origin",
+                  " units from the origin; .spz reaches 8388608: write a .ply, or move the scene to the origin",
               file);
 }
 
@@ -312,13 +423,31 @@ std::uint64_t expected_spz_bytes(std::span<const std::byte> start, std::uint64_t
   return std::max(file_bytes, header->count * cloud_row_bytes(header->sh_degree));
 }
 
-Result<scene::GaussianCloud> decode_spz(std::span<const std::byte> bytes, const std::string& file,
-                                        const ReadOptions& options) {
-  Attributes in;
+Result<SpzCount> read_spz_header(std::span<const std::byte> bytes, const std::string& file) {
+  std::array<std::byte, header_bytes> unpacked{};
   const bool plain = !bytes.empty() && bytes[0] == std::byte{'N'};
-  const auto header = plain ? unpack_zstd(bytes, file, options, in) : unpack_gzip(bytes, file, options, in);
+  if (!plain && !GzipReader(bytes).read(unpacked)) return damaged("no .spz header could be unpacked", file);
+  const auto header = parse_header(plain ? bytes.first(std::min(bytes.size(), header_bytes)) : unpacked, 1, 4, file);
   if (!header) return propagate(header);
-  scene::GaussianCloud cloud;
+  return SpzCount{header->count, header->sh_degree};
+}
+
+Result<DecodedScene> decode_spz(std::span<const std::byte> bytes, const std::string& file, const ReadOptions& options) {
+  Attributes in;
+  DecodedScene scene;
+  SceneOrigin& origin = scene.origin;
+  origin.format = SceneFormat::spz;
+  origin.axes = usual_axes;
+  const bool plain = !bytes.empty() && bytes[0] == std::byte{'N'};
+  const auto header =
+      plain ? unpack_zstd(bytes, file, options, in, origin) : unpack_gzip(bytes, file, options, in, origin);
+  if (!header) return propagate(header);
+  origin.version = int(header->version);
+  origin.packing = plain ? "zstd" : "gzip";
+  origin.antialiased = (header->flags & flag_antialiased) != 0;
+  if (options.spz_frame == SpzFrame::as_stored) origin.axes = "RDF", origin.axes_declared = false;
+  const Turn to_rdf(rdf_from(origin.axes));
+  scene::GaussianCloud& cloud = scene.cloud;
   cloud.sh_degree = header->sh_degree;
   cloud.resize(header->count);
   const std::size_t coefficients = scene::sh_coefficients(cloud.sh_degree);
@@ -328,8 +457,8 @@ Result<scene::GaussianCloud> decode_spz(std::span<const std::byte> bytes, const 
       cloud.opacity_logit[i] = logit_of_byte(std::to_integer<std::uint8_t>(in.alphas[i]));
       const auto log_scale = [&](std::size_t axis) { return float(byte_at(in.scales, 3 * i + axis)) / 16.0f - 10.0f; };
       cloud.log_scale.set(i, {log_scale(0), log_scale(1), log_scale(2)});
-      cloud.rotation.set(
-          i, header->version <= 2 ? rotation_first_three(in.rotations, i) : rotation_smallest_three(in.rotations, i));
+      cloud.rotation.set(i, header->version <= 2 ? rotation_first_three(in.rotations, i)
+                                                 : rotation_smallest_three(word_at(in.rotations, i)));
       const auto sh = cloud.sh_row(i);
       for (std::size_t c = 0; c < 3; ++c) {
         sh[c * coefficients] = float((byte_at(in.colors, 3 * i + c) / 255.0 - 0.5) / colour_scale);
@@ -337,53 +466,53 @@ Result<scene::GaussianCloud> decode_spz(std::span<const std::byte> bytes, const 
           sh[c * coefficients + k] =
               (float(byte_at(in.sh, (i * (coefficients - 1) + k - 1) * 3 + c)) - 128.0f) / 128.0f;
       }
-      if (options.spz_frame == SpzFrame::rub) flip_row(cloud, i);
+      to_rdf.apply(cloud, i);
     }
   });
   if (auto finite = check_finite(cloud, file); !finite) return propagate(finite);
-  return cloud;
+  return scene;
 }
 
-Result<Bytes> encode_spz(const scene::GaussianCloud& cloud, const std::string& file) {
+Result<Bytes> encode_spz(const scene::GaussianCloud& cloud, const std::string& file, const SpzOptions& options) {
+  assert(options.version == 3 || options.version == 4);
+  const auto number = std::ranges::find(axes_by_number, std::string_view(options.axes)) - axes_by_number.begin();
+  if (std::size_t(number) >= axes_by_number.size() || number == 0)
+    return fail(ErrorCode::invalid_argument, "axes '" + options.axes + "' cannot be declared in an .spz file", file);
   const auto bits = fractional_bits_for(cloud, file);
   if (!bits) return propagate(bits);
   Header header;
-  header.version = 3;
+  header.version = std::uint32_t(options.version);
   header.count = std::uint32_t(cloud.size());
   header.sh_degree = cloud.sh_degree;
   header.fractional_bits = *bits;
-  Bytes bytes;
-  bytes.reserve(header_bytes + cloud.size() * packed_row_bytes(header));
-  const auto put = [&](std::uint32_t value, std::size_t size) {
-    for (std::size_t b = 0; b < size; ++b) bytes.push_back(std::byte(value >> 8 * b & 255u));
-  };
-  put(magic, 4), put(header.version, 4), put(header.count, 4);
-  put(std::uint32_t(header.sh_degree), 1), put(std::uint32_t(header.fractional_bits), 1), put(0, 2);
+  // Version 4 always says what its axes are. Older readers take older versions for RUB, and need not be told that.
+  const bool declares = options.version == 4 || options.axes != usual_axes;
+  header.flags = std::uint8_t((options.antialiased ? flag_antialiased : 0) |
+                              (declares || !options.extensions.empty() ? flag_extensions : 0));
 
-  const std::size_t n = cloud.size(), coefficients = scene::sh_coefficients(cloud.sh_degree);
-  for (std::size_t i = 0; i < n; ++i)
-    for (int axis = 0; axis < 3; ++axis) {
-      const double x = axis == 0 ? cloud.mean.get(i)[axis] : -cloud.mean.get(i)[axis];  // RDF -> RUB
-      put(std::uint32_t(std::int32_t(std::lround(std::ldexp(x, header.fractional_bits)))), 3);
+  Attributes out;
+  for (const auto& row : attribute_rows(header)) (out.*row.bytes).resize(cloud.size() * row.size);
+  const Turn from_rdf(glm::transpose(rdf_from(options.axes)));
+  parallel_for(cloud.size(), rows_per_task, [&](std::size_t begin, std::size_t end) {
+    std::vector<std::uint32_t> rows(end - begin);
+    std::iota(rows.begin(), rows.end(), std::uint32_t(begin));
+    scene::GaussianCloud turned = scene::gather(cloud, rows);
+    for (std::size_t i = 0; i < turned.size(); ++i) {
+      from_rdf.apply(turned, i);
+      pack_row(turned, i, header, out, begin + i);
     }
-  for (const float logit : cloud.opacity_logit) put(byte_of_logit(logit), 1);
-  for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t c = 0; c < 3; ++c)
-      put(nearest_byte((double(cloud.sh_row(i)[c * coefficients]) * colour_scale + 0.5) * 255.0), 1);
-  for (std::size_t i = 0; i < n; ++i)
-    for (int axis = 0; axis < 3; ++axis) put(nearest_byte((double(cloud.log_scale.get(i)[axis]) + 10.0) * 16.0), 1);
-  for (std::size_t i = 0; i < n; ++i) {
-    const Quat q = cloud.rotation.get(i);
-    put(packed_rotation({q.w, q.x, -q.y, -q.z}), 4);
+  });
+
+  ByteWriter extensions;
+  const auto write_extension = [&](std::uint32_t type, std::span<const std::byte> payload) {
+    extensions.write(type), extensions.write(std::uint32_t(payload.size())), extensions.write_all(payload);
+  };
+  if (declares) {
+    const auto value = std::uint32_t(number);
+    write_extension(axes_extension, std::as_bytes(std::span(&value, 1)));
   }
-  // All 8 bits of each coefficient: Niantic's writer keeps 4 or 5 to pack better, which costs quality.
-  for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t k = 1; k < coefficients; ++k)
-      for (std::size_t c = 0; c < 3; ++c) {
-        const double value = cloud.sh_row(i)[c * coefficients + k];
-        put(nearest_byte((flips_sh[k] ? -value : value) * 128.0 + 128.0), 1);
-      }
-  return gzip(bytes);
+  for (const SpzExtension& extension : options.extensions) write_extension(extension.type, extension.payload);
+  return options.version == 4 ? pack_zstd(header, out, extensions.bytes()) : pack_gzip(header, out, extensions.bytes());
 }
 
 }  // namespace engine::io

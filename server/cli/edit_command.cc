@@ -206,7 +206,9 @@ Result<void> run(const EditOptions& options, Terminal& terminal) {
 void add_edit_command(CLI::App& program, Action& action) {
   CLI::App* const command = program.add_subcommand("edit", "Drags parts of a scene and writes the edited scene");
   const auto options = std::make_shared<EditOptions>();
-  command->add_option("--scene", options->scene, "Scene to edit: .ply, .splat or .spz")->required()->type_name("FILE");
+  command->add_option("--scene", options->scene, "Scene to edit: .ply, .splat, .spz, .sog or .glb")
+      ->required()
+      ->type_name("FILE");
   command
       ->add_option("--dataset", options->dataset,
                    "Folder with the scene's cameras (COLMAP, transforms.json or an INRIA model); without it, cameras "

@@ -190,7 +190,7 @@ Result<void> run(const RenderOptions& options, Terminal& terminal) {
 void add_render_command(CLI::App& program, Action& action) {
   CLI::App* const command = program.add_subcommand("render", "Renders pictures of a scene");
   const auto options = std::make_shared<RenderOptions>();
-  command->add_option("--scene", options->scene, "Scene to render: .ply, .splat or .spz")
+  command->add_option("--scene", options->scene, "Scene to render: .ply, .splat, .spz, .sog or .glb")
       ->required()
       ->type_name("FILE");
   command

@@ -138,7 +138,7 @@ void add_select_command(CLI::App& program, Action& action) {
   CLI::App* const command =
       program.add_subcommand("select", "Says which Gaussians of a scene a selection means, and shows them");
   const auto options = std::make_shared<SelectOptions>();
-  command->add_option("--scene,scene", options->scene, "Scene to select in: .ply, .splat or .spz")
+  command->add_option("--scene,scene", options->scene, "Scene to select in: .ply, .splat, .spz, .sog or .glb")
       ->required()
       ->type_name("FILE");
   command

@@ -36,8 +36,8 @@ proto::ServiceInfo service_info(const ServeOptions& options) {
   info.correctors = {
       {"none", true, ""}, {"scene", true, ""}, {"sd", false, "this version cannot load a diffusion model yet"}};
   info.perceptual = {{"msssim", true, ""}, {"lpips", false, "this version has no network to compare pictures with"}};
-  info.read_formats = {"ply", "compressed_ply", "splat", "spz"};
-  info.write_formats = {"ply", "splat", "spz"};
+  for (const auto& format : engine::names<engine::io::SceneFormat>) info.read_formats.emplace_back(format.text);
+  info.write_formats = info.read_formats;
   info.picture_formats = {"png", "jpeg", "exr"};
   for (const auto& preset : engine::names<proto::Preset>) info.presets.emplace_back(preset.text);
   info.limits = {.upload_bytes = options.http.dispatcher.max_upload_bytes,

@@ -36,7 +36,8 @@ const std::vector<Reserved>& reserved() {
       {"toml++/", {"server/cli"}},
       {"spdlog/", {"server/cli", "server/http", "server/edits", "server/service"}},
       {"prometheus/", {"server/http"}, false},
-      {"zip.h", {"server/scenes/uploads"}, false},
+      {"zip.h", {"engine/io", "server/scenes/uploads"}, false},
+      {"webp/", {"engine/io"}, false},
       {"xxh", {"server/scenes/disk"}, false}};
   return list;
 }

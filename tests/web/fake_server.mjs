@@ -466,8 +466,8 @@ export function start({ port = 0, token = null, slow = 0, empty = false, tick = 
           { name: "sd", available: false, reason: "this version cannot load a diffusion model yet" },
         ],
         formats: {
-          read: ["ply", "compressed_ply", "splat", "spz"],
-          write: ["ply", "splat", "spz"],
+          read: ["ply", "compressed_ply", "splat", "spz", "sog", "glb"],
+          write: ["ply", "compressed_ply", "splat", "spz", "sog", "glb"],
           pictures: ["png", "jpeg", "exr"],
         },
         presets: ["preview", "draft", "standard", "paper"],
@@ -491,7 +491,7 @@ export function start({ port = 0, token = null, slow = 0, empty = false, tick = 
       /^\/v1\/scenes$/,
       ({ json, query, body, reply }) => {
         if (json) {
-          if (!/\.(ply|spz|splat)$/.test(json.path))
+          if (!/\.(ply|spz|splat|sog|glb)$/.test(json.path))
             fail(404, "not_found", `there is no file "${json.path}" in the scene folder`, "path");
           return reply(201, sceneJson(addScene(json.name ?? json.path)));
         }

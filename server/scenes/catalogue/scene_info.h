@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "engine/core/vec.h"
+#include "engine/io/scene_origin.h"
 #include "engine/scene/overlay.h"
 
 namespace server::scenes {
@@ -43,7 +44,7 @@ struct SceneInfo {
   std::string id;  ///< "s000001": counts up, never used twice.
   std::string name;
   Time created{};
-  std::string format;  ///< "ply", "splat", "spz", "compressed_ply"
+  std::string format;  ///< Name of an io::SceneFormat: "ply", "compressed_ply", "splat", "spz", "sog", "glb"
   int sh_degree = 0;
   engine::DVec3 low{0.0}, high{0.0};  ///< Box of the means, world units.
   engine::DVec3 centre{0.0};          ///< Median of the means.
@@ -68,7 +69,7 @@ struct Preview {
   Time expires{};
 };
 
-enum class FileFormat { ply, splat, spz };
+using FileFormat = engine::io::SceneFormat;
 
 /// A version as a file for download.
 struct VersionFile {

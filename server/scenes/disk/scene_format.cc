@@ -7,9 +7,12 @@
 
 #include "engine/io/checks.h"
 #include "engine/io/compressed_ply.h"
+#include "engine/io/glb.h"
 #include "engine/io/input_file.h"
+#include "engine/io/sog.h"
 #include "engine/io/splat.h"
 #include "engine/io/spz.h"
+#include "engine/io/zip_archive.h"
 #include "engine/scene/overlay.h"
 
 namespace server::scenes {
@@ -44,7 +47,7 @@ std::uint64_t expected_of_ply(const io::InputFile& file) {
 
 }  // namespace
 
-std::uint64_t expected_memory_bytes(const std::filesystem::path& path) {
+std::uint64_t expected_memory_bytes(const std::filesystem::path& path, engine::MemoryBudget* work) {
   const auto file = io::InputFile::open(path);
   if (!file) return 0;
   const auto start = file->read_at(0, std::min<std::uint64_t>(file->size(), 64));
@@ -54,21 +57,14 @@ std::uint64_t expected_memory_bytes(const std::filesystem::path& path) {
     const auto more = file->read_at(0, std::min<std::uint64_t>(file->size(), 4096));
     return more ? io::expected_spz_bytes(*more, file->size()) + column_bytes(io::inria_layout(3)) : 0;
   }
+  if (const bool glb = io::looks_like_glb(*start); glb || io::looks_like_zip(*start)) {
+    const auto lent = engine::take_from(work, file->size(), file->name());
+    const auto whole = lent ? file->read_at(0, file->size()) : propagate(lent);
+    if (!whole) return 0;
+    return (glb ? io::expected_glb_bytes(*whole) : io::expected_sog_bytes(*whole)) + column_bytes(io::inria_layout(3));
+  }
   return file->size() / io::splat_record_bytes * io::cloud_row_bytes(0) + file->size() +
          column_bytes(io::inria_layout(0));
-}
-
-Result<SceneFormat> detect_format(const std::filesystem::path& path) {
-  const auto file = io::InputFile::open(path);
-  if (!file) return propagate(file);
-  const auto start = file->read_at(0, std::min<std::uint64_t>(file->size(), 64));
-  if (!start) return propagate(start);
-  if (is_ply(*start)) {
-    const auto header = io::read_ply_header(*file);
-    if (!header) return propagate(header);
-    return io::is_compressed_ply(*header) ? SceneFormat{"compressed_ply", "ply"} : SceneFormat{"ply", "ply"};
-  }
-  return io::looks_like_spz(*start) ? SceneFormat{"spz", "spz"} : SceneFormat{"splat", "splat"};
 }
 
 std::uint64_t memory_bytes(const io::SceneFile& file) {

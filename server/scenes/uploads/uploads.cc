@@ -24,7 +24,7 @@ Result<Uploads::Upload> Uploads::read(const fs::path& file) {
     if (error.code == engine::ErrorCode::too_large) error.where = file.filename().string();
     return tl::make_unexpected(std::move(error));
   };
-  const std::uint64_t expected = expected_memory_bytes(file);
+  const std::uint64_t expected = expected_memory_bytes(file, options_.read.memory);
   auto reservation = std::make_optional(memory_.reserve(expected));
   if (!*reservation) return no_room(reservation->error());
   // One at a time: a reader takes more than what is left of it, and the file is in memory, too.
@@ -45,13 +45,13 @@ Result<ManifestPtr> Uploads::add_staged(const fs::path& file, const fs::path& st
   if (!called) return propagate(called);
   auto upload = read(file);
   if (!upload) return propagate(upload);
-  const auto format = detect_format(file);
+  const auto format = io::detect_format(file);
   if (!format) return public_error_(format, file.parent_path());
   const auto& cloud = upload->file->cloud;
 
   Manifest manifest;
   manifest.nonce = random_nonce();
-  manifest.base = std::string("base.") + format->extension;
+  manifest.base = std::string("base.") + io::extension_of(*format);
   manifest.base_disk_bytes = bytes_below(file);
   manifest.base_memory_bytes = memory_bytes(*upload->file);
   manifest.overlay_memory_bytes = {0};
@@ -63,7 +63,7 @@ Result<ManifestPtr> Uploads::add_staged(const fs::path& file, const fs::path& st
   const SceneStatistics measured = statistics(cloud);
   scene.name = *called;
   scene.created = options_.clock();
-  scene.format = format->name;
+  scene.format = engine::name_of(*format);
   scene.sh_degree = cloud.sh_degree;
   scene.low = measured.low, scene.high = measured.high;
   scene.centre = measured.centre, scene.radius = measured.radius;

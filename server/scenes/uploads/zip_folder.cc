@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "engine/core/file_descriptor.h"
+#include "engine/io/zip_directory.h"
 #include "server/scenes/disk/disk.h"
-#include "server/scenes/uploads/zip_directory.h"
 
 namespace server::scenes {
 namespace {
@@ -88,7 +88,7 @@ tl::unexpected<engine::Error> too_many(const std::string& name, const std::strin
 
 /// libzip loads the directory whole, some 300 bytes of memory for each entry: how large it is is asked before.
 Result<void> check_directory(const fs::path& zip, const std::string& name, const ZipLimits& limits) {
-  const auto directory = largest_directory(zip);
+  const auto directory = engine::io::largest_directory(zip);
   if (!directory) return propagate(directory);
   if (directory->entries > limits.max_files)
     return too_many(name, std::to_string(directory->entries) + " entries", limits.max_files);

@@ -3,6 +3,7 @@
 #include <memory>
 #include <utility>
 
+#include "engine/io/checks.h"
 #include "engine/io/scene_file.h"
 #include "server/scenes/disk/disk.h"
 
@@ -13,7 +14,8 @@ namespace fs = std::filesystem;
 namespace io = engine::io;
 using engine::propagate;
 
-constexpr std::uint64_t max_packed_row_bytes = 64;  ///< Of a Gaussian in a .splat or .spz file, at most.
+/// Of a Gaussian in a file that is no .ply, at most: a .glb file has floats and four bytes of a colour, others less.
+std::uint64_t max_row_bytes(int sh_degree) { return io::cloud_row_bytes(sh_degree) + 4; }
 
 /// A file in a scene's folder that goes when nobody holds it.
 struct HeldFile {
@@ -26,23 +28,14 @@ struct HeldFile {
   std::string digest;
 };
 
-const char* extension_of(FileFormat format) {
-  return format == FileFormat::ply ? "ply" : format == FileFormat::splat ? "splat" : "spz";
-}
-io::SceneFormat to_io(FileFormat format) {
-  return format == FileFormat::ply     ? io::SceneFormat::ply
-         : format == FileFormat::splat ? io::SceneFormat::splat
-                                       : io::SceneFormat::spz;
-}
-
 }  // namespace
 
 Result<VersionFile> VersionFiles::get(const Snapshot& at, const std::string& version, FileFormat format) {
   const Manifest& manifest = *at.manifest;
-  const std::string extension = extension_of(format);
+  const std::string extension = io::extension_of(format);
   const std::string suffix = version == "0" ? "" : (is_preview(version) ? "-" : "-v") + version;
   const std::string download_name = manifest.scene.name + suffix + "." + extension;
-  if (version == "0" && manifest.scene.format == extension) {
+  if (version == "0" && manifest.scene.format == engine::name_of(format)) {
     if (auto sound = sound_files_.check(at.scene->folder->path() / manifest.base, manifest.base_digest,
                                         stored_name(at, manifest.base));
         !sound)
@@ -61,7 +54,7 @@ Result<VersionFile> VersionFiles::written(const Snapshot& at, const std::string&
   const auto base = versions_.base(at);  // in memory, since `loaded` holds its cloud
   if (!base) return propagate(base);
   const io::PlyLayout& layout = (*base)->layout;
-  const std::string extension = extension_of(format);
+  const std::string extension = io::extension_of(format);
   const auto write = [&]() -> Result<BoundedCache::CachedObject> {
     const fs::path folder = at.scene->folder->path() / "files";
     if (auto status = make_folder(folder); !status) return public_error_(status);
@@ -71,15 +64,15 @@ Result<VersionFile> VersionFiles::written(const Snapshot& at, const std::string&
                                      (loaded->cloud.overlay ? engine::scene::memory_bytes(*loaded->cloud.overlay) : 0);
     const auto reservation = memory_.reserve(flat_bytes);
     if (!reservation) return propagate(reservation);
-    const io::SceneFile file{engine::scene::flatten(loaded->cloud), layout};
-    if (auto saved = io::write_scene(path, file, to_io(format)); !saved) return public_error_(saved);
+    const io::SceneFile file{engine::scene::flatten(loaded->cloud), layout, (*base)->origin};
+    if (auto saved = io::write_scene(path, file, format); !saved) return public_error_(saved);
     auto digest = digest_of_file(path);
     if (!digest) return public_error_(digest);
     return BoundedCache::CachedObject{std::make_shared<const HeldFile>(at.scene->folder, path, std::move(*digest)),
                                       bytes_below(path)};
   };
   const std::string name = at.scene->id + "/" + version + "." + extension;
-  const std::uint64_t row_bytes = format == FileFormat::ply ? layout.vertex().stride : max_packed_row_bytes;
+  const std::uint64_t row_bytes = format == FileFormat::ply ? layout.vertex().stride : max_row_bytes(layout.sh_degree);
   auto held = files_.get<HeldFile>(name, loaded->cloud.size() * row_bytes, write);
   if (held && !sound_files_.check((*held)->file.path(), (*held)->digest, name)) {  // it can be made again
     files_.forget(name);

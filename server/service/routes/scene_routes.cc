@@ -180,13 +180,17 @@ Result<Reply> get_views(const Call& call, SceneViews& views) {
   return Reply::json(proto::to_json(out, (*set)->is_virtual ? "virtual" : "dataset"));
 }
 
-Result<FileFormat> file_format(const Call& call) {
+/// The format asked for; "original" is that of the file the scene came in.
+Result<FileFormat> file_format(const Call& call, SceneStore& store) {
   const std::string format = call.query("format").value_or("ply");
-  constexpr std::array<std::pair<const char*, FileFormat>, 3> formats{
-      std::pair{"ply", FileFormat::ply}, {"splat", FileFormat::splat}, {"spz", FileFormat::spz}};
-  for (const auto& [name, value] : formats)
-    if (format == name) return value;
-  return fail(ErrorCode::invalid_argument, "expected one of ply, splat, spz", "format");
+  if (format == "original") {
+    const auto scene = store.find(call.path("id"));
+    if (!scene) return propagate(scene);
+    return engine::value_named<FileFormat>(scene->format).value_or(FileFormat::ply);
+  }
+  if (const auto found = engine::value_named<FileFormat>(format)) return *found;
+  return fail(ErrorCode::invalid_argument, "expected one of ply, compressed_ply, splat, spz, sog, glb, original",
+              "format");
 }
 
 /// As RFC 6266 wants it: a name in ASCII for all, and the true one for those who understand it.
@@ -204,7 +208,7 @@ std::string attachment(const std::string& name) {
 }
 
 Result<Reply> get_file(const Call& call, SceneStore& store) {
-  const auto format = file_format(call);
+  const auto format = file_format(call, store);
   if (!format) return propagate(format);
   auto file = store.file(call.path("id"), call.path("v"), *format);
   if (!file) return propagate(file);

@@ -85,6 +85,26 @@ inline std::string simple_ply(int degree, std::size_t count) {
   return bytes;
 }
 
+/// R S S R^T of one Gaussian, in double.
+inline DMat3 covariance(const scene::GaussianCloud& cloud, std::size_t i) {
+  const DMat3 r = glm::mat3_cast(glm::normalize(DQuat(cloud.rotation.get(i))));
+  DMat3 rs = r;
+  for (int c = 0; c < 3; ++c) rs[c] *= std::exp(double(cloud.log_scale.get(i)[c]));
+  return rs * glm::transpose(rs);
+}
+
+/// How far the Gaussians of two clouds differ in shape, as a share of the first one's: whatever the signs of their
+/// local axes, which no covariance shows.
+inline double covariance_difference(const scene::GaussianCloud& a, const scene::GaussianCloud& b, std::size_t i) {
+  const DMat3 p = covariance(a, i), q = covariance(b, i);
+  double square = 0, whole = 0;
+  for (int c = 0; c < 3; ++c) {
+    square += glm::dot(p[c] - q[c], p[c] - q[c]);
+    whole += glm::dot(p[c], p[c]);
+  }
+  return std::sqrt(square / whole);
+}
+
 /// The angle in radians between two rotations given as quaternions of any length.
 inline double angle_between(Quat a, Quat b) {
   const DQuat p = glm::normalize(DQuat(a)), q = glm::normalize(DQuat(b));

@@ -1,12 +1,13 @@
 #include "engine/io/scene_file.h"
 
 #include <gtest/gtest.h>
-#include <zstd.h>
 
 #include <span>
 
+#include "engine/io/glb.h"
 #include "engine/io/gzip.h"
 #include "engine/io/ply.h"
+#include "engine/io/sog.h"
 #include "engine/io/splat.h"
 #include "engine/io/spz.h"
 #include "tests/engine/io/compressed_sample.h"
@@ -28,23 +29,6 @@ std::string unzipped(const std::string& bytes, std::size_t size) {
 
 constexpr std::size_t spz3_unpacked_bytes = 16 + 3 * (9 + 1 + 3 + 3 + 4 + 9);  // of the sample below
 
-/// Three Gaussians of degree 0 as version 4.
-std::string spz_v4() {
-  std::string out, table, streams;
-  append(out, std::uint32_t(0x5053474e)), append(out, std::uint32_t(4)), append(out, std::uint32_t(3));
-  for (const int u : {0, 12, 0, 5}) append(out, std::uint8_t(u));
-  append(out, std::uint32_t(32));
-  out += std::string(12, '\0');
-  for (const std::size_t size : {9, 1, 3, 3, 4}) {
-    const std::string attribute(3 * size, 'A');
-    std::string packed(ZSTD_compressBound(attribute.size()), '\0');
-    packed.resize(ZSTD_compress(packed.data(), packed.size(), attribute.data(), attribute.size(), 3));
-    append(table, std::uint64_t(packed.size())), append(table, std::uint64_t(attribute.size()));
-    streams += packed;
-  }
-  return out + table + streams;
-}
-
 struct Sample {
   std::string name, bytes;
   std::size_t count;
@@ -56,8 +40,10 @@ std::vector<Sample> samples() {
   return {{"ply", simple_ply(1, 3), 3},
           {"compressed", CompressedSample::random(3, 1).bytes(), 3},
           {"splat", text_of(encode_splat(cloud)), 3},
-          {"spz3", text_of(encode_spz(cloud, "a.spz").value()), 3},
-          {"spz4", spz_v4(), 3}};
+          {"spz3", text_of(encode_spz(cloud, "a.spz", {.version = 3}).value()), 3},
+          {"spz4", text_of(encode_spz(cloud, "a.spz").value()), 3},
+          {"sog", text_of(encode_sog(cloud, false, "a.sog").value()), 3},
+          {"glb", text_of(encode_glb(cloud, "a.glb").value()), 3}};
 }
 
 class SceneFiles : public ::testing::Test {
@@ -97,7 +83,7 @@ TEST_F(SceneFiles, WritesWhatItReadAsEveryFormat) {
   for (const auto& [name, bytes, count] : samples()) {
     const auto scene = read(bytes);
     ASSERT_TRUE(scene) << name;
-    for (const char* extension : {".ply", ".splat", ".SPZ"}) {
+    for (const char* extension : {".ply", ".compressed.ply", ".splat", ".SPZ", ".sog", ".Glb"}) {
       const auto path = folder_.path() / ("out" + std::string(extension));
       const auto format = format_for(path);
       ASSERT_TRUE(format);
@@ -106,6 +92,10 @@ TEST_F(SceneFiles, WritesWhatItReadAsEveryFormat) {
       const auto back = read_scene(path);
       ASSERT_TRUE(back) << name << " as " << extension << ": " << back.error().message;
       EXPECT_EQ(back->cloud.size(), count);
+      EXPECT_EQ(back->origin.format, *format);
+      const auto twice = folder_.path() / "twice";
+      ASSERT_TRUE(write_scene(twice, *back, *format));
+      EXPECT_TRUE(support::read_file(twice) == support::read_file(path)) << name << " as " << extension;
       if (*format == SceneFormat::ply) {
         EXPECT_EQ(back->cloud, scene->cloud);
       }
@@ -167,7 +157,7 @@ TEST_F(SceneFiles, SaysWhatItKnowsWhenAFileIsSomethingElse) {
   const auto scene = read(text);
   ASSERT_FALSE(scene);
   EXPECT_EQ(scene.error().code, ErrorCode::unsupported);
-  for (const char* format : {".ply", ".spz", ".splat"})
+  for (const char* format : {".ply", ".spz", ".sog", ".glb", ".splat"})
     EXPECT_NE(scene.error().message.find(format), std::string::npos) << scene.error().message;
   const auto empty = read("");
   ASSERT_FALSE(empty);
@@ -190,7 +180,7 @@ TEST_F(SceneFiles, NamesAFileThatCannotBeRead) {
 TEST_F(SceneFiles, AnUnknownExtensionIsRefusedWithTheKnownOnes) {
   const auto format = format_for("scene.obj");
   ASSERT_FALSE(format);
-  EXPECT_NE(format.error().message.find(".ply, .splat or .spz"), std::string::npos);
+  EXPECT_NE(format.error().message.find(".ply, .compressed.ply, .splat, .spz, .sog or .glb"), std::string::npos);
 }
 
 }  // namespace

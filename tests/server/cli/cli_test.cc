@@ -8,6 +8,7 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "engine/io/dataset.h"
@@ -492,6 +493,41 @@ TEST_F(Cli, ConvertSaysWhatIsLost) {
   ASSERT_EQ(splatdrag("convert --in " + at("a.splat") + " --out " + at("a.spz")).status, 0);
   EXPECT_EQ(json::parse(splatdrag("info --json --scene " + at("a.splat")).out)["scene"]["format"], "splat");
   EXPECT_EQ(json::parse(splatdrag("info --json --scene " + at("a.spz")).out)["scene"]["format"], "spz");
+}
+
+TEST_F(Cli, ConvertSaysInNumbersWhatItRounds) {
+  for (const char* name : {"n.spz", "n.sog", "n.compressed.ply"}) {
+    const Finished run = splatdrag("convert --in " + demo("scene.ply") + " --out " + at(name));
+    ASSERT_EQ(run.status, 0) << run.err;
+    const std::size_t line = run.err.find(" rounds rotations: ");
+    ASSERT_NE(line, std::string::npos) << run.err;
+    const double degrees = std::stod(run.err.substr(line + 19));
+    EXPECT_GT(degrees, 0.001) << name;
+    EXPECT_LT(degrees, 2.5) << name;
+    EXPECT_NE(run.err.find(" at most, ", line), std::string::npos);
+    EXPECT_NE(run.err.find("rounds positions: "), std::string::npos) << run.err;
+  }
+  const Finished glb = splatdrag("convert --in " + demo("scene.ply") + " --out " + at("n.glb"));
+  ASSERT_EQ(glb.status, 0) << glb.err;
+  EXPECT_EQ(glb.err.find("rounds positions"), std::string::npos) << glb.err;
+}
+
+TEST_F(Cli, InfoNamesAxesAndCompression) {
+  const auto scene = [&](const std::string& file) {
+    return json::parse(splatdrag("info --json --scene " + file).out)["scene"];
+  };
+  EXPECT_EQ(scene(demo("scene.ply"))["axes"]["stored"], "RDF");
+  EXPECT_EQ(scene(demo("scene.ply"))["compression"], "none");
+  for (const auto& [name, axes, declared, compression] : {std::tuple("i.spz", "RUB", true, "zstd"),
+                                                          {"i.sog", "RDF", false, "WebP, palettes"},
+                                                          {"i.glb", "LUF", false, "none"}}) {
+    ASSERT_EQ(splatdrag("convert --in " + demo("scene.ply") + " --out " + at(name)).status, 0);
+    EXPECT_EQ(scene(at(name))["axes"]["stored"], axes) << name;
+    EXPECT_EQ(scene(at(name))["axes"]["declared"], declared) << name;
+    EXPECT_EQ(scene(at(name))["compression"], compression) << name;
+  }
+  const Finished text = splatdrag("info --scene " + at("i.spz"));
+  EXPECT_NE(text.out.find("axes         RUB, as the file declares; read as RDF"), std::string::npos) << text.out;
 }
 
 TEST_F(Cli, SettingsComeFromFlagThenEnvironmentThenFile) {

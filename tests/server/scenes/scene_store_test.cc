@@ -12,6 +12,7 @@
 #include <set>
 #include <thread>
 
+#include "engine/io/spz.h"
 #include "tests/server/scenes/store_support.h"
 #include "tests/support/full_disk.h"
 
@@ -45,8 +46,7 @@ std::vector<std::string> entries(const fs::path& folder) {
 
 TEST_F(SceneStoreTest, TakesUploadsOfEveryFormat) {
   const auto cloud = random_cloud(40, 2, 3);
-  for (const auto& [format, name] : {std::pair(SceneFormat::ply, "ply"), std::pair(SceneFormat::splat, "splat"),
-                                     std::pair(SceneFormat::spz, "spz")}) {
+  for (const auto& [format, name] : engine::names<SceneFormat>) {
     write(temp.path() / "in", cloud, format);
     const auto added = store->add_upload(temp.path() / "in", "my chair.bin", "");
     ASSERT_TRUE(added) << name << ": " << added.error().message;
@@ -58,7 +58,7 @@ TEST_F(SceneStoreTest, TakesUploadsOfEveryFormat) {
     EXPECT_GT(added->radius, 0.5);
     EXPECT_LT(added->low.x, added->centre.x);
   }
-  EXPECT_EQ(store->list().size(), 3u);
+  EXPECT_EQ(store->list().size(), engine::names<SceneFormat>.size());
 }
 
 TEST_F(SceneStoreTest, RefusesGarbageAndKeepsNothingOfIt) {
@@ -197,17 +197,37 @@ TEST_F(SceneStoreTest, UndoGivesTheInputBackByteForByte) {
 TEST_F(SceneStoreTest, WritesEveryFormatOnDemandAndOnce) {
   const std::string id = add();
   ASSERT_TRUE(store->add_version(id, 0, "e1", small_edit(cloud_of(id, "0"))));
-  for (const FileFormat format : {FileFormat::ply, FileFormat::splat, FileFormat::spz}) {
+  for (const auto& [format, name] : engine::names<FileFormat>) {
     const auto file = store->file(id, "1", format);
     ASSERT_TRUE(file) << file.error().message;
     const auto read = engine::io::read_scene(file->path);
     ASSERT_TRUE(read) << read.error().message;
     EXPECT_EQ(read->cloud.size(), 50u);
+    EXPECT_EQ(read->origin.format, format) << name;
     EXPECT_EQ(store->file(id, "1", format)->path, file->path);
   }
-  EXPECT_EQ(entries(options.folder / id / "files").size(), 3u);
+  EXPECT_EQ(entries(options.folder / id / "files").size(), engine::names<FileFormat>.size());
   open();
   EXPECT_FALSE(fs::exists(options.folder / id / "files")) << "a cache does not outlive the service";
+}
+
+TEST_F(SceneStoreTest, AnEditedSceneKeepsWhatItsFileSaidBesideItsGaussians) {
+  const std::vector<engine::io::SpzExtension> extensions{{0x12340001, std::vector<std::byte>(7)}};
+  const auto bytes =
+      engine::io::encode_spz(random_cloud(40, 1, 3), "", {.version = 4, .axes = "RFU", .extensions = extensions});
+  ASSERT_TRUE(bytes);
+  support::write_file(temp.path() / "in", {reinterpret_cast<const char*>(bytes->data()), bytes->size()});
+  const auto added = store->add_upload(temp.path() / "in", "chair.spz", "");
+  ASSERT_TRUE(added);
+  open();  // and a restart in between
+  ASSERT_TRUE(store->add_version(added->id, 0, "e1", small_edit(cloud_of(added->id, "0"))));
+  const auto file = store->file(added->id, "1", FileFormat::spz);
+  ASSERT_TRUE(file);
+  const auto read = engine::io::read_scene(file->path);
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->origin.axes, "RFU");
+  EXPECT_EQ(read->origin.version, 4);
+  EXPECT_EQ(read->origin.spz_extensions, extensions);
 }
 
 TEST_F(SceneStoreTest, RemovesWrittenFilesThatNobodyReads) {
@@ -307,7 +327,7 @@ TEST_F(SceneStoreTest, RefusesAnUploadThatNeverFitsItsMemory) {
 }
 
 TEST_F(SceneStoreTest, ReadsAnUploadOnlyOnceThereIsMemoryForIt) {
-  for (const auto format : {SceneFormat::ply, SceneFormat::splat, SceneFormat::spz}) {
+  for (const auto& [format, name] : engine::names<SceneFormat>) {
     const std::string first = add(1000, 1, 3);
     options.memory_bytes = 2 * store->find(first)->memory_bytes - 1;
     open();

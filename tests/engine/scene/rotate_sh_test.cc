@@ -1,4 +1,4 @@
-#include "engine/deform/rotate_sh.h"
+#include "engine/scene/rotate_sh.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include "engine/core/rng.h"
 #include "engine/scene/sh.h"
 
-namespace engine::deform {
+namespace engine::scene {
 namespace {
 
 DVec3 random_direction(Rng& rng) { return glm::normalize(DVec3(rng.normal(), rng.normal(), rng.normal())); }
@@ -20,7 +20,7 @@ DQuat random_rotation(Rng& rng) {
 
 double colour(int degree, std::span<const float> coefficients, DVec3 d) {
   std::vector<double> basis(coefficients.size());
-  scene::sh_basis(degree, d.x, d.y, d.z, basis.data());
+  sh_basis(degree, d.x, d.y, d.z, basis.data());
   double sum = 0;
   for (std::size_t k = 0; k < basis.size(); ++k) sum += basis[k] * double(coefficients[k]);
   return sum;
@@ -78,7 +78,7 @@ TEST(ShBasis, IsOrthonormalOnTheSphere) {
     for (int j = 0; j < 16; ++j) {
       const double phi = 2 * std::numbers::pi * (j + 0.25) / 16;
       double basis[16];
-      scene::sh_basis(3, r * std::cos(phi), r * std::sin(phi), z, basis);
+      sh_basis(3, r * std::cos(phi), r * std::sin(phi), z, basis);
       for (std::size_t a = 0; a < 16; ++a)
         for (std::size_t b = 0; b < 16; ++b)
           gram[a * 16 + b] += basis[a] * basis[b] * weights[i / 2] * 2 * std::numbers::pi / 16;
@@ -90,20 +90,20 @@ TEST(ShBasis, IsOrthonormalOnTheSphere) {
 
 TEST(ShBasis, HasTheSignsOfTheFiles) {
   double y[16];
-  scene::sh_basis(3, 0.0, 1.0, 0.0, y);
+  sh_basis(3, 0.0, 1.0, 0.0, y);
   EXPECT_LT(y[1], 0);  // -y
-  scene::sh_basis(3, 1.0, 0.0, 0.0, y);
+  sh_basis(3, 1.0, 0.0, 0.0, y);
   EXPECT_LT(y[3], 0);   // -x
   EXPECT_GT(y[8], 0);   // xx - yy
   EXPECT_LT(y[15], 0);  // -x (xx - 3yy)
-  scene::sh_basis(3, 0.0, 0.0, 1.0, y);
+  sh_basis(3, 0.0, 0.0, 1.0, y);
   EXPECT_GT(y[2], 0);
   EXPECT_GT(y[12], 0);
   const double s = std::sqrt(0.5);
-  scene::sh_basis(3, 0.0, s, s, y);
+  sh_basis(3, 0.0, s, s, y);
   EXPECT_NEAR(y[5], -0.5462742152960396, 1e-15);  // -yz
   EXPECT_GT(y[9], 0);                             // -y (3xx - yy)
 }
 
 }  // namespace
-}  // namespace engine::deform
+}  // namespace engine::scene

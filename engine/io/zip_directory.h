@@ -1,15 +1,14 @@
 // What a zip file says about its directory, before anybody loads that.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <span>
 
 #include "engine/core/result.h"
 
-namespace server::scenes {
-
-using engine::Result;
-
+namespace engine::io {
 /// What an end record says.
 struct ZipDirectory {
   std::uint64_t entries = 0;
@@ -20,5 +19,7 @@ struct ZipDirectory {
 /// too: which of several a reader will believe need not be known. Zeros if there is none: then it is no zip file.
 ///   errors  those of io::InputFile
 [[nodiscard]] Result<ZipDirectory> largest_directory(const std::filesystem::path& zip);
+/// The same of a zip file in memory.
+[[nodiscard]] ZipDirectory largest_directory(std::span<const std::byte> zip);
 
-}  // namespace server::scenes
+}  // namespace engine::io

@@ -1,4 +1,4 @@
-#include "engine/deform/rotate_sh.h"
+#include "engine/scene/rotate_sh.h"
 
 #include <cmath>
 #include <cstddef>
@@ -6,7 +6,7 @@
 
 #include "engine/scene/sh.h"
 
-namespace engine::deform {
+namespace engine::scene {
 namespace {
 
 constexpr int degree = 3;
@@ -31,7 +31,7 @@ std::array<Node, nodes> lebedev_nodes() {
   for (std::size_t j = 0; j < nodes; ++j) {
     const double share = j < 3 ? 1.0 / 21 : j < 9 ? 4.0 / 105 : 9.0 / 280;  // of the sphere, per point of the 26
     rule[j].direction = directions[j];
-    scene::sh_basis(degree, directions[j].x, directions[j].y, directions[j].z, rule[j].weighted_basis.data());
+    sh_basis(degree, directions[j].x, directions[j].y, directions[j].z, rule[j].weighted_basis.data());
     for (double& value : rule[j].weighted_basis) value *= 2 * 4 * std::numbers::pi * share;
   }
   return rule;
@@ -55,21 +55,32 @@ void accumulate(std::array<double, n * n>& matrix, std::size_t first, const Node
     for (std::size_t k = 0; k < n; ++k) matrix[m * n + k] += node.weighted_basis[first + m] * basis_before[first + k];
 }
 
+/// before(d) is where what is seen along d was seen along before the turn.
+template <class Before>
+ShRotation matrices(Before&& before) {
+  static const std::array<Node, nodes> rule = lebedev_nodes();
+  ShRotation result{};
+  for (const Node& node : rule) {
+    const DVec3 d = before(node.direction);
+    std::array<double, coefficients_of_degree> basis;
+    sh_basis(degree, d.x, d.y, d.z, basis.data());
+    accumulate<3>(result.band1, 1, node, basis.data());
+    accumulate<5>(result.band2, 4, node, basis.data());
+    accumulate<7>(result.band3, 9, node, basis.data());
+  }
+  return result;
+}
+
 }  // namespace
 
 ShRotation sh_rotation(const DQuat& rotation) {
-  static const std::array<Node, nodes> rule = lebedev_nodes();
-  ShRotation result{};
   const DQuat inverse = glm::conjugate(rotation);
-  for (const Node& node : rule) {
-    const DVec3 d = inverse * node.direction;
-    std::array<double, coefficients_of_degree> before;
-    scene::sh_basis(degree, d.x, d.y, d.z, before.data());
-    accumulate<3>(result.band1, 1, node, before.data());
-    accumulate<5>(result.band2, 4, node, before.data());
-    accumulate<7>(result.band3, 9, node, before.data());
-  }
-  return result;
+  return matrices([&](DVec3 d) { return inverse * d; });
+}
+
+ShRotation sh_rotation(const DMat3& turn) {
+  const DMat3 inverse = glm::transpose(turn);
+  return matrices([&](DVec3 d) { return inverse * d; });
 }
 
 void rotate_sh(const ShRotation& rotation, std::span<float> coefficients) {
@@ -78,4 +89,4 @@ void rotate_sh(const ShRotation& rotation, std::span<float> coefficients) {
   if (coefficients.size() >= 16) rotate_band<7>(rotation.band3, coefficients.data() + 9);
 }
 
-}  // namespace engine::deform
+}  // namespace engine::scene
