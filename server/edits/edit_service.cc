@@ -389,6 +389,26 @@ Result<void> EditService::remove_scene(const std::string& scene) {
   return while_idle(scene, [&] { return impl_->scenes.remove(scene); });
 }
 
+Result<void> EditService::remove_version(const std::string& scene, const std::string& version) {
+  const auto hold = impl_->scenes_in_use.lock(scene);
+  const auto active = impl_->queue->list({.lane = scene, .active_only = true, .limit = all_jobs});
+  if (!active) return propagate(active);
+  for (const jobs::Job& listed : *active) {
+    const auto job = impl_->queue->find(listed.id);  // a list has no payloads
+    if (!job && job.error().code == ErrorCode::not_found) continue;
+    if (!job) return propagate(job);
+    const auto request = proto::parse_edit_request(job->payload);
+    const auto made = version_made_by(impl_->scenes, scene, job->id);
+    if (!jobs::is_final(job->state) && ((request && std::to_string(request->version.value_or(0)) == version) ||
+                                        (made && std::to_string(*made) == version)))
+      return fail(ErrorCode::conflict,
+                  job->id + ", an edit of this version, is " + std::string(to_string(job->state)) +
+                      ": cancel it, or wait for its end",
+                  "version");
+  }
+  return impl_->scenes.remove_version(scene, version);
+}
+
 std::uint64_t EditService::version() const { return impl_->queue->revision(); }
 
 std::uint64_t EditService::wait_for_change(std::uint64_t seen, std::chrono::milliseconds timeout) const {

@@ -97,6 +97,10 @@ class EditService {
   /// Removes a scene, unless an edit of it waits or runs. Errors as while_idle().
   [[nodiscard]] Result<void> remove_scene(const std::string& scene);
 
+  /// Deletes a version of a scene, unless an edit of it waits or runs, or one that has yet to end has made it.
+  ///   errors  conflict: names the edit; those of SceneStore::remove_version()
+  [[nodiscard]] Result<void> remove_version(const std::string& scene, const std::string& version);
+
   /// Counts changes of any edit; wait_for_change() returns when it is not `seen` any more, or after `timeout`.
   [[nodiscard]] std::uint64_t version() const;
   std::uint64_t wait_for_change(std::uint64_t seen, std::chrono::milliseconds timeout) const;

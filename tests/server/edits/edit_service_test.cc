@@ -535,7 +535,7 @@ TEST_F(ServiceTest, AnEditThatOutlivesItsTimeEndsWithWhatItHas) {
   proto::EditRequest request = move_ball(scene, 3);
   request.params.iterations = 1;
   // Estimates of so little are mostly of what surrounds it; under a sanitizer they are longer.
-  const double limit = std::max(0.3, 1.5 * value(service->estimate(request)).seconds);
+  const double limit = std::max(1.0, 1.5 * value(service->estimate(request)).seconds);
   service.reset();
   Sleeper sleeper;
   const auto hurried = value(EditService::open(*store, {.folder = dir.path() / "edits",
@@ -620,6 +620,26 @@ TEST_F(ServiceTest, RemovingAnEditKeepsItsResult) {
   value(service->remove(id));
   EXPECT_EQ(versions(), 2u);
   EXPECT_EQ(names_in(dir.path() / "edits/jobs"), std::set<std::string>{"last_number"});
+}
+
+TEST_F(ServiceTest, AVersionIsKeptAsLongAsAnEditNeedsIt) {
+  for (int i = 0; i < 2; ++i) wait_for_end(*service, submit(move_ball(scene)));
+  proto::EditRequest request = move_ball_slowly(scene);
+  request.version = 1;
+  request.handles[0].source = {0.5, 0, 0}, request.handles[0].target = proto::Point{0, 0, 0};
+  const auto id = submit(request);
+  const auto refused = service->remove_version(scene, "1");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::conflict);
+  EXPECT_NE(refused.error().message.find(id), std::string::npos) << refused.error().message;
+  EXPECT_TRUE(service->remove_version(scene, "2")) << "nobody needs that one";
+  value(service->cancel(id));
+  wait_for_end(*service, id);
+  value(service->remove_version(scene, "1"));
+  EXPECT_EQ(versions(), 1u);
+  EXPECT_EQ(value(service->find("e000001")).result_version, 1) << "what it made then";
+  EXPECT_EQ(code_of(service->submit(request, "")), ErrorCode::not_found);
+  EXPECT_EQ(wait_for_end(*service, submit(move_ball(scene))).result_version, 3) << "no number is used twice";
 }
 
 TEST_F(ServiceTest, ASceneIsKeptAsLongAsAnEditNeedsIt) {
