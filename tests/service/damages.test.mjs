@@ -106,8 +106,13 @@ test(`${rounds} damages, each named or harmless`, { timeout: 30 * 60_000 }, asyn
     cpSync(sound, dataDir, { recursive: true });
     const file = random.of(files), what = `round ${round}, ${file}, ${damage(path.join(dataDir, file))}`;
     const owner = ownerOf(file);
-    let service;
-    let isNamed = false;
+    let service, isNamed = false;
+    try {
+      execFileSync(program, ['admin', 'check', '--data', dataDir], { stdio: 'pipe' });
+    } catch ({ status }) {
+      assert.equal(status, 4, `${what}: admin check`);
+      isNamed = true;
+    }
     try {
       service = await Service.start({ dataDir, args: ['--log-level', 'warn'] });
     } catch (refused) {
@@ -133,6 +138,7 @@ test(`${rounds} damages, each named or harmless`, { timeout: 30 * 60_000 }, asyn
       assert.ok(namesIt(problem) || isInLog, `${what}: ${name}: ${JSON.stringify(problem)}\n${service.log}`);
       isNamed = true;
     }
+    isNamed ||= service.log.includes(path.basename(file));
     await service.kill();
     rmSync(dataDir, { recursive: true });
     counts[isNamed ? 'named' : 'harmless'] += 1;
