@@ -99,7 +99,8 @@ std::optional<std::int64_t> number_of(std::string_view id) {
 }
 
 Time turn_of(const Job& job) {
-  return job.state == JobState::stop_requested ? job.created : job.created + stretch * job.expected;
+  if (job.state == JobState::stop_requested || job.expected <= negligible) return job.created;
+  return job.created + stretch * (job.expected - negligible);
 }
 
 Result<Job> transition(Job job, const Change& change, Time now) {

@@ -67,10 +67,14 @@ struct Job {
 /// the worker busy for less than three quarters of its time, no job comes to the end of this.
 inline constexpr int stretch = 4;
 
-/// When it is a job's turn: its worker takes the job whose turn is earliest, of those that can run. A shorter job that
-/// is handed in within `stretch` times what this one takes goes first; none that is handed in later does, so that each
-/// job's turn comes however many shorter ones follow. Jobs of which nobody knows how long they take come in the order
-/// in which they were handed in; so does one that is only to end and keep what it has.
+/// So short are jobs that nobody minds in which order they come: the one in which they were handed in. A choice.
+inline constexpr std::chrono::milliseconds negligible{500};
+
+/// When it is a job's turn, by what it takes beyond what is negligible: its worker takes the job whose turn is
+/// earliest, of those that can run. A shorter job that is handed in within `stretch` times what this one takes goes
+/// first; none that is handed in later does, so that each job's turn comes however many shorter ones follow. Jobs of
+/// which nobody knows how long they take come in the order in which they were handed in; so does one that is only to
+/// end and keep what it has.
 [[nodiscard]] Time turn_of(const Job& job);
 
 /// What can happen to a job. Its worker brings about all but `stop`, `cancel` and `abandon`: whoever finds it claimed

@@ -75,7 +75,7 @@ constexpr const char* adds_expected = R"(
 ///   job  the table, or another name of it
 std::string turn_in_sql(const std::string& job) {
   return "(" + job + ".created + CASE " + job + ".state WHEN 'stop_requested' THEN 0 ELSE " + std::to_string(stretch) +
-         " * " + job + ".expected END)";
+         " * max(" + job + ".expected - " + std::to_string(negligible.count()) + ", 0) END)";
 }
 /// Of jobs that have not ended: nobody holds it, and none of its lane comes before it.
 constexpr const char* can_run =

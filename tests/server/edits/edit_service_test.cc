@@ -489,10 +489,16 @@ TEST_F(ServiceTest, StopNeedsSomethingToKeep) {
 
 TEST_F(ServiceTest, AShortEditGoesFirstBetweenTheIntervalsOfALongOneWhichEndsWithTheSameBytes) {
   const std::string undisturbed = add_ball(*store, dir.path()), other = add_ball(*store, dir.path());
-  const auto alone = wait_for_end(*service, submit(move_ball_slowly(undisturbed)));
+  const auto slowly = [](const std::string& of) {
+    proto::EditRequest request = move_ball_slowly(of);
+    if (!under_thread_sanitizer) request.params.views = 400, request.params.max_image_side = 320;
+    return request;
+  };
+  ASSERT_GT(value(service->estimate(slowly(scene))).seconds, 1.0) << "it is too short to be overtaken";
+  const auto alone = wait_for_end(*service, submit(slowly(undisturbed)));
   ASSERT_EQ(alone.state, "succeeded");
 
-  const auto longest = submit(move_ball_slowly(scene)), after_it = submit(move_ball(scene, 1));
+  const auto longest = submit(slowly(scene)), after_it = submit(move_ball(scene, 1));
   wait_for_interval(*service, longest);
   const auto shorter = submit(move_ball(other, 1));
   EXPECT_EQ(wait_for_end(*service, shorter).state, "succeeded");
