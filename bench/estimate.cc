@@ -31,12 +31,14 @@
 #include "bench/fox.h"
 #include "bench/measure.h"
 #include "engine/edit/preview.h"
+#include "engine/edit/workload.h"
 #include "engine/io/scene_file.h"
 #include "engine/procedural/demo_scene.h"
 #include "engine/render/forward.h"
 #include "server/cli/capture_files.h"
 #include "server/cli/suggested_drag.h"
 #include "server/edits/convert.h"
+#include "server/edits/convert_selection.h"
 #include "server/edits/edit_service.h"
 #include "server/edits/estimate.h"
 
@@ -100,6 +102,7 @@ class Service {
     return {with, without};
   }
   server::scenes::SceneStore& store() { return *store_; }
+  edits::SpeedLog& speeds() { return speeds_; }
   edits::EditService& operator*() { return *service_; }
   edits::EditService* operator->() { return service_.get(); }
 
@@ -107,6 +110,7 @@ class Service {
   path folder_;
   std::unique_ptr<server::scenes::SceneStore> store_;
   std::unique_ptr<edits::EditService> service_;
+  edits::SpeedLog speeds_{engine::edit::measured_slowness};
 };
 
 struct Sample {
@@ -137,6 +141,10 @@ EditRequest with(EditRequest request, const std::string& scene, Preset preset, c
 
 proto::Handle handle(proto::Point from, std::optional<proto::Point> to, double radius) {
   return {.source = from, .target = to, .radius = radius};
+}
+
+proto::selection::Operation sphere(proto::Point center, double radius) {
+  return {proto::selection::Op::add, proto::selection::Sphere{center, radius}};
 }
 
 std::vector<Sample> demo_samples(Service& service) {
@@ -178,9 +186,20 @@ std::vector<Sample> fox_samples(Service& service) {
   ear.handles = {handle({2.50, -1.46, 1.60}, proto::Point{2.56, -1.96, 1.62}, 0.3),
                  handle({2.36, -1.28, 1.68}, proto::Point{2.39, -1.53, 1.69}, 0.3),
                  handle({2.24, -0.88, 1.93}, std::nullopt, 0.3)};
+  // Its head, turned by a tenth of a circle about an upright axis through its neck; and all of it, lifted.
+  EditRequest head, whole;
+  head.selection = {sphere({1.95, -0.35, 1.6}, 0.95)};
+  head.handles = {
+      {.source = {2.3, 0.1, 2.1}, .target = proto::Point{2.3, 0.1, 2.1}, .rotation = {{0.951, 0, 0.309, 0}}}};
+  whole.selection = {sphere({2.1, 0.2, 2.2}, 1.9)};
+  whole.handles = {{.source = {2.0, -0.3, 1.6}, .target = proto::Point{2.0, -0.7, 1.6}}};
   return {{"fox, draft, ear", false, with(ear, id, Preset::draft)},
+          {"fox, draft, ear, no dataset", true, with(ear, bare, Preset::draft)},
+          {"fox, draft, head turned", true, with(head, id, Preset::draft)},
+          {"fox, draft, all of it", true, with(whole, id, Preset::draft)},
           {"fox, standard, ear, no dataset, 2 x 50 iterations", false,
-           with(ear, bare, Preset::standard, {.intervals = 2, .iterations = 50})}};
+           with(ear, bare, Preset::standard, {.intervals = 2, .iterations = 50})},
+          {"fox, preview, head turned, no dataset", false, with(head, bare, Preset::preview)}};
 }
 
 // Runs ---------------------------------------------------------------------------------------------------------------
@@ -218,10 +237,13 @@ void judge(const std::vector<Told>& told, Run& run) {
 void add_planned(const EditRequest& asked, Service& service, Run& run) {
   auto request = value(edits::to_engine(asked));
   const auto version = value(service.store().load(*asked.scene, "0"));
-  const auto preview = value(engine::edit::preview(version.cloud, request));
   const auto dataset = value(service.store().dataset(*asked.scene));
-  const auto work = edits::workload_of(version.cloud, request, preview, edits::cameras_of(dataset.get()),
-                                       edits::uses_corrector(request.params), pictured_views);
+  const auto cameras = edits::cameras_of(dataset.get());
+  if (asked.selection)
+    value(edits::select_rows(*version.cloud.base, *asked.selection, {.views = cameras, .up = request.up}, request));
+  const auto preview = value(engine::edit::preview(version.cloud, request));
+  const auto work = edits::workload_of(version.cloud, request, preview, cameras, edits::uses_corrector(request.params),
+                                       pictured_views, *asked.scene, service.speeds());
   for (const auto& planned : engine::edit::plan_of(work.edit))
     run.stages[std::string(engine::edit::name_of(planned.stage))].first += planned.seconds;
   std::printf("    dragged %zu, covered %.3f, frame %.2f ms + %.2f ns a pixel, views %zu of %zu pixels\n",

@@ -1,5 +1,6 @@
 // A service under load: many clients look, pick and poll while edits run. Prints what they waited, and what memory the
-// service took. Closed loop: a client sends its next request when it has the answer to the last.
+// service took. Closed loop: a client sends its next request when it has the answer to the last, or `--think` later.
+// With `--alone` edits are first carried out before any client comes, to tell what clients cost them.
 //
 //     splatdrag serve --port 8080 --data-dir data &
 //     service_load --url http://127.0.0.1:8080 --scene s000001 --edit drag.json --pid $! --markdown
@@ -39,8 +40,8 @@ struct Options {
   std::string url = "http://127.0.0.1:8080", scene, edit, token;
   int version = 0;
   int clients = 16;
-  double seconds = 120;
-  int pid = 0;
+  double seconds = 120, think_ms = 0;
+  int pid = 0, alone = 0;
   int dripping = 0;
   int width = 640, height = 360;
   bool markdown = false;
@@ -200,6 +201,8 @@ class LoadClient {
       const auto start = Clock::now();
       const Heard answer = ask(kind);
       const double ms = 1000 * seconds_since(start);
+      if (options_.think_ms > 0)
+        std::this_thread::sleep_for(std::chrono::duration<double, std::milli>(options_.think_ms));
       if (answer.status > 0 && answer.status < 400) {
         tally_.milliseconds[kind].push_back(float(ms));
       } else {
@@ -263,6 +266,22 @@ struct Edits {
   std::size_t succeeded = 0, others = 0;
   double seconds = 0;  ///< Of those that succeeded, from submission to result.
 };
+
+/// Edits, one after the other, while nobody else asks for anything: seconds of each.
+double seconds_alone(const Options& options, const json& request) {
+  auto client = connect(options);
+  const auto start = Clock::now();
+  for (int i = 0; i < options.alone; ++i) {
+    const json accepted = expect_json(client.Post("/v1/edits", request.dump(), "application/json"), "the edit");
+    const std::string path = accepted["links"]["self"];
+    for (std::string state; state != "succeeded";) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+      state = expect_json(client.Get(path), "the edit")["state"];
+      if (state == "failed" || state == "cancelled") throw std::runtime_error("the edit " + state);
+    }
+  }
+  return seconds_since(start) / options.alone;
+}
 
 /// Keeps an edit in work until the end; then cancels the one there is.
 Edits keep_editing(const Options& options, const json& request, Clock::time_point end, CurrentEdit& current) {
@@ -363,12 +382,13 @@ void print_waits(const std::vector<Tally>& tallies, double seconds, bool markdow
   }
 }
 
-void print_report(const Options& options, const std::vector<Tally>& tallies, const Edits& edits,
+void print_report(const Options& options, const std::vector<Tally>& tallies, const Edits& edits, double alone,
                   const std::vector<double>& memory, const Drippers& drippers, double seconds) {
   print_waits(tallies, seconds, options.markdown);
   std::cout << '\n'
-            << options.clients << " clients, " << fixed(seconds, 0) << " s, renders of " << options.width << "x"
-            << options.height << ".\n";
+            << options.clients << " clients"
+            << (options.think_ms > 0 ? " that think for " + fixed(options.think_ms, 0) + " ms" : "") << ", "
+            << fixed(seconds, 0) << " s, renders of " << options.width << "x" << options.height << ".\n";
   if (options.dripping > 0)
     std::cout << options.dripping << " clients dripped meanwhile; " << drippers.cut_off()
               << " times one was cut off, and came again.\n";
@@ -376,6 +396,9 @@ void print_report(const Options& options, const std::vector<Tally>& tallies, con
     std::cout << "Edits meanwhile: " << edits.succeeded << " succeeded"
               << (edits.succeeded > 0 ? ", " + fixed(edits.seconds / double(edits.succeeded), 2) + " s each" : "")
               << "; " << edits.others << " did not.\n";
+  if (alone > 0 && edits.succeeded > 0)
+    std::cout << "Edits before that, alone: " << fixed(alone, 2) << " s each; under load they have "
+              << fixed(100 * alone * double(edits.succeeded) / edits.seconds, 0) << " % of that speed.\n";
   if (!memory.empty())
     std::cout << "Resident memory of the service, MiB: " << fixed(memory.front(), 0) << " at the start, "
               << fixed(memory.back(), 0) << " at the end, " << fixed(*std::max_element(memory.begin(), memory.end()), 0)
@@ -398,6 +421,7 @@ json read_edit(const Options& options) {
 bool run(const Options& options) {
   const SceneExtent extent = find_extent(options);
   const json request = options.edit.empty() ? json() : read_edit(options);
+  const double alone = options.alone > 0 && !options.edit.empty() ? seconds_alone(options, request) : 0;
   const auto start = Clock::now();
   const auto end = start + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(options.seconds));
 
@@ -427,7 +451,7 @@ bool run(const Options& options) {
   const double seconds = seconds_since(start);
   std::vector<Tally> tallies;
   for (const auto& client : clients) tallies.push_back(client->tally());
-  print_report(options, tallies, edits, memory, drippers, seconds);
+  print_report(options, tallies, edits, alone, memory, drippers, seconds);
   if (!edit_failure.empty()) std::cerr << edit_failure << '\n';
   const bool clean =
       std::all_of(tallies.begin(), tallies.end(), [](const Tally& tally) { return tally.complaints.empty(); });
@@ -451,6 +475,11 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0, 1000))
       ->capture_default_str();
   program.add_option("--edit", options.edit, "Edit request (JSON) to keep in work all the while; its scene is --scene");
+  program.add_option("--think", options.think_ms, "Milliseconds between an answer and a client's next request")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  program.add_option("--alone", options.alone, "Edits to carry out before the clients come, to compare with")
+      ->check(CLI::Range(0, 1000));
   program.add_option("--pid", options.pid, "Process of the service, to read its memory from /proc; else from /metrics");
   program.add_option("--token", options.token, "Bearer token");
   program.add_option("--width", options.width, "Of the renders, pixels")

@@ -29,6 +29,7 @@ ordered_json object(const ServiceLimits& limits) {
           {"queued_edits", limits.queued_edits},
           {"scene_memory_bytes", limits.scene_memory_bytes},
           {"edit_memory_bytes", limits.edit_memory_bytes},
+          {"edit_seconds", limits.edit_seconds},
           {"streams", limits.streams},
           {"scenes", limits.scenes},
           {"dataset_bytes", limits.dataset_bytes}};

@@ -18,8 +18,8 @@ struct Capability {
 /// Most of each thing that the service takes: bytes, counts, and pixels of a side.
 struct ServiceLimits {
   std::uint64_t upload_bytes = 0, json_bytes = 0, gaussians = 0, handles = 0, views = 0, render_side = 0,
-                image_side = 0, queued_edits = 0, scene_memory_bytes = 0, edit_memory_bytes = 0, streams = 0,
-                scenes = 0, dataset_bytes = 0;
+                image_side = 0, queued_edits = 0, scene_memory_bytes = 0, edit_memory_bytes = 0, edit_seconds = 0,
+                streams = 0, scenes = 0, dataset_bytes = 0;
 };
 
 /// What the service is and has.

@@ -5,7 +5,9 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cassert>
+#include <chrono>
 #include <thread>
 
 #ifdef SPLATDRAG_TSAN
@@ -104,6 +106,21 @@ void WorkArena::run(const std::function<void()>& work) {
     work();
   });
 }
+
+void WorkArena::start_threads() {
+  // Nobody leaves before all are there, or else one would do the work of several. A machine that is very busy may take
+  // longer than we wait; they then start with the first work.
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::milliseconds(200);
+  const auto count = std::size_t(threads());
+  std::atomic<std::size_t> arrived = 0;
+  run([&] {
+    parallel_for(count, 1, [&](std::size_t, std::size_t) {
+      ++arrived;
+      while (arrived < count && std::chrono::steady_clock::now() < deadline) std::this_thread::yield();
+    });
+  });
+}
+
 int WorkArena::threads() const { return impl_->arena.max_concurrency(); }
 
 }  // namespace engine

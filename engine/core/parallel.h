@@ -35,6 +35,10 @@ class WorkArena {
   WorkArena& operator=(WorkArena&&) noexcept;
 
   void run(const std::function<void()>& work);
+  /// Has its worker threads started now, if they have not been. A thread has the priority of the one that starts it,
+  /// for good, and all arenas share their threads: whoever lowers the priority of a thread that works in an arena, so
+  /// that only that work comes last, calls this before.
+  void start_threads();
   [[nodiscard]] int threads() const;
 
  private:

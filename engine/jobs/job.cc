@@ -19,17 +19,17 @@ using Row = std::array<std::optional<JobState>, event_count>;
 
 constexpr std::array<Row, state_count> make_transitions() {
   constexpr std::optional<JobState> no;
-  constexpr std::optional run(JobState::running), stop(JobState::stop_requested), cancel(JobState::cancel_requested),
-      good(JobState::succeeded), bad(JobState::failed), gone(JobState::cancelled);
+  constexpr std::optional wait(JobState::queued), run(JobState::running), stop(JobState::stop_requested),
+      cancel(JobState::cancel_requested), good(JobState::succeeded), bad(JobState::failed), gone(JobState::cancelled);
   return {{
-      //  claim report finish_interval stop cancel succeed fail release abandon
-      Row{run, no, no, no, gone, no, no, no, no},                   // queued
-      Row{run, run, run, stop, cancel, good, bad, run, run},        // running
-      Row{stop, stop, stop, stop, cancel, good, bad, stop, stop},   // stop_requested
-      Row{no, cancel, cancel, no, cancel, gone, gone, gone, gone},  // cancel_requested
-      Row{},                                                        // succeeded
-      Row{},                                                        // failed
-      Row{no, no, no, no, gone, no, no, no, no},                    // cancelled
+      //  claim report finish_interval stop cancel succeed fail release make_way abandon
+      Row{run, no, no, stop, gone, no, no, no, no, no},                   // queued
+      Row{run, run, run, stop, cancel, good, bad, run, wait, run},        // running
+      Row{stop, stop, stop, stop, cancel, good, bad, stop, stop, stop},   // stop_requested
+      Row{no, cancel, cancel, no, cancel, gone, gone, gone, gone, gone},  // cancel_requested
+      Row{},                                                              // succeeded
+      Row{},                                                              // failed
+      Row{no, no, no, no, gone, no, no, no, no, no},                      // cancelled
   }};
 }
 constexpr auto transitions = make_transitions();
@@ -98,6 +98,11 @@ std::optional<std::int64_t> number_of(std::string_view id) {
   return std::int64_t(*number);
 }
 
+Time turn_of(const Job& job) {
+  if (job.state == JobState::stop_requested || job.expected <= negligible) return job.created;
+  return job.created + stretch * (job.expected - negligible);
+}
+
 Result<Job> transition(Job job, const Change& change, Time now) {
   const auto next = next_state(job, change.event);
   if (!next) return fail(ErrorCode::conflict, refusal(job, change.event), job.id);
@@ -129,6 +134,7 @@ Result<Job> transition(Job job, const Change& change, Time now) {
       if (*next == JobState::failed) job.error = change.error;
       break;
     case Event::release:
+    case Event::make_way:
       job.claimed = false;
       break;
     case Event::abandon:

@@ -21,6 +21,7 @@ using Time = std::chrono::sys_time<std::chrono::milliseconds>;
 ///       v                 |      stop_requested-+
 ///     cancelled <- cancel_requested <-/ cancel
 ///
+/// - A running job that *makes way* for a shorter one at a checkpoint is queued again, and goes on from there.
 /// - *stop* keeps the last finished interval: the job ends `succeeded`, with `stopped_early`. There has to be one.
 /// - *cancel* discards. It may be asked for again and again, and it wins: whatever the job still returns is dropped.
 /// - A job whose worker went away (shutdown, kill -9) keeps its state and is claimed again before younger ones; one
@@ -37,10 +38,11 @@ inline constexpr int state_count = 7;
 
 /// The record of a job. This room does not read its texts, which may be any bytes.
 struct Job {
-  std::string id;               ///< "e000001": counts up, never used twice.
-  std::string lane;             ///< Jobs of one lane run one after the other, in the order of their ids.
-  std::string payload;          ///< The request to carry out. Empty in a list.
-  std::string idempotency_key;  ///< "": none.
+  std::string id;                         ///< "e000001": counts up, never used twice.
+  std::string lane;                       ///< Jobs of one lane run one after the other, in the order of their ids.
+  std::string payload;                    ///< The request to carry out. Empty in a list.
+  std::string idempotency_key;            ///< "": none.
+  std::chrono::milliseconds expected{0};  ///< What the whole work should take, as it was handed in; 0: nobody knows.
   JobState state = JobState::queued;
   bool claimed = false;        ///< A worker holds it.
   bool stopped_early = false;  ///< Succeeded with fewer intervals than asked for.
@@ -61,10 +63,24 @@ struct Job {
 [[nodiscard]] std::string id_of(std::int64_t number);
 [[nodiscard]] std::optional<std::int64_t> number_of(std::string_view id);
 
+/// How long a job lets shorter ones go first, in times of what it takes itself. A choice: as long as shorter jobs keep
+/// the worker busy for less than three quarters of its time, no job comes to the end of this.
+inline constexpr int stretch = 4;
+
+/// So short are jobs that nobody minds in which order they come: the one in which they were handed in. A choice.
+inline constexpr std::chrono::milliseconds negligible{500};
+
+/// When it is a job's turn, by what it takes beyond what is negligible: its worker takes the job whose turn is
+/// earliest, of those that can run. A shorter job that is handed in within `stretch` times what this one takes goes
+/// first; none that is handed in later does, so that each job's turn comes however many shorter ones follow. Jobs of
+/// which nobody knows how long they take come in the order in which they were handed in; so does one that is only to
+/// end and keep what it has.
+[[nodiscard]] Time turn_of(const Job& job);
+
 /// What can happen to a job. Its worker brings about all but `stop`, `cancel` and `abandon`: whoever finds it claimed
 /// by a process that is no more does that.
-enum class Event { claim, report, finish_interval, stop, cancel, succeed, fail, release, abandon };
-inline constexpr int event_count = 9;
+enum class Event { claim, report, finish_interval, stop, cancel, succeed, fail, release, make_way, abandon };
+inline constexpr int event_count = 10;
 
 /// An event with its data; fields that do not belong to the event are ignored.
 struct Change {

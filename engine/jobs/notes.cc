@@ -20,7 +20,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view magic = "SDJOBNTE";
-constexpr std::uint32_t format_number = 1;  // another once a value of ErrorCode becomes another number
+constexpr std::uint32_t format_number = 2;  // another once a value of ErrorCode becomes another number
+constexpr std::uint32_t first_with_expected = 2;
 constexpr const char* note_suffix = ".job";
 constexpr const char* removed_suffix = ".removed";
 constexpr const char* counter_name = "last_number";
@@ -80,6 +81,7 @@ std::string encode_note(const Job& job) {
   out.write(std::int32_t(error.code));
   out.write_string(error.message), out.write_string(error.where);
   for (const std::optional<Time>& time : {std::optional(job.created), job.started, job.ended}) write_time(out, time);
+  out.write(std::int64_t(job.expected.count()));
   out.write(fnv1a(out.bytes()));
   return std::move(out).take();
 }
@@ -92,7 +94,8 @@ Result<Job> decode_note(std::string_view text) {
   const auto checked = bytes.first(bytes.size() - checksum_bytes);
   if (ByteReader(bytes.subspan(checked.size())).read<std::uint64_t>() != fnv1a(checked)) return damaged();
   ByteReader in(checked.subspan(magic.size()));
-  if (in.read<std::uint32_t>() != format_number)
+  const auto format = in.read<std::uint32_t>();
+  if (format < 1 || format > format_number)
     return fail(ErrorCode::unsupported, "the note of a job was written by a newer version");
   Job job;
   for (std::string* into : {&job.id, &job.lane, &job.payload, &job.idempotency_key, &job.progress, &job.result})
@@ -105,6 +108,7 @@ Result<Job> decode_note(std::string_view text) {
   Error error{ErrorCode::internal, in.read_string(), in.read_string()};
   const auto created = read_time(in);
   job.started = read_time(in), job.ended = read_time(in);
+  if (format >= first_with_expected) job.expected = std::chrono::milliseconds(in.read<std::int64_t>());
   if (!in.ok() || in.remaining() != 0 || !state || code < 0 || code > int(ErrorCode::internal)) return damaged();
   error.code = ErrorCode(code);
   job.state = *state;

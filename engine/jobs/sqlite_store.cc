@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <exception>
 #include <iterator>
+#include <map>
 #include <mutex>
 #include <span>
 #include <string_view>
@@ -21,7 +22,7 @@
 namespace engine::jobs {
 namespace {
 
-constexpr int schema_number = 3;  // of the tables below; user_version in the file
+constexpr int schema_number = 4;  // of the tables below; user_version in the file
 constexpr const char* schema = R"(
   CREATE TABLE jobs (
     number INTEGER PRIMARY KEY AUTOINCREMENT,  -- AUTOINCREMENT: a removed job's number is never given away again
@@ -57,10 +58,29 @@ constexpr const char* counts_deaths = R"(
 /// and indices, but not to what they hold.
 constexpr std::string_view summed_columns =
     "number, lane, payload, idempotency_key, state, claimed, stopped_early, finished_intervals, progress, result, "
+    "error_code, error_message, error_where, created, started, ended, place, died_at, deaths, expected";
+/// The same in schema 3.
+constexpr std::string_view once_summed_columns =
+    "number, lane, payload, idempotency_key, state, claimed, stopped_early, finished_intervals, progress, result, "
     "error_code, error_message, error_where, created, started, ended, place, died_at, deaths";
 /// From schema 2 to 3.
 constexpr const char* adds_checksums = "ALTER TABLE jobs ADD COLUMN checksum INTEGER NOT NULL DEFAULT 0;";
-constexpr const char* says_schema_3 = "PRAGMA user_version = 3;";
+/// From schema 3 to 4: how long jobs take, milliseconds.
+constexpr const char* adds_expected = R"(
+  ALTER TABLE jobs ADD COLUMN expected INTEGER NOT NULL DEFAULT 0;
+  PRAGMA user_version = 4;
+)";
+
+/// turn_of() in SQL.
+///   job  the table, or another name of it
+std::string turn_in_sql(const std::string& job) {
+  return "(" + job + ".created + CASE " + job + ".state WHEN 'stop_requested' THEN 0 ELSE " + std::to_string(stretch) +
+         " * max(" + job + ".expected - " + std::to_string(negligible.count()) + ", 0) END)";
+}
+/// Of jobs that have not ended: nobody holds it, and none of its lane comes before it.
+constexpr const char* can_run =
+    "ended IS NULL AND NOT claimed AND NOT EXISTS (SELECT 1 FROM jobs AS older WHERE older.ended IS NULL AND "
+    "older.lane = jobs.lane AND older.number < jobs.number)";
 
 /// What row_checksum(...) is in SQL: fnv1a() over the values, each with its type and length.
 void row_checksum(sqlite3_context* context, int count, sqlite3_value** values) {
@@ -80,7 +100,9 @@ void row_checksum(sqlite3_context* context, int count, sqlite3_value** values) {
   sqlite3_result_int64(context, std::int64_t(fnv1a(all.bytes())));
 }
 
-std::string checksum_of_row() { return "row_checksum(" + std::string(summed_columns) + ")"; }
+std::string checksum_of_row(std::string_view columns = summed_columns) {
+  return "row_checksum(" + std::string(columns) + ")";
+}
 
 /// SQLite's result codes become an Error here, travel as an exception to guarded() and leave this file as a Result.
 struct Failure : std::exception {
@@ -248,9 +270,7 @@ std::string select(bool whole) {
   const std::string is_sound = whole ? "checksum IS " + checksum_of_row() : "1";
   return "SELECT number, lane, " + payload +
          ", idempotency_key, state, claimed, stopped_early, finished_intervals, progress, " + result +
-         ", error_code, error_message, error_where, created, started, ended, "
-         "CASE state WHEN 'queued' THEN (SELECT count(*) FROM jobs AS other WHERE other.ended IS NULL AND "
-         "other.state = 'queued' AND other.number <= jobs.number) ELSE 0 END, place, died_at, deaths, " +
+         ", error_code, error_message, error_where, created, started, ended, place, died_at, deaths, expected, " +
          is_sound + " FROM jobs ";
 }
 
@@ -282,23 +302,57 @@ Job read(const Database& database, const Statement& row) {
   job.created = time_at(row, 13).value_or(Time{});
   job.started = time_at(row, 14);
   job.ended = time_at(row, 15);
-  job.queue_position = int(row.integer(16));
-  job.place = row.text(17);
-  job.died_at = row.text(18);
-  job.deaths = int(row.integer(19));
+  job.place = row.text(16);
+  job.died_at = row.text(17);
+  job.deaths = int(row.integer(18));
+  job.expected = std::chrono::milliseconds(row.integer(19));
   return job;
+}
+
+/// The jobs that wait, in the order of their turns, by number: 1 for the next one.
+std::map<std::int64_t, int> places_in_queue(Database& database) {
+  struct Waiting {
+    std::int64_t turn, number;
+  };
+  std::vector<Waiting> waiting;
+  std::map<std::string, std::int64_t> last_turn;  // by lane: its jobs come in order, whatever each of them takes
+  Statement row(database, "SELECT number, lane, state, " + turn_in_sql("jobs") +
+                              " FROM jobs WHERE ended IS NULL ORDER BY number");
+  while (row.step()) {
+    std::int64_t& turn = last_turn.try_emplace(row.text(1), row.integer(3)).first->second;
+    turn = std::max(turn, row.integer(3));
+    if (row.text(2) == to_string(JobState::queued)) waiting.push_back({turn, row.integer(0)});
+  }
+  std::ranges::stable_sort(waiting, {}, &Waiting::turn);
+  std::map<std::int64_t, int> places;
+  for (const Waiting& job : waiting) places.emplace(job.number, int(places.size()) + 1);
+  return places;
+}
+
+/// What read() leaves out.
+void find_places(Database& database, std::span<Job> jobs) {
+  const auto waits = [](const Job& job) { return job.state == JobState::queued; };
+  if (std::ranges::none_of(jobs, waits)) return;
+  const auto places = places_in_queue(database);
+  for (Job& job : jobs)
+    if (const auto place = places.find(number_of(job.id).value_or(0)); waits(job) && place != places.end())
+      job.queue_position = place->second;
 }
 
 Job find_in(Database& database, const std::string& id) {
   Statement row(database, select(true) + "WHERE number = ?1", known_number(id));
   if (!row.step()) no_such_job(id);
-  return read(database, row);
+  Job job = read(database, row);
+  find_places(database, {&job, 1});
+  return job;
 }
 
 std::optional<Job> find_key_in(Database& database, const std::string& key) {
   Statement row(database, select(true) + "WHERE idempotency_key = ?1", key);
   if (!row.step()) return std::nullopt;
-  return read(database, row);
+  Job job = read(database, row);
+  find_places(database, {&job, 1});
+  return job;
 }
 
 /// Notes in a row what it holds now.
@@ -351,6 +405,13 @@ void skip_numbers(Database& database, std::int64_t used) {
   Statement(database, "UPDATE sqlite_sequence SET seq = max(seq, ?1) WHERE name = 'jobs'", used).run();
 }
 
+/// Names a row that does not have its checksum.
+void check_rows(Database& database, std::string_view columns = summed_columns) {
+  for (const std::string& id : ids(Statement(
+           database, "SELECT number FROM jobs WHERE checksum IS NOT " + checksum_of_row(columns) + " LIMIT 1")))
+    database.corrupt("the record of job " + id);
+}
+
 /// Makes the tables, or those of an older version into ours.
 void bring_up_to_date(Database& database, int found_schema) {
   if (found_schema == 0) {
@@ -359,23 +420,24 @@ void bring_up_to_date(Database& database, int found_schema) {
     database.execute(schema);
   }
   // A damaged number of the schema would have columns added twice.
-  const bool is_newer =
-      text_of(database, "SELECT count(*) FROM pragma_table_info('jobs') WHERE name = 'checksum'") != "0";
-  if (found_schema < schema_number && is_newer) database.corrupt("the number of its schema");
+  const auto has = [&](const std::string& column) {
+    return text_of(database, "SELECT count(*) FROM pragma_table_info('jobs') WHERE name = '" + column + "'") != "0";
+  };
+  if ((found_schema < 3 && has("checksum")) || (found_schema < 4 && has("expected")))
+    database.corrupt("the number of its schema");
   if (found_schema < 2) database.execute(counts_deaths);
-  if (found_schema < 3) {
-    database.execute(adds_checksums);
+  if (found_schema < 3) database.execute(adds_checksums);
+  if (found_schema == 3) check_rows(database, once_summed_columns);  // before they are sealed anew
+  if (found_schema < 4) {
+    database.execute(adds_expected);
     Statement(database, "UPDATE jobs SET checksum = " + checksum_of_row()).run();
-    database.execute(says_schema_3);
   }
 }
 
 /// SQLite's own check, of indices, too, and ours of what the rows hold.
 void check_all(Database& database) {
   if (const auto found = text_of(database, "PRAGMA integrity_check(1)"); found != "ok") database.corrupt(found);
-  for (const std::string& id :
-       ids(Statement(database, "SELECT number FROM jobs WHERE checksum IS NOT " + checksum_of_row() + " LIMIT 1")))
-    database.corrupt("the record of job " + id);
+  check_rows(database);
 }
 
 void prepare(Database& database, Time now, const SqliteOptions& options) {
@@ -489,8 +551,8 @@ Result<Submission> SqliteStore::submit(const NewJob& job, std::size_t max_queued
                      "max_queued"});
     Statement(database,
               "INSERT INTO jobs (lane, payload, idempotency_key, state, claimed, stopped_early, finished_intervals, "
-              "progress, result, created) VALUES (?1, ?2, ?3, 'queued', 0, 0, 0, '', '', ?4)",
-              job.lane, job.payload, key, impl_->now())
+              "progress, result, created, expected) VALUES (?1, ?2, ?3, 'queued', 0, 0, 0, '', '', ?4, ?5)",
+              job.lane, job.payload, key, impl_->now(), std::int64_t(job.expected.count()))
         .run();
     seal(database, sqlite3_last_insert_rowid(database.handle()));
     Job accepted = find_in(database, id_of(sqlite3_last_insert_rowid(database.handle())));
@@ -514,8 +576,10 @@ Result<void> SqliteStore::restore(const Job& job) {
               "progress, result, created) VALUES (?1, ?2, ?3, 'queued', 0, 0, 0, '', '', ?4)",
               number, job.lane, job.payload, job.created)
         .run();
-    Statement(database, "UPDATE jobs SET lane = ?2, payload = ?3, idempotency_key = ?4, created = ?5 WHERE number = ?1",
-              number, job.lane, job.payload, key, job.created)
+    Statement(database,
+              "UPDATE jobs SET lane = ?2, payload = ?3, idempotency_key = ?4, created = ?5, expected = ?6 "
+              "WHERE number = ?1",
+              number, job.lane, job.payload, key, job.created, std::int64_t(job.expected.count()))
         .run();
     write_in(database, job);
   });
@@ -546,18 +610,30 @@ Result<std::vector<Job>> SqliteStore::list(const Filter& filter) {
         lane, std::int64_t(filter.active_only), std::int64_t(filter.limit));
     std::vector<Job> jobs;
     while (row.step()) jobs.push_back(read(impl_->database, row));
+    find_places(impl_->database, jobs);
     return jobs;
   });
 }
 
 Result<std::optional<Job>> SqliteStore::claim() {
   return impl_->transact([&]() -> std::optional<Job> {
-    const auto found = ids(Statement(impl_->database,
-                                     "SELECT number FROM jobs WHERE ended IS NULL AND NOT claimed AND NOT EXISTS "
-                                     "(SELECT 1 FROM jobs AS older WHERE older.ended IS NULL AND "
-                                     "older.lane = jobs.lane AND older.number < jobs.number) ORDER BY number LIMIT 1"));
+    const auto found = ids(Statement(impl_->database, std::string("SELECT number FROM jobs WHERE ") + can_run +
+                                                          " ORDER BY " + turn_in_sql("jobs") + ", number LIMIT 1"));
     if (found.empty()) return std::nullopt;
     return apply_in(impl_->database, found.front(), {.event = Event::claim}, impl_->now());
+  });
+}
+
+Result<bool> SqliteStore::should_make_way(const std::string& id, std::chrono::milliseconds left) {
+  return guarded([&] {
+    const std::lock_guard lock(impl_->mutex);
+    const Job running = find_in(impl_->database, id);
+    if (running.state != JobState::running) return false;
+    Statement row(impl_->database,
+                  std::string("SELECT 1 FROM jobs WHERE ") + can_run + " AND expected BETWEEN 1 AND ?1 AND " +
+                      turn_in_sql("jobs") + " < ?2 LIMIT 1",
+                  std::int64_t(left.count() / 2), turn_of(running));
+    return row.step();
   });
 }
 

@@ -17,7 +17,8 @@ namespace engine::jobs {
 struct NewJob {
   std::string lane;
   std::string payload;
-  std::string idempotency_key = {};  ///< "": none.
+  std::string idempotency_key = {};       ///< "": none.
+  std::chrono::milliseconds expected{0};  ///< As of Job.
 };
 
 /// The answer to a job that was handed in.
@@ -71,9 +72,13 @@ class Store {
   [[nodiscard]] virtual Result<std::optional<Job>> find_key(const std::string& idempotency_key) = 0;
   /// The jobs that pass the filter, youngest first, without payloads and results.
   [[nodiscard]] virtual Result<std::vector<Job>> list(const Filter& filter) = 0;
-  /// Gives the oldest job that can run to the caller; nothing if none can. A job can run if nobody holds it and no
-  /// older one of its lane has yet to end.
+  /// Gives the job that can run and whose turn (turn_of()) is earliest to the caller; nothing if none can. A job can
+  /// run if nobody holds it and no older one of its lane has yet to end.
   [[nodiscard]] virtual Result<std::optional<Job>> claim() = 0;
+  /// Whether this job, which runs, should make way: another one that can run has an earlier turn, and takes at most
+  /// half of `left`. One that is not much shorter would only delay this one.
+  ///   left  what the rest of the job should take
+  [[nodiscard]] virtual Result<bool> should_make_way(const std::string& id, std::chrono::milliseconds left) = 0;
   /// Changes a record by the rules of transition().
   ///   returns  the record afterwards
   ///   errors   those of transition()

@@ -50,7 +50,8 @@ fs::path JobContext::checkpoint_file(int interval) const {
 
 Result<std::string> JobContext::load_checkpoint() const { return read_bytes(checkpoint_file(job_.finished_intervals)); }
 
-Result<void> JobContext::save_checkpoint(int interval, std::string_view bytes) {
+Result<void> JobContext::save_checkpoint(int interval, std::string_view bytes,
+                                         std::optional<std::chrono::milliseconds> left) {
   const int previous = job_.finished_intervals;
   const Change change{.event = Event::finish_interval, .progress = running_.progress(), .interval = interval};
   // The number is checked before the file is written: a wrong one must not overwrite the checkpoint that the record
@@ -65,6 +66,10 @@ Result<void> JobContext::save_checkpoint(int interval, std::string_view bytes) {
   queue_.bump_revision();
   if (running_.interrupt.stop_requested() || draining_)
     return fail(ErrorCode::cancelled, job_.id + " was interrupted after interval " + std::to_string(interval), job_.id);
+  // A store that cannot say so now is met where it matters, at the next checkpoint.
+  makes_way_ = left && queue_.store_.should_make_way(job_.id, *left).value_or(false);
+  if (makes_way_)
+    return fail(ErrorCode::cancelled, job_.id + " makes way after interval " + std::to_string(interval), job_.id);
   return {};
 }
 
@@ -164,6 +169,8 @@ void Worker::run(const Job& job) {
     change.stopped_early = outcome->stopped_early;
   } else if (outcome.error().code == ErrorCode::cancelled && draining_) {
     change.event = Event::release;
+  } else if (outcome.error().code == ErrorCode::cancelled && context.makes_way_) {
+    change.event = Event::make_way;
   } else {
     change.event = Event::fail;
     change.error = outcome.error();

@@ -1,4 +1,4 @@
-// A thread that carries out the jobs of a queue, oldest first.
+// A thread that carries out the jobs of a queue, in the order of their turns (turn_of()).
 #pragma once
 
 #include <atomic>
@@ -59,9 +59,12 @@ class JobContext {
   /// Puts the state after an interval on disk, then says so in the record: kill -9 at any moment leaves either this
   /// checkpoint or the one before, whole.
   ///   interval  larger than finished_intervals()
-  ///   errors    cancelled: it was saved, but the job is to end here (cancel or shutdown: return the error);
-  ///             invalid_argument: `interval` does not count up; no_space, unavailable: it was not saved
-  [[nodiscard]] Result<void> save_checkpoint(int interval, std::string_view bytes);
+  ///   left      what the rest should take, if that is known: a shorter job then goes first from here on
+  ///   errors    cancelled: it was saved, but the job is to end here, for good or for a while (cancel, shutdown, a
+  ///             shorter job: return the error); invalid_argument: `interval` does not count up; no_space, unavailable:
+  ///             it was not saved
+  [[nodiscard]] Result<void> save_checkpoint(int interval, std::string_view bytes,
+                                             std::optional<std::chrono::milliseconds> left = std::nullopt);
   /// Notes on disk what the job does next, so that a process that dies at it time and again is known to: call it where
   /// another kind of work begins, with a text that is the same in each attempt. Costs a write where the text is another
   /// than before. For the thread of save_checkpoint().
@@ -89,6 +92,7 @@ class JobContext {
   const std::atomic<bool>& draining_;
   const WorkerOptions options_;
   std::atomic<std::chrono::steady_clock::rep> last_write_;  ///< When progress last went to disk.
+  bool makes_way_ = false;
 };
 
 /// Runs until drained. Several workers may share a queue.

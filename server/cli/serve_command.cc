@@ -2,6 +2,7 @@
 #include <spdlog/logger.h>
 
 #include <filesystem>
+#include <map>
 #include <memory>
 
 #include "engine/params/params.h"
@@ -60,6 +61,14 @@ CLI::Option* add_count(CLI::App& command, const std::string& name, Number& value
   return command.add_option(name, value, description)->check(CLI::Range(low, high))->type_name("N");
 }
 
+CLI::Option* add_seconds(CLI::App& command, const std::string& name, double& value, const std::string& description) {
+  const std::map<std::string, double> units{{"s", 1}, {"min", 60}, {"h", 3600}, {"d", 24 * 3600}};
+  return command.add_option(name, value, description + " (a number of seconds, or such as 90min)")
+      ->transform(CLI::AsNumberWithUnit(units))
+      ->check(CLI::PositiveNumber)
+      ->type_name("SECONDS");
+}
+
 void add_http_options(CLI::App& command, http::ServerOptions& options, http::AccessOptions& access) {
   command.add_option("--host", options.host, "Address to listen on")->type_name("HOST");
   command
@@ -116,6 +125,9 @@ void add_store_options(CLI::App& command, ServeOptions& options) {
   options.edits.memory_bytes = edits::usual_edit_memory();
   add_bytes(command, "--edit-memory", options.edits.memory_bytes,
             "What one edit may take, by its estimate; usually half of what the machine and its control group have");
+  add_seconds(command, "--edit-time", options.edits.longest_seconds,
+              "What one edit may take, by its estimate; one that has worked for twice as long ends with the intervals "
+              "it has");
   options.work_memory_bytes = edits::usual_work_memory();
   add_bytes(command, "--work-memory", options.work_memory_bytes,
             "What renders, and the reading of uploads, may take together at a time, beside scenes and edits; usually a "

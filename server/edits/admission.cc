@@ -1,8 +1,11 @@
 #include "server/edits/admission.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
+#include <functional>
 #include <string>
+#include <vector>
 
 namespace server::edits {
 namespace {
@@ -12,6 +15,7 @@ using engine::fail;
 using engine::params::Params;
 
 constexpr std::size_t least_side = 16;  // of the parameter's range
+constexpr double usual_intervals = 5;   // the paper's
 
 std::string in_words(std::uint64_t bytes) {
   const double gib = double(bytes) / double(std::uint64_t{1} << 30);
@@ -20,6 +24,20 @@ std::string in_words(std::uint64_t bytes) {
     std::snprintf(text, sizeof text, "%.0f MiB", 1024 * gib);
   else
     std::snprintf(text, sizeof text, gib < 100 ? "%.1f GiB" : "%.0f GiB", gib);
+  return text;
+}
+
+std::string time_in_words(double seconds) {
+  constexpr double minute = 60, hour = 60 * minute, day = 24 * hour;
+  char text[32];
+  if (seconds < 3 * minute)
+    std::snprintf(text, sizeof text, "%.0f s", seconds);
+  else if (seconds < 3 * hour)
+    std::snprintf(text, sizeof text, "%.0f minutes", seconds / minute);
+  else if (seconds < 3 * day)
+    std::snprintf(text, sizeof text, "%.0f hours", seconds / hour);
+  else
+    std::snprintf(text, sizeof text, "%.0f days", seconds / day);
   return text;
 }
 
@@ -66,7 +84,72 @@ bool views_are_the_luxury(const JobWorkload& work, const Params& params) {
   return double(work.edit.views) / double(usual.views) > side * side;
 }
 
+/// A parameter that an edit's time grows with.
+struct Lever {
+  const char* name;
+  std::size_t value, least;
+  double luxury;  ///< How many times what is usual it asks for.
+  std::function<void(JobWorkload&, std::size_t)> set;
+  std::size_t fits = 0;  ///< The largest value with which the edit would be accepted; 0: none would do alone.
+};
+
+/// The levers of an edit, the most luxurious one first. The usual values are those of `standard`.
+std::vector<Lever> levers_of(const JobWorkload& work, const Params& params,
+                             std::span<const engine::scene::Camera> dataset) {
+  const Params usual = engine::params::filled_in({}, engine::params::Preset::standard);
+  const double side = double(params.max_image_side) / double(usual.max_image_side);
+  const auto count = [](int number) { return std::size_t(std::max(number, 0)); };
+  std::vector<Lever> levers{
+      {"iterations", count(work.edit.iterations), 1, double(work.edit.iterations) / double(usual.iterations),
+       [](JobWorkload& w, std::size_t value) { w.edit.iterations = int(value); }},
+      {"annealing_steps", count(work.edit.corrections), 1, double(work.edit.corrections),
+       [](JobWorkload& w, std::size_t value) { w.edit.corrections = int(value); }},
+      {"intervals", count(work.edit.intervals), 1, double(work.edit.intervals) / usual_intervals,
+       [](JobWorkload& w, std::size_t value) { w.edit.intervals = int(value); }},
+      {"views", work.edit.views, 1, double(work.edit.views) / double(usual.views),
+       [](JobWorkload& w, std::size_t value) { w.edit.views = value; }},
+      {"max_image_side", count(params.max_image_side), least_side, side * side,
+       [dataset](JobWorkload& w, std::size_t value) { w.edit.view_pixels = view_pixels_at(int(value), dataset); }},
+  };
+  std::ranges::stable_sort(levers, std::greater{}, &Lever::luxury);
+  return levers;
+}
+
 }  // namespace
+
+engine::Result<void> admit_time(const JobWorkload& work, const Params& params,
+                                std::span<const engine::scene::Camera> dataset, double limit) {
+  const double needed = estimated_seconds(work);
+  if (limit <= 0 || needed <= limit) return {};
+  const std::string found = "the edit would take about " + time_in_words(needed) + "; the limit (--edit-time) is " +
+                            time_in_words(limit) + ": ";
+  std::vector<Lever> levers = levers_of(work, params, dataset);
+  std::vector<Lever> that_do;
+  JobWorkload least = work;
+  for (Lever& lever : levers) {
+    lever.fits = largest_that_fits(lever.least, lever.value, [&](std::size_t value) {
+      JobWorkload lower = work;
+      lever.set(lower, value);
+      return estimated_seconds(lower) <= limit;
+    });
+    if (lever.fits > 0) that_do.push_back(lever);
+    lever.set(least, std::min(lever.least, lever.value));
+  }
+  const auto address = [](const Lever& lever) { return std::string("params.") + lever.name; };
+  const auto advice = [&](const Lever& lever) {
+    return "lower " + address(lever) + " to at most " + std::to_string(lever.fits);
+  };
+  if (!that_do.empty())
+    return fail(ErrorCode::too_large,
+                found + advice(that_do[0]) + (that_do.size() > 1 ? ", or " + advice(that_do[1]) : ""),
+                address(that_do[0]));
+  if (estimated_seconds(least) <= limit)
+    return fail(ErrorCode::too_large,
+                found + "lower " + address(levers[0]) + " and " + address(levers[1]) + ", one alone is not enough",
+                address(levers[0]));
+  return fail(ErrorCode::too_large, found + "the scene is too large to be edited here, whatever the parameters are",
+              "scene");
+}
 
 engine::Result<void> admit(const JobWorkload& work, const Params& params,
                            std::span<const engine::scene::Camera> dataset, std::uint64_t limit) {

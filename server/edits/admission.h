@@ -1,4 +1,4 @@
-// Whether an edit may have the memory that it will need.
+// Whether an edit may have the memory and the time that it will need.
 #pragma once
 
 #include <cstdint>
@@ -20,5 +20,13 @@ namespace server::edits {
 ///            "params.max_image_side"; "scene" where no value of the two would do
 [[nodiscard]] engine::Result<void> admit(const JobWorkload& work, const engine::params::Params& params,
                                          std::span<const engine::scene::Camera> dataset, std::uint64_t limit);
+
+/// Holds the estimate of an edit's time against what one may take: others wait for it.
+///   work     of these parameters, from workload_of()
+///   limit    seconds; 0: none
+///   errors   too_large: as above, of "params.iterations", "params.annealing_steps", "params.intervals", "params.views"
+///            and "params.max_image_side"
+[[nodiscard]] engine::Result<void> admit_time(const JobWorkload& work, const engine::params::Params& params,
+                                              std::span<const engine::scene::Camera> dataset, double limit);
 
 }  // namespace server::edits

@@ -6,10 +6,12 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <exception>
 #include <memory>
 #include <new>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <utility>
 #include <vector>
@@ -37,15 +39,20 @@ using engine::Result;
 using engine::jobs::JobContext;
 using engine::jobs::JobResult;
 
-constexpr int background_niceness = 10;
+constexpr int background_niceness = 10;  // beyond that of the process: its starter may have chosen one
 
-/// On Linux, process 0 of PRIO_PROCESS is the calling thread alone. Where this fails, edits are merely less polite.
-void yield_to_others() { (void)::setpriority(PRIO_PROCESS, 0, background_niceness); }
+/// On Linux, process 0 of PRIO_PROCESS is the calling thread alone; the first thread has the process's id. Where this
+/// fails, edits are merely less polite.
+void yield_to_others() {
+  (void)::setpriority(PRIO_PROCESS, 0, ::getpriority(PRIO_PROCESS, id_t(::getpid())) + background_niceness);
+}
 
 void log(const Workshop& workshop, spdlog::level::level_enum level, const JobContext& context,
          const std::string& message) {
   if (workshop.logger != nullptr) workshop.logger->log(level, context.id() + ": " + message);
 }
+
+std::string whole_seconds(double seconds) { return std::to_string(std::lround(seconds)) + " s"; }
 
 std::vector<proto::Point> to_points(const std::vector<engine::DVec3>& positions) {
   std::vector<proto::Point> points;
@@ -144,20 +151,58 @@ class Run {
     keeper_.publish();
   }
 
+  /// Carries the edit out, or ends it with what it has where it has outlived its time.
   Result<edit::Outcome> run() {
+    auto outcome = attempt();
+    if (outcome || !has_outlived_ || context_.cancel_token().stop_requested()) return outcome;
+    if (context_.finished_intervals() == 0)
+      return fail(ErrorCode::too_large,
+                  "the edit has not finished an interval in " + whole_seconds(workshop_.outlived_seconds) +
+                      ", twice what one may be estimated to take (--edit-time): choose smaller radii, fewer views or "
+                      "iterations, or a smaller max_image_side");
+    keeper_.warn("the edit ended early, after interval " + std::to_string(context_.finished_intervals()) +
+                 ": it had worked for " + whole_seconds(workshop_.outlived_seconds) +
+                 ", twice what one may be estimated to take (--edit-time)");
+    note(spdlog::level::warn, "has outlived its time, and ends after its last interval");
+    return attempt();
+  }
+
+  /// The edit asks this all the time, which costs no more than looking at a clock.
+  void look_at_the_time() {
+    if (workshop_.outlived_seconds <= 0 || has_outlived_) return;
+    if (keeper_.seconds() < workshop_.outlived_seconds) return;
+    has_outlived_ = true;
+    out_of_time_.request_stop();
+  }
+
+  Result<edit::Outcome> attempt() {
+    out_of_time_ = {};
+    const std::stop_callback cancelled(context_.cancel_token(), [this] { out_of_time_.request_stop(); });
     edit::Observer observer;
     observer.assigned = [this](const edit::Report& report) { tell_assignment(report); };
-    observer.progress = [this](const edit::Progress& progress) { keeper_.advance(progress); };
+    observer.progress = [this](const edit::Progress& progress) {
+      keeper_.advance(progress);
+      look_at_the_time();
+    };
     observer.moment = [this](const edit::Moment& moment) { return pictures_->add(moment); };
     observer.pictured = std::size_t(std::max(0, workshop_.pictured_views));
     observer.interval_done = [this](const edit::IntervalDone& done) { return finish_interval(done); };
     // A checkpoint that could not be used is made up for first: the record promises its interval.
-    observer.keep = [this] { return context_.stop_requested() && last_interval_ >= context_.finished_intervals(); };
-    observer.stop = context_.cancel_token();
+    observer.keep = [this] {
+      return (context_.stop_requested() || has_outlived_) && last_interval_ >= context_.finished_intervals();
+    };
+    observer.stop = out_of_time_.get_token();
     const auto corrector = make_corrector(asked_);
     auto state = last_state();
     last_interval_ = state ? state->interval : 0;
     return edit::run(*input_, cameras_, request_, {corrector.get(), workshop_.perceptual}, observer, std::move(state));
+  }
+
+  /// What the rest should take, as far as anybody knows.
+  [[nodiscard]] std::optional<std::chrono::milliseconds> left() {
+    const std::optional<double> seconds = keeper_.record().eta_seconds;
+    if (!seconds) return std::nullopt;
+    return std::chrono::milliseconds(std::int64_t(1000 * *seconds));
   }
 
   /// The state to go on from; nothing: from the start.
@@ -193,7 +238,7 @@ class Run {
                  .renders = pictures_->renders_of(done.interval)});
     keeper_.publish();
     if (done.interval <= context_.finished_intervals()) return {};  // made up for
-    auto saved = context_.save_checkpoint(done.interval, edit::encode(done.state));
+    auto saved = context_.save_checkpoint(done.interval, edit::encode(done.state), left());
     if (!saved && saved.error().code != ErrorCode::cancelled)
       return fail(saved.error().code, "the checkpoint of interval " + std::to_string(done.interval) +
                                           " cannot be kept: " + saved.error().message);
@@ -233,6 +278,8 @@ class Run {
   std::shared_ptr<const scene::GaussianCloud> input_;
   std::optional<IntervalPictures> pictures_;
   int last_interval_ = 0;  ///< That this run has finished or taken over.
+  bool has_outlived_ = false;
+  std::stop_source out_of_time_;  ///< Fires with the context's token, too.
   bool stopped_early_ = false;
 
  public:

@@ -26,6 +26,10 @@ struct Workshop {
   engine::optim::PerceptualLoss* perceptual = nullptr;  ///< As in engine::edit::run().
   /// Is told how long an edit took that has made its version, by stages. Empty: nobody is.
   std::function<void(const std::vector<proto::StageSeconds>&)> timed = {};
+  /// Seconds of work, those of earlier runs included, after which an edit ends: with the intervals it has finished, as
+  /// if it had been asked to stop, and a warning; without any it has failed. Others wait for it, and its estimate was
+  /// far off. 0: never.
+  double outlived_seconds = 0;
 };
 
 /// The version of a scene that an edit has made; nothing if it has not made one.
@@ -36,7 +40,8 @@ struct Workshop {
 /// Goes on after the last checkpoint. Where that cannot be used, it begins again, to the same bytes. The thread is
 /// given a low priority by the operating system, for good.
 ///   errors  those of the engine, with their addresses; of the scene store; no_space, unavailable: a picture or a
-///           checkpoint cannot be written; too_large: out of memory
+///           checkpoint cannot be written; too_large: out of memory, or of time with no interval finished; cancelled:
+///           as of JobContext::save_checkpoint()
 [[nodiscard]] engine::Result<engine::jobs::JobResult> carry_out(engine::jobs::JobContext& context,
                                                                 const Workshop& workshop);
 

@@ -7,6 +7,7 @@
 
 #include "engine/edit/handles.h"
 #include "engine/edit/preview.h"
+#include "engine/edit/workload.h"
 #include "engine/jobs/worker.h"
 #include "proto/edit_record.h"
 #include "proto/time_text.h"
@@ -18,6 +19,7 @@
 #include "server/edits/interval_pictures.h"
 #include "server/edits/named_locks.h"
 #include "server/edits/records.h"
+#include "server/edits/speed_log.h"
 #include "server/edits/status.h"
 #include "server/scenes/disk/public_errors.h"
 
@@ -32,6 +34,9 @@ using engine::propagate;
 using std::chrono::steady_clock;
 
 constexpr std::size_t all_jobs = 1'000'000;
+/// An edit that takes so many times what one may be estimated to take has outlived its time. A choice: estimates are
+/// mostly within a factor of one and a half.
+constexpr double outlived = 2;
 constexpr auto result_is_recorded_within = std::chrono::seconds(2);
 
 double seconds_since(steady_clock::time_point start) {
@@ -129,8 +134,14 @@ Result<Checked> check(scenes::SceneStore& scenes, Selections& selections, const 
 
 struct Admitted {
   Checked checked;
-  std::vector<engine::scene::Camera> cameras;  ///< Of the dataset.
+  JobWorkload work;
+  double seconds = 0;  ///< estimated_seconds()
 };
+
+std::chrono::milliseconds in_milliseconds(double seconds) {
+  constexpr double most = 1e9;  // thirty years: what has no limit must have a number
+  return std::chrono::milliseconds(std::int64_t(1000 * std::clamp(seconds, 0.001, most)));
+}
 
 }  // namespace
 
@@ -140,7 +151,8 @@ struct EditService::Impl {
         options(std::move(given)),
         own_selections(store),
         selections(options.selections != nullptr ? *options.selections : own_selections),
-        arena(options.threads, engine::Priority::low) {}
+        arena(options.threads, engine::Priority::low),
+        speeds(edit::measured_slowness) {}
 
   Result<void> open() {
     auto opened = open_records(scenes, options);
@@ -150,9 +162,8 @@ struct EditService::Impl {
     for (const engine::Error& finding : queue->findings())
       if (options.logger != nullptr) options.logger->log(spdlog::level::warn, finding.message);
     worker.emplace(*queue, [workshop = Workshop{scenes, arena, results, options.logger, options.pictured_views,
-                                                options.perceptual, options.timed}](jobs::JobContext& context) {
-      return carry_out(context, workshop);
-    });
+                                                options.perceptual, options.timed, outlived * options.longest_seconds}](
+                               jobs::JobContext& context) { return carry_out(context, workshop); });
     return {};
   }
 
@@ -162,11 +173,22 @@ struct EditService::Impl {
     if (!checked) return propagate(checked);
     const auto dataset = scenes.dataset(*asked.scene);
     if (!dataset) return propagate(dataset);
-    Admitted out{std::move(*checked), cameras_of(dataset->get())};
-    const edit::Request& request = out.checked.request;
-    const JobWorkload work = memory_workload_of(out.checked.version.cloud, request, out.checked.preview, out.cameras,
-                                                uses_corrector(request.params), options.pictured_views);
-    if (auto fits = admit(work, request.params, out.cameras, options.memory_bytes); !fits) return propagate(fits);
+    Admitted out{std::move(*checked), {}};
+    const auto cameras = cameras_of(dataset->get());
+    const auto& [request, version, preview, warnings] = out.checked;
+    const bool corrected = uses_corrector(request.params);
+    out.work = memory_workload_of(version.cloud, request, preview, cameras, corrected, options.pictured_views);
+    // Before frames are rendered to see how long they take.
+    if (auto fits = admit(out.work, request.params, cameras, options.memory_bytes); !fits) return propagate(fits);
+    const auto info = scenes.find(*asked.scene);
+    if (!info) return propagate(info);
+    edit::Request request_there = request;
+    if (info->up) request_there.up = *info->up;
+    out.work = workload_of(version.cloud, request_there, preview, cameras, corrected, options.pictured_views,
+                           *asked.scene, speeds);
+    out.seconds = estimated_seconds(out.work);
+    if (auto fits = admit_time(out.work, request.params, cameras, options.longest_seconds); !fits)
+      return propagate(fits);
     return out;
   }
 
@@ -200,6 +222,7 @@ struct EditService::Impl {
   engine::WorkArena arena;
   NamedLocks scenes_in_use;  ///< By scene: shared while an edit of it is accepted, alone in while_idle().
   NamedLocks results;        ///< By edit; see Workshop.
+  SpeedLog speeds;
   std::unique_ptr<jobs::Store> records;
   std::unique_ptr<jobs::Queue> queue;
   std::optional<jobs::Worker> worker;  ///< Last: it uses all of the above until it ends.
@@ -218,12 +241,14 @@ Result<EditService::Submission> EditService::submit(const proto::EditRequest& re
                                                     const std::string& idempotency_key) {
   const auto asked = canonical(request);
   if (!asked) return propagate(asked);
-  const jobs::NewJob job{.lane = *asked->scene, .payload = proto::to_json(*asked), .idempotency_key = idempotency_key};
+  jobs::NewJob job{.lane = *asked->scene, .payload = proto::to_json(*asked), .idempotency_key = idempotency_key};
   const auto earlier = impl_->earlier(idempotency_key, job);
   if (!earlier) return propagate(earlier);
   if (*earlier) return Submission{status_of(**earlier), false};
   const auto hold = impl_->scenes_in_use.lock_shared(*asked->scene);
-  if (const auto admitted = impl_->admitted(*asked); !admitted) return propagate(admitted);
+  const auto admitted = impl_->admitted(*asked);
+  if (!admitted) return propagate(admitted);
+  job.expected = in_milliseconds(admitted->seconds);
   const auto submission = impl_->queue->submit(job);
   if (!submission) return propagate(submission);
   return Submission{status_of(submission->job), submission->created};
@@ -232,22 +257,17 @@ Result<EditService::Submission> EditService::submit(const proto::EditRequest& re
 Result<proto::EditEstimate> EditService::estimate(const proto::EditRequest& request) {
   const auto asked = canonical(request);
   if (!asked) return propagate(asked);
-  const auto admitted = impl_->admitted(*asked);  // before frames are rendered to see how long they take
+  const auto admitted = impl_->admitted(*asked);
   if (!admitted) return propagate(admitted);
   const Checked& checked = admitted->checked;
-  const auto info = impl_->scenes.find(*asked->scene);
-  if (!info) return propagate(info);
-  edit::Request request_there = checked.request;
-  if (info->up) request_there.up = *info->up;
-  const JobWorkload work = workload_of(checked.version.cloud, request_there, checked.preview, admitted->cameras,
-                                       uses_corrector(request_there.params), impl_->options.pictured_views);
+  const JobWorkload& work = admitted->work;
 
   proto::EditEstimate estimate;
   estimate.handles = checked.handles();
   estimate.views = work.edit.views;
   estimate.intervals = work.edit.intervals;
   estimate.parts = to_parts(checked.preview.parts);
-  estimate.seconds = std::round(100 * estimated_seconds(work)) / 100;
+  estimate.seconds = std::round(100 * admitted->seconds) / 100;
   estimate.memory_bytes = estimated_bytes(work);
   estimate.request = checked.resolved_for(*asked);
   estimate.warnings = checked.warnings(*asked);
@@ -369,6 +389,26 @@ Result<void> EditService::remove_scene(const std::string& scene) {
   return while_idle(scene, [&] { return impl_->scenes.remove(scene); });
 }
 
+Result<void> EditService::remove_version(const std::string& scene, const std::string& version) {
+  const auto hold = impl_->scenes_in_use.lock(scene);
+  const auto active = impl_->queue->list({.lane = scene, .active_only = true, .limit = all_jobs});
+  if (!active) return propagate(active);
+  for (const jobs::Job& listed : *active) {
+    const auto job = impl_->queue->find(listed.id);  // a list has no payloads
+    if (!job && job.error().code == ErrorCode::not_found) continue;
+    if (!job) return propagate(job);
+    const auto request = proto::parse_edit_request(job->payload);
+    const auto made = version_made_by(impl_->scenes, scene, job->id);
+    if (!jobs::is_final(job->state) && ((request && std::to_string(request->version.value_or(0)) == version) ||
+                                        (made && std::to_string(*made) == version)))
+      return fail(ErrorCode::conflict,
+                  job->id + ", an edit of this version, is " + std::string(to_string(job->state)) +
+                      ": cancel it, or wait for its end",
+                  "version");
+  }
+  return impl_->scenes.remove_version(scene, version);
+}
+
 std::uint64_t EditService::version() const { return impl_->queue->revision(); }
 
 std::uint64_t EditService::wait_for_change(std::uint64_t seen, std::chrono::milliseconds timeout) const {
@@ -408,7 +448,7 @@ double EditService::oldest_queued_seconds() {
   if (!found) return oldest;
   const auto now = std::chrono::system_clock::now();
   for (const jobs::Job& job : *found)
-    if (job.state == jobs::JobState::queued)
+    if (job.state == jobs::JobState::queued && !job.started)  // one that made way has been begun
       oldest = std::max(oldest, std::chrono::duration<double>(now - job.created).count());
   return oldest;
 }

@@ -1,4 +1,5 @@
-// Edits as a service: checked and accepted at once, carried out one after the other, durable at every interval.
+// Edits as a service: checked and accepted at once, carried out one after the other, durable at every interval. Short
+// ones go first between the intervals of long ones (docs/adr/0028-every-edit-has-its-turn.md).
 #pragma once
 
 #include <spdlog/logger.h>
@@ -33,7 +34,10 @@ struct ServiceOptions {
   engine::jobs::Retention retention = {};
   int pictured_views = 4;  ///< Of each interval, for its intermediate renders.
   int attempts = 3;        ///< An edit has failed once the service died so often at the same place of it; 0: never.
-  std::uint64_t memory_bytes = 0;    ///< What one edit may be estimated to take; 0: any amount.
+  std::uint64_t memory_bytes = 0;  ///< What one edit may be estimated to take; 0: any amount.
+  /// What one edit may be estimated to take; 0: any time. One that has worked for twice as long ends with what it has
+  /// (see Workshop). A choice: a night.
+  double longest_seconds = 12 * 3600;
   int threads = 0;                   ///< 0: as many as the machine has cores.
   spdlog::logger* logger = nullptr;  ///< Is told what becomes of edits; outlives the service. Null: nobody is.
   /// Is told how long an edit took that has made its version: by stages, in seconds. Called by the worker's thread;
@@ -64,7 +68,7 @@ class EditService {
   /// handle is held against the scene; a selection is carried out.
   ///   errors  invalid_argument, not_found (`where` "scene", "version"; a view of a selection), unprocessable (a handle
   ///           without Gaussians, an empty selection; a key used for another request), unsupported, busy; those of
-  ///           admit()
+  ///           admit() and admit_time()
   [[nodiscard]] Result<Submission> submit(const proto::EditRequest& request, const std::string& idempotency_key);
   /// What submit() would do, and what it would cost. Errors as submit().
   [[nodiscard]] Result<proto::EditEstimate> estimate(const proto::EditRequest& request);
@@ -93,6 +97,10 @@ class EditService {
   /// Removes a scene, unless an edit of it waits or runs. Errors as while_idle().
   [[nodiscard]] Result<void> remove_scene(const std::string& scene);
 
+  /// Deletes a version of a scene, unless an edit of it waits or runs, or one that has yet to end has made it.
+  ///   errors  conflict: names the edit; those of SceneStore::remove_version()
+  [[nodiscard]] Result<void> remove_version(const std::string& scene, const std::string& version);
+
   /// Counts changes of any edit; wait_for_change() returns when it is not `seen` any more, or after `timeout`.
   [[nodiscard]] std::uint64_t version() const;
   std::uint64_t wait_for_change(std::uint64_t seen, std::chrono::milliseconds timeout) const;
@@ -104,7 +112,7 @@ class EditService {
   [[nodiscard]] std::optional<engine::Error> trouble() const;
   /// How many edits are in each state, by its name.
   [[nodiscard]] std::map<std::string, std::size_t> counts();
-  /// Since the edit was accepted that has waited longest for its turn; 0 where none waits.
+  /// Since the edit was accepted that has waited longest to be begun; 0 where none waits.
   [[nodiscard]] double oldest_queued_seconds();
   /// Takes no more edits up; the running one ends at its next interval, or when `grace` is over, and goes on after the
   /// next start.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <string>
 #include <vector>
 
 #include "engine/edit/optimise.h"
@@ -16,6 +17,9 @@ namespace scene = engine::scene;
 
 constexpr int virtual_cameras_looked_for = 8;  // they stand around the part alike: a few tell what all will see
 
+// Larger pictures are not rendered to see how long they take: a frame's time goes with its pixels.
+constexpr int most_measured_side = 1024;
+
 constexpr double load_seconds = 1e-3, publish_seconds = 6e-3, flatten_row_seconds = 2e-8;
 
 constexpr std::size_t frame_row_bytes = 200, frame_pixel_bytes = 32, trained_pixel_bytes = 36, frozen_row_bytes = 24;
@@ -25,6 +29,14 @@ constexpr std::size_t corrected_pixel_bytes = 36, corrected_row_bytes = 100;
 std::vector<scene::Camera> some_virtual_cameras(const scene::GaussianCloud& cloud, edit::Request request) {
   request.params.views = std::min(request.params.views, virtual_cameras_looked_for);
   return edit::candidate_cameras(cloud, {}, request);
+}
+
+/// Virtual cameras stand around what is dragged.
+std::string around(const edit::Request& request) {
+  std::string place = " around";
+  if (!request.handles.empty())
+    for (int axis = 0; axis < 3; ++axis) place += " " + std::to_string(request.handles[0].source[axis]);
+  return place;
 }
 
 }  // namespace
@@ -61,7 +73,7 @@ JobWorkload memory_workload_of(const scene::LayeredCloud& version, const edit::R
 
 JobWorkload workload_of(const scene::LayeredCloud& version, const edit::Request& request,
                         const edit::PreviewOutcome& preview, std::span<const scene::Camera> dataset, bool corrected,
-                        int pictured) {
+                        int pictured, const std::string& scene_id, SpeedLog& log) {
   const scene::GaussianCloud& cloud = *version.base;
   std::vector<scene::Camera> cameras(dataset.begin(), dataset.end());
   if (cameras.empty()) cameras = some_virtual_cameras(cloud, request);
@@ -71,8 +83,12 @@ JobWorkload workload_of(const scene::LayeredCloud& version, const edit::Request&
 
   JobWorkload work = memory_workload_of(version, request, preview, dataset, corrected, pictured);
   work.edit.covered = edit::covered_part(copies, rows, cameras);
-  work.edit.frame = edit::measured_frames(cloud, cameras, request.params.max_image_side);
-  work.edit.slowness = edit::measured_slowness();
+  const int side = std::min(request.params.max_image_side, most_measured_side);
+  const std::string picture =
+      scene_id + (dataset.empty() ? around(request) : " in its views") + ", " + std::to_string(side) + " pixels";
+  const MachineSpeed speed = log.speed_of(picture, [&] { return edit::measured_frames(cloud, cameras, side); });
+  work.edit.frame = speed.frame;
+  work.edit.slowness = speed.slowness;
   return work;
 }
 

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "engine/edit/plan.h"
@@ -12,6 +13,7 @@
 #include "engine/io/dataset.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/overlay.h"
+#include "server/edits/speed_log.h"
 
 namespace server::edits {
 
@@ -37,15 +39,17 @@ struct JobWorkload {
                                              std::span<const engine::scene::Camera> dataset, bool corrected,
                                              int pictured);
 
-/// Looks at the scene and the machine: renders a few frames.
+/// Looks at the scene and the machine: renders a few frames, unless the log knows them.
 ///   request    with the scene's own `up`
 ///   preview    of that request
 ///   dataset    its cameras; none: a few of the virtual ones are found, of which the edit will find all
 ///   corrected  by a corrector
 ///   pictured   views with intermediate pictures, at most
+///   scene      its id: what the log knows its frames by
 [[nodiscard]] JobWorkload workload_of(const engine::scene::LayeredCloud& version, const engine::edit::Request& request,
                                       const engine::edit::PreviewOutcome& preview,
-                                      std::span<const engine::scene::Camera> dataset, bool corrected, int pictured);
+                                      std::span<const engine::scene::Camera> dataset, bool corrected, int pictured,
+                                      const std::string& scene, SpeedLog& log);
 
 /// Seconds of what a job does beside the edit: before it, to read the request and put the version together, and after
 /// it, until the result is on disk as a version.

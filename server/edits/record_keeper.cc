@@ -74,6 +74,13 @@ void RecordKeeper::warn(const std::string& warning) {
   if (std::find(all.begin(), all.end(), warning) == all.end()) all.push_back(warning);
 }
 
+double RecordKeeper::seconds() {
+  count_time();
+  double sum = 0;
+  for (const proto::StageSeconds& timing : record_.timings) sum += timing.seconds;
+  return sum;
+}
+
 void RecordKeeper::publish() {
   count_time();
   published_ = clock_();

@@ -32,6 +32,8 @@ class RecordKeeper {
   /// Puts the interval in, in place of an earlier record of it.
   void add(proto::FinishedInterval finished);
   void warn(const std::string& warning);  ///< Once for each sentence.
+  /// Time that has counted for stages so far, those of earlier runs included, seconds.
+  [[nodiscard]] double seconds();
   void publish();
   void finish();  ///< All is done: publishes it.
 

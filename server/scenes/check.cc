@@ -30,9 +30,9 @@ class SceneCheck {
     const auto manifest = read_manifest(folder_);
     if (!manifest) return manifest_is_damaged(manifest.error());
     check(manifest->base, manifest->base_digest);
-    for (const VersionInfo& version : manifest->scene.versions)
-      if (version.version > 0)
-        check(overlay_name(version.version), manifest->overlay_digests[std::size_t(version.version)]);
+    const auto& versions = manifest->scene.versions;
+    for (std::size_t place = 1; place < versions.size(); ++place)  // version 0 is the base
+      check(overlay_name(versions[place].version), manifest->overlay_digests[place]);
     if (manifest->dataset && !manifest->dataset->below_root) check_dataset(*manifest->dataset);
   }
 

@@ -168,6 +168,12 @@ Result<int> SceneStore::add_version(const std::string& id, int parent, const std
   return impl_->with(id, [&](const Snapshot& at) { return impl_->versions.add(at, parent, edit, overlay); });
 }
 
+Result<void> SceneStore::remove_version(const std::string& id, const std::string& version) {
+  auto removed = impl_->with(id, [&](const Snapshot& at) { return impl_->versions.remove(at, version); });
+  if (removed) impl_->files.forget(id + "/" + version + ".");
+  return removed;
+}
+
 Result<Preview> SceneStore::add_preview(const std::string& id, int parent, const Overlay& overlay) {
   return impl_->with(id, [&](const Snapshot& at) { return impl_->versions.add_preview(at, parent, overlay); });
 }

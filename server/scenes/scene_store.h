@@ -93,6 +93,10 @@ class SceneStore {
   ///   overlay  over the parent
   [[nodiscard]] Result<int> add_version(const std::string& id, int parent, const std::string& edit,
                                         const engine::scene::Overlay& overlay);
+  /// Deletes a version for good, durable when this returns; its number is not used again. Those that were made from it
+  /// are said to have been made from its parent, and stay as they are. Whoever holds it keeps it in memory.
+  ///   errors  not_found; conflict: version 0, which all others lie over
+  [[nodiscard]] Result<void> remove_version(const std::string& id, const std::string& version);
   /// A version that lives in memory only, for a while. It is dropped early where others need its place.
   [[nodiscard]] Result<Preview> add_preview(const std::string& id, int parent, const engine::scene::Overlay& overlay);
 

@@ -70,7 +70,9 @@ std::vector<std::uint8_t> on_layers(const render::Layers& layers, std::span<cons
 RenderService::RenderService(const RenderServiceOptions& options)
     : options_(options),
       arena_(options.threads, engine::Priority::high),
-      slots_(arena_.threads(), options.max_waiting) {}
+      slots_(arena_.threads(), options.max_waiting) {
+  arena_.start_threads();
+}
 
 std::string RenderService::etag(const scenes::LoadedVersion& version, const PictureOrder& order) const {
   const Camera& camera = order.camera;

@@ -56,6 +56,7 @@ struct Picture {
 /// Safe to call from any thread.
 class RenderService {
  public:
+  /// Its threads, which all arenas share, are started here: they have the priority of this thread for good.
   explicit RenderService(const RenderServiceOptions& options);
 
   /// Names the bytes of a picture before it is made: the same order of the same version has the same bytes by this

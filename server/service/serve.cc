@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <fstream>
 #include <map>
 #include <thread>
@@ -50,6 +51,7 @@ proto::ServiceInfo service_info(const ServeOptions& options) {
                  .queued_edits = options.edits.max_queued,
                  .scene_memory_bytes = options.scenes.memory_bytes,
                  .edit_memory_bytes = options.edits.memory_bytes,
+                 .edit_seconds = std::uint64_t(std::ceil(options.edits.longest_seconds)),
                  .streams = options.http.dispatcher.max_streams,
                  .scenes = options.scenes.max_scenes,
                  .dataset_bytes = options.scenes.max_dataset_bytes};
@@ -189,11 +191,11 @@ Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& lo
     http::log(logger, spdlog::level::warn, damage.message, {{"where", damage.where}});
   http::Metrics metrics;
   options.edits.timed = [&metrics](const std::vector<proto::StageSeconds>& timings) { observe_edit(metrics, timings); };
+  RenderService renders(options.renders);  // before edits are taken up, which give their thread a low priority
   edits::Selections selections(**scenes);
   options.edits.selections = &selections;
   auto edits = edits::EditService::open(**scenes, options.edits);
   if (!edits) return propagate(edits);
-  RenderService renders(options.renders);
   SceneViews views(**scenes);
   http::AccessGuard guard(options.access);
   add_gauges(metrics, **scenes, **edits, renders, options.data_dir);

@@ -19,8 +19,10 @@ using engine::propagate;
 using nlohmann::json;
 using nlohmann::ordered_json;
 
-constexpr int manifest_format = 2;     // format number of scene.json
+constexpr int manifest_format = 3;  // format number of scene.json
+constexpr int most_versions = 1'000'000'000;
 constexpr int first_with_digests = 2;  // a format before has none
+constexpr int first_with_gaps = 3;     // before, no version was ever deleted
 /// A larger file is refused before it is read: a hundred thousand versions come to less. A choice.
 constexpr std::uint64_t max_manifest_bytes = std::uint64_t{64} << 20;
 
@@ -166,13 +168,18 @@ ordered_json encoded(const VersionInfo& version, std::uint64_t memory_bytes, con
 }
 
 void read_version(const json& value, int format, Manifest& manifest) {
-  const int number = int(manifest.scene.versions.size());
-  const Object in(value, "versions[" + std::to_string(number) + "]",
+  const auto& known = manifest.scene.versions;
+  const std::size_t place = known.size();
+  const int least = known.empty() ? 0 : known.back().version + 1;
+  const bool may_be_later = place > 0 && format >= first_with_gaps;
+  const Object in(value, "versions[" + std::to_string(place) + "]",
                   {"version", "parent", "edit", "created", "gaussians", "disk_bytes", "memory_bytes", "xxh3"});
   VersionInfo version;
-  version.version = in.whole("version", number, number);
-  version.parent = in.maybe("parent", [&] { return in.whole("parent", 0, std::max(number - 1, 0)); });
-  if (version.parent.has_value() != (number > 0)) throw Wrong{"only version 0 has no parent", in.address("parent")};
+  version.version = in.whole("version", least, may_be_later ? most_versions : least);
+  version.parent = in.maybe("parent", [&] { return in.whole("parent", 0, std::max(least - 1, 0)); });
+  if (version.parent.has_value() != (place > 0)) throw Wrong{"only version 0 has no parent", in.address("parent")};
+  if (version.parent && !place_of(manifest, *version.parent))
+    throw Wrong{"there is no such version", in.address("parent")};
   version.edit = in.text("edit");
   version.created = in.time("created");
   version.gaussians = in.count("gaussians");
@@ -189,11 +196,27 @@ std::string digest_before(std::string_view text) {
 }
 
 Manifest decode(const json& document, std::string_view text) {
-  const Object in(
-      document, "",
-      {"manifest",          "id",           "nonce",     "name", "created", "format", "base",   "base_disk_bytes",
-       "base_memory_bytes", "base_xxh3",    "sh_degree", "low",  "high",    "centre", "radius", "up",
-       "dataset",           "next_dataset", "versions",  "xxh3"});
+  const Object in(document, "", {"manifest",
+                                 "id",
+                                 "nonce",
+                                 "name",
+                                 "created",
+                                 "format",
+                                 "base",
+                                 "base_disk_bytes",
+                                 "base_memory_bytes",
+                                 "base_xxh3",
+                                 "sh_degree",
+                                 "low",
+                                 "high",
+                                 "centre",
+                                 "radius",
+                                 "up",
+                                 "dataset",
+                                 "next_dataset",
+                                 "next_version",
+                                 "versions",
+                                 "xxh3"});
   const int format = in.whole("manifest", 1, manifest_format);
   Manifest manifest;
   SceneInfo& scene = manifest.scene;
@@ -215,6 +238,11 @@ Manifest decode(const json& document, std::string_view text) {
   manifest.next_dataset = in.whole("next_dataset", 1, 1'000'000'000);
   for (const json& version : in.array("versions")) read_version(version, format, manifest);
   if (scene.versions.empty()) throw Wrong{"expected at least version 0", "versions"};
+  const int next = scene.versions.back().version + 1;
+  manifest.next_version = format < first_with_gaps ? next : in.whole("next_version", next, most_versions + 1);
+  // A damaged number of the format must not leave the rest unchecked.
+  if (format < first_with_digests && document.contains("xxh3"))
+    throw Wrong{"the file is damaged: a manifest of this format has no checksum", "manifest"};
   // Last: of a field that makes no sense its name says more.
   if (format >= first_with_digests && (in.digest("xxh3").empty() || in.digest("xxh3") != digest_before(text)))
     throw Wrong{"the file is damaged: it does not have the checksum it was written with; put back a copy of it",
@@ -241,7 +269,8 @@ ordered_json encoded(const Manifest& manifest) {
                    {"radius", scene.radius},
                    {"up", scene.up ? encoded(*scene.up) : ordered_json(nullptr)},
                    {"dataset", nullptr},
-                   {"next_dataset", manifest.next_dataset}};
+                   {"next_dataset", manifest.next_dataset},
+                   {"next_version", manifest.next_version}};
   if (scene.dataset) out["dataset"] = encoded(*scene.dataset, *manifest.dataset);
   ordered_json& versions = out["versions"] = ordered_json::array();
   for (std::size_t i = 0; i < scene.versions.size(); ++i)
@@ -257,6 +286,13 @@ std::string text_of(const Manifest& manifest) {
 }
 
 }  // namespace
+
+std::optional<std::size_t> place_of(const Manifest& manifest, int version) {
+  const auto& versions = manifest.scene.versions;
+  const auto found = std::ranges::lower_bound(versions, version, {}, &VersionInfo::version);
+  if (found == versions.end() || found->version != version) return std::nullopt;
+  return std::size_t(found - versions.begin());
+}
 
 Result<Manifest> read_manifest(const std::filesystem::path& folder) {
   const auto bytes = engine::io::read_bytes(folder / manifest_name, max_manifest_bytes);

@@ -29,19 +29,23 @@ struct Manifest {
   std::string base;   ///< File name of version 0.
   // Digests of files (disk/digest.h); "" is none: it was stored by a release that kept none.
   std::string base_digest;
-  std::vector<std::string> overlay_digests;  ///< One entry per version; "" for version 0.
+  std::vector<std::string> overlay_digests;  ///< One entry per version, in their order; "" for version 0.
   std::uint64_t base_disk_bytes = 0, base_memory_bytes = 0;
-  std::vector<std::uint64_t> overlay_memory_bytes;  ///< One entry per version; 0 for version 0.
+  std::vector<std::uint64_t> overlay_memory_bytes;  ///< The same; 0 for version 0.
   std::optional<DatasetLocation> dataset;           ///< Present exactly where scene.dataset is.
   int next_dataset = 1;                             ///< Number of the next dataset's folder.
+  int next_version = 1;                             ///< Never used twice: a name stands for the same bytes for ever.
 };
+
+/// Where a version stands in the lists of a manifest; nothing where there is none of that number (any more).
+[[nodiscard]] std::optional<std::size_t> place_of(const Manifest& manifest, int version);
 
 constexpr const char* manifest_name = "scene.json";
 /// What the manifest of a removed scene is called, until nobody reads its files any more.
 constexpr const char* removed_manifest_name = "scene.json.removed";
 
 /// Strict: every field must be there, be of its type and be within what makes sense, and the whole have its checksum. A
-/// manifest of format 1 has no digests, of itself neither.
+/// manifest of format 1 has no digests, of itself neither; up to format 2 no version was ever deleted.
 ///   errors  not_found: no such file; corrupt_data: `where` is "<folder>/scene.json:field"
 [[nodiscard]] Result<Manifest> read_manifest(const std::filesystem::path& folder);
 

@@ -78,7 +78,8 @@ Result<VersionFile> VersionFiles::written(const Snapshot& at, const std::string&
     files_.forget(name);
     held = files_.get<HeldFile>(name, loaded->cloud.size() * row_bytes, write);
   }
-  if (!catalogue_.has(at) || (is_preview(version) && !previews_.has(version))) files_.forget(name);
+  const bool is_gone = is_preview(version) ? !previews_.has(version) : !versions_.has(at, version);
+  if (!catalogue_.has(at) || is_gone) files_.forget(name);
   if (!held) return propagate(held);
   return VersionFile{(*held)->file.path(), loaded->key + "-" + extension, {}, *held};
 }

@@ -34,14 +34,32 @@ Result<void> check_overlay(const Overlay& overlay, const GaussianCloud& base) {
   return {};
 }
 
+/// "0 to 3, 7": the first dozen of runs.
+std::string numbers_of(const std::vector<VersionInfo>& versions) {
+  constexpr int most_runs = 12;
+  std::string text;
+  int runs = 0;
+  for (std::size_t from = 0, to = 0; from < versions.size(); from = to + 1) {
+    if (++runs > most_runs) return text + ", ...";
+    for (to = from; to + 1 < versions.size() && versions[to + 1].version == versions[to].version + 1;) ++to;
+    text += (text.empty() ? "" : ", ") + std::to_string(versions[from].version);
+    if (to > from) text += " to " + std::to_string(versions[to].version);
+  }
+  return text;
+}
+
 Result<int> known_version(const Snapshot& at, const std::string& version) {
-  const auto number = engine::number_in<std::uint64_t>(version);
-  const auto& versions = at.manifest->scene.versions;
-  if (number && *number < versions.size() && std::to_string(*number) == version) return int(*number);
+  const auto number = engine::number_in<int>(version);
+  if (number && place_of(*at.manifest, *number) && std::to_string(*number) == version) return *number;
   return fail(ErrorCode::not_found,
-              "scene " + at.scene->id + " has no version " + safe_file_name(version) + "; there are 0 to " +
-                  std::to_string(versions.size() - 1),
+              "scene " + at.scene->id + " has no version " + safe_file_name(version) + "; there are " +
+                  numbers_of(at.manifest->scene.versions),
               "version");
+}
+
+/// The name of a version's overlay in the cache. No other one's begins so.
+std::string cached_name(const std::string& scene, int version) {
+  return scene + "/" + std::to_string(version) + ".overlay";
 }
 
 /// The version that an edit has made.
@@ -57,21 +75,34 @@ std::shared_ptr<const GaussianCloud> cloud_of(const std::shared_ptr<const io::Sc
 
 }  // namespace
 
-void Versions::forget_if_removed(const Snapshot& at) {
-  if (!catalogue_.has(at)) memory_.forget(at.scene->id + "/");
+void Versions::forget_if_removed(const Snapshot& at, int version) {
+  if (!catalogue_.has(at)) return memory_.forget(at.scene->id + "/");
+  if (!is_still_there(at, version)) memory_.forget(cached_name(at.scene->id, version));
+}
+
+bool Versions::is_still_there(const Snapshot& at, int version) const {
+  const auto now = catalogue_.snapshot(at.scene->id);
+  return now && place_of(*now->manifest, version);
+}
+
+bool Versions::has(const Snapshot& at, const std::string& version) const {
+  const auto number = engine::number_in<int>(version);
+  return number && is_still_there(at, *number);
 }
 
 Result<void> Versions::check(const Snapshot& at, int version, RunningDigest& seen) {
   const Manifest& manifest = *at.manifest;
   const std::string name = version == 0 ? manifest.base : overlay_name(version);
-  const std::string& digest = version == 0 ? manifest.base_digest : manifest.overlay_digests[std::size_t(version)];
+  const std::string& digest =
+      version == 0 ? manifest.base_digest : manifest.overlay_digests[place_of(manifest, version).value()];
   const fs::path file = at.scene->folder->path() / name;
   if (!digest.empty()) return seen.check(file, digest, stored_name(at, name));
   const auto found = digest_of_file(file);
   if (!found) return public_error_(found);
   // Where it cannot be noted now, it is next time.
   (void)catalogue_.change(at, [&](Manifest& changed) -> Result<void> {
-    (version == 0 ? changed.base_digest : changed.overlay_digests[std::size_t(version)]) = *found;
+    if (const auto place = place_of(changed, version))
+      (version == 0 ? changed.base_digest : changed.overlay_digests[*place]) = *found;
     return {};
   });
   return {};
@@ -99,7 +130,7 @@ Result<std::shared_ptr<const io::SceneFile>> Versions::base(const Snapshot& at) 
 
 Result<std::shared_ptr<const Overlay>> Versions::overlay(const Snapshot& at, int version, const GaussianCloud& base) {
   if (version == 0) return std::shared_ptr<const Overlay>();
-  const std::uint64_t expected = at.manifest->overlay_memory_bytes[std::size_t(version)];
+  const std::uint64_t expected = at.manifest->overlay_memory_bytes[place_of(*at.manifest, version).value()];
   const auto read = [&]() -> Result<BoundedCache::CachedObject> {
     RunningDigest seen;
     if (auto sound = check(at, version, seen); !sound) return propagate(sound);
@@ -108,8 +139,12 @@ Result<std::shared_ptr<const Overlay>> Versions::overlay(const Snapshot& at, int
     const std::uint64_t bytes = engine::scene::memory_bytes(*rows);
     return BoundedCache::CachedObject{std::make_shared<const Overlay>(std::move(*rows)), bytes};
   };
-  auto held = memory_.get<Overlay>(at.scene->id + "/" + std::to_string(version), expected, read);
-  forget_if_removed(at);
+  auto held = memory_.get<Overlay>(cached_name(at.scene->id, version), expected, read);
+  forget_if_removed(at, version);
+  if (held) return held;
+  const auto now = catalogue_.snapshot(at.scene->id);
+  if (now && !place_of(*now->manifest, version))  // its file went while it was read
+    return propagate(known_version(*now, std::to_string(version)));
   return held;
 }
 
@@ -172,7 +207,7 @@ Result<int> Versions::add(const Snapshot& at, int parent, const std::string& edi
       number = *before;
       return {};
     }
-    number = int(manifest.scene.versions.size());
+    number = manifest.next_version++;
     const fs::path file = folder / overlay_name(number);
     if (auto ready = make_folder(file.parent_path()); !ready) return public_error_(ready);
     if (auto moved = move_durably(staged, file); !moved) return public_error_(moved, staging->folder());
@@ -188,10 +223,35 @@ Result<int> Versions::add(const Snapshot& at, int parent, const std::string& edi
     return {};
   });
   if (!changed) return propagate(changed);
-  memory_.put(at.scene->id + "/" + std::to_string(number), {composed->overlay, composed->bytes},
+  memory_.put(cached_name(at.scene->id, number), {composed->overlay, composed->bytes},
               std::move(composed->reservation));
-  forget_if_removed(at);
+  forget_if_removed(at, number);
   return number;
+}
+
+Result<void> Versions::remove(const Snapshot& at, const std::string& version) {
+  const auto number = known_version(at, version);
+  if (!number) return propagate(number);
+  if (*number == 0)
+    return fail(ErrorCode::conflict, "all versions lie over version 0: delete the scene to be rid of it", "version");
+  const auto changed = catalogue_.change(at, [&](Manifest& manifest) -> Result<void> {
+    const auto place = place_of(manifest, *number);
+    if (!place) return {};  // by another thread meanwhile
+    auto& versions = manifest.scene.versions;
+    const auto parent = versions[*place].parent;
+    for (VersionInfo& other : versions)
+      if (other.parent == *number) other.parent = parent;
+    const auto offset = std::ptrdiff_t(*place);
+    versions.erase(versions.begin() + offset);
+    manifest.overlay_memory_bytes.erase(manifest.overlay_memory_bytes.begin() + offset);
+    manifest.overlay_digests.erase(manifest.overlay_digests.begin() + offset);
+    return {};
+  });
+  if (!changed) return propagate(changed);
+  // What cannot be removed now is no longer named, and goes at the next start.
+  remove_quietly(at.scene->folder->path() / overlay_name(*number));
+  memory_.forget(cached_name(at.scene->id, *number));
+  return {};
 }
 
 Result<Preview> Versions::add_preview(const Snapshot& at, int parent, const Overlay& overlay) {

@@ -35,12 +35,19 @@ class Versions {
   ///           of io
   [[nodiscard]] Result<LoadedVersion> load(const Snapshot& at, const std::string& version);
 
+  /// Whether a version that was there then is there now.
+  [[nodiscard]] bool has(const Snapshot& at, const std::string& version) const;
   /// A new version, durable when this returns: its number. Called again for the same edit, it gives back the one made
   /// before.
   ///   overlay  over the parent
   ///   errors   those of load() and write_manifest()
   [[nodiscard]] Result<int> add(const Snapshot& at, int parent, const std::string& edit,
                                 const engine::scene::Overlay& overlay);
+  /// Deletes a version for good: its number is not used again, and those that were made from it are said to have been
+  /// made from its parent. Each is an overlay over version 0, so none needs another one's file. Whoever holds it keeps
+  /// it in memory.
+  ///   errors  not_found; conflict: version 0, which all others lie over; those of write_manifest()
+  [[nodiscard]] Result<void> remove(const Snapshot& at, const std::string& version);
   /// A version that lives in memory only, for a while. Errors as load().
   [[nodiscard]] Result<Preview> add_preview(const Snapshot& at, int parent, const engine::scene::Overlay& overlay);
 
@@ -57,7 +64,9 @@ class Versions {
                                                                               const engine::scene::GaussianCloud& base);
   [[nodiscard]] Result<LoadedVersion> load_preview(const Snapshot& at, const std::string& preview);
   [[nodiscard]] Result<OverBase> over_base(const Snapshot& at, int parent, const engine::scene::Overlay& overlay);
-  void forget_if_removed(const Snapshot& at);
+  /// Drops from the cache what has been removed while it was read.
+  void forget_if_removed(const Snapshot& at, int version = 0);
+  [[nodiscard]] bool is_still_there(const Snapshot& at, int version) const;
   /// Holds the file of a version against its digest. One that has none, of an earlier release, gets it now.
   ///   seen  of what has been read of it already
   [[nodiscard]] Result<void> check(const Snapshot& at, int version, RunningDigest& seen);

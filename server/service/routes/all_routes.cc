@@ -12,6 +12,9 @@ http::Router all_routes(const RouteDependencies& dependencies) {
   add_scene_routes(router, {dependencies.scenes, dependencies.renders, dependencies.views,
                             [&edits = dependencies.edits](const std::string& scene, const auto& change) {
                               return edits.while_idle(scene, change);
+                            },
+                            [&edits = dependencies.edits](const std::string& scene, const std::string& version) {
+                              return edits.remove_version(scene, version);
                             }});
   add_render_routes(router, {dependencies.scenes, dependencies.views, dependencies.renders, dependencies.selections});
   add_edit_routes(router, dependencies.edits, {.limits = dependencies.edit_limits});

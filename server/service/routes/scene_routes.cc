@@ -262,6 +262,14 @@ void add_scene_routes(http::Router& router, const SceneRouteDependencies& depend
               .path = "/v1/scenes/{id}/views",
               .handler = [&views](const Call& call) { return get_views(call, views); },
               .queries = {}});
+  router.add({.method = "DELETE",
+              .path = "/v1/scenes/{id}/versions/{v}",
+              .handler = [dependencies](const Call& call) -> Result<Reply> {
+                const auto removed = dependencies.remove_version(call.path("id"), call.path("v"));
+                if (!removed) return propagate(removed);
+                return Reply::no_content();
+              },
+              .queries = {}});
   router.add({.method = "GET",
               .path = "/v1/scenes/{id}/versions/{v}/file",
               .handler = [&store](const Call& call) { return get_file(call, store); },

@@ -20,6 +20,8 @@ struct SceneRouteDependencies {
   /// Makes a change to a scene that no edit of it may see half-way: EditService::while_idle(), whose errors it has.
   std::function<engine::Result<void>(const std::string& scene, const std::function<engine::Result<void>()>& change)>
       while_idle;
+  /// EditService::remove_version()
+  std::function<engine::Result<void>(const std::string& scene, const std::string& version)> remove_version;
 };
 
 /// Adds these routes.

@@ -1,10 +1,13 @@
 #include "engine/core/parallel.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <atomic>
 #include <chrono>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <numeric>
 #include <stdexcept>
 #include <thread>
@@ -89,6 +92,27 @@ TEST(WorkArena, HasTheThreadsAskedForAtAnyPriority) {
     arena.run([&] { parallel_for(100, 1, [&](std::size_t, std::size_t) { ++visits; }); });
     EXPECT_EQ(visits, 100);
   }
+}
+
+TEST(WorkArena, ThreadsKeepThePriorityOfTheOneThatStartedThem) {
+  const auto niceness = [] { return ::getpriority(PRIO_PROCESS, 0); };  // on Linux, of the calling thread
+  WorkArena arena(3);
+  arena.start_threads();
+  const int usual = niceness();
+  std::mutex mutex;
+  std::map<std::thread::id, int> seen;
+  std::thread polite([&] {
+    ASSERT_EQ(::setpriority(PRIO_PROCESS, 0, usual + 3), 0);
+    arena.run([&] {
+      parallel_for(300, 1, [&](std::size_t, std::size_t) {
+        const std::lock_guard lock(mutex);
+        seen[std::this_thread::get_id()] = niceness();
+      });
+    });
+    seen.erase(std::this_thread::get_id());
+  });
+  polite.join();
+  for (const auto& [thread, value] : seen) EXPECT_EQ(value, usual);
 }
 
 TEST(WorkArena, WorkOfHighPriorityIsDoneWhileALongJobOfLowPriorityGoesOn) {

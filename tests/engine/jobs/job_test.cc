@@ -34,27 +34,29 @@ struct Line {
   JobState state;
   bool claimed;
   int finished_intervals;
-  std::array<std::string, event_count> next;  // claim report finish_interval stop cancel succeed fail release abandon
+  /// claim report finish_interval stop cancel succeed fail release make_way abandon
+  std::array<std::string, event_count> next;
 };
 
-const std::string no = "-", run = "running", stopping = "stop_requested", leaving = "cancel_requested",
+const std::string no = "-", wait = "queued", run = "running", stopping = "stop_requested", leaving = "cancel_requested",
                   good = "succeeded", bad = "failed", gone = "cancelled";
 
 const std::vector<Line>& table() {
   using enum JobState;
   static const std::vector<Line> lines = {
-      {queued, false, 0, {run, no, no, no, gone, no, no, no, no}},
-      {running, true, 0, {no, run, run, no, leaving, good, bad, run, run}},
-      {running, true, 2, {no, run, run, stopping, leaving, good, bad, run, run}},
-      {running, false, 0, {run, no, no, no, gone, no, no, no, no}},
-      {running, false, 2, {run, no, no, stopping, gone, no, no, no, no}},
-      {stop_requested, true, 2, {no, stopping, stopping, stopping, leaving, good, bad, stopping, stopping}},
-      {stop_requested, false, 2, {stopping, no, no, stopping, gone, no, no, no, no}},
-      {cancel_requested, true, 0, {no, leaving, leaving, no, leaving, gone, gone, gone, gone}},
-      {cancel_requested, true, 2, {no, leaving, leaving, no, leaving, gone, gone, gone, gone}},
-      {succeeded, false, 2, {no, no, no, no, no, no, no, no, no}},
-      {failed, false, 2, {no, no, no, no, no, no, no, no, no}},
-      {cancelled, false, 0, {no, no, no, no, gone, no, no, no, no}},
+      {queued, false, 0, {run, no, no, no, gone, no, no, no, no, no}},
+      {queued, false, 2, {run, no, no, stopping, gone, no, no, no, no, no}},
+      {running, true, 0, {no, run, run, no, leaving, good, bad, run, wait, run}},
+      {running, true, 2, {no, run, run, stopping, leaving, good, bad, run, wait, run}},
+      {running, false, 0, {run, no, no, no, gone, no, no, no, no, no}},
+      {running, false, 2, {run, no, no, stopping, gone, no, no, no, no, no}},
+      {stop_requested, true, 2, {no, stopping, stopping, stopping, leaving, good, bad, stopping, stopping, stopping}},
+      {stop_requested, false, 2, {stopping, no, no, stopping, gone, no, no, no, no, no}},
+      {cancel_requested, true, 0, {no, leaving, leaving, no, leaving, gone, gone, gone, gone, gone}},
+      {cancel_requested, true, 2, {no, leaving, leaving, no, leaving, gone, gone, gone, gone, gone}},
+      {succeeded, false, 2, {no, no, no, no, no, no, no, no, no, no}},
+      {failed, false, 2, {no, no, no, no, no, no, no, no, no, no}},
+      {cancelled, false, 0, {no, no, no, no, gone, no, no, no, no, no}},
   };
   return lines;
 }
@@ -183,6 +185,21 @@ TEST(JobStates, KeepTheTimeOfTheFirstStart) {
   job.started = Time(std::chrono::hours(3));
   EXPECT_EQ(after_event(job, Event::claim)->started, job.started);
   EXPECT_EQ(after_event(job_in(JobState::queued, false, 0), Event::claim)->started, noon);
+}
+
+TEST(JobTurns, AreLaterTheLongerAJobTakesButNoLaterThanThat) {
+  using namespace std::chrono_literals;
+  Job job = job_in(JobState::queued, false, 0);
+  job.created = noon;
+  EXPECT_EQ(turn_of(job), noon) << "nobody knows how long it takes";
+  job.expected = negligible;
+  EXPECT_EQ(turn_of(job), noon) << "nobody minds";
+  job.expected += 1h;
+  EXPECT_EQ(turn_of(job), noon + stretch * 1h);
+  job.state = JobState::running;
+  EXPECT_EQ(turn_of(job), noon + stretch * 1h) << "it does not move up by having begun";
+  job.state = JobState::stop_requested;
+  EXPECT_EQ(turn_of(job), noon) << "what it has only has to be kept";
 }
 
 TEST(JobStates, RefuseIntervalsThatDoNotCountUp) {

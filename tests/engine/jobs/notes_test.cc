@@ -20,6 +20,7 @@ Job full_job() {
   job.error = Error{ErrorCode::too_large, "it is too large", "params.views"};
   job.created = Time(std::chrono::milliseconds(5));
   job.ended = Time(std::chrono::milliseconds(7));
+  job.expected = std::chrono::milliseconds(90);
   return job;
 }
 
@@ -31,6 +32,7 @@ TEST(Note, ComesBackAsItWasWritten) {
   EXPECT_EQ(read.error->where, "params.views");
   EXPECT_FALSE(read.started);
   EXPECT_EQ(read.ended, full_job().ended);
+  EXPECT_EQ(read.expected, full_job().expected);
 }
 
 TEST(Note, KnowsItselfByEveryBitAndEveryCut) {

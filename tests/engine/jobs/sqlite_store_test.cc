@@ -17,8 +17,14 @@ constexpr std::size_t many = 1000;
 
 class SqliteStoreTest : public testing::Test {
  protected:
-  std::string submit(const std::string& lane = "a", const std::string& payload = "{}") {
-    return value(store->submit({.lane = lane, .payload = payload}, many)).job.id;
+  std::string submit(const std::string& lane = "a", const std::string& payload = "{}",
+                     std::chrono::milliseconds expected = 0ms) {
+    return value(store->submit({.lane = lane, .payload = payload, .expected = expected}, many)).job.id;
+  }
+  /// From here on the store's clock is set by `now`.
+  void use_own_clock() {
+    store.reset();
+    store = value(SqliteStore::open({.folder = dir.path(), .now = [this] { return now; }}));
   }
   std::string claim() {
     const auto job = value(store->claim());
@@ -45,11 +51,13 @@ class SqliteStoreTest : public testing::Test {
   support::TempDir dir;
   fs::path file = dir.path() / "jobs.db";
   std::unique_ptr<SqliteStore> store = open_store(dir.path());
+  Time now{1000h};
 };
 
 TEST_F(SqliteStoreTest, KeepsEveryFieldAcrossARestart) {
   const std::string bytes("a\0'\"\xff\n", 6);
-  const auto submitted = value(store->submit({.lane = bytes, .payload = bytes, .idempotency_key = "key"}, many));
+  const auto submitted =
+      value(store->submit({.lane = bytes, .payload = bytes, .idempotency_key = "key", .expected = 1234ms}, many));
   EXPECT_TRUE(submitted.created);
   const std::string id = submitted.job.id;
   EXPECT_EQ(id, "e000001");
@@ -62,6 +70,7 @@ TEST_F(SqliteStoreTest, KeepsEveryFieldAcrossARestart) {
   EXPECT_EQ(after.lane, bytes);
   EXPECT_EQ(after.payload, bytes);
   EXPECT_EQ(after.idempotency_key, "key");
+  EXPECT_EQ(after.expected, 1234ms);
   EXPECT_EQ(after.state, JobState::failed);
   EXPECT_EQ(after.finished_intervals, 3);
   EXPECT_EQ(after.progress, bytes);
@@ -156,6 +165,52 @@ TEST_F(SqliteStoreTest, GivesOutOneJobOfALaneAtATimeAndTheOldestFirst) {
   EXPECT_EQ(claim(), "e000002");
 }
 
+TEST_F(SqliteStoreTest, LetsShorterJobsGoFirstForAWhile) {
+  use_own_clock();
+  const std::string longest = submit("a", "", 1h), middle = submit("b", "", 10min);
+  now += stretch * 50min - 1ms;
+  const std::string before = submit("c", "", 10min);
+  now += 2ms;
+  const std::string after = submit("d", "", 10min);
+  EXPECT_EQ(value(store->find(longest)).queue_position, 3);
+  EXPECT_EQ(value(store->find(after)).queue_position, 4);
+  EXPECT_EQ(claim(), middle);
+  EXPECT_EQ(claim(), before) << "it was handed in while the long one still let others go first";
+  EXPECT_EQ(claim(), longest) << "its turn comes, whatever follows";
+  EXPECT_EQ(claim(), after);
+}
+
+TEST_F(SqliteStoreTest, KeepsALaneInOrderWhateverItsJobsTake) {
+  const std::string longest = submit("a", "", 1h), of_lane = submit("a", "", 1s), other = submit("b", "", 10min);
+  EXPECT_EQ(value(store->find(other)).queue_position, 1);
+  EXPECT_EQ(value(store->find(longest)).queue_position, 2);
+  EXPECT_EQ(value(store->find(of_lane)).queue_position, 3) << "it is short, but comes after the long one";
+  EXPECT_EQ(claim(), other);
+  EXPECT_EQ(claim(), longest);
+  EXPECT_EQ(claim(), "");
+}
+
+TEST_F(SqliteStoreTest, SaysWhenAJobShouldMakeWay) {
+  use_own_clock();
+  const std::string longest = submit("a", "", 1h);
+  EXPECT_EQ(claim(), longest);
+  EXPECT_FALSE(value(store->should_make_way(longest, 1h))) << "nobody waits";
+  submit("a", "", 1s);
+  EXPECT_FALSE(value(store->should_make_way(longest, 1h))) << "one of its lane has to wait for it";
+  submit("b");
+  EXPECT_FALSE(value(store->should_make_way(longest, 1h))) << "nobody knows how long the other one takes";
+  const std::string shorter = submit("c", "", 10min);
+  EXPECT_TRUE(value(store->should_make_way(longest, 20min)));
+  EXPECT_FALSE(value(store->should_make_way(longest, 19min))) << "what is left of it is nearly as short";
+  value(store->apply(longest, {.event = Event::finish_interval, .interval = 1}));
+  value(store->apply(longest, {.event = Event::stop}));
+  EXPECT_FALSE(value(store->should_make_way(longest, 1h))) << "it is about to end";
+  value(store->apply(shorter, {.event = Event::cancel}));
+  now += stretch * 1h;
+  submit("d", "", 1s);
+  EXPECT_FALSE(value(store->should_make_way(longest, 1h))) << "it has let others go first for long enough";
+}
+
 TEST_F(SqliteStoreTest, ReleasesWhatADeadProcessHeld) {
   for (const char* lane : {"a", "b", "c", "d"}) submit(lane);
   for (int i = 0; i < 3; ++i) claim();
@@ -207,9 +262,7 @@ TEST_F(SqliteStoreTest, FindsNothingUnderATextThatIsNoId) {
 }
 
 TEST_F(SqliteStoreTest, ForgetsWhatIsOldOrTooMuch) {
-  store.reset();
-  Time now{1000h};
-  store = value(SqliteStore::open({.folder = dir.path(), .now = [&now] { return now; }}));
+  use_own_clock();
   for (int i = 0; i < 6; ++i) submit();
   for (int i = 0; i < 4; ++i) {
     end_one();
@@ -282,7 +335,7 @@ TEST_F(SqliteStoreTest, ReadsAFileOfTheVersionBefore) {
   value(store->apply("e000001", {.event = Event::finish_interval, .progress = "half", .interval = 2}));
   execute(
       "ALTER TABLE jobs DROP COLUMN place; ALTER TABLE jobs DROP COLUMN died_at; ALTER TABLE jobs DROP COLUMN deaths; "
-      "ALTER TABLE jobs DROP COLUMN checksum; "
+      "ALTER TABLE jobs DROP COLUMN checksum; ALTER TABLE jobs DROP COLUMN expected; "
       "PRAGMA user_version = 1");
   store = open_store(dir.path());
   const Job job = value(store->find("e000001"));
@@ -295,7 +348,7 @@ TEST_F(SqliteStoreTest, ReadsAFileOfTheVersionBefore) {
 }
 
 TEST_F(SqliteStoreTest, RefusesAFileOfANewerVersion) {
-  execute("PRAGMA user_version = 4");
+  execute("PRAGMA user_version = 5");
   EXPECT_EQ(code_of(SqliteStore::open({.folder = dir.path()})), ErrorCode::unsupported);
 }
 

@@ -96,6 +96,66 @@ TEST_F(WorkerTest, DoesJobsInTheirOrder) {
   EXPECT_EQ(wait_for_end(*queue, late).result, "four done") << "a worker that waits must notice";
 }
 
+TEST_F(WorkerTest, LetsAShorterJobGoFirstAtACheckpointAndGoesOnFromThere) {
+  std::vector<std::string> order;
+  const std::string longest = value(queue->submit({.lane = "a", .payload = "long", .expected = 1h})).job.id;
+  const auto function = [&](JobContext& context) -> Result<JobResult> {
+    std::string done = context.finished_intervals() > 0 ? value(context.load_checkpoint()) : "";
+    for (int u = context.finished_intervals() + 1; u <= (context.payload() == "long" ? 3 : 1); ++u) {
+      if (context.payload() == "long" && u == 2 && order.size() == 1) {
+        arrived.open();
+        gate.pass();
+      }
+      order.push_back(context.payload() + " " + std::to_string(u));
+      done += std::to_string(u);
+      if (auto saved = context.save_checkpoint(u, done, 30min); !saved) return propagate(saved);
+    }
+    return JobResult{.text = done};
+  };
+  start(function);
+  arrived.pass();
+  const std::string of_lane = value(queue->submit({.lane = "a", .payload = "same lane", .expected = 1s})).job.id;
+  const std::string shorter = value(queue->submit({.lane = "b", .payload = "short", .expected = 1s})).job.id;
+  gate.open();
+  EXPECT_EQ(wait_for_end(*queue, shorter).state, JobState::succeeded);
+  EXPECT_EQ(wait_for_end(*queue, of_lane).state, JobState::succeeded);
+  const Job done = value(queue->find(longest));
+  EXPECT_EQ(done.state, JobState::succeeded);
+  EXPECT_EQ(done.result, "123");
+  EXPECT_EQ(done.deaths, 0);
+  EXPECT_EQ(order, (std::vector<std::string>{"long 1", "long 2", "short 1", "long 3", "same lane 1"}));
+}
+
+TEST_F(WorkerTest, AJobThatMadeWayCanBeStoppedAndCancelled) {
+  const std::string stopped = value(queue->submit({.lane = "a", .payload = "long", .expected = 1h})).job.id;
+  const std::string cancelled = value(queue->submit({.lane = "b", .payload = "long", .expected = 2h})).job.id;
+  std::string shorter;
+  start([&](JobContext& context) -> Result<JobResult> {
+    if (context.payload() == "short") {
+      arrived.open();
+      gate.pass();
+      return JobResult{};
+    }
+    if (context.stop_requested()) return JobResult{.text = value(context.load_checkpoint()), .stopped_early = true};
+    if (context.finished_intervals() > 0) return fail(ErrorCode::internal, "it was to be stopped");
+    shorter = value(queue->submit({.lane = context.id(), .payload = "short", .expected = 1s})).job.id;
+    if (auto saved = context.save_checkpoint(1, "one", 30min); !saved) return propagate(saved);
+    return fail(ErrorCode::internal, "it did not make way");
+  });
+  arrived.pass();
+  EXPECT_EQ(value(queue->find(stopped)).state, JobState::queued);
+  EXPECT_EQ(value(queue->find(stopped)).finished_intervals, 1);
+  EXPECT_EQ(value(queue->stop(stopped)).state, JobState::stop_requested);
+  gate.open();
+  EXPECT_EQ(wait_for_end(*queue, stopped).result, "one");
+  EXPECT_TRUE(value(queue->find(stopped)).stopped_early);
+  arrived.pass();
+  EXPECT_EQ(value(queue->cancel(cancelled)).state, JobState::cancelled) << "nobody holds it";
+  EXPECT_FALSE(fs::exists(folder(cancelled)));
+  gate.open();
+  EXPECT_EQ(wait_for_end(*queue, shorter).state, JobState::succeeded);
+}
+
 TEST_F(WorkerTest, RecordsTheErrorOfAJobAndGoesOn) {
   submit("bad");
   submit("good");

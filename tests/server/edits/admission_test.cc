@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -98,6 +99,64 @@ TEST(Admission, SaysSoWhereOneParameterAloneIsNotEnough) {
   ASSERT_FALSE(none);
   EXPECT_EQ(none.error().where, "scene");
   EXPECT_NE(none.error().message.find("--edit-memory) is 1 MiB: "), std::string::npos) << none.error().message;
+}
+
+/// The same with what its time depends on; a frame takes ten milliseconds.
+Edit timed(int views, int side, int iterations, int intervals = 1) {
+  Edit edit(views, side);
+  edit.work.edit.iterations = iterations, edit.work.edit.intervals = intervals;
+  edit.work.edit.candidates = 50, edit.work.edit.covered = 0.2;
+  edit.work.edit.frame = {5e-3, 2e-8};
+  return edit;
+}
+
+TEST(AdmissionByTime, TakesWhatIsOverInTime) {
+  const Edit usual = timed(50, 512, 500);
+  const double needed = estimated_seconds(usual.work);
+  EXPECT_TRUE(admit_time(usual.work, usual.params, {}, needed));
+  EXPECT_FALSE(admit_time(usual.work, usual.params, {}, 0.99 * needed));
+  const Edit endless = timed(1000, 8192, 1'000'000, 100);
+  EXPECT_TRUE(admit_time(endless.work, endless.params, {}, 0)) << "no limit";
+}
+
+TEST(AdmissionByTime, NamesWhatIsFurthestBeyondTheUsualAndHowFarToLowerIt) {
+  struct Case {
+    Edit edit;
+    std::string parameter;
+    std::function<Edit(int)> with;
+  };
+  const std::vector<Case> cases = {
+      {timed(50, 512, 1'000'000), "params.iterations", [](int n) { return timed(50, 512, n); }},
+      {timed(50, 512, 500, 1000), "params.intervals", [](int n) { return timed(50, 512, 500, n); }},
+      {timed(1000, 512, 500), "params.views", [](int n) { return timed(n, 512, 500); }},
+      {timed(50, 8192, 500), "params.max_image_side", [](int n) { return timed(50, n, 500); }}};
+  for (const Case& each : cases) {
+    SCOPED_TRACE(each.parameter);
+    const double limit = estimated_seconds(each.edit.work) / 4;
+    const auto refused = admit_time(each.edit.work, each.edit.params, {}, limit);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::too_large);
+    EXPECT_EQ(refused.error().where, each.parameter) << refused.error().message;
+    EXPECT_NE(refused.error().message.find("--edit-time"), std::string::npos) << refused.error().message;
+    const int most = advised(refused.error().message, each.parameter);
+    ASSERT_GT(most, 0) << refused.error().message;
+    const Edit fits = each.with(most), does_not = each.with(most + 1);
+    EXPECT_TRUE(admit_time(fits.work, fits.params, {}, limit));
+    EXPECT_FALSE(admit_time(does_not.work, does_not.params, {}, limit));
+  }
+}
+
+TEST(AdmissionByTime, SaysSoWhereOneParameterAloneIsNotEnough) {
+  const Edit edit = timed(1000, 8192, 1'000'000, 100);
+  const auto several = admit_time(edit.work, edit.params, {}, 60);
+  ASSERT_FALSE(several);
+  EXPECT_EQ(several.error().where, "params.iterations");
+  EXPECT_NE(several.error().message.find("params.iterations and params."), std::string::npos);
+  EXPECT_NE(several.error().message.find(" days; the limit (--edit-time) is 60 s: "), std::string::npos)
+      << several.error().message;
+  const auto none = admit_time(edit.work, edit.params, {}, 1e-3);
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().where, "scene");
 }
 
 }  // namespace

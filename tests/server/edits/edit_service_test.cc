@@ -489,6 +489,88 @@ TEST_F(ServiceTest, StopNeedsSomethingToKeep) {
   EXPECT_EQ(code_of(service->stop("e000077")), ErrorCode::not_found);
 }
 
+TEST_F(ServiceTest, AShortEditGoesFirstBetweenTheIntervalsOfALongOneWhichEndsWithTheSameBytes) {
+  const std::string undisturbed = add_ball(*store, dir.path()), other = add_ball(*store, dir.path());
+  const auto slowly = [](const std::string& of) {
+    proto::EditRequest request = move_ball_slowly(of);
+    if (!under_thread_sanitizer) request.params.views = 400, request.params.max_image_side = 320;
+    return request;
+  };
+  ASSERT_GT(value(service->estimate(slowly(scene))).seconds, 1.0) << "it is too short to be overtaken";
+  const auto alone = wait_for_end(*service, submit(slowly(undisturbed)));
+  ASSERT_EQ(alone.state, "succeeded");
+
+  const auto longest = submit(slowly(scene)), after_it = submit(move_ball(scene, 1));
+  wait_for_interval(*service, longest);
+  const auto shorter = submit(move_ball(other, 1));
+  EXPECT_EQ(wait_for_end(*service, shorter).state, "succeeded");
+  const auto overtaken = value(service->find(longest));
+  EXPECT_FALSE(overtaken.ended) << "the short one has waited for the long one";
+  EXPECT_GE(overtaken.finished_intervals.size(), 1u);
+  EXPECT_FALSE(value(service->find(after_it)).started) << "edits of a scene come in order";
+  const auto done = wait_for_end(*service, longest);
+  EXPECT_EQ(done.state, "succeeded");
+  EXPECT_TRUE(done.warnings.empty()) << done.warnings[0];
+  EXPECT_EQ(done.finished_intervals.size(), 20u);
+  EXPECT_EQ(version_bytes(*store, scene, *done.result_version),
+            version_bytes(*store, undisturbed, *alone.result_version));
+  EXPECT_EQ(wait_for_end(*service, after_it).state, "succeeded");
+}
+
+TEST_F(ServiceTest, RefusesAnEditThatTakesLongerThanOneMay) {
+  service.reset();
+  service = value(EditService::open(*store, {.folder = dir.path() / "edits", .longest_seconds = 1e-4, .threads = 1}));
+  for (const auto& refused :
+       {code_of(service->submit(move_ball(scene), "")), code_of(service->estimate(move_ball(scene)))})
+    EXPECT_EQ(refused, ErrorCode::too_large);
+  EXPECT_EQ(service->submit(move_ball(scene), "").error().where, "scene") << "nothing would be short enough";
+  EXPECT_TRUE(value(service->list({})).empty());
+}
+
+/// Takes its time.
+class Sleeper final : public engine::optim::PerceptualLoss {
+ public:
+  Result<double> evaluate(const engine::scene::Image& rendered, const engine::scene::Image&,
+                          engine::scene::Image& v_rendered) override {
+    std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+    v_rendered = engine::scene::Image(rendered.width, rendered.height, rendered.channels, 0.0f);
+    return 0.0;
+  }
+  double seconds = 0;
+};
+
+TEST_F(ServiceTest, AnEditThatOutlivesItsTimeEndsWithWhatItHas) {
+  proto::EditRequest request = move_ball(scene, 3);
+  request.params.iterations = 1;
+  // Estimates of so little are mostly of what surrounds it; under a sanitizer they are longer.
+  const double limit = std::max(1.0, 1.5 * value(service->estimate(request)).seconds);
+  service.reset();
+  Sleeper sleeper;
+  const auto hurried = value(EditService::open(*store, {.folder = dir.path() / "edits",
+                                                        .pictured_views = 1,
+                                                        .longest_seconds = limit,
+                                                        .threads = 1,
+                                                        .perceptual = &sleeper}));
+  sleeper.seconds = 0.9 * limit;  // of each interval
+  const auto some = wait_for_end(*hurried, value(hurried->submit(request, "")).status.id);
+  ASSERT_EQ(some.state, "succeeded") << some.error->message;
+  EXPECT_TRUE(some.stopped_early);
+  EXPECT_LT(some.finished_intervals.size(), 3u);
+  ASSERT_FALSE(some.warnings.empty());
+  EXPECT_TRUE(std::ranges::any_of(
+      some.warnings, [](const std::string& warning) { return warning.find("--edit-time") != std::string::npos; }));
+  EXPECT_EQ(some.result_version, 1);
+
+  request.params.intervals = 1;
+  request.params.iterations = 4;
+  const auto none = wait_for_end(*hurried, value(hurried->submit(request, "")).status.id);
+  EXPECT_EQ(none.state, "failed");
+  ASSERT_TRUE(none.error);
+  EXPECT_EQ(none.error->code, ErrorCode::too_large);
+  EXPECT_NE(none.error->message.find("--edit-time"), std::string::npos) << none.error->message;
+  EXPECT_EQ(versions(), 2u);
+}
+
 TEST_F(ServiceTest, ACancelledEditLeavesNothingAtWhateverMomentItComes) {
   engine::Rng rng(8);
   int cancelled = 0;
@@ -546,6 +628,26 @@ TEST_F(ServiceTest, RemovingAnEditKeepsItsResult) {
   value(service->remove(id));
   EXPECT_EQ(versions(), 2u);
   EXPECT_EQ(names_in(dir.path() / "edits/jobs"), std::set<std::string>{"last_number"});
+}
+
+TEST_F(ServiceTest, AVersionIsKeptAsLongAsAnEditNeedsIt) {
+  for (int i = 0; i < 2; ++i) wait_for_end(*service, submit(move_ball(scene)));
+  proto::EditRequest request = move_ball_slowly(scene);
+  request.version = 1;
+  request.handles[0].source = {0.5, 0, 0}, request.handles[0].target = proto::Point{0, 0, 0};
+  const auto id = submit(request);
+  const auto refused = service->remove_version(scene, "1");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::conflict);
+  EXPECT_NE(refused.error().message.find(id), std::string::npos) << refused.error().message;
+  EXPECT_TRUE(service->remove_version(scene, "2")) << "nobody needs that one";
+  value(service->cancel(id));
+  wait_for_end(*service, id);
+  value(service->remove_version(scene, "1"));
+  EXPECT_EQ(versions(), 1u);
+  EXPECT_EQ(value(service->find("e000001")).result_version, 1) << "what it made then";
+  EXPECT_EQ(code_of(service->submit(request, "")), ErrorCode::not_found);
+  EXPECT_EQ(wait_for_end(*service, submit(move_ball(scene))).result_version, 3) << "no number is used twice";
 }
 
 TEST_F(ServiceTest, ASceneIsKeptAsLongAsAnEditNeedsIt) {

@@ -160,6 +160,78 @@ TEST_F(SceneStoreTest, MakesOneVersionForOneEdit) {
   EXPECT_EQ(store->add_version(id, 0, "e000002", overlay).value(), 2);
 }
 
+TEST_F(SceneStoreTest, DeletesAVersionAndNothingOfThoseMadeFromIt) {
+  const std::string id = add();
+  for (int v = 0; v < 3; ++v)
+    ASSERT_EQ(*store->add_version(id, v, "e00000" + std::to_string(v + 1), small_edit(cloud_of(id, std::to_string(v)))),
+              v + 1);
+  const auto bytes_of = [&](const std::string& version) {
+    const auto file = store->file(id, version, FileFormat::ply);
+    return file ? support::read_file(file->path) : file.error().message;
+  };
+  const std::string second = bytes_of("2"), third = bytes_of("3");
+  const auto held = store->load(id, "1");
+  ASSERT_TRUE(held);
+  ASSERT_TRUE(store->remove_version(id, "1"));
+  const auto check = [&] {
+    const auto gone = store->load(id, "1");
+    ASSERT_FALSE(gone);
+    EXPECT_EQ(gone.error().code, ErrorCode::not_found);
+    EXPECT_EQ(gone.error().where, "version");
+    EXPECT_NE(gone.error().message.find("there are 0, 2 to 3"), std::string::npos) << gone.error().message;
+    EXPECT_EQ(store->file(id, "1", FileFormat::ply).error().code, ErrorCode::not_found);
+    EXPECT_EQ(store->remove_version(id, "1").error().code, ErrorCode::not_found);
+    EXPECT_EQ(bytes_of("2"), second);
+    EXPECT_EQ(bytes_of("3"), third);
+    const SceneInfo info = *store->find(id);
+    ASSERT_EQ(info.versions.size(), 3u);
+    EXPECT_EQ(info.versions[1].version, 2);
+    EXPECT_EQ(info.versions[1].parent, 0) << "the nearest one that is left";
+    EXPECT_EQ(info.versions[2].parent, 2);
+    EXPECT_EQ(entries(options.folder / id / "versions"), (std::vector<std::string>{"2.overlay", "3.overlay"}));
+  };
+  check();
+  open();
+  check();
+  EXPECT_GT(held->cloud.size(), 0u) << "whoever holds it keeps it";
+  ASSERT_TRUE(store->remove_version(id, "3"));
+  open();
+  EXPECT_EQ(*store->add_version(id, 2, "e000009", small_edit(cloud_of(id, "2"))), 4) << "no number is used twice";
+}
+
+TEST_F(SceneStoreTest, DeletesNoVersionThatOthersNeedOrThatIsNone) {
+  const std::string id = add();
+  ASSERT_TRUE(store->add_version(id, 0, "e000001", small_edit(cloud_of(id, "0"))));
+  const auto preview = store->add_preview(id, 0, small_edit(cloud_of(id, "0")));
+  ASSERT_TRUE(preview);
+  EXPECT_EQ(store->remove_version(id, "0").error().code, ErrorCode::conflict);
+  for (const std::string& none :
+       {std::string("2"), std::string("01"), std::string("-1"), std::string("all"), preview->version})
+    EXPECT_EQ(store->remove_version(id, none).error().code, ErrorCode::not_found) << none;
+  EXPECT_EQ(store->remove_version("s000077", "1").error().where, "scene");
+  EXPECT_EQ(store->find(id)->versions.size(), 2u);
+}
+
+TEST_F(SceneStoreTest, AVersionThatIsDeletedWhileOthersReadItIsThereOrNot) {
+  const std::string id = add();
+  for (int round = 0; round < 20; ++round) {
+    const int version = *store->add_version(id, 0, "e0000" + std::to_string(10 + round), small_edit(cloud_of(id, "0")));
+    const std::string name = std::to_string(version);
+    open();  // nothing of it is in memory
+    std::vector<std::thread> readers;
+    for (int reader = 0; reader < 3; ++reader)
+      readers.emplace_back([&, reader] {
+        const auto loaded = reader == 0 ? store->file(id, name, FileFormat::ply).map([](const auto&) {})
+                                        : store->load(id, name).map([](const auto&) {});
+        EXPECT_TRUE(loaded || loaded.error().code == ErrorCode::not_found) << loaded.error().message;
+      });
+    EXPECT_TRUE(store->remove_version(id, name));
+    for (std::thread& reader : readers) reader.join();
+    EXPECT_EQ(store->load(id, name).error().code, ErrorCode::not_found);
+    EXPECT_TRUE(entries(options.folder / id / "versions").empty());
+  }
+}
+
 TEST_F(SceneStoreTest, NeverKeepsAPoisonedVersion) {
   const std::string id = add();
   Overlay overlay = small_edit(cloud_of(id, "0"));

@@ -28,6 +28,7 @@ Manifest full_manifest() {
   manifest.overlay_digests = {"", "0123456789abcdef"};
   manifest.dataset = DatasetLocation{"dataset.3/chair", false, 1234, "fedcba9876543210"};
   manifest.next_dataset = 4;
+  manifest.next_version = 5;
   return manifest;
 }
 

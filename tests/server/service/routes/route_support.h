@@ -56,8 +56,10 @@ struct RouteFixture : scenes::StoreFixture {
     views = std::make_unique<SceneViews>(*store);
     selections = std::make_unique<edits::Selections>(*store);
     router = {};
-    add_scene_routes(router,
-                     {*store, renders, *views, [](const std::string&, const auto& change) { return change(); }});
+    add_scene_routes(router, {*store, renders, *views, [](const std::string&, const auto& change) { return change(); },
+                              [this](const std::string& id, const std::string& version) {
+                                return store->remove_version(id, version);
+                              }});
     add_render_routes(router, {*store, *views, renders, *selections});
   }
 

@@ -85,9 +85,10 @@ TEST_F(SceneRoutes, ChangeAndRemoveAScene) {
 TEST_F(SceneRoutes, LeaveASceneToTheEditThatNeedsIt) {
   const std::string id = add_wall();
   http::Router guarded;
-  add_scene_routes(guarded, {*store, renders, *views, [](const std::string&, const auto&) -> engine::Result<void> {
-                               return engine::fail(ErrorCode::conflict, "edit e000001 runs on it");
-                             }});
+  const auto refuse = [](const std::string&, const auto&) -> engine::Result<void> {
+    return engine::fail(ErrorCode::conflict, "edit e000001 runs on it");
+  };
+  add_scene_routes(guarded, {*store, renders, *views, refuse, refuse});
   for (const http::Route& route : guarded.routes()) {
     if (route.method == "DELETE") {
       EXPECT_EQ(route.handler(about(id)).error().code, ErrorCode::conflict);
