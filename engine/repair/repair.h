@@ -69,7 +69,7 @@ class Repair {
 
   /// One correction of all views. Appends seeds to the working scene.
   ///   masks    per view, dilated; views without a set pixel stay as they are
-  ///   advance  called with the part that is done after each view; its error ends the correction
+  ///   advance  called with the part that is done, after each view of either pass; its error ends the correction
   ///   errors   those of the corrector and of `advance`; internal: the corrector gave back something else than a
   ///            picture of the view's size
   [[nodiscard]] Result<Corrected> correct(WorkingScene& working, std::span<const scene::Mask> masks, const Round& round,
@@ -114,7 +114,9 @@ class Repair {
   [[nodiscard]] ContinuedSurfaces surfaces_behind(const ViewNow& now, std::size_t v, const Round& round) const;
   /// The view that shows most of what can be completed, and is to decide what is there: at an outline of what goes on,
   /// little of it is seen. The first one if nothing is to be completed.
-  [[nodiscard]] Telling most_telling_view(const WorkingScene& working, const Rows& rows, const Round& round);
+  ///   looked  called after each view; its error ends the search
+  [[nodiscard]] Result<Telling> most_telling_view(const WorkingScene& working, const Rows& rows, const Round& round,
+                                                  const std::function<Result<void>()>& looked);
   /// Completes the surface that goes on at most pixels in a chart of it, before any view does, if enough around it is
   /// known: returns the number of seeds.
   [[nodiscard]] Result<std::size_t> complete_chart(WorkingScene& working, Rows& rows, const Telling& telling,

@@ -48,7 +48,7 @@ std::vector<Touch> contact_of(const scene::LayeredCloud& scene, std::span<const 
     shown.push_back(std::uint32_t(k));
   }
   const float usual = within.empty() ? 0 : median(std::move(within));
-  const bool grows_out = firmness(graph, around.alike, is_part) >= grown * double(usual);
+  const bool grows_out = usual > 0 && firmness(graph, around.alike, is_part) >= grown * double(usual);
   for (std::size_t i = 0; i < shown.size(); ++i)
     out[shown[i]] = across[i] == none                           ? Touch::nothing
                     : grows_out && across[i] >= goes_on * usual ? Touch::grows_out

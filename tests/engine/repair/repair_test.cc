@@ -441,8 +441,12 @@ TEST(Repair, GoesOutwardFromTheViewThatShowsMostOfTheHoleAndTellsHowFarItIs) {
     told.push_back(done);
     return Result<void>{};
   }));
-  ASSERT_EQ(told.size(), 5u);
-  for (std::size_t k = 0; k < 5; ++k) EXPECT_NEAR(told[k], 0.2 * double(k + 1), 1e-12);
+  ASSERT_EQ(told.size(), 11u) << "the closure, five views looked at, five corrected";
+  EXPECT_GT(told.front(), 0);
+  for (std::size_t k = 1; k < told.size(); ++k) EXPECT_GT(told[k], told[k - 1]) << k;
+  for (std::size_t k = 7; k < told.size(); ++k)
+    EXPECT_NEAR(told[k] - told[k - 1], told[6] - told[5], 1e-12) << "as much for each view that is corrected";
+  EXPECT_NEAR(told.back(), 1, 1e-12);
   std::vector<std::size_t> order;
   const std::span<const correct::CorrectionTask> asked = moved.corrector.of_views();
   for (std::size_t k = 0; k < asked.size(); k += 2) order.push_back(asked[k].examples[0]);
@@ -465,13 +469,17 @@ TEST(Repair, EndsWithTheErrorOfTheCorrectorOrOfWhoeverIsTold) {
   const auto failed = failing.correct();
   ASSERT_FALSE(failed);
   EXPECT_EQ(failed.error().where, "corrector");
-  Moved told;
-  const auto ended = told.repair().correct(told.working, told.masks, {1, 1, 0.5}, [](double) -> Result<void> {
-    return fail(ErrorCode::cancelled, "enough", "here");
-  });
-  ASSERT_FALSE(ended);
-  EXPECT_EQ(ended.error().where, "here");
-  EXPECT_EQ(told.corrector.of_views().size(), 2u) << "after one view";
+  for (const int enough : {1, 3, 7}) {  // after the closure, while views are looked at, after one is corrected
+    Moved told;
+    int calls = 0;
+    const auto ended = told.repair().correct(told.working, told.masks, {1, 1, 0.5}, [&](double) -> Result<void> {
+      if (++calls < enough) return {};
+      return fail(ErrorCode::cancelled, "enough", "here");
+    });
+    ASSERT_FALSE(ended) << enough;
+    EXPECT_EQ(ended.error().where, "here");
+    EXPECT_EQ(told.corrector.asked.size(), enough < 7 ? 0u : 3u) << enough << ": the chart and one view, twice";
+  }
 }
 
 }  // namespace

@@ -103,6 +103,14 @@ TEST(ContactOf, OfRowsThatNothingShowsIsNone) {
   EXPECT_EQ(contact_of(shared(cloud), rows, rows), std::vector<Touch>(2, Touch::nothing));
 }
 
+TEST(ContactOf, StandsWhereNothingSaysHowAlikeItsRowsUsuallyAre) {
+  scene::GaussianCloud cloud;
+  add_sheet(cloud, {0, 0, 0}, 12, 0.1f, {0.1f, 0.2f, 0.5f});
+  add_at(cloud, {0, 0, -0.1f}, 4, std::log(0.05f), {0.9f, 0.9f, 0.9f});  // one row: it has no neighbour in its part
+  const std::vector<std::uint32_t> rows{std::uint32_t(cloud.size() - 1)};
+  EXPECT_EQ(contact_of(shared(cloud), rows, rows), std::vector<Touch>{Touch::stands});
+}
+
 TEST(ContactOf, OfASceneOfOneRowIsNone) {
   const auto touches =
       contact_of(shared(cloud_at({{1, 2, 3}})), std::vector<std::uint32_t>{0}, std::vector<std::uint32_t>{0});
