@@ -28,11 +28,12 @@ constexpr std::size_t rows_per_task = 4096;  // of a parallel task: a choice
 constexpr std::uint32_t magic = 0x46546c67, json_chunk = 0x4e4f534a,
                         binary_chunk = 0x004e4942;  // "glTF" "JSON" "BIN\0"
 constexpr std::uint32_t signed_byte = 5120, unsigned_byte = 5121, signed_short = 5122, unsigned_short = 5123,
-                        float32 = 5126;   // of glTF's componentType
-constexpr int points_mode = 0;            // of glTF's primitive.mode
-constexpr std::string_view axes = "LUF";  // of glTF
-constexpr int max_depth = 64;             // of nodes within nodes: a choice
-constexpr double most_uneven = 1e-4;      // relative, of what counts as a uniform scale: rounding of a printed matrix
+                        float32 = 5126;              // of glTF's componentType
+constexpr int points_mode = 0;                       // of glTF's primitive.mode
+constexpr std::string_view axes = "LUF";             // of glTF
+constexpr int max_depth = 64;                        // of nodes within nodes: a choice
+constexpr std::uint64_t max_json_bytes = 16u << 20;  // a choice: as a tree, 50 times that; a million nodes have it
+constexpr double most_uneven = 1e-4;  // relative, of what counts as a uniform scale: rounding of a printed matrix
 constexpr const char* extension = "KHR_gaussian_splatting";
 constexpr std::array compressions = {"KHR_gaussian_splatting_compression_spz_2",
                                      "KHR_gaussian_splatting_compression_spz"};
@@ -172,6 +173,11 @@ class Glb {
       if (type == binary_chunk && binary_.empty()) binary_ = chunk;
     }
     if (text.empty()) return damaged("there is no JSON", where);
+    if (text.size() > max_json_bytes)
+      return fail(ErrorCode::too_large,
+                  "the JSON has " + std::to_string(text.size()) + " bytes; at most " + std::to_string(max_json_bytes) +
+                      " are read",
+                  file_ + ":json");
     auto lent = take_from(options_.memory, json_tree_bytes(text), file_);
     if (!lent) return propagate(lent);
     tree_memory_ = std::move(*lent);
@@ -228,23 +234,28 @@ class Glb {
       int depth;
     };
     std::vector<Open> open;
-    for (std::size_t i = roots.size(); i-- > 0;) open.push_back({roots[i], {}, 0});
     std::vector<bool> seen(nodes);
+    // glTF's nodes are trees: each has one parent, and none is above itself. Asked before one is put down, so that
+    // there are never more than the file has.
+    const auto put = [&](Open next) {
+      if (error_) return;
+      if (seen[next.node])
+        return member(root, "nodes", next.node).fail_here("the node is in the scene twice, or below itself");
+      seen[next.node] = true;
+      open.push_back(next);
+    };
+    for (std::size_t i = roots.size(); i-- > 0;) put({roots[i], {}, 0});
     while (!open.empty() && !error_) {
       const Open next = open.back();
       open.pop_back();
       const JsonFields node = member(root, "nodes", next.node);
-      // glTF's nodes are trees: each has one parent, and none is above itself.
-      if (seen[next.node]) return node.fail_here("the node is in the scene twice, or below itself");
-      seen[next.node] = true;
       if (next.depth > max_depth) return node.fail_here("nodes lie more than " + std::to_string(max_depth) + " deep");
       const Placement own = placement_of(node);
       const Placement placement{next.placement.linear * own.linear,
                                 next.placement.linear * own.shift + next.placement.shift};
       if (node.has("children")) {
         const JsonFields children = node.at("children");
-        for (std::size_t i = children.size(); i-- > 0;)
-          open.push_back({index(children.at(i), nodes), placement, next.depth + 1});
+        for (std::size_t i = children.size(); i-- > 0;) put({index(children.at(i), nodes), placement, next.depth + 1});
       }
       if (node.has("mesh") && !error_) add_mesh(root, node, index(node.at("mesh"), meshes), placement);
     }
@@ -642,11 +653,13 @@ bool looks_like_glb(std::span<const std::byte> bytes) {
   return bytes.size() >= mark.size() && std::memcmp(bytes.data(), mark.data(), mark.size()) == 0;
 }
 
-std::uint64_t expected_glb_bytes(std::span<const std::byte> bytes) {
-  const ReadOptions options;
-  Glb glb(bytes, "", options);
-  if (!glb.survey()) return bytes.size();
-  return std::max<std::uint64_t>(bytes.size(), glb.count() * cloud_row_bytes(glb.sh_degree()));
+std::uint64_t expected_glb_bytes(std::span<const std::byte> bytes, const ReadOptions& options) {
+  const auto expected = within_memory("", [&]() -> Result<std::uint64_t> {
+    Glb glb(bytes, "", options);
+    if (auto done = glb.survey(); !done) return propagate(done);
+    return glb.count() * cloud_row_bytes(glb.sh_degree());
+  });
+  return std::max<std::uint64_t>(bytes.size(), expected.value_or(0));
 }
 
 Result<DecodedScene> decode_glb(std::span<const std::byte> bytes, const std::string& file, const ReadOptions& options) {

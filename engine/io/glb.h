@@ -19,8 +19,8 @@ namespace engine::io {
 [[nodiscard]] bool looks_like_glb(std::span<const std::byte> bytes);
 
 /// Bytes that the Gaussians of a file take in memory, by its JSON: at least the file's own size, and that alone where
-/// the JSON says nothing that the file could hold.
-[[nodiscard]] std::uint64_t expected_glb_bytes(std::span<const std::byte> bytes);
+/// the JSON says nothing that the file could hold, or takes more than options.memory lends.
+[[nodiscard]] std::uint64_t expected_glb_bytes(std::span<const std::byte> bytes, const ReadOptions& options = {});
 
 /// Decodes a whole file: all Gaussians of the scene that it names (without one: of all nodes), where their nodes put
 /// them, turned from glTF's left, up, front to right, down, front. Meshes, cameras and materials are left out, and that

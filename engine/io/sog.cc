@@ -404,6 +404,22 @@ class Sog {
     return {};
   }
 
+  /// What a leaf gives for the level that is asked for, else for its nearest finer or coarser one.
+  void add_piece(const JsonFields& lods, Plan& plan) const {
+    const auto has = [&](int level) { return lods.has(std::to_string(level).c_str()); };
+    int level = options_.level;
+    while (level >= 0 && !has(level)) --level;
+    if (level < 0)
+      for (level = options_.level + 1; level < plan.levels && !has(level);) ++level;
+    if (level >= plan.levels) return;
+    const JsonFields leaf = lods.at(std::to_string(level).c_str());
+    const Piece piece{std::size_t(whole(leaf.at("file"), 1u << 24)), whole(leaf.at("offset"), std::uint64_t{1} << 32),
+                      whole(leaf.at("count"), std::uint64_t{1} << 32)};
+    if (piece.file >= plan.names.size()) leaf.at("file").fail_here("there is no such file among filenames");
+    plan.pieces.push_back(piece);
+    plan.count += piece.count;
+  }
+
   /// Which rows of which files make the level that is asked for, in the order of the tree.
   Result<Plan> plan_of(const std::string& name) {
     const auto document = parsed(name, max_lod_meta_bytes);
@@ -429,34 +445,24 @@ class Sog {
       return fail(ErrorCode::too_large,
                   std::to_string(plan.names.size()) + " files; at most " + std::to_string(max_lod_files) + " are read",
                   where(name) + ":filenames");
-    // A stack of our own, and of limited depth: how deep the tree goes, the file says.
-    struct Node {
-      JsonFields fields;
-      int depth;
+    // A stack of our own, and of limited depth: how deep the tree goes, the file says. It holds where each level is
+    // among its siblings, not the siblings: of those, there may be millions.
+    struct Siblings {
+      JsonFields nodes;
+      std::size_t next = 0;
     };
-    std::vector<Node> open{{root.at("tree"), 0}};
-    while (!open.empty() && !error) {
-      const auto [node, depth] = open.back();
-      open.pop_back();
+    std::vector<Siblings> open;
+    JsonFields node = root.at("tree");
+    for (bool more = true; more && !error;) {
+      if (node.has("lods")) add_piece(node.at("lods"), plan);
       if (node.has("children")) {
-        const JsonFields children = node.at("children");
-        if (depth == max_lod_depth) children.fail_here("the tree is deeper than " + std::to_string(max_lod_depth));
-        for (std::size_t i = children.size(); i-- > 0;) open.push_back({children.at(i), depth + 1});
+        if (open.size() == max_lod_depth)
+          node.at("children").fail_here("the tree is deeper than " + std::to_string(max_lod_depth));
+        open.push_back({node.at("children")});
       }
-      if (!node.has("lods")) continue;
-      const JsonFields lods = node.at("lods");
-      const auto has = [&](int level) { return lods.has(std::to_string(level).c_str()); };
-      int level = options_.level;
-      while (level >= 0 && !has(level)) --level;
-      if (level < 0)
-        for (level = options_.level + 1; level < plan.levels && !has(level);) ++level;
-      if (level >= plan.levels) continue;
-      const JsonFields leaf = lods.at(std::to_string(level).c_str());
-      const Piece piece{std::size_t(whole(leaf.at("file"), 1u << 24)), whole(leaf.at("offset"), std::uint64_t{1} << 32),
-                        whole(leaf.at("count"), std::uint64_t{1} << 32)};
-      if (!error && piece.file >= plan.names.size()) leaf.at("file").fail_here("there is no such file among filenames");
-      plan.pieces.push_back(piece);
-      plan.count += piece.count;
+      while (!open.empty() && open.back().next == open.back().nodes.size()) open.pop_back();
+      more = !open.empty();
+      if (more) node = open.back().nodes.at(open.back().next++);
     }
     if (error) return tl::make_unexpected(std::move(*error));
     for (const Piece& piece : plan.pieces) {
@@ -695,14 +701,14 @@ bool looks_like_sog_meta(std::span<const std::byte> start) {
   return first != std::string_view::npos && text[first] == '{';
 }
 
-std::uint64_t expected_sog_bytes(std::span<const std::byte> zip, int level) {
-  ReadOptions options;
-  options.level = level;
-  const auto archive = ZipArchive::open(zip, "");
-  if (!archive) return zip.size();
-  auto bundle = open_bundle(*archive, "", nullptr);
-  if (!bundle) return zip.size();
-  const auto size = Sog(std::move(bundle->files), options).size(bundle->root);
+std::uint64_t expected_sog_bytes(std::span<const std::byte> zip, const ReadOptions& options) {
+  const auto size = within_memory("", [&]() -> Result<std::pair<std::uint64_t, int>> {
+    const auto archive = ZipArchive::open(zip, "");
+    if (!archive) return propagate(archive);
+    auto bundle = open_bundle(*archive, "", options.memory);
+    if (!bundle) return propagate(bundle);
+    return Sog(std::move(bundle->files), options).size(bundle->root);
+  });
   if (!size) return zip.size();
   return std::max<std::uint64_t>(zip.size(), size->first * cloud_row_bytes(size->second));
 }

@@ -234,6 +234,7 @@ TEST(Glb, NamesWhatDoesNotFit) {
   refused([](Parts& p) { p.tree["buffers"][0]["uri"] = "/etc/passwd"; }, unsupported, "a.glb:bufferViews[0]");
   refused([](Parts& p) { p.tree["nodes"][0]["children"] = {0}; }, corrupt_data, "a.glb:nodes[0]");
   refused([](Parts& p) { p.tree["scenes"][0]["nodes"] = {0, 0}; }, corrupt_data, "a.glb:nodes[0]");
+  refused([](Parts& p) { p.tree["nodes"] = {{{"children", {1, 1}}}, {{"mesh", 0}}}; }, corrupt_data, "a.glb:nodes[1]");
   refused([](Parts& p) { p.tree["scenes"][0]["nodes"] = {9}; }, corrupt_data, "a.glb:scenes[0].nodes[0]");
   refused([](Parts& p) { p.tree["extensionsRequired"] = {"KHR_draco_mesh_compression"}; }, unsupported,
           "a.glb:extensionsRequired[0]");
@@ -268,6 +269,29 @@ TEST(Glb, ViewsThatOverlapCostNoMoreThanTheLimitAllows) {
   EXPECT_EQ(decode(many, {.max_memory_bytes = 100 << 20}).error().code, ErrorCode::too_large);
   const std::string bytes = many.bytes();
   EXPECT_EQ(expected_glb_bytes(as_span(bytes)), 1'000'000 * cloud_row_bytes(3));
+}
+
+// JSON takes 50 times its size as a tree: it is counted, also where only the size of the scene is asked for.
+TEST(Glb, JsonTakesNoMoreMemoryThanThereIs) {
+  Parts parts = Parts::of(random_cloud(1000, 0, 52));
+  parts.tree["nodes"] = json::array({{{"mesh", 0}}, {{"mesh", 0}}, {{"mesh", 0}}});
+  parts.tree["scenes"][0]["nodes"] = {0, 1, 2};
+  parts.tree["extras"] = json::array();
+  for (int k = 0; k < 10'000; ++k) parts.tree["extras"].push_back(json::object());
+  const std::string bytes = parts.bytes();
+  MemoryBudget enough(8 << 20), little(1 << 20);
+  EXPECT_EQ(expected_glb_bytes(as_span(bytes), {.memory = &enough}), 3000 * cloud_row_bytes(0));
+  EXPECT_EQ(expected_glb_bytes(as_span(bytes), {.memory = &little}), bytes.size());
+  EXPECT_EQ(little.lent(), 0u);
+  const auto scene = decode(parts, {.memory = &little});
+  ASSERT_FALSE(scene);
+  EXPECT_EQ(scene.error().code, ErrorCode::too_large);
+
+  parts.tree["extras"] = std::string(std::size_t(16) << 20, ' ');
+  const auto large = decode(parts);
+  ASSERT_FALSE(large);
+  EXPECT_EQ(large.error().code, ErrorCode::too_large);
+  EXPECT_EQ(large.error().where, "a.glb:json");
 }
 
 }  // namespace

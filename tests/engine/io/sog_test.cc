@@ -232,21 +232,21 @@ TEST(Sog, APictureThatIsTooLargeForItsGaussiansIsNotDecoded) {
   EXPECT_EQ(budget.lent(), 0u);
 }
 
-/// A zip file of one file of `size` zero bytes, deflated.
-Bytes deflated_zeros(const char* name, std::size_t size) {
+/// A zip file of one file, deflated.
+Bytes deflated(const char* name, const std::string& text) {
   const support::TempDir folder;
   const auto path = folder.path() / "a.zip";
-  const std::string zeros(size, '\0');
   int error = 0;
   zip_t* const archive = zip_open(path.c_str(), ZIP_CREATE, &error);
-  const auto index = zip_file_add(archive, name, zip_source_buffer(archive, zeros.data(), zeros.size(), 0), 0);
+  const auto index = zip_file_add(archive, name, zip_source_buffer(archive, text.data(), text.size(), 0), 0);
   zip_set_file_compression(archive, zip_uint64_t(index), ZIP_CM_DEFLATE, 9);
   EXPECT_EQ(zip_close(archive), 0);
   return bytes_of(support::read_file(path));
 }
 
 TEST(Sog, AFileThatUnpacksToTooMuchIsNotUnpacked) {
-  const Bytes bomb = deflated_zeros("meta.json", std::size_t(64) << 20);
+  const auto zeros = [](std::size_t size) { return deflated("meta.json", std::string(size, '\0')); };
+  const Bytes bomb = zeros(std::size_t(64) << 20);
   EXPECT_LT(bomb.size(), 100'000u);
   const auto scene = decode(bomb);
   ASSERT_FALSE(scene);
@@ -256,7 +256,7 @@ TEST(Sog, AFileThatUnpacksToTooMuchIsNotUnpacked) {
   MemoryBudget little(1 << 20);
   ReadOptions options;
   options.memory = &little;
-  EXPECT_EQ(decode(deflated_zeros("meta.json", 3 << 20), options).error().code, ErrorCode::too_large);
+  EXPECT_EQ(decode(zeros(3 << 20), options).error().code, ErrorCode::too_large);
 }
 
 TEST(Sog, AZipFileWithinAZipFileIsNoScene) {
@@ -371,6 +371,28 @@ TEST(Sog, TellsWhatItUnpacksToByItsText) {
   const Bytes zip = parts.zip();
   EXPECT_GE(expected_sog_bytes(zip), 300 * cloud_row_bytes(2));
   EXPECT_EQ(expected_sog_bytes(std::span(zip).first(100)), 100u);
+}
+
+TEST(Sog, TheTreeOfAStreamedSceneTakesNoMoreMemoryThanThereIs) {
+  std::string text = R"({"lodLevels": 1, "filenames": ["a/meta.json"], "tree": {"children": [{})";
+  for (int k = 0; k < 100'000; ++k) text += ",{}";
+  const Bytes bomb = deflated("lod-meta.json", text + "]}}");
+  EXPECT_LT(bomb.size(), 5'000u);
+  MemoryBudget enough(64 << 20), little(1 << 20);
+  EXPECT_EQ(decode(bomb, {.memory = &enough}).error().code, ErrorCode::unprocessable) << "a scene of no Gaussians";
+  EXPECT_EQ(decode(bomb, {.memory = &little}).error().code, ErrorCode::too_large);
+  // The text fits a budget of which its tree leaves nothing: the scene that it names counts for nothing then.
+  const Parts parts = Parts::of(random_cloud(2000, 1, 41));
+  const json leaf = {{"lods", {{"0", {{"file", 0}, {"offset", 0}, {"count", 2000}}}}}};
+  json children = json::array({leaf});
+  for (int k = 0; k < 10'000; ++k) children.push_back(json::object());
+  const json lod = {{"lodLevels", 1}, {"filenames", {"a/meta.json"}}, {"tree", {{"children", children}}}};
+  const Bytes zip = make_zip(std::vector<NamedFile>{{"lod-meta.json", bytes_of(lod.dump())},
+                                                    {"a/meta.json", bytes_of(parts.meta.dump())}})
+                        .value();
+  EXPECT_EQ(expected_sog_bytes(zip, {.memory = &enough}), 2000 * cloud_row_bytes(1));
+  EXPECT_EQ(expected_sog_bytes(zip, {.memory = &little}), zip.size());
+  EXPECT_EQ(little.lent(), 0u);
 }
 
 }  // namespace
