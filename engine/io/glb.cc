@@ -33,6 +33,7 @@ constexpr int points_mode = 0;                       // of glTF's primitive.mode
 constexpr std::string_view axes = "LUF";             // of glTF
 constexpr int max_depth = 64;                        // of nodes within nodes: a choice
 constexpr std::uint64_t max_json_bytes = 16u << 20;  // a choice: as a tree, 50 times that; a million nodes have it
+constexpr std::size_t max_primitives = 1'000'000, max_splats = 10'000;  // of all nodes, and with Gaussians: choices
 constexpr double most_uneven = 1e-4;  // relative, of what counts as a uniform scale: rounding of a printed matrix
 constexpr const char* extension = "KHR_gaussian_splatting";
 constexpr std::array compressions = {"KHR_gaussian_splatting_compression_spz_2",
@@ -101,7 +102,7 @@ class Glb {
   Glb(std::span<const std::byte> bytes, std::string file, const ReadOptions& options)
       : bytes_(bytes), file_(std::move(file)), options_(options) {}
 
-  /// What there is, without decoding it.
+  /// What there is, without decoding it, and within the limits.
   Result<void> survey() {
     if (auto opened = open(); !opened) return opened;
     const JsonFields root(tree_, file_ + ":", error_);
@@ -112,10 +113,6 @@ class Glb {
       return fail(ErrorCode::unsupported,
                   file_ + " holds no Gaussians in its scene: KHR_gaussian_splatting is on none of its primitives",
                   file_);
-    for (const Splats& splats : splats_) {
-      count_ += splats.count;
-      sh_degree_ = std::max(sh_degree_, splats.sh_degree);
-    }
     return {};
   }
   [[nodiscard]] std::uint64_t count() const { return count_; }
@@ -123,8 +120,6 @@ class Glb {
 
   Result<DecodedScene> decode() {
     if (auto done = survey(); !done) return propagate(done);
-    if (auto checked = check_limits(count_, cloud_row_bytes(sh_degree_), options_, file_); !checked)
-      return propagate(checked);
     DecodedScene scene;
     scene.cloud.sh_degree = sh_degree_;
     scene.cloud.resize(count_);
@@ -305,6 +300,8 @@ class Glb {
     const JsonFields primitives = member(root, "meshes", mesh).at("primitives");
     for (std::size_t i = 0; i < primitives.size() && !error_; ++i) {
       const JsonFields primitive = primitives.at(i);
+      // Nodes share meshes: a short text may name a trillion primitives.
+      if (++primitives_ > max_primitives) return too_many("primitives", max_primitives, node.where());
       if (!primitive.has("extensions") || !primitive.at("extensions").has(extension)) {
         leave_out("meshes of triangles, lines or points");
         continue;
@@ -320,8 +317,19 @@ class Glb {
       check_placement(placement, node.where());
       Splats splats{placement, mesh, i, node.where(), 0, 0, {}};
       survey_primitive(root, primitive, gaussians, splats);
+      if (error_) return;
+      if (splats_.size() == max_splats) return too_many("primitives of Gaussians", max_splats, node.where());
+      count_ += splats.count;
+      sh_degree_ = std::max(sh_degree_, splats.sh_degree);
       splats_.push_back(std::move(splats));
+      if (auto checked = check_limits(count_, cloud_row_bytes(sh_degree_), options_, file_); !checked)
+        error_ = checked.error();
     }
+  }
+
+  void too_many(const char* what, std::size_t most, const std::string& where) {
+    error_ = Error{ErrorCode::too_large,
+                   std::string("the nodes of the scene hold more than ") + std::to_string(most) + " " + what, where};
   }
 
   void leave_out(std::string what) {
@@ -573,6 +581,7 @@ class Glb {
   std::optional<Error> error_;
   std::vector<Splats> splats_;
   std::vector<std::string> left_out_;
+  std::size_t primitives_ = 0;  ///< Of all nodes, of whatever kind.
   std::uint64_t count_ = 0;
   int sh_degree_ = 0;
 };

@@ -271,6 +271,36 @@ TEST(Glb, ViewsThatOverlapCostNoMoreThanTheLimitAllows) {
   EXPECT_EQ(expected_glb_bytes(as_span(bytes)), 1'000'000 * cloud_row_bytes(3));
 }
 
+// A mesh may be in many nodes: what they name together is limited as it is counted, not once all of it is listed.
+TEST(Glb, PrimitivesOfManyNodesAreCountedAsTheyAreFound) {
+  const auto in_nodes = [](Parts parts, int nodes) {
+    parts.tree["nodes"] = json::array(), parts.tree["scenes"][0]["nodes"] = json::array();
+    for (int k = 0; k < nodes; ++k) {
+      parts.tree["nodes"].push_back({{"mesh", 0}});
+      parts.tree["scenes"][0]["nodes"].push_back(k);
+    }
+    return parts;
+  };
+  const Parts one = Parts::of(random_cloud(1, 0, 53));
+  ASSERT_TRUE(decode(in_nodes(one, 10'000)));
+  const auto refused = [&](const Parts& parts, const std::string& where, const ReadOptions& options = {}) {
+    const auto scene = decode(parts, options);
+    ASSERT_FALSE(scene) << where;
+    EXPECT_EQ(scene.error().code, ErrorCode::too_large) << scene.error().message;
+    EXPECT_EQ(scene.error().where, where) << scene.error().message;
+  };
+  refused(in_nodes(one, 10'001), "a.glb:nodes[10000]");
+  // The 101st node is broken: the Gaussians of the hundred before it are too many already.
+  Parts broken = in_nodes(one, 101);
+  broken.tree["nodes"][100]["mesh"] = 7;
+  EXPECT_EQ(decode(broken).error().code, ErrorCode::corrupt_data);
+  refused(broken, "a.glb:header", {.max_gaussians = 99});
+  Parts triangles = one;
+  triangles.tree["meshes"][0]["primitives"] = json::array();
+  for (int k = 0; k < 2'000; ++k) triangles.tree["meshes"][0]["primitives"].push_back({{"mode", 4}});
+  refused(in_nodes(triangles, 600), "a.glb:nodes[500]");
+}
+
 // JSON takes 50 times its size as a tree: it is counted, also where only the size of the scene is asked for.
 TEST(Glb, JsonTakesNoMoreMemoryThanThereIs) {
   Parts parts = Parts::of(random_cloud(1000, 0, 52));
