@@ -8,6 +8,7 @@
 #include <numbers>
 #include <numeric>
 #include <optional>
+#include <set>
 #include <string_view>
 #include <utility>
 
@@ -31,8 +32,9 @@ constexpr std::uint64_t max_meta_bytes = 4u << 20;       // of a meta.json: a ch
 constexpr std::uint64_t max_lod_meta_bytes = 64u << 20;  // of a lod-meta.json: 100 bytes per leaf and level
 constexpr std::size_t max_palette = 65536, palette_columns = 64;  // of the format
 constexpr std::size_t max_lod_files = 10'000;                     // of a streamed scene: a choice
-constexpr int max_lod_depth = 64;   // of its tree: a choice; an octree of that depth has no end
-constexpr int rotation_mode = 252;  // the alpha of a rotation is this and the largest's index
+constexpr std::size_t max_level_files = 1'000;  // of one of its levels: a choice; half a million rows in each are usual
+constexpr int max_lod_depth = 64;               // of its tree: a choice; an octree of that depth has no end
+constexpr int rotation_mode = 252;              // the alpha of a rotation is this and the largest's index
 constexpr const char* meta_name = "meta.json";
 constexpr const char* lod_meta_name = "lod-meta.json";
 
@@ -428,10 +430,18 @@ class Sog {
     const JsonFields root(document->tree, where(name) + ":", error);
     Plan plan;
     const JsonFields names = root.at("filenames");
+    if (names.size() > max_lod_files)
+      return fail(ErrorCode::too_large,
+                  std::to_string(names.size()) + " files; at most " + std::to_string(max_lod_files) + " are read",
+                  where(name) + ":filenames");
+    std::set<std::string> known_names;
     for (std::size_t i = 0; i < names.size(); ++i) {
       const auto safe = safe_name(parent_of(name), names.at(i).string());
       if (!safe)
         names.at(i).fail_here("the name of a file in the scene's own folder was expected, without a way out of it");
+      // A file is decoded once for each time that it is named.
+      else if (!known_names.insert(*safe).second)
+        names.at(i).fail_here("the file is named twice");
       plan.names.push_back(safe.value_or(""));
     }
     plan.levels = int(whole(root.at("lodLevels"), 1000));
@@ -441,10 +451,6 @@ class Sog {
                   "there is no level " + std::to_string(options_.level) +
                       " of detail; the scene has 0, the finest, to " + std::to_string(plan.levels - 1),
                   where(name) + ":lodLevels");
-    if (!error && plan.names.size() > max_lod_files)
-      return fail(ErrorCode::too_large,
-                  std::to_string(plan.names.size()) + " files; at most " + std::to_string(max_lod_files) + " are read",
-                  where(name) + ":filenames");
     // A stack of our own, and of limited depth: how deep the tree goes, the file says. It holds where each level is
     // among its siblings, not the siblings: of those, there may be millions.
     struct Siblings {
@@ -465,13 +471,23 @@ class Sog {
       if (more) node = open.back().nodes.at(open.back().next++);
     }
     if (error) return tl::make_unexpected(std::move(*error));
+    const std::uint64_t most_rows = 2 * std::min<std::uint64_t>(options_.max_gaussians, std::uint64_t{1} << 32);
+    std::uint64_t rows = 0;  // of the files that the level is in
     for (const Piece& piece : plan.pieces) {
       auto known = plan.metas.find(piece.file);
       if (known == plan.metas.end()) {
         auto meta = meta_of(plan.names[piece.file]);
         if (!meta) return propagate(meta);
         plan.sh_degree = std::max(plan.sh_degree, meta->version == 2 ? meta->sh_degree : meta->has_sh ? 3 : 0);
+        rows += meta->count;
         known = plan.metas.emplace(piece.file, std::move(*meta)).first;
+        // Whole files are decoded, however few of their rows a level has.
+        if (plan.metas.size() > max_level_files || rows > most_rows)
+          return fail(ErrorCode::too_large,
+                      "the level lies in more than " + std::to_string(max_level_files) +
+                          " files, or in files of more than " + std::to_string(most_rows) +
+                          " Gaussians together, twice the limit (max_gaussians)",
+                      where(name) + ":filenames");
       }
       if (piece.offset + piece.count > known->second.count)
         return fail(ErrorCode::corrupt_data,

@@ -366,6 +366,44 @@ TEST_F(SogFolder, AStreamedOneIsTheRowsOfItsTree) {
   EXPECT_EQ(read_scene(scene, {.max_gaussians = 50'000}).error().code, ErrorCode::too_large);
 }
 
+// Whole files are decoded, and each takes time: what a text of a few kilobytes can ask for is limited before that.
+TEST_F(SogFolder, AStreamedOneDecodesNoMoreThanTwiceTheLimit) {
+  const auto set = [&](const json& filenames) {
+    json children = json::array();
+    for (std::size_t k = 0; k < filenames.size(); ++k)
+      children.push_back({{"lods", {{"0", {{"file", k}, {"offset", 0}, {"count", 1}}}}}});
+    support::write_file(scene / "lod-meta.json",
+                        json{{"lodLevels", 1}, {"filenames", filenames}, {"tree", {{"children", children}}}}.dump());
+  };
+  const Parts parts = Parts::of(random_cloud(40, 0, 42));
+  for (const char* name : {"a", "b", "c"}) write(parts, scene / name);
+  set({"a/meta.json", "b/meta.json", "c/meta.json"});
+  ASSERT_TRUE(read_scene(scene, {.max_gaussians = 60}));
+  const auto limited = read_scene(scene, {.max_gaussians = 59});
+  ASSERT_FALSE(limited) << "3 rows, of files of 120";
+  EXPECT_EQ(limited.error().code, ErrorCode::too_large);
+  EXPECT_EQ(limited.error().where, "scene:lod-meta.json:filenames");
+  for (const char* again : {"a/meta.json", "a/./meta.json", "a//meta.json"}) {
+    set({"a/meta.json", "b/meta.json", again});
+    const auto twice = read_scene(scene);
+    ASSERT_FALSE(twice) << again;
+    EXPECT_EQ(twice.error().code, ErrorCode::corrupt_data);
+    EXPECT_EQ(twice.error().where, "scene:lod-meta.json:filenames[2]");
+  }
+  // One file under many names, as a zip file can have it, too.
+  json many = json::array();
+  for (int k = 0; k < 1001; ++k) {
+    const std::string name = "a/" + std::to_string(k) + ".json";
+    std::filesystem::create_hard_link(scene / "a/meta.json", scene / name);
+    many.push_back(name);
+  }
+  set(many);
+  const auto named = read_scene(scene);
+  ASSERT_FALSE(named);
+  EXPECT_EQ(named.error().code, ErrorCode::too_large);
+  EXPECT_EQ(named.error().where, "scene:lod-meta.json:filenames");
+}
+
 TEST(Sog, TellsWhatItUnpacksToByItsText) {
   const Parts parts = Parts::of(random_cloud(300, 2, 39));
   const Bytes zip = parts.zip();
