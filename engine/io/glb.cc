@@ -121,17 +121,15 @@ class Glb {
   Result<DecodedScene> decode() {
     if (auto done = survey(); !done) return propagate(done);
     DecodedScene scene;
-    scene.cloud.sh_degree = sh_degree_;
-    scene.cloud.resize(count_);
-    std::size_t at = 0;
-    bool compressed = false;
-    for (const Splats& splats : splats_) {
-      auto done =
-          splats.spz.empty() ? decode_attributes(splats, scene.cloud, at) : decode_spz_part(splats, scene.cloud, at);
-      if (!done) return propagate(done);
-      compressed = compressed || !splats.spz.empty();
-      at += std::size_t(splats.count);
+    // Mostly, one SPZ part is the whole scene: it needs no second cloud to be copied into.
+    if (splats_.size() == 1 && !splats_.front().spz.empty()) {
+      auto part = spz_part(splats_.front());
+      if (!part) return propagate(part);
+      scene.cloud = std::move(*part);
+    } else if (auto done = decode_all(scene.cloud); !done) {
+      return propagate(done);
     }
+    const bool compressed = std::ranges::any_of(splats_, [](const Splats& splats) { return !splats.spz.empty(); });
     scene.origin.format = SceneFormat::glb;
     scene.origin.version = 2;
     scene.origin.axes = axes;
@@ -142,6 +140,18 @@ class Glb {
   }
 
  private:
+  Result<void> decode_all(scene::GaussianCloud& cloud) {
+    cloud.sh_degree = sh_degree_;
+    cloud.resize(count_);
+    std::size_t at = 0;
+    for (const Splats& splats : splats_) {
+      auto done = splats.spz.empty() ? decode_attributes(splats, cloud, at) : copy_spz_part(splats, cloud, at);
+      if (!done) return done;
+      at += std::size_t(splats.count);
+    }
+    return {};
+  }
+
   tl::unexpected<Error> damaged(const std::string& message, const std::string& where) const {
     return fail(ErrorCode::corrupt_data, message + ": the file is damaged or incomplete, copy or download it again",
                 where);
@@ -448,24 +458,37 @@ class Glb {
     return out;
   }
 
-  Result<void> decode_spz_part(const Splats& splats, scene::GaussianCloud& cloud, std::size_t first) {
-    const auto part = decode_spz(splats.spz, file_ + ":" + "spz", options_);
+  /// A part's Gaussians, where their node puts them.
+  Result<scene::GaussianCloud> spz_part(const Splats& splats) {
+    auto part = decode_spz(splats.spz, spz_name(), options_);
     if (!part) return propagate(part);
-    if (part->cloud.size() != splats.count || part->cloud.sh_degree != splats.sh_degree)
+    scene::GaussianCloud& cloud = part->cloud;
+    if (cloud.size() != splats.count || cloud.sh_degree != splats.sh_degree)
       return damaged("its SPZ part contradicts itself", file_);
-    const std::size_t in = scene::sh_coefficients(splats.sh_degree), out = scene::sh_coefficients(cloud.sh_degree);
     const Mover mover(splats.placement, true);
-    parallel_for(part->cloud.size(), rows_per_task, [&](std::size_t begin, std::size_t end) {
+    parallel_for(cloud.size(), rows_per_task, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) mover.apply(cloud, i);
+    });
+    return std::move(cloud);
+  }
+  [[nodiscard]] std::string spz_name() const { return file_ + ":spz"; }
+
+  Result<void> copy_spz_part(const Splats& splats, scene::GaussianCloud& cloud, std::size_t first) {
+    const auto lent = take_from(options_.memory, splats.count * cloud_row_bytes(splats.sh_degree), spz_name());
+    if (!lent) return propagate(lent);
+    const auto part = spz_part(splats);
+    if (!part) return propagate(part);
+    const std::size_t in = scene::sh_coefficients(splats.sh_degree), out = scene::sh_coefficients(cloud.sh_degree);
+    parallel_for(part->size(), rows_per_task, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         const std::size_t to = first + i;
-        cloud.mean.set(to, part->cloud.mean.get(i));
-        cloud.log_scale.set(to, part->cloud.log_scale.get(i));
-        cloud.rotation.set(to, part->cloud.rotation.get(i));
-        cloud.opacity_logit[to] = part->cloud.opacity_logit[i];
+        cloud.mean.set(to, part->mean.get(i));
+        cloud.log_scale.set(to, part->log_scale.get(i));
+        cloud.rotation.set(to, part->rotation.get(i));
+        cloud.opacity_logit[to] = part->opacity_logit[i];
         for (std::size_t c = 0; c < 3; ++c)
-          std::copy_n(part->cloud.sh_row(i).begin() + std::ptrdiff_t(c * in), in,
+          std::copy_n(part->sh_row(i).begin() + std::ptrdiff_t(c * in), in,
                       cloud.sh_row(to).begin() + std::ptrdiff_t(c * out));
-        mover.apply(cloud, to);
       }
     });
     return {};

@@ -30,6 +30,7 @@ constexpr std::uint32_t magic = 0x5053474e;  // "NGSP"
 constexpr std::size_t rows_per_task = 4096;  // of a parallel task: a choice
 constexpr std::size_t header_bytes = 16;
 constexpr std::size_t max_deflate_ratio = 1032;  // of deflate: 258 bytes for every 2 bits
+constexpr std::size_t max_zstd_ratio = 32768;    // of Zstandard: 128 KiB, a block's most, for 4 bytes
 constexpr double colour_scale = 0.15;            // of this format; wider than sh_c0 to keep colours beyond 0..1
 constexpr double farthest_fixed = 8388608;       // steps, of a position in 24 bits
 constexpr std::uint8_t flag_antialiased = 1, flag_extensions = 2;
@@ -121,6 +122,19 @@ Result<void> check_limits(const Header& header, const ReadOptions& options, cons
   return check_limits(header.count, cloud_row_bytes(header.sh_degree) + packed_row_bytes(header), options, file);
 }
 
+/// Could a file of that size unpack to what its header announces?
+bool plausible(const Header& header, std::uint64_t file_bytes) {
+  const std::size_t ratio = header.version == 4 ? max_zstd_ratio : max_deflate_ratio;
+  return header.count * packed_row_bytes(header) / ratio <= file_bytes;
+}
+
+Result<void> check_plausible(const Header& header, std::uint64_t file_bytes, const std::string& where) {
+  if (plausible(header, file_bytes)) return {};
+  return damaged("the header announces " + std::to_string(header.count) + " Gaussians, more than " +
+                     std::to_string(file_bytes) + " bytes can unpack to",
+                 where);
+}
+
 Result<void> lend(const Header& header, const ReadOptions& options, const std::string& file, Attributes& attributes) {
   auto share = take_from(options.memory, header.count * packed_row_bytes(header), file);
   if (!share) return propagate(share);
@@ -161,10 +175,7 @@ Result<Header> unpack_gzip(std::span<const std::byte> bytes, const std::string& 
   auto header = parse_header(start, 1, 3, file + ":header");
   if (!header) return header;
   if (auto checked = check_limits(*header, options, file); !checked) return propagate(checked);
-  if (const auto needed = header->count * packed_row_bytes(*header); needed / max_deflate_ratio > bytes.size())
-    return damaged("the header announces " + std::to_string(header->count) + " Gaussians, more than " +
-                       std::to_string(bytes.size()) + " bytes can unpack to",
-                   file + ":header");
+  if (auto checked = check_plausible(*header, bytes.size(), file + ":header"); !checked) return propagate(checked);
   if (auto lent = lend(*header, options, file, attributes); !lent) return propagate(lent);
   for (const auto& row : attribute_rows(*header)) {
     Bytes& unpacked = attributes.*row.bytes;
@@ -195,6 +206,7 @@ Result<Header> unpack_zstd(std::span<const std::byte> bytes, const std::string& 
   auto header = parse_header(in.take(std::min(header_bytes, bytes.size())), 4, 4, where);
   if (!header) return header;
   if (auto checked = check_limits(*header, options, file); !checked) return propagate(checked);
+  if (auto checked = check_plausible(*header, bytes.size(), where); !checked) return propagate(checked);
   const auto toc_offset = in.read<std::uint32_t>();
   if (!in.ok() || toc_offset < v4_header_bytes || toc_offset > bytes.size())
     return damaged("the table of contents lies outside the file", where);
@@ -418,8 +430,7 @@ std::uint64_t expected_spz_bytes(std::span<const std::byte> start, std::uint64_t
   if (!plain && !GzipReader(start).read(unpacked)) return file_bytes;
   const auto header = parse_header(plain ? start.first(std::min(start.size(), header_bytes)) : unpacked, 1, 4, "");
   if (!header) return file_bytes;
-  // Zstandard knows no such ratio, but names the sizes in frames that are checked before room is made for them.
-  if (!plain && header->count * packed_row_bytes(*header) / max_deflate_ratio > file_bytes) return file_bytes;
+  if (!plausible(*header, file_bytes)) return file_bytes;
   return std::max(file_bytes, header->count * cloud_row_bytes(header->sh_degree));
 }
 
@@ -429,6 +440,7 @@ Result<SpzCount> read_spz_header(std::span<const std::byte> bytes, const std::st
   if (!plain && !GzipReader(bytes).read(unpacked)) return damaged("no .spz header could be unpacked", file);
   const auto header = parse_header(plain ? bytes.first(std::min(bytes.size(), header_bytes)) : unpacked, 1, 4, file);
   if (!header) return propagate(header);
+  if (auto checked = check_plausible(*header, bytes.size(), file); !checked) return propagate(checked);
   return SpzCount{header->count, header->sh_degree};
 }
 

@@ -7,6 +7,7 @@
 
 #include "engine/io/axes.h"
 #include "engine/io/checks.h"
+#include "engine/io/gzip.h"
 #include "engine/io/spz.h"
 #include "engine/scene/sh.h"
 #include "tests/engine/io/agreement.h"
@@ -170,22 +171,28 @@ TEST(Glb, QuantisedAttributesMeanWhatTheyAreNormalisedTo) {
   EXPECT_EQ(scene->cloud.log_scale.get(0), Vec3(-3, -2, 2));
 }
 
+/// A file whose Gaussians are an .spz file.
+Parts with_spz(std::span<const std::byte> spz) {
+  Parts parts;
+  parts.binary = std::string(reinterpret_cast<const char*>(spz.data()), spz.size());
+  parts.tree = {{"asset", {{"version", "2.0"}}},
+                {"extensionsRequired", {"KHR_gaussian_splatting", "KHR_gaussian_splatting_compression_spz_2"}},
+                {"nodes", json::array({{{"mesh", 0}}})},
+                {"buffers", json::array({{{"byteLength", spz.size()}}})},
+                {"bufferViews", json::array({{{"buffer", 0}, {"byteLength", spz.size()}}})}};
+  json gaussians;
+  gaussians["extensions"]["KHR_gaussian_splatting_compression_spz_2"]["bufferView"] = 0;
+  json primitive = {{"mode", 0}, {"attributes", json::object()}};
+  primitive["extensions"]["KHR_gaussian_splatting"] = gaussians;
+  parts.tree["meshes"] = json::array({{{"primitives", json::array({primitive})}}});
+  return parts;
+}
+
 TEST(Glb, ReadsAnSpzPart) {
   const scene::GaussianCloud cloud = random_cloud(80, 2, 47);
   for (const int version : {3, 4}) {
     const auto spz = encode_spz(cloud, "a.spz", {.version = version}).value();
-    Parts parts;
-    parts.binary = std::string(reinterpret_cast<const char*>(spz.data()), spz.size());
-    parts.tree = {{"asset", {{"version", "2.0"}}},
-                  {"extensionsRequired", {"KHR_gaussian_splatting", "KHR_gaussian_splatting_compression_spz_2"}},
-                  {"nodes", json::array({{{"mesh", 0}}})},
-                  {"buffers", json::array({{{"byteLength", spz.size()}}})},
-                  {"bufferViews", json::array({{{"buffer", 0}, {"byteLength", spz.size()}}})}};
-    json gaussians;
-    gaussians["extensions"]["KHR_gaussian_splatting_compression_spz_2"]["bufferView"] = 0;
-    json primitive = {{"mode", 0}, {"attributes", json::object()}};
-    primitive["extensions"]["KHR_gaussian_splatting"] = gaussians;
-    parts.tree["meshes"] = json::array({{{"primitives", json::array({primitive})}}});
+    Parts parts = with_spz(spz);
     const auto scene = decode(parts);
     ASSERT_TRUE(scene) << scene.error().message << scene.error().where;
     const auto alone = decode_spz(spz, "a.spz", {});
@@ -195,6 +202,48 @@ TEST(Glb, ReadsAnSpzPart) {
     parts.binary.resize(parts.binary.size() / 2);
     EXPECT_FALSE(decode(parts));
   }
+}
+
+TEST(Glb, AnSpzPartIsBelievedAsFarAsItsBytesBearItOut) {
+  for (const int version : {3, 4}) {
+    const auto spz = encode_spz(random_cloud(80, 3, 54), "a.spz", {.version = version}).value();
+    std::vector<std::byte> lies = spz;
+    if (version == 3) {
+      lies.resize(16 + 80 * 65);
+      ASSERT_TRUE(GzipReader(spz).read(lies));
+    }
+    const std::uint32_t count = 40'000'000;
+    std::memcpy(lies.data() + 8, &count, sizeof count);
+    if (version == 3) lies = gzip(lies);
+    const Parts parts = with_spz(lies);
+    const std::string bytes = parts.bytes();
+    EXPECT_EQ(expected_glb_bytes(as_span(bytes)), bytes.size());
+    const auto scene = decode(parts);
+    ASSERT_FALSE(scene);
+    EXPECT_EQ(scene.error().code, ErrorCode::corrupt_data);
+    EXPECT_EQ(scene.error().where, "a.glb:meshes[0].primitives[0]");
+  }
+}
+
+TEST(Glb, SpzPartsThatAreCopiedAreCounted) {
+  const scene::GaussianCloud cloud = random_cloud(5'000, 3, 55);
+  const auto spz = encode_spz(cloud, "a.spz").value();
+  Parts parts = with_spz(spz);
+  // What unpacking takes is lent besides; a part that is the whole scene needs no more.
+  MemoryBudget budget(5'000 * cloud_row_bytes(3) - 1);
+  ASSERT_TRUE(decode(parts, {.memory = &budget}));
+  parts.tree["nodes"] = json::array({{{"mesh", 0}}, {{"mesh", 0}, {"translation", {0, 0, 7}}}});
+  const auto scene = decode(parts);
+  ASSERT_TRUE(scene) << scene.error().message;
+  const auto alone = decode_spz(spz, "a.spz", {});
+  ASSERT_EQ(scene->cloud.size(), 10'000u);
+  EXPECT_EQ(scene->cloud.mean.get(17), alone->cloud.mean.get(17));
+  EXPECT_EQ(scene->cloud.mean.get(5'017).z, alone->cloud.mean.get(17).z + 7);
+  const auto refused = decode(parts, {.memory = &budget});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::too_large);
+  EXPECT_EQ(refused.error().where, "a.glb:spz");
+  EXPECT_EQ(budget.lent(), 0u);
 }
 
 TEST(Glb, SeveralPrimitivesAreOneSceneAndMeshesAreSaidToBeLeftOut) {
