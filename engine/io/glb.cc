@@ -573,10 +573,10 @@ class Glb {
         cloud.mean.set(to, vector(position));
         Vec3 size = vector(scale);
         if (!logarithmic)
-          for (int c = 0; c < 3; ++c) size[c] = size[c] > 0 ? float(std::log(double(size[c]))) : -20.0f;
+          for (int c = 0; c < 3; ++c) size[c] = size[c] == 0 ? -20.0f : float(std::log(double(size[c])));  // NaN stays
         cloud.log_scale.set(to, size);
         const Quat q(rotation.at(i, 3), rotation.at(i, 0), rotation.at(i, 1), rotation.at(i, 2));
-        cloud.rotation.set(to, glm::dot(q, q) > 0 ? q : Quat(1, 0, 0, 0));
+        cloud.rotation.set(to, glm::dot(q, q) == 0 ? Quat(1, 0, 0, 0) : q);
         cloud.opacity_logit[to] = logit_of(opacity.at(i, opacity_channel));
         for (std::size_t k = 0; k < sh.size(); ++k)
           for (std::size_t c = 0; c < 3; ++c) {

@@ -302,6 +302,34 @@ TEST(Glb, NamesWhatDoesNotFit) {
       corrupt_data, "a.glb:vertex[0].opacity");
 }
 
+TEST(Glb, NaNIsNamedAndZeroIsSmallOrNoTurn) {
+  const Parts good = Parts::of(random_cloud(6, 0, 56));
+  const auto with = [&](const char* name, std::size_t row, std::size_t channels, float value) {
+    Parts parts = good;
+    const json& accessor =
+        parts.tree["accessors"]
+                  [parts.tree["meshes"][0]["primitives"][0]["attributes"][std::string("KHR_gaussian_splatting:") + name]
+                       .get<std::size_t>()];
+    const json& view = parts.tree["bufferViews"][accessor["bufferView"].get<std::size_t>()];
+    for (std::size_t c = 0; c < channels; ++c)
+      std::memcpy(parts.binary.data() + view["byteOffset"].get<std::size_t>() + 4 * (channels * row + c), &value, 4);
+    return decode(parts);
+  };
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const auto refused = [](const Result<DecodedScene>& scene, const std::string& where) {
+    ASSERT_FALSE(scene) << where;
+    EXPECT_EQ(scene.error().code, ErrorCode::corrupt_data);
+    EXPECT_EQ(scene.error().where, where);
+  };
+  refused(with("SCALE", 3, 3, nan), "a.glb:vertex[3].scale_0");
+  refused(with("ROTATION", 4, 4, nan), "a.glb:vertex[4].rot_0");
+  refused(with("SH_DEGREE_0_COEF_0", 5, 3, nan), "a.glb:vertex[5].f_dc_0");
+  const auto scale = with("SCALE", 3, 3, 0), rotation = with("ROTATION", 4, 4, 0);
+  ASSERT_TRUE(scale && rotation);
+  EXPECT_EQ(scale->cloud.log_scale.get(3), Vec3(-20));
+  EXPECT_LT(axes_angle(rotation->cloud.rotation.get(4), {1, 0, 0, 0}), 1e-3);
+}
+
 // Views may overlap: that is how attributes share data. What is read of them is counted by accessors, not by bytes.
 TEST(Glb, ViewsThatOverlapCostNoMoreThanTheLimitAllows) {
   Parts parts = Parts::of(random_cloud(1000, 3, 50));
