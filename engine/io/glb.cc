@@ -140,7 +140,27 @@ class Glb {
   }
 
  private:
+  /// The draft of 2025 had the logarithm of the scale, what was ratified has the scale. No scale is negative, and
+  /// hardly a scene has no Gaussian smaller than its unit. Asked of the whole file: one of its primitives may have
+  /// none.
+  bool has_logarithms() {
+    const JsonFields root(tree_, file_ + ":", error_);
+    for (const Splats& splats : splats_) {
+      if (!splats.spz.empty()) continue;
+      const Values scale = values(root, attributes_of(root, splats), attribute("SCALE"), "VEC3");
+      for (std::size_t i = 0; i < scale.count && !error_; ++i)
+        for (std::size_t c = 0; c < 3; ++c)
+          if (scale.at(i, c) < 0) return true;
+    }
+    return false;
+  }
+  JsonFields attributes_of(const JsonFields& root, const Splats& splats) {
+    return member(root, "meshes", splats.mesh).at("primitives").at(splats.primitive).at("attributes");
+  }
+
   Result<void> decode_all(scene::GaussianCloud& cloud) {
+    logarithmic_ = has_logarithms();
+    if (error_) return tl::make_unexpected(*error_);
     cloud.sh_degree = sh_degree_;
     cloud.resize(count_);
     std::size_t at = 0;
@@ -534,8 +554,7 @@ class Glb {
 
   Result<void> decode_attributes(const Splats& splats, scene::GaussianCloud& cloud, std::size_t first) {
     const JsonFields root(tree_, file_ + ":", error_);
-    const JsonFields attributes =
-        member(root, "meshes", splats.mesh).at("primitives").at(splats.primitive).at("attributes");
+    const JsonFields attributes = attributes_of(root, splats);
     const Values position = values(root, attributes, "POSITION", "VEC3");
     const Values rotation = values(root, attributes, attribute("ROTATION"), "VEC4");
     const Values scale = values(root, attributes, attribute("SCALE"), "VEC3");
@@ -554,11 +573,6 @@ class Glb {
       if (!error_ && all.count != splats.count) attributes.fail_here("the attributes differ in count");
     if (error_) return tl::make_unexpected(*error_);
 
-    // The draft of 2025 had the logarithm of the scale, what was ratified has the scale. No scale is negative, and
-    // hardly a scene has no Gaussian smaller than its unit.
-    bool logarithmic = false;
-    for (std::size_t i = 0; i < splats.count && !logarithmic; ++i)
-      for (std::size_t c = 0; c < 3; ++c) logarithmic = logarithmic || scale.at(i, c) < 0;
     const std::size_t opacity_channel = has_opacity ? 0 : 3;
     for (std::size_t i = 0; i < splats.count; ++i)
       if (const float p = opacity.at(i, opacity_channel); !(p >= 0 && p <= 1))
@@ -572,7 +586,7 @@ class Glb {
         const auto vector = [&](const Values& from) { return Vec3(from.at(i, 0), from.at(i, 1), from.at(i, 2)); };
         cloud.mean.set(to, vector(position));
         Vec3 size = vector(scale);
-        if (!logarithmic)
+        if (!logarithmic_)
           for (int c = 0; c < 3; ++c) size[c] = size[c] == 0 ? -20.0f : float(std::log(double(size[c])));  // NaN stays
         cloud.log_scale.set(to, size);
         const Quat q(rotation.at(i, 3), rotation.at(i, 0), rotation.at(i, 1), rotation.at(i, 2));
@@ -604,6 +618,7 @@ class Glb {
   std::optional<Error> error_;
   std::vector<Splats> splats_;
   std::vector<std::string> left_out_;
+  bool logarithmic_ = false;    ///< Are SCALE the logarithms of scales?
   std::size_t primitives_ = 0;  ///< Of all nodes, of whatever kind.
   std::uint64_t count_ = 0;
   int sh_degree_ = 0;

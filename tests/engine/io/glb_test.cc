@@ -188,6 +188,34 @@ Parts with_spz(std::span<const std::byte> spz) {
   return parts;
 }
 
+// The draft's logarithms show by a sign, which a primitive of large Gaussians alone has not.
+TEST(Glb, AFilesScalesAreAllLogarithmsOrNone) {
+  Parts parts = Parts::of(random_cloud(2, 0, 57));
+  const json& primitive = parts.tree["meshes"][0]["primitives"][0];
+  const auto scale = primitive["attributes"]["KHR_gaussian_splatting:SCALE"].get<std::size_t>();
+  const json& view = parts.tree["bufferViews"][parts.tree["accessors"][scale]["bufferView"].get<std::size_t>()];
+  const std::array<float, 6> scales{0.5f, 1, 2, 0.25f, 3, -1};  // one row each for two primitives
+  std::memcpy(parts.binary.data() + view["byteOffset"].get<std::size_t>(), scales.data(), sizeof scales);
+  json second = primitive;
+  for (auto& [name, index] : second["attributes"].items()) {
+    json accessor = parts.tree["accessors"][index.get<std::size_t>()];
+    const auto type = accessor["type"].get<std::string>();
+    const int components = type == "SCALAR" ? 1 : type == "VEC3" ? 3 : 4;
+    accessor["byteOffset"] = components * (accessor["componentType"] == 5126 ? 4 : 1);
+    accessor["count"] = 1;
+    index = parts.tree["accessors"].size();
+    parts.tree["accessors"].push_back(accessor);
+  }
+  for (const auto& [name, index] : parts.tree["meshes"][0]["primitives"][0]["attributes"].items())
+    parts.tree["accessors"][index.get<std::size_t>()]["count"] = 1;
+  parts.tree["meshes"][0]["primitives"].push_back(second);
+  const auto scene = decode(parts);
+  ASSERT_TRUE(scene) << scene.error().message << scene.error().where;
+  ASSERT_EQ(scene->cloud.size(), 2u);
+  EXPECT_EQ(scene->cloud.log_scale.get(0), Vec3(0.5f, 1, 2));
+  EXPECT_EQ(scene->cloud.log_scale.get(1), Vec3(0.25f, 3, -1));
+}
+
 TEST(Glb, ReadsAnSpzPart) {
   const scene::GaussianCloud cloud = random_cloud(80, 2, 47);
   for (const int version : {3, 4}) {
