@@ -41,7 +41,16 @@ constexpr const char* lod_meta_name = "lod-meta.json";
 /// Files of a scene, by names relative to its folder that have been checked: from a zip file or a folder.
 struct Files {
   std::string file;  ///< For error addresses.
-  std::function<Result<UnpackedFile>(const std::string& name, std::uint64_t most)> read;
+  std::function<Result<UnpackedFile>(const std::string& name, std::uint64_t most)> read_file;
+
+  /// One that the scene names and that is not there is the scene's fault: to whoever sent it, it was found.
+  [[nodiscard]] Result<UnpackedFile> read(const std::string& name, std::uint64_t most) const {
+    auto found = read_file(name, most);
+    if (!found && found.error().code == ErrorCode::not_found)
+      return fail(ErrorCode::corrupt_data, "the scene names a file that is missing: copy or download it again, whole",
+                  found.error().where);
+    return found;
+  }
 };
 
 /// A relative name without a way out, in its shortest form; nothing for any other.

@@ -27,7 +27,8 @@ namespace engine::io {
 /// The numbers are in right, down, front, as the .ply they were made of: what PlayCanvas' tools write, though the
 /// format's text says up. Of a streamed scene, level options.level; a branch without it gives its nearest finer one.
 ///   errors  unsupported: a zip file that holds no scene, another version, lossless pictures of another kind than WebP
-///           corrupt_data: pictures or numbers that contradict each other; a picture outside of the folder; damage
+///           corrupt_data: pictures or numbers that contradict each other; a picture that is missing or outside of the
+///           folder; damage
 ///           invalid_argument: no such level; unprocessable; too_large; those of options.memory
 ///   `where` is "<file>:meta.json.means.files[0]" or "<file>:means_l.webp"
 [[nodiscard]] Result<DecodedScene> decode_sog(std::span<const std::byte> zip, const std::string& file,

@@ -204,7 +204,7 @@ TEST(Sog, NamesWhatDoesNotFit) {
   refused([](Parts& p) { p.files["scales.webp"] = bytes_of("RIFF0000WEBP"); }, corrupt_data, "a.sog:scales.webp");
   refused([](Parts& p) { p.files["scales.webp"] = bytes_of("\x89PNG\r\n\x1a\n and so on, and on"); }, unsupported,
           "a.sog:scales.webp");
-  refused([](Parts& p) { p.files.erase("sh0.webp"); }, not_found, "a.sog:sh0.webp");
+  refused([](Parts& p) { p.files.erase("sh0.webp"); }, corrupt_data, "a.sog:sh0.webp");
   for (const char* name : {"../secret.webp", "/etc/passwd", "a/../../b", "C:\\x", "", "a\nb"})
     refused([&](Parts& p) { p.meta["means"]["files"][1] = name; }, corrupt_data, "a.sog:meta.json:means.files[1]");
 }
@@ -307,6 +307,11 @@ TEST_F(SogFolder, MayNotPointOutOfItself) {
   ASSERT_FALSE(link);
   EXPECT_EQ(link.error().code, ErrorCode::corrupt_data);
   EXPECT_EQ(link.error().where, "scene:scales.webp");
+  std::filesystem::remove(scene / "scales.webp");
+  const auto missing = read_scene(scene);
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().code, ErrorCode::corrupt_data);
+  EXPECT_EQ(missing.error().where, "scene:scales.webp");
   parts.meta["scales"]["files"][0] = "../scales.webp";
   write(parts, scene);
   const auto named = read_scene(scene / "meta.json");
