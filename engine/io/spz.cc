@@ -36,7 +36,8 @@ constexpr double farthest_fixed = 8388608;       // steps, of a position in 24 b
 constexpr std::uint8_t flag_antialiased = 1, flag_extensions = 2;
 constexpr std::uint32_t v4_header_bytes = 32;
 constexpr std::uint32_t axes_extension = 0xADBE0003;     // SPZ_ADOBE_coordinate_system: 4 bytes, an index as below
-constexpr std::uint64_t max_extension_bytes = 1u << 20;  // of all records: a choice; those known take 12 and 20
+constexpr std::uint64_t axes_record_bytes = 12;          // with type and length
+constexpr std::uint64_t max_extension_bytes = 1u << 20;  // of all records but the axes': a choice; those known take 20
 constexpr int zstd_level = 9;                            // a choice: beyond it, seconds buy a percent or two
 constexpr std::string_view usual_axes = "RUB";           // of a file that declares none
 
@@ -144,12 +145,21 @@ Result<void> lend(const Header& header, const ReadOptions& options, const std::s
 
 /// Records of a type, a length and that many bytes, one after the other. The axes go to origin.axes, all else is kept.
 Result<void> read_extensions(std::span<const std::byte> bytes, const std::string& where, SceneOrigin& origin) {
+  const auto too_large = [&] {
+    return fail(ErrorCode::too_large,
+                "the extensions take more than the limit of " + std::to_string(max_extension_bytes) + " bytes", where);
+  };
+  if (bytes.size() > max_extension_bytes + axes_record_bytes) return too_large();
+  std::uint64_t kept_bytes = 0;
   ByteReader in(bytes);
   while (in.remaining() > 0) {
     const auto type = in.read<std::uint32_t>(), size = in.read<std::uint32_t>();
     const auto payload = in.take(size);
     if (!in.ok()) return damaged("the last extension is longer than the room it has", where);
     if (type != axes_extension) {
+      // A file of version 4 that is written of these has the axes besides, and must be read again.
+      kept_bytes += 2 * sizeof(std::uint32_t) + size;
+      if (kept_bytes > max_extension_bytes) return too_large();
       origin.spz_extensions.push_back({type, {payload.begin(), payload.end()}});
       continue;
     }
@@ -186,12 +196,8 @@ Result<Header> unpack_gzip(std::span<const std::byte> bytes, const std::string& 
           file + ":" + row.name);
   }
   if (header->flags & flag_extensions) {
-    Bytes records(max_extension_bytes + 1);
+    Bytes records(max_extension_bytes + axes_record_bytes + 1);
     records.resize(in.read_some(records));
-    if (records.size() > max_extension_bytes)
-      return fail(ErrorCode::too_large,
-                  "extensions of more than " + std::to_string(max_extension_bytes) + " bytes follow the last Gaussian",
-                  file + ":extensions");
     if (auto read = read_extensions(records, file + ":extensions", origin); !read) return propagate(read);
   }
   if (!in.at_end()) return damaged("the file does not end after the last Gaussian", file);
@@ -211,11 +217,6 @@ Result<Header> unpack_zstd(std::span<const std::byte> bytes, const std::string& 
   if (!in.ok() || toc_offset < v4_header_bytes || toc_offset > bytes.size())
     return damaged("the table of contents lies outside the file", where);
   if (const auto zone = bytes.subspan(v4_header_bytes, toc_offset - v4_header_bytes); header->flags & flag_extensions) {
-    if (zone.size() > max_extension_bytes)
-      return fail(ErrorCode::too_large,
-                  "the extensions take " + std::to_string(zone.size()) + " bytes; the limit is " +
-                      std::to_string(max_extension_bytes),
-                  file + ":extensions");
     if (auto read = read_extensions(zone, file + ":extensions", origin); !read) return propagate(read);
   } else if (!zone.empty()) {
     origin.left_out.push_back(std::to_string(zone.size()) +
