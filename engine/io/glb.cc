@@ -134,6 +134,7 @@ class Glb {
     scene.origin.version = 2;
     scene.origin.axes = axes;
     scene.origin.packing = compressed ? "SPZ within glTF" : "none";
+    scene.origin.antialiased = antialiased_;
     scene.origin.left_out = std::move(left_out_);
     if (auto finite = check_finite(scene.cloud, file_); !finite) return propagate(finite);
     return scene;
@@ -485,6 +486,9 @@ class Glb {
     scene::GaussianCloud& cloud = part->cloud;
     if (cloud.size() != splats.count || cloud.sh_degree != splats.sh_degree)
       return damaged("its SPZ part contradicts itself", file_);
+    antialiased_ = antialiased_ || part->origin.antialiased;
+    if (!part->origin.spz_extensions.empty()) leave_out("extensions of SPZ parts");
+    for (std::string& left_out : part->origin.left_out) leave_out("in an SPZ part, " + std::move(left_out));
     const Mover mover(splats.placement, true);
     parallel_for(cloud.size(), rows_per_task, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) mover.apply(cloud, i);
@@ -618,6 +622,7 @@ class Glb {
   std::optional<Error> error_;
   std::vector<Splats> splats_;
   std::vector<std::string> left_out_;
+  bool antialiased_ = false;    ///< Does an SPZ part say so?
   bool logarithmic_ = false;    ///< Are SCALE the logarithms of scales?
   std::size_t primitives_ = 0;  ///< Of all nodes, of whatever kind.
   std::uint64_t count_ = 0;

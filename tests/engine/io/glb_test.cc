@@ -253,6 +253,21 @@ TEST(Glb, AnSpzPartIsBelievedAsFarAsItsBytesBearItOut) {
   }
 }
 
+TEST(Glb, WhatAnSpzPartSaysBesideItsGaussiansIsKeptOrSaidToBeLeftOut) {
+  SpzOptions options{.antialiased = true};
+  options.extensions = {{0x12340001, std::vector<std::byte>(18)}, {0xADBE0002, std::vector<std::byte>(12)}};
+  const auto spz = encode_spz(random_cloud(3, 1, 58), "a.spz", options).value();
+  Parts parts = with_spz(spz);
+  for (const int nodes : {1, 2}) {
+    parts.tree["nodes"] = json::array();
+    for (int k = 0; k < nodes; ++k) parts.tree["nodes"].push_back({{"mesh", 0}});
+    const auto scene = decode(parts);
+    ASSERT_TRUE(scene) << scene.error().message;
+    EXPECT_TRUE(scene->origin.antialiased);
+    EXPECT_EQ(scene->origin.left_out, std::vector<std::string>{"extensions of SPZ parts"});
+  }
+}
+
 TEST(Glb, SpzPartsThatAreCopiedAreCounted) {
   const scene::GaussianCloud cloud = random_cloud(5'000, 3, 55);
   const auto spz = encode_spz(cloud, "a.spz").value();
