@@ -377,8 +377,7 @@ class Glb {
     if (!(scale > 0 && std::isfinite(scale) && worst < most_uneven))
       refuse(
           "the node, or one above it, scales unevenly or shears: Gaussians can follow a rotation, a shift, a mirror "
-          "and "
-          "one scale for all axes; apply the node's scale to the Gaussians before export",
+          "and one scale for all axes; apply the node's scale to the Gaussians before export",
           node);
   }
   static double scale_of(const Placement& placement) { return std::cbrt(std::abs(glm::determinant(placement.linear))); }

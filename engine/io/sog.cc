@@ -454,6 +454,7 @@ class Sog {
       plan.names.push_back(safe.value_or(""));
     }
     plan.levels = int(whole(root.at("lodLevels"), 1000));
+    if (plan.levels == 0) root.at("lodLevels").fail_here("a streamed scene has a level at least");
     plan.has_environment = root.has_value("environment");
     if (!error && (options_.level < 0 || options_.level >= plan.levels))
       return fail(ErrorCode::invalid_argument,

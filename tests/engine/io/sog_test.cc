@@ -278,6 +278,12 @@ TEST(Sog, AStreamedSceneMayBeZipped) {
   std::vector<NamedFile> files{{"lod-meta.json", bytes_of(lod.dump())}, {"0_0/meta.json", bytes_of(parts.meta.dump())}};
   for (const auto& [name, bytes] : parts.files) files.push_back({"0_0/" + name, bytes});
   const Bytes zip = make_zip(files).value();
+  json none = lod;
+  none["lodLevels"] = 0;
+  const auto refused = decode(make_zip(std::vector<NamedFile>{{"lod-meta.json", bytes_of(none.dump())}}).value());
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::corrupt_data);
+  EXPECT_EQ(refused.error().where, "a.sog:lod-meta.json:lodLevels");
   const auto scene = decode(zip), whole = decode(parts.zip());
   ASSERT_TRUE(scene) << scene.error().message << scene.error().where;
   ASSERT_EQ(scene->cloud.size(), 10u);
