@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 constexpr std::size_t rows_per_task = 4096;              // of a parallel task: a choice
-constexpr std::uint64_t max_meta_bytes = 4u << 20;       // of a meta.json: a choice; with codebooks it has 15 KB
+constexpr std::uint64_t max_meta_bytes = 256u << 10;     // of a meta.json: a choice; with codebooks it has 15 KB
 constexpr std::uint64_t max_lod_meta_bytes = 64u << 20;  // of a lod-meta.json: 100 bytes per leaf and level
 constexpr std::size_t max_palette = 65536, palette_columns = 64;  // of the format
 constexpr std::size_t max_lod_files = 10'000;                     // of a streamed scene: a choice

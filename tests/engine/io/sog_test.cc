@@ -253,10 +253,13 @@ TEST(Sog, AFileThatUnpacksToTooMuchIsNotUnpacked) {
   EXPECT_EQ(scene.error().code, ErrorCode::too_large);
   EXPECT_EQ(scene.error().where, "a.sog:meta.json");
   // Within what a meta.json may have, the budget counts it.
-  MemoryBudget little(1 << 20);
+  EXPECT_EQ(decode(zeros(256 << 10)).error().code, ErrorCode::corrupt_data);
+  EXPECT_EQ(decode(zeros((256 << 10) + 1)).error().code, ErrorCode::too_large)
+      << "a streamed scene may have a thousand";
+  MemoryBudget little(100 << 10);
   ReadOptions options;
   options.memory = &little;
-  EXPECT_EQ(decode(zeros(3 << 20), options).error().code, ErrorCode::too_large);
+  EXPECT_EQ(decode(zeros(200 << 10), options).error().code, ErrorCode::too_large);
 }
 
 TEST(Sog, AZipFileWithinAZipFileIsNoScene) {
