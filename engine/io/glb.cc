@@ -28,11 +28,13 @@ constexpr std::size_t rows_per_task = 4096;  // of a parallel task: a choice
 constexpr std::uint32_t magic = 0x46546c67, json_chunk = 0x4e4f534a,
                         binary_chunk = 0x004e4942;  // "glTF" "JSON" "BIN\0"
 constexpr std::uint32_t signed_byte = 5120, unsigned_byte = 5121, signed_short = 5122, unsigned_short = 5123,
-                        float32 = 5126;   // of glTF's componentType
-constexpr int points_mode = 0;            // of glTF's primitive.mode
-constexpr std::string_view axes = "LUF";  // of glTF
-constexpr int max_depth = 64;             // of nodes within nodes: a choice
-constexpr double most_uneven = 1e-4;      // relative, of what counts as a uniform scale: rounding of a printed matrix
+                        float32 = 5126;              // of glTF's componentType
+constexpr int points_mode = 0;                       // of glTF's primitive.mode
+constexpr std::string_view axes = "LUF";             // of glTF
+constexpr int max_depth = 64;                        // of nodes within nodes: a choice
+constexpr std::uint64_t max_json_bytes = 16u << 20;  // a choice: as a tree, 50 times that; a million nodes have it
+constexpr std::size_t max_primitives = 1'000'000, max_splats = 10'000;  // of all nodes, and with Gaussians: choices
+constexpr double most_uneven = 1e-4;  // relative, of what counts as a uniform scale: rounding of a printed matrix
 constexpr const char* extension = "KHR_gaussian_splatting";
 constexpr std::array compressions = {"KHR_gaussian_splatting_compression_spz_2",
                                      "KHR_gaussian_splatting_compression_spz"};
@@ -100,7 +102,7 @@ class Glb {
   Glb(std::span<const std::byte> bytes, std::string file, const ReadOptions& options)
       : bytes_(bytes), file_(std::move(file)), options_(options) {}
 
-  /// What there is, without decoding it.
+  /// What there is, without decoding it, and within the limits.
   Result<void> survey() {
     if (auto opened = open(); !opened) return opened;
     const JsonFields root(tree_, file_ + ":", error_);
@@ -111,10 +113,6 @@ class Glb {
       return fail(ErrorCode::unsupported,
                   file_ + " holds no Gaussians in its scene: KHR_gaussian_splatting is on none of its primitives",
                   file_);
-    for (const Splats& splats : splats_) {
-      count_ += splats.count;
-      sh_degree_ = std::max(sh_degree_, splats.sh_degree);
-    }
     return {};
   }
   [[nodiscard]] std::uint64_t count() const { return count_; }
@@ -122,30 +120,59 @@ class Glb {
 
   Result<DecodedScene> decode() {
     if (auto done = survey(); !done) return propagate(done);
-    if (auto checked = check_limits(count_, cloud_row_bytes(sh_degree_), options_, file_); !checked)
-      return propagate(checked);
     DecodedScene scene;
-    scene.cloud.sh_degree = sh_degree_;
-    scene.cloud.resize(count_);
-    std::size_t at = 0;
-    bool compressed = false;
-    for (const Splats& splats : splats_) {
-      auto done =
-          splats.spz.empty() ? decode_attributes(splats, scene.cloud, at) : decode_spz_part(splats, scene.cloud, at);
-      if (!done) return propagate(done);
-      compressed = compressed || !splats.spz.empty();
-      at += std::size_t(splats.count);
+    // Mostly, one SPZ part is the whole scene: it needs no second cloud to be copied into.
+    if (splats_.size() == 1 && !splats_.front().spz.empty()) {
+      auto part = spz_part(splats_.front());
+      if (!part) return propagate(part);
+      scene.cloud = std::move(*part);
+    } else if (auto done = decode_all(scene.cloud); !done) {
+      return propagate(done);
     }
+    const bool compressed = std::ranges::any_of(splats_, [](const Splats& splats) { return !splats.spz.empty(); });
     scene.origin.format = SceneFormat::glb;
     scene.origin.version = 2;
     scene.origin.axes = axes;
     scene.origin.packing = compressed ? "SPZ within glTF" : "none";
+    scene.origin.antialiased = antialiased_;
     scene.origin.left_out = std::move(left_out_);
     if (auto finite = check_finite(scene.cloud, file_); !finite) return propagate(finite);
     return scene;
   }
 
  private:
+  /// The draft of 2025 had the logarithm of the scale, what was ratified has the scale. No scale is negative, and
+  /// hardly a scene has no Gaussian smaller than its unit. Asked of the whole file: one of its primitives may have
+  /// none.
+  bool has_logarithms() {
+    const JsonFields root(tree_, file_ + ":", error_);
+    for (const Splats& splats : splats_) {
+      if (!splats.spz.empty()) continue;
+      const Values scale = values(root, attributes_of(root, splats), attribute("SCALE"), "VEC3");
+      for (std::size_t i = 0; i < scale.count && !error_; ++i)
+        for (std::size_t c = 0; c < 3; ++c)
+          if (scale.at(i, c) < 0) return true;
+    }
+    return false;
+  }
+  JsonFields attributes_of(const JsonFields& root, const Splats& splats) {
+    return member(root, "meshes", splats.mesh).at("primitives").at(splats.primitive).at("attributes");
+  }
+
+  Result<void> decode_all(scene::GaussianCloud& cloud) {
+    logarithmic_ = has_logarithms();
+    if (error_) return tl::make_unexpected(*error_);
+    cloud.sh_degree = sh_degree_;
+    cloud.resize(count_);
+    std::size_t at = 0;
+    for (const Splats& splats : splats_) {
+      auto done = splats.spz.empty() ? decode_attributes(splats, cloud, at) : copy_spz_part(splats, cloud, at);
+      if (!done) return done;
+      at += std::size_t(splats.count);
+    }
+    return {};
+  }
+
   tl::unexpected<Error> damaged(const std::string& message, const std::string& where) const {
     return fail(ErrorCode::corrupt_data, message + ": the file is damaged or incomplete, copy or download it again",
                 where);
@@ -172,6 +199,11 @@ class Glb {
       if (type == binary_chunk && binary_.empty()) binary_ = chunk;
     }
     if (text.empty()) return damaged("there is no JSON", where);
+    if (text.size() > max_json_bytes)
+      return fail(ErrorCode::too_large,
+                  "the JSON has " + std::to_string(text.size()) + " bytes; at most " + std::to_string(max_json_bytes) +
+                      " are read",
+                  file_ + ":json");
     auto lent = take_from(options_.memory, json_tree_bytes(text), file_);
     if (!lent) return propagate(lent);
     tree_memory_ = std::move(*lent);
@@ -228,23 +260,28 @@ class Glb {
       int depth;
     };
     std::vector<Open> open;
-    for (std::size_t i = roots.size(); i-- > 0;) open.push_back({roots[i], {}, 0});
     std::vector<bool> seen(nodes);
+    // glTF's nodes are trees: each has one parent, and none is above itself. Asked before one is put down, so that
+    // there are never more than the file has.
+    const auto put = [&](Open next) {
+      if (error_) return;
+      if (seen[next.node])
+        return member(root, "nodes", next.node).fail_here("the node is in the scene twice, or below itself");
+      seen[next.node] = true;
+      open.push_back(next);
+    };
+    for (std::size_t i = roots.size(); i-- > 0;) put({roots[i], {}, 0});
     while (!open.empty() && !error_) {
       const Open next = open.back();
       open.pop_back();
       const JsonFields node = member(root, "nodes", next.node);
-      // glTF's nodes are trees: each has one parent, and none is above itself.
-      if (seen[next.node]) return node.fail_here("the node is in the scene twice, or below itself");
-      seen[next.node] = true;
       if (next.depth > max_depth) return node.fail_here("nodes lie more than " + std::to_string(max_depth) + " deep");
       const Placement own = placement_of(node);
       const Placement placement{next.placement.linear * own.linear,
                                 next.placement.linear * own.shift + next.placement.shift};
       if (node.has("children")) {
         const JsonFields children = node.at("children");
-        for (std::size_t i = children.size(); i-- > 0;)
-          open.push_back({index(children.at(i), nodes), placement, next.depth + 1});
+        for (std::size_t i = children.size(); i-- > 0;) put({index(children.at(i), nodes), placement, next.depth + 1});
       }
       if (node.has("mesh") && !error_) add_mesh(root, node, index(node.at("mesh"), meshes), placement);
     }
@@ -294,6 +331,8 @@ class Glb {
     const JsonFields primitives = member(root, "meshes", mesh).at("primitives");
     for (std::size_t i = 0; i < primitives.size() && !error_; ++i) {
       const JsonFields primitive = primitives.at(i);
+      // Nodes share meshes: a short text may name a trillion primitives.
+      if (++primitives_ > max_primitives) return too_many("primitives", max_primitives, node.where());
       if (!primitive.has("extensions") || !primitive.at("extensions").has(extension)) {
         leave_out("meshes of triangles, lines or points");
         continue;
@@ -309,8 +348,19 @@ class Glb {
       check_placement(placement, node.where());
       Splats splats{placement, mesh, i, node.where(), 0, 0, {}};
       survey_primitive(root, primitive, gaussians, splats);
+      if (error_) return;
+      if (splats_.size() == max_splats) return too_many("primitives of Gaussians", max_splats, node.where());
+      count_ += splats.count;
+      sh_degree_ = std::max(sh_degree_, splats.sh_degree);
       splats_.push_back(std::move(splats));
+      if (auto checked = check_limits(count_, cloud_row_bytes(sh_degree_), options_, file_); !checked)
+        error_ = checked.error();
     }
+  }
+
+  void too_many(const char* what, std::size_t most, const std::string& where) {
+    error_ = Error{ErrorCode::too_large,
+                   std::string("the nodes of the scene hold more than ") + std::to_string(most) + " " + what, where};
   }
 
   void leave_out(std::string what) {
@@ -327,8 +377,7 @@ class Glb {
     if (!(scale > 0 && std::isfinite(scale) && worst < most_uneven))
       refuse(
           "the node, or one above it, scales unevenly or shears: Gaussians can follow a rotation, a shift, a mirror "
-          "and "
-          "one scale for all axes; apply the node's scale to the Gaussians before export",
+          "and one scale for all axes; apply the node's scale to the Gaussians before export",
           node);
   }
   static double scale_of(const Placement& placement) { return std::cbrt(std::abs(glm::determinant(placement.linear))); }
@@ -429,24 +478,40 @@ class Glb {
     return out;
   }
 
-  Result<void> decode_spz_part(const Splats& splats, scene::GaussianCloud& cloud, std::size_t first) {
-    const auto part = decode_spz(splats.spz, file_ + ":" + "spz", options_);
+  /// A part's Gaussians, where their node puts them.
+  Result<scene::GaussianCloud> spz_part(const Splats& splats) {
+    auto part = decode_spz(splats.spz, spz_name(), options_);
     if (!part) return propagate(part);
-    if (part->cloud.size() != splats.count || part->cloud.sh_degree != splats.sh_degree)
+    scene::GaussianCloud& cloud = part->cloud;
+    if (cloud.size() != splats.count || cloud.sh_degree != splats.sh_degree)
       return damaged("its SPZ part contradicts itself", file_);
-    const std::size_t in = scene::sh_coefficients(splats.sh_degree), out = scene::sh_coefficients(cloud.sh_degree);
+    antialiased_ = antialiased_ || part->origin.antialiased;
+    if (!part->origin.spz_extensions.empty()) leave_out("extensions of SPZ parts");
+    for (std::string& left_out : part->origin.left_out) leave_out("in an SPZ part, " + std::move(left_out));
     const Mover mover(splats.placement, true);
-    parallel_for(part->cloud.size(), rows_per_task, [&](std::size_t begin, std::size_t end) {
+    parallel_for(cloud.size(), rows_per_task, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) mover.apply(cloud, i);
+    });
+    return std::move(cloud);
+  }
+  [[nodiscard]] std::string spz_name() const { return file_ + ":spz"; }
+
+  Result<void> copy_spz_part(const Splats& splats, scene::GaussianCloud& cloud, std::size_t first) {
+    const auto lent = take_from(options_.memory, splats.count * cloud_row_bytes(splats.sh_degree), spz_name());
+    if (!lent) return propagate(lent);
+    const auto part = spz_part(splats);
+    if (!part) return propagate(part);
+    const std::size_t in = scene::sh_coefficients(splats.sh_degree), out = scene::sh_coefficients(cloud.sh_degree);
+    parallel_for(part->size(), rows_per_task, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         const std::size_t to = first + i;
-        cloud.mean.set(to, part->cloud.mean.get(i));
-        cloud.log_scale.set(to, part->cloud.log_scale.get(i));
-        cloud.rotation.set(to, part->cloud.rotation.get(i));
-        cloud.opacity_logit[to] = part->cloud.opacity_logit[i];
+        cloud.mean.set(to, part->mean.get(i));
+        cloud.log_scale.set(to, part->log_scale.get(i));
+        cloud.rotation.set(to, part->rotation.get(i));
+        cloud.opacity_logit[to] = part->opacity_logit[i];
         for (std::size_t c = 0; c < 3; ++c)
-          std::copy_n(part->cloud.sh_row(i).begin() + std::ptrdiff_t(c * in), in,
+          std::copy_n(part->sh_row(i).begin() + std::ptrdiff_t(c * in), in,
                       cloud.sh_row(to).begin() + std::ptrdiff_t(c * out));
-        mover.apply(cloud, to);
       }
     });
     return {};
@@ -492,8 +557,7 @@ class Glb {
 
   Result<void> decode_attributes(const Splats& splats, scene::GaussianCloud& cloud, std::size_t first) {
     const JsonFields root(tree_, file_ + ":", error_);
-    const JsonFields attributes =
-        member(root, "meshes", splats.mesh).at("primitives").at(splats.primitive).at("attributes");
+    const JsonFields attributes = attributes_of(root, splats);
     const Values position = values(root, attributes, "POSITION", "VEC3");
     const Values rotation = values(root, attributes, attribute("ROTATION"), "VEC4");
     const Values scale = values(root, attributes, attribute("SCALE"), "VEC3");
@@ -512,11 +576,6 @@ class Glb {
       if (!error_ && all.count != splats.count) attributes.fail_here("the attributes differ in count");
     if (error_) return tl::make_unexpected(*error_);
 
-    // The draft of 2025 had the logarithm of the scale, what was ratified has the scale. No scale is negative, and
-    // hardly a scene has no Gaussian smaller than its unit.
-    bool logarithmic = false;
-    for (std::size_t i = 0; i < splats.count && !logarithmic; ++i)
-      for (std::size_t c = 0; c < 3; ++c) logarithmic = logarithmic || scale.at(i, c) < 0;
     const std::size_t opacity_channel = has_opacity ? 0 : 3;
     for (std::size_t i = 0; i < splats.count; ++i)
       if (const float p = opacity.at(i, opacity_channel); !(p >= 0 && p <= 1))
@@ -530,11 +589,11 @@ class Glb {
         const auto vector = [&](const Values& from) { return Vec3(from.at(i, 0), from.at(i, 1), from.at(i, 2)); };
         cloud.mean.set(to, vector(position));
         Vec3 size = vector(scale);
-        if (!logarithmic)
-          for (int c = 0; c < 3; ++c) size[c] = size[c] > 0 ? float(std::log(double(size[c]))) : -20.0f;
+        if (!logarithmic_)
+          for (int c = 0; c < 3; ++c) size[c] = size[c] == 0 ? -20.0f : float(std::log(double(size[c])));  // NaN stays
         cloud.log_scale.set(to, size);
         const Quat q(rotation.at(i, 3), rotation.at(i, 0), rotation.at(i, 1), rotation.at(i, 2));
-        cloud.rotation.set(to, glm::dot(q, q) > 0 ? q : Quat(1, 0, 0, 0));
+        cloud.rotation.set(to, glm::dot(q, q) == 0 ? Quat(1, 0, 0, 0) : q);
         cloud.opacity_logit[to] = logit_of(opacity.at(i, opacity_channel));
         for (std::size_t k = 0; k < sh.size(); ++k)
           for (std::size_t c = 0; c < 3; ++c) {
@@ -562,6 +621,9 @@ class Glb {
   std::optional<Error> error_;
   std::vector<Splats> splats_;
   std::vector<std::string> left_out_;
+  bool antialiased_ = false;    ///< Does an SPZ part say so?
+  bool logarithmic_ = false;    ///< Are SCALE the logarithms of scales?
+  std::size_t primitives_ = 0;  ///< Of all nodes, of whatever kind.
   std::uint64_t count_ = 0;
   int sh_degree_ = 0;
 };
@@ -642,11 +704,13 @@ bool looks_like_glb(std::span<const std::byte> bytes) {
   return bytes.size() >= mark.size() && std::memcmp(bytes.data(), mark.data(), mark.size()) == 0;
 }
 
-std::uint64_t expected_glb_bytes(std::span<const std::byte> bytes) {
-  const ReadOptions options;
-  Glb glb(bytes, "", options);
-  if (!glb.survey()) return bytes.size();
-  return std::max<std::uint64_t>(bytes.size(), glb.count() * cloud_row_bytes(glb.sh_degree()));
+std::uint64_t expected_glb_bytes(std::span<const std::byte> bytes, const ReadOptions& options) {
+  const auto expected = within_memory("", [&]() -> Result<std::uint64_t> {
+    Glb glb(bytes, "", options);
+    if (auto done = glb.survey(); !done) return propagate(done);
+    return glb.count() * cloud_row_bytes(glb.sh_degree());
+  });
+  return std::max<std::uint64_t>(bytes.size(), expected.value_or(0));
 }
 
 Result<DecodedScene> decode_glb(std::span<const std::byte> bytes, const std::string& file, const ReadOptions& options) {

@@ -19,16 +19,16 @@ namespace engine::io {
 [[nodiscard]] bool looks_like_glb(std::span<const std::byte> bytes);
 
 /// Bytes that the Gaussians of a file take in memory, by its JSON: at least the file's own size, and that alone where
-/// the JSON says nothing that the file could hold.
-[[nodiscard]] std::uint64_t expected_glb_bytes(std::span<const std::byte> bytes);
+/// the JSON says nothing that the file could hold, or takes more than options.memory lends.
+[[nodiscard]] std::uint64_t expected_glb_bytes(std::span<const std::byte> bytes, const ReadOptions& options = {});
 
 /// Decodes a whole file: all Gaussians of the scene that it names (without one: of all nodes), where their nodes put
-/// them, turned from glTF's left, up, front to right, down, front. Meshes, cameras and materials are left out, and that
-/// is said.
+/// them, turned from glTF's left, up, front to right, down, front. Meshes, cameras and materials are left out, and what
+/// another colour space would mean; that is said.
 ///   errors  corrupt_data: chunks, views or accessors that contradict each other or the file; a circle of nodes; NaN
-///           unsupported: no Gaussians (a mesh), SH degree 4, data in other files, a node that scales unevenly, mirrors
-///           or shears, another kernel or colour space; an extension that is required and unknown unprocessable,
-///           too_large; those of options.memory
+///           unsupported: no Gaussians (a mesh), SH degree 4, data in other files, a node that scales unevenly or
+///           shears, another kernel, an extension that is required and unknown
+///           unprocessable, too_large: asked before anything is decoded; those of options.memory
 ///   `where` is "<file>:nodes[3].scale", "<file>:accessors[2]"
 [[nodiscard]] Result<DecodedScene> decode_glb(std::span<const std::byte> bytes, const std::string& file,
                                               const ReadOptions& options);

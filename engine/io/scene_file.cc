@@ -118,11 +118,11 @@ std::optional<std::filesystem::path> sog_folder(const std::filesystem::path& pat
 /// come from an older one: only that says what its axes are.
 SpzOptions spz_options(const SceneOrigin& origin) {
   SpzOptions options;
+  options.antialiased = origin.antialiased;
   if (origin.format != SceneFormat::spz) return options;
   options.version = origin.version == 4 ? 4 : 3;
   options.axes = origin.axes;
   options.extensions = origin.spz_extensions;
-  options.antialiased = origin.antialiased;
   return options;
 }
 

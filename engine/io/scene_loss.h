@@ -19,8 +19,7 @@ struct AttributeLoss {
 ///   before   the scene, its SH as far as `after` has it
 ///   after    of as many Gaussians (asserted), in the order that written_order() says
 ///   returns  in the order above; rotations as the least angle over half turns about a Gaussian's own axes, which
-///   change
-///            nothing; opacities and colours from 0 to 1, as displayed; SH beyond DC, as stored
+///            change nothing; opacities and colours from 0 to 1, as displayed; SH beyond DC, as stored
 [[nodiscard]] std::vector<AttributeLoss> scene_loss(const SceneFile& before, const SceneFile& after,
                                                     SceneFormat format);
 

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <numeric>
 #include <optional>
+#include <set>
 #include <string_view>
 #include <utility>
 
@@ -27,19 +28,29 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 constexpr std::size_t rows_per_task = 4096;              // of a parallel task: a choice
-constexpr std::uint64_t max_meta_bytes = 4u << 20;       // of a meta.json: a choice; with codebooks it has 15 KB
+constexpr std::uint64_t max_meta_bytes = 256u << 10;     // of a meta.json: a choice; with codebooks it has 15 KB
 constexpr std::uint64_t max_lod_meta_bytes = 64u << 20;  // of a lod-meta.json: 100 bytes per leaf and level
 constexpr std::size_t max_palette = 65536, palette_columns = 64;  // of the format
 constexpr std::size_t max_lod_files = 10'000;                     // of a streamed scene: a choice
-constexpr int max_lod_depth = 64;   // of its tree: a choice; an octree of that depth has no end
-constexpr int rotation_mode = 252;  // the alpha of a rotation is this and the largest's index
+constexpr std::size_t max_level_files = 1'000;  // of one of its levels: a choice; half a million rows in each are usual
+constexpr int max_lod_depth = 64;               // of its tree: a choice; an octree of that depth has no end
+constexpr int rotation_mode = 252;              // the alpha of a rotation is this and the largest's index
 constexpr const char* meta_name = "meta.json";
 constexpr const char* lod_meta_name = "lod-meta.json";
 
 /// Files of a scene, by names relative to its folder that have been checked: from a zip file or a folder.
 struct Files {
   std::string file;  ///< For error addresses.
-  std::function<Result<UnpackedFile>(const std::string& name, std::uint64_t most)> read;
+  std::function<Result<UnpackedFile>(const std::string& name, std::uint64_t most)> read_file;
+
+  /// One that the scene names and that is not there is the scene's fault: to whoever sent it, it was found.
+  [[nodiscard]] Result<UnpackedFile> read(const std::string& name, std::uint64_t most) const {
+    auto found = read_file(name, most);
+    if (!found && found.error().code == ErrorCode::not_found)
+      return fail(ErrorCode::corrupt_data, "the scene names a file that is missing: copy or download it again, whole",
+                  found.error().where);
+    return found;
+  }
 };
 
 /// A relative name without a way out, in its shortest form; nothing for any other.
@@ -404,6 +415,22 @@ class Sog {
     return {};
   }
 
+  /// What a leaf gives for the level that is asked for, else for its nearest finer or coarser one.
+  void add_piece(const JsonFields& lods, Plan& plan) const {
+    const auto has = [&](int level) { return lods.has(std::to_string(level).c_str()); };
+    int level = options_.level;
+    while (level >= 0 && !has(level)) --level;
+    if (level < 0)
+      for (level = options_.level + 1; level < plan.levels && !has(level);) ++level;
+    if (level >= plan.levels) return;
+    const JsonFields leaf = lods.at(std::to_string(level).c_str());
+    const Piece piece{std::size_t(whole(leaf.at("file"), 1u << 24)), whole(leaf.at("offset"), std::uint64_t{1} << 32),
+                      whole(leaf.at("count"), std::uint64_t{1} << 32)};
+    if (piece.file >= plan.names.size()) leaf.at("file").fail_here("there is no such file among filenames");
+    plan.pieces.push_back(piece);
+    plan.count += piece.count;
+  }
+
   /// Which rows of which files make the level that is asked for, in the order of the tree.
   Result<Plan> plan_of(const std::string& name) {
     const auto document = parsed(name, max_lod_meta_bytes);
@@ -412,60 +439,65 @@ class Sog {
     const JsonFields root(document->tree, where(name) + ":", error);
     Plan plan;
     const JsonFields names = root.at("filenames");
+    if (names.size() > max_lod_files)
+      return fail(ErrorCode::too_large,
+                  std::to_string(names.size()) + " files; at most " + std::to_string(max_lod_files) + " are read",
+                  where(name) + ":filenames");
+    std::set<std::string> known_names;
     for (std::size_t i = 0; i < names.size(); ++i) {
       const auto safe = safe_name(parent_of(name), names.at(i).string());
       if (!safe)
         names.at(i).fail_here("the name of a file in the scene's own folder was expected, without a way out of it");
+      // A file is decoded once for each time that it is named.
+      else if (!known_names.insert(*safe).second)
+        names.at(i).fail_here("the file is named twice");
       plan.names.push_back(safe.value_or(""));
     }
     plan.levels = int(whole(root.at("lodLevels"), 1000));
+    if (plan.levels == 0) root.at("lodLevels").fail_here("a streamed scene has a level at least");
     plan.has_environment = root.has_value("environment");
     if (!error && (options_.level < 0 || options_.level >= plan.levels))
       return fail(ErrorCode::invalid_argument,
                   "there is no level " + std::to_string(options_.level) +
                       " of detail; the scene has 0, the finest, to " + std::to_string(plan.levels - 1),
                   where(name) + ":lodLevels");
-    if (!error && plan.names.size() > max_lod_files)
-      return fail(ErrorCode::too_large,
-                  std::to_string(plan.names.size()) + " files; at most " + std::to_string(max_lod_files) + " are read",
-                  where(name) + ":filenames");
-    // A stack of our own, and of limited depth: how deep the tree goes, the file says.
-    struct Node {
-      JsonFields fields;
-      int depth;
+    // A stack of our own, and of limited depth: how deep the tree goes, the file says. It holds where each level is
+    // among its siblings, not the siblings: of those, there may be millions.
+    struct Siblings {
+      JsonFields nodes;
+      std::size_t next = 0;
     };
-    std::vector<Node> open{{root.at("tree"), 0}};
-    while (!open.empty() && !error) {
-      const auto [node, depth] = open.back();
-      open.pop_back();
+    std::vector<Siblings> open;
+    JsonFields node = root.at("tree");
+    for (bool more = true; more && !error;) {
+      if (node.has("lods")) add_piece(node.at("lods"), plan);
       if (node.has("children")) {
-        const JsonFields children = node.at("children");
-        if (depth == max_lod_depth) children.fail_here("the tree is deeper than " + std::to_string(max_lod_depth));
-        for (std::size_t i = children.size(); i-- > 0;) open.push_back({children.at(i), depth + 1});
+        if (open.size() == max_lod_depth)
+          node.at("children").fail_here("the tree is deeper than " + std::to_string(max_lod_depth));
+        open.push_back({node.at("children")});
       }
-      if (!node.has("lods")) continue;
-      const JsonFields lods = node.at("lods");
-      const auto has = [&](int level) { return lods.has(std::to_string(level).c_str()); };
-      int level = options_.level;
-      while (level >= 0 && !has(level)) --level;
-      if (level < 0)
-        for (level = options_.level + 1; level < plan.levels && !has(level);) ++level;
-      if (level >= plan.levels) continue;
-      const JsonFields leaf = lods.at(std::to_string(level).c_str());
-      const Piece piece{std::size_t(whole(leaf.at("file"), 1u << 24)), whole(leaf.at("offset"), std::uint64_t{1} << 32),
-                        whole(leaf.at("count"), std::uint64_t{1} << 32)};
-      if (!error && piece.file >= plan.names.size()) leaf.at("file").fail_here("there is no such file among filenames");
-      plan.pieces.push_back(piece);
-      plan.count += piece.count;
+      while (!open.empty() && open.back().next == open.back().nodes.size()) open.pop_back();
+      more = !open.empty();
+      if (more) node = open.back().nodes.at(open.back().next++);
     }
     if (error) return tl::make_unexpected(std::move(*error));
+    const std::uint64_t most_rows = 2 * std::min<std::uint64_t>(options_.max_gaussians, std::uint64_t{1} << 32);
+    std::uint64_t rows = 0;  // of the files that the level is in
     for (const Piece& piece : plan.pieces) {
       auto known = plan.metas.find(piece.file);
       if (known == plan.metas.end()) {
         auto meta = meta_of(plan.names[piece.file]);
         if (!meta) return propagate(meta);
         plan.sh_degree = std::max(plan.sh_degree, meta->version == 2 ? meta->sh_degree : meta->has_sh ? 3 : 0);
+        rows += meta->count;
         known = plan.metas.emplace(piece.file, std::move(*meta)).first;
+        // Whole files are decoded, however few of their rows a level has.
+        if (plan.metas.size() > max_level_files || rows > most_rows)
+          return fail(ErrorCode::too_large,
+                      "the level lies in more than " + std::to_string(max_level_files) +
+                          " files, or in files of more than " + std::to_string(most_rows) +
+                          " Gaussians together, twice the limit (max_gaussians)",
+                      where(name) + ":filenames");
       }
       if (piece.offset + piece.count > known->second.count)
         return fail(ErrorCode::corrupt_data,
@@ -695,14 +727,14 @@ bool looks_like_sog_meta(std::span<const std::byte> start) {
   return first != std::string_view::npos && text[first] == '{';
 }
 
-std::uint64_t expected_sog_bytes(std::span<const std::byte> zip, int level) {
-  ReadOptions options;
-  options.level = level;
-  const auto archive = ZipArchive::open(zip, "");
-  if (!archive) return zip.size();
-  auto bundle = open_bundle(*archive, "", nullptr);
-  if (!bundle) return zip.size();
-  const auto size = Sog(std::move(bundle->files), options).size(bundle->root);
+std::uint64_t expected_sog_bytes(std::span<const std::byte> zip, const ReadOptions& options) {
+  const auto size = within_memory("", [&]() -> Result<std::pair<std::uint64_t, int>> {
+    const auto archive = ZipArchive::open(zip, "");
+    if (!archive) return propagate(archive);
+    auto bundle = open_bundle(*archive, "", options.memory);
+    if (!bundle) return propagate(bundle);
+    return Sog(std::move(bundle->files), options).size(bundle->root);
+  });
   if (!size) return zip.size();
   return std::max<std::uint64_t>(zip.size(), size->first * cloud_row_bytes(size->second));
 }

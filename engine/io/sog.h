@@ -20,14 +20,15 @@ namespace engine::io {
 [[nodiscard]] bool looks_like_sog_meta(std::span<const std::byte> start);
 
 /// Bytes that the Gaussians of a bundled file take in memory, by its meta.json: at least the file's own size, and that
-/// alone where it cannot be read.
-[[nodiscard]] std::uint64_t expected_sog_bytes(std::span<const std::byte> zip, int level = 0);
+/// alone where it cannot be read, or takes more than options.memory lends.
+[[nodiscard]] std::uint64_t expected_sog_bytes(std::span<const std::byte> zip, const ReadOptions& options = {});
 
 /// Decodes a bundled file: meta.json or lod-meta.json and pictures, at the root of a zip file or in one folder of it.
 /// The numbers are in right, down, front, as the .ply they were made of: what PlayCanvas' tools write, though the
 /// format's text says up. Of a streamed scene, level options.level; a branch without it gives its nearest finer one.
 ///   errors  unsupported: a zip file that holds no scene, another version, lossless pictures of another kind than WebP
-///           corrupt_data: pictures or numbers that contradict each other; a picture outside of the folder; damage
+///           corrupt_data: pictures or numbers that contradict each other; a picture that is missing or outside of the
+///           folder; damage
 ///           invalid_argument: no such level; unprocessable; too_large; those of options.memory
 ///   `where` is "<file>:meta.json.means.files[0]" or "<file>:means_l.webp"
 [[nodiscard]] Result<DecodedScene> decode_sog(std::span<const std::byte> zip, const std::string& file,

@@ -30,12 +30,14 @@ constexpr std::uint32_t magic = 0x5053474e;  // "NGSP"
 constexpr std::size_t rows_per_task = 4096;  // of a parallel task: a choice
 constexpr std::size_t header_bytes = 16;
 constexpr std::size_t max_deflate_ratio = 1032;  // of deflate: 258 bytes for every 2 bits
+constexpr std::size_t max_zstd_ratio = 32768;    // of Zstandard: 128 KiB, a block's most, for 4 bytes
 constexpr double colour_scale = 0.15;            // of this format; wider than sh_c0 to keep colours beyond 0..1
 constexpr double farthest_fixed = 8388608;       // steps, of a position in 24 bits
 constexpr std::uint8_t flag_antialiased = 1, flag_extensions = 2;
 constexpr std::uint32_t v4_header_bytes = 32;
 constexpr std::uint32_t axes_extension = 0xADBE0003;     // SPZ_ADOBE_coordinate_system: 4 bytes, an index as below
-constexpr std::uint64_t max_extension_bytes = 1u << 20;  // of all records: a choice; those known take 12 and 20
+constexpr std::uint64_t axes_record_bytes = 12;          // with type and length
+constexpr std::uint64_t max_extension_bytes = 1u << 20;  // of all records but the axes': a choice; those known take 20
 constexpr int zstd_level = 9;                            // a choice: beyond it, seconds buy a percent or two
 constexpr std::string_view usual_axes = "RUB";           // of a file that declares none
 
@@ -121,6 +123,19 @@ Result<void> check_limits(const Header& header, const ReadOptions& options, cons
   return check_limits(header.count, cloud_row_bytes(header.sh_degree) + packed_row_bytes(header), options, file);
 }
 
+/// Could a file of that size unpack to what its header announces?
+bool plausible(const Header& header, std::uint64_t file_bytes) {
+  const std::size_t ratio = header.version == 4 ? max_zstd_ratio : max_deflate_ratio;
+  return header.count * packed_row_bytes(header) / ratio <= file_bytes;
+}
+
+Result<void> check_plausible(const Header& header, std::uint64_t file_bytes, const std::string& where) {
+  if (plausible(header, file_bytes)) return {};
+  return damaged("the header announces " + std::to_string(header.count) + " Gaussians, more than " +
+                     std::to_string(file_bytes) + " bytes can unpack to",
+                 where);
+}
+
 Result<void> lend(const Header& header, const ReadOptions& options, const std::string& file, Attributes& attributes) {
   auto share = take_from(options.memory, header.count * packed_row_bytes(header), file);
   if (!share) return propagate(share);
@@ -130,12 +145,21 @@ Result<void> lend(const Header& header, const ReadOptions& options, const std::s
 
 /// Records of a type, a length and that many bytes, one after the other. The axes go to origin.axes, all else is kept.
 Result<void> read_extensions(std::span<const std::byte> bytes, const std::string& where, SceneOrigin& origin) {
+  const auto too_large = [&] {
+    return fail(ErrorCode::too_large,
+                "the extensions take more than the limit of " + std::to_string(max_extension_bytes) + " bytes", where);
+  };
+  if (bytes.size() > max_extension_bytes + axes_record_bytes) return too_large();
+  std::uint64_t kept_bytes = 0;
   ByteReader in(bytes);
   while (in.remaining() > 0) {
     const auto type = in.read<std::uint32_t>(), size = in.read<std::uint32_t>();
     const auto payload = in.take(size);
     if (!in.ok()) return damaged("the last extension is longer than the room it has", where);
     if (type != axes_extension) {
+      // A file of version 4 that is written of these has the axes besides, and must be read again.
+      kept_bytes += 2 * sizeof(std::uint32_t) + size;
+      if (kept_bytes > max_extension_bytes) return too_large();
       origin.spz_extensions.push_back({type, {payload.begin(), payload.end()}});
       continue;
     }
@@ -161,10 +185,7 @@ Result<Header> unpack_gzip(std::span<const std::byte> bytes, const std::string& 
   auto header = parse_header(start, 1, 3, file + ":header");
   if (!header) return header;
   if (auto checked = check_limits(*header, options, file); !checked) return propagate(checked);
-  if (const auto needed = header->count * packed_row_bytes(*header); needed / max_deflate_ratio > bytes.size())
-    return damaged("the header announces " + std::to_string(header->count) + " Gaussians, more than " +
-                       std::to_string(bytes.size()) + " bytes can unpack to",
-                   file + ":header");
+  if (auto checked = check_plausible(*header, bytes.size(), file + ":header"); !checked) return propagate(checked);
   if (auto lent = lend(*header, options, file, attributes); !lent) return propagate(lent);
   for (const auto& row : attribute_rows(*header)) {
     Bytes& unpacked = attributes.*row.bytes;
@@ -175,12 +196,8 @@ Result<Header> unpack_gzip(std::span<const std::byte> bytes, const std::string& 
           file + ":" + row.name);
   }
   if (header->flags & flag_extensions) {
-    Bytes records(max_extension_bytes + 1);
+    Bytes records(max_extension_bytes + axes_record_bytes + 1);
     records.resize(in.read_some(records));
-    if (records.size() > max_extension_bytes)
-      return fail(ErrorCode::too_large,
-                  "extensions of more than " + std::to_string(max_extension_bytes) + " bytes follow the last Gaussian",
-                  file + ":extensions");
     if (auto read = read_extensions(records, file + ":extensions", origin); !read) return propagate(read);
   }
   if (!in.at_end()) return damaged("the file does not end after the last Gaussian", file);
@@ -195,15 +212,11 @@ Result<Header> unpack_zstd(std::span<const std::byte> bytes, const std::string& 
   auto header = parse_header(in.take(std::min(header_bytes, bytes.size())), 4, 4, where);
   if (!header) return header;
   if (auto checked = check_limits(*header, options, file); !checked) return propagate(checked);
+  if (auto checked = check_plausible(*header, bytes.size(), where); !checked) return propagate(checked);
   const auto toc_offset = in.read<std::uint32_t>();
   if (!in.ok() || toc_offset < v4_header_bytes || toc_offset > bytes.size())
     return damaged("the table of contents lies outside the file", where);
   if (const auto zone = bytes.subspan(v4_header_bytes, toc_offset - v4_header_bytes); header->flags & flag_extensions) {
-    if (zone.size() > max_extension_bytes)
-      return fail(ErrorCode::too_large,
-                  "the extensions take " + std::to_string(zone.size()) + " bytes; the limit is " +
-                      std::to_string(max_extension_bytes),
-                  file + ":extensions");
     if (auto read = read_extensions(zone, file + ":extensions", origin); !read) return propagate(read);
   } else if (!zone.empty()) {
     origin.left_out.push_back(std::to_string(zone.size()) +
@@ -418,8 +431,7 @@ std::uint64_t expected_spz_bytes(std::span<const std::byte> start, std::uint64_t
   if (!plain && !GzipReader(start).read(unpacked)) return file_bytes;
   const auto header = parse_header(plain ? start.first(std::min(start.size(), header_bytes)) : unpacked, 1, 4, "");
   if (!header) return file_bytes;
-  // Zstandard knows no such ratio, but names the sizes in frames that are checked before room is made for them.
-  if (!plain && header->count * packed_row_bytes(*header) / max_deflate_ratio > file_bytes) return file_bytes;
+  if (!plausible(*header, file_bytes)) return file_bytes;
   return std::max(file_bytes, header->count * cloud_row_bytes(header->sh_degree));
 }
 
@@ -429,6 +441,7 @@ Result<SpzCount> read_spz_header(std::span<const std::byte> bytes, const std::st
   if (!plain && !GzipReader(bytes).read(unpacked)) return damaged("no .spz header could be unpacked", file);
   const auto header = parse_header(plain ? bytes.first(std::min(bytes.size(), header_bytes)) : unpacked, 1, 4, file);
   if (!header) return propagate(header);
+  if (auto checked = check_plausible(*header, bytes.size(), file); !checked) return propagate(checked);
   return SpzCount{header->count, header->sh_degree};
 }
 

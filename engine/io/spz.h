@@ -22,7 +22,7 @@ namespace engine::io {
 ///   start  of the file: 4096 bytes are plenty
 [[nodiscard]] std::uint64_t expected_spz_bytes(std::span<const std::byte> start, std::uint64_t file_bytes);
 
-/// How many Gaussians a file holds, and their SH degree, by its header.
+/// How many Gaussians a file holds, and their SH degree, by its header: no more than its bytes could unpack to.
 struct SpzCount {
   std::uint64_t count = 0;
   int sh_degree = 0;

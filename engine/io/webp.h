@@ -27,8 +27,8 @@ struct BytePicture {
 
 /// Decodes a WebP file.
 ///   max_pixels  asked of the header, before memory is allocated
-///   errors      unsupported: no WebP, or an animation; corrupt_data: damaged, or more than max_pixels; those of
-///   `budget`
+///   errors      unsupported: no WebP, or an animation
+///               corrupt_data: damaged, or more than max_pixels; those of `budget`
 [[nodiscard]] Result<BytePicture> decode_webp(std::span<const std::byte> bytes, std::uint64_t max_pixels,
                                               MemoryBudget* budget, const std::string& where);
 

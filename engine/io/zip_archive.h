@@ -28,9 +28,9 @@ struct UnpackedFile {
 /// A zip file from a stranger. Believes its directory only as far as the bytes bear it out.
 class ZipArchive {
  public:
-  /// bytes    outlive this
-  ///   file     for error addresses
-  ///   errors   corrupt_data: no zip file, damaged; too_large: more than `max_entries` files
+  ///   bytes   outlive this
+  ///   file    for error addresses
+  ///   errors  corrupt_data: no zip file, damaged; too_large: more than `max_entries` files
   [[nodiscard]] static Result<ZipArchive> open(std::span<const std::byte> bytes, const std::string& file,
                                                std::uint64_t max_entries = 10'000);
 
@@ -39,9 +39,9 @@ class ZipArchive {
 
   /// A file whole.
   ///   most    bytes; asked of what comes out, not of what the directory says
-  ///   errors  not_found; too_large: more than `most`, or than the budget; corrupt_data; unsupported: encrypted, or
-  ///   packed
-  ///           in a way we do not know. `where` is "<file>:<name>".
+  ///   errors  not_found; too_large: more than `most`, or than the budget; corrupt_data
+  ///           unsupported: encrypted, or packed in a way we do not know
+  ///   `where` is "<file>:<name>"
   [[nodiscard]] Result<UnpackedFile> read(const std::string& name, std::uint64_t most, MemoryBudget* budget) const;
 
  private:

@@ -9,6 +9,7 @@
 #include "engine/core/result.h"
 
 namespace engine::io {
+
 /// What an end record says.
 struct ZipDirectory {
   std::uint64_t entries = 0;

@@ -47,7 +47,7 @@ std::uint64_t expected_of_ply(const io::InputFile& file) {
 
 }  // namespace
 
-std::uint64_t expected_memory_bytes(const std::filesystem::path& path, engine::MemoryBudget* work) {
+std::uint64_t expected_memory_bytes(const std::filesystem::path& path, const io::ReadOptions& options) {
   const auto file = io::InputFile::open(path);
   if (!file) return 0;
   const auto start = file->read_at(0, std::min<std::uint64_t>(file->size(), 64));
@@ -58,10 +58,14 @@ std::uint64_t expected_memory_bytes(const std::filesystem::path& path, engine::M
     return more ? io::expected_spz_bytes(*more, file->size()) + column_bytes(io::inria_layout(3)) : 0;
   }
   if (const bool glb = io::looks_like_glb(*start); glb || io::looks_like_zip(*start)) {
-    const auto lent = engine::take_from(work, file->size(), file->name());
-    const auto whole = lent ? file->read_at(0, file->size()) : propagate(lent);
-    if (!whole) return 0;
-    return (glb ? io::expected_glb_bytes(*whole) : io::expected_sog_bytes(*whole)) + column_bytes(io::inria_layout(3));
+    const auto expected = io::within_memory(file->name(), [&]() -> Result<std::uint64_t> {
+      const auto lent = engine::take_from(options.memory, file->size(), file->name());
+      if (!lent) return propagate(lent);
+      const auto whole = file->read_at(0, file->size());
+      if (!whole) return propagate(whole);
+      return glb ? io::expected_glb_bytes(*whole, options) : io::expected_sog_bytes(*whole, options);
+    });
+    return expected ? *expected + column_bytes(io::inria_layout(3)) : 0;
   }
   return file->size() / io::splat_record_bytes * io::cloud_row_bytes(0) + file->size() +
          column_bytes(io::inria_layout(0));

@@ -24,11 +24,12 @@ Result<Uploads::Upload> Uploads::read(const fs::path& file) {
     if (error.code == engine::ErrorCode::too_large) error.where = file.filename().string();
     return tl::make_unexpected(std::move(error));
   };
-  const std::uint64_t expected = expected_memory_bytes(file, options_.read.memory);
+  // One at a time: a reader takes more than what is left of it, and the file is in memory, too, even to tell what it
+  // will take.
+  const std::lock_guard one_at_a_time(reading_);
+  const std::uint64_t expected = expected_memory_bytes(file, options_.read);
   auto reservation = std::make_optional(memory_.reserve(expected));
   if (!*reservation) return no_room(reservation->error());
-  // One at a time: a reader takes more than what is left of it, and the file is in memory, too.
-  const std::lock_guard one_at_a_time(reading_);
   auto scene = io::read_scene(file, options_.read);
   if (!scene) return public_error_(scene, file.parent_path());
   const std::uint64_t bytes = memory_bytes(*scene);

@@ -7,6 +7,7 @@
 
 #include "engine/io/axes.h"
 #include "engine/io/checks.h"
+#include "engine/io/gzip.h"
 #include "engine/io/spz.h"
 #include "engine/scene/sh.h"
 #include "tests/engine/io/agreement.h"
@@ -170,22 +171,56 @@ TEST(Glb, QuantisedAttributesMeanWhatTheyAreNormalisedTo) {
   EXPECT_EQ(scene->cloud.log_scale.get(0), Vec3(-3, -2, 2));
 }
 
+/// A file whose Gaussians are an .spz file.
+Parts with_spz(std::span<const std::byte> spz) {
+  Parts parts;
+  parts.binary = std::string(reinterpret_cast<const char*>(spz.data()), spz.size());
+  parts.tree = {{"asset", {{"version", "2.0"}}},
+                {"extensionsRequired", {"KHR_gaussian_splatting", "KHR_gaussian_splatting_compression_spz_2"}},
+                {"nodes", json::array({{{"mesh", 0}}})},
+                {"buffers", json::array({{{"byteLength", spz.size()}}})},
+                {"bufferViews", json::array({{{"buffer", 0}, {"byteLength", spz.size()}}})}};
+  json gaussians;
+  gaussians["extensions"]["KHR_gaussian_splatting_compression_spz_2"]["bufferView"] = 0;
+  json primitive = {{"mode", 0}, {"attributes", json::object()}};
+  primitive["extensions"]["KHR_gaussian_splatting"] = gaussians;
+  parts.tree["meshes"] = json::array({{{"primitives", json::array({primitive})}}});
+  return parts;
+}
+
+// The draft's logarithms show by a sign, which a primitive of large Gaussians alone has not.
+TEST(Glb, AFilesScalesAreAllLogarithmsOrNone) {
+  Parts parts = Parts::of(random_cloud(2, 0, 57));
+  const json& primitive = parts.tree["meshes"][0]["primitives"][0];
+  const auto scale = primitive["attributes"]["KHR_gaussian_splatting:SCALE"].get<std::size_t>();
+  const json& view = parts.tree["bufferViews"][parts.tree["accessors"][scale]["bufferView"].get<std::size_t>()];
+  const std::array<float, 6> scales{0.5f, 1, 2, 0.25f, 3, -1};  // one row each for two primitives
+  std::memcpy(parts.binary.data() + view["byteOffset"].get<std::size_t>(), scales.data(), sizeof scales);
+  json second = primitive;
+  for (auto& [name, index] : second["attributes"].items()) {
+    json accessor = parts.tree["accessors"][index.get<std::size_t>()];
+    const auto type = accessor["type"].get<std::string>();
+    const int components = type == "SCALAR" ? 1 : type == "VEC3" ? 3 : 4;
+    accessor["byteOffset"] = components * (accessor["componentType"] == 5126 ? 4 : 1);
+    accessor["count"] = 1;
+    index = parts.tree["accessors"].size();
+    parts.tree["accessors"].push_back(accessor);
+  }
+  for (const auto& [name, index] : parts.tree["meshes"][0]["primitives"][0]["attributes"].items())
+    parts.tree["accessors"][index.get<std::size_t>()]["count"] = 1;
+  parts.tree["meshes"][0]["primitives"].push_back(second);
+  const auto scene = decode(parts);
+  ASSERT_TRUE(scene) << scene.error().message << scene.error().where;
+  ASSERT_EQ(scene->cloud.size(), 2u);
+  EXPECT_EQ(scene->cloud.log_scale.get(0), Vec3(0.5f, 1, 2));
+  EXPECT_EQ(scene->cloud.log_scale.get(1), Vec3(0.25f, 3, -1));
+}
+
 TEST(Glb, ReadsAnSpzPart) {
   const scene::GaussianCloud cloud = random_cloud(80, 2, 47);
   for (const int version : {3, 4}) {
     const auto spz = encode_spz(cloud, "a.spz", {.version = version}).value();
-    Parts parts;
-    parts.binary = std::string(reinterpret_cast<const char*>(spz.data()), spz.size());
-    parts.tree = {{"asset", {{"version", "2.0"}}},
-                  {"extensionsRequired", {"KHR_gaussian_splatting", "KHR_gaussian_splatting_compression_spz_2"}},
-                  {"nodes", json::array({{{"mesh", 0}}})},
-                  {"buffers", json::array({{{"byteLength", spz.size()}}})},
-                  {"bufferViews", json::array({{{"buffer", 0}, {"byteLength", spz.size()}}})}};
-    json gaussians;
-    gaussians["extensions"]["KHR_gaussian_splatting_compression_spz_2"]["bufferView"] = 0;
-    json primitive = {{"mode", 0}, {"attributes", json::object()}};
-    primitive["extensions"]["KHR_gaussian_splatting"] = gaussians;
-    parts.tree["meshes"] = json::array({{{"primitives", json::array({primitive})}}});
+    Parts parts = with_spz(spz);
     const auto scene = decode(parts);
     ASSERT_TRUE(scene) << scene.error().message << scene.error().where;
     const auto alone = decode_spz(spz, "a.spz", {});
@@ -195,6 +230,63 @@ TEST(Glb, ReadsAnSpzPart) {
     parts.binary.resize(parts.binary.size() / 2);
     EXPECT_FALSE(decode(parts));
   }
+}
+
+TEST(Glb, AnSpzPartIsBelievedAsFarAsItsBytesBearItOut) {
+  for (const int version : {3, 4}) {
+    const auto spz = encode_spz(random_cloud(80, 3, 54), "a.spz", {.version = version}).value();
+    std::vector<std::byte> lies = spz;
+    if (version == 3) {
+      lies.resize(16 + 80 * 65);
+      ASSERT_TRUE(GzipReader(spz).read(lies));
+    }
+    const std::uint32_t count = 40'000'000;
+    std::memcpy(lies.data() + 8, &count, sizeof count);
+    if (version == 3) lies = gzip(lies);
+    const Parts parts = with_spz(lies);
+    const std::string bytes = parts.bytes();
+    EXPECT_EQ(expected_glb_bytes(as_span(bytes)), bytes.size());
+    const auto scene = decode(parts);
+    ASSERT_FALSE(scene);
+    EXPECT_EQ(scene.error().code, ErrorCode::corrupt_data);
+    EXPECT_EQ(scene.error().where, "a.glb:meshes[0].primitives[0]");
+  }
+}
+
+TEST(Glb, WhatAnSpzPartSaysBesideItsGaussiansIsKeptOrSaidToBeLeftOut) {
+  SpzOptions options{.antialiased = true};
+  options.extensions = {{0x12340001, std::vector<std::byte>(18)}, {0xADBE0002, std::vector<std::byte>(12)}};
+  const auto spz = encode_spz(random_cloud(3, 1, 58), "a.spz", options).value();
+  Parts parts = with_spz(spz);
+  for (const int nodes : {1, 2}) {
+    parts.tree["nodes"] = json::array();
+    for (int k = 0; k < nodes; ++k) parts.tree["nodes"].push_back({{"mesh", 0}});
+    const auto scene = decode(parts);
+    ASSERT_TRUE(scene) << scene.error().message;
+    EXPECT_TRUE(scene->origin.antialiased);
+    EXPECT_EQ(scene->origin.left_out, std::vector<std::string>{"extensions of SPZ parts"});
+  }
+}
+
+TEST(Glb, SpzPartsThatAreCopiedAreCounted) {
+  const scene::GaussianCloud cloud = random_cloud(5'000, 3, 55);
+  const auto spz = encode_spz(cloud, "a.spz").value();
+  Parts parts = with_spz(spz);
+  // What unpacking takes is lent besides; a part that is the whole scene needs no more.
+  MemoryBudget budget(5'000 * cloud_row_bytes(3) - 1);
+  ASSERT_TRUE(decode(parts, {.memory = &budget}));
+  parts.tree["nodes"] = json::array({{{"mesh", 0}}, {{"mesh", 0}, {"translation", {0, 0, 7}}}});
+  const auto scene = decode(parts);
+  ASSERT_TRUE(scene) << scene.error().message;
+  const auto alone = decode_spz(spz, "a.spz", {});
+  ASSERT_EQ(scene->cloud.size(), 10'000u);
+  EXPECT_EQ(scene->cloud.mean.get(17), alone->cloud.mean.get(17));
+  EXPECT_EQ(scene->cloud.mean.get(5'017).z, alone->cloud.mean.get(17).z + 7);
+  const auto refused = decode(parts, {.memory = &budget});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::too_large);
+  EXPECT_EQ(refused.error().where, "a.glb:spz");
+  EXPECT_EQ(budget.lent(), 0u);
 }
 
 TEST(Glb, SeveralPrimitivesAreOneSceneAndMeshesAreSaidToBeLeftOut) {
@@ -234,6 +326,7 @@ TEST(Glb, NamesWhatDoesNotFit) {
   refused([](Parts& p) { p.tree["buffers"][0]["uri"] = "/etc/passwd"; }, unsupported, "a.glb:bufferViews[0]");
   refused([](Parts& p) { p.tree["nodes"][0]["children"] = {0}; }, corrupt_data, "a.glb:nodes[0]");
   refused([](Parts& p) { p.tree["scenes"][0]["nodes"] = {0, 0}; }, corrupt_data, "a.glb:nodes[0]");
+  refused([](Parts& p) { p.tree["nodes"] = {{{"children", {1, 1}}}, {{"mesh", 0}}}; }, corrupt_data, "a.glb:nodes[1]");
   refused([](Parts& p) { p.tree["scenes"][0]["nodes"] = {9}; }, corrupt_data, "a.glb:scenes[0].nodes[0]");
   refused([](Parts& p) { p.tree["extensionsRequired"] = {"KHR_draco_mesh_compression"}; }, unsupported,
           "a.glb:extensionsRequired[0]");
@@ -252,6 +345,34 @@ TEST(Glb, NamesWhatDoesNotFit) {
       corrupt_data, "a.glb:vertex[0].opacity");
 }
 
+TEST(Glb, NaNIsNamedAndZeroIsSmallOrNoTurn) {
+  const Parts good = Parts::of(random_cloud(6, 0, 56));
+  const auto with = [&](const char* name, std::size_t row, std::size_t channels, float value) {
+    Parts parts = good;
+    const json& accessor =
+        parts.tree["accessors"]
+                  [parts.tree["meshes"][0]["primitives"][0]["attributes"][std::string("KHR_gaussian_splatting:") + name]
+                       .get<std::size_t>()];
+    const json& view = parts.tree["bufferViews"][accessor["bufferView"].get<std::size_t>()];
+    for (std::size_t c = 0; c < channels; ++c)
+      std::memcpy(parts.binary.data() + view["byteOffset"].get<std::size_t>() + 4 * (channels * row + c), &value, 4);
+    return decode(parts);
+  };
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const auto refused = [](const Result<DecodedScene>& scene, const std::string& where) {
+    ASSERT_FALSE(scene) << where;
+    EXPECT_EQ(scene.error().code, ErrorCode::corrupt_data);
+    EXPECT_EQ(scene.error().where, where);
+  };
+  refused(with("SCALE", 3, 3, nan), "a.glb:vertex[3].scale_0");
+  refused(with("ROTATION", 4, 4, nan), "a.glb:vertex[4].rot_0");
+  refused(with("SH_DEGREE_0_COEF_0", 5, 3, nan), "a.glb:vertex[5].f_dc_0");
+  const auto scale = with("SCALE", 3, 3, 0), rotation = with("ROTATION", 4, 4, 0);
+  ASSERT_TRUE(scale && rotation);
+  EXPECT_EQ(scale->cloud.log_scale.get(3), Vec3(-20));
+  EXPECT_LT(axes_angle(rotation->cloud.rotation.get(4), {1, 0, 0, 0}), 1e-3);
+}
+
 // Views may overlap: that is how attributes share data. What is read of them is counted by accessors, not by bytes.
 TEST(Glb, ViewsThatOverlapCostNoMoreThanTheLimitAllows) {
   Parts parts = Parts::of(random_cloud(1000, 3, 50));
@@ -268,6 +389,59 @@ TEST(Glb, ViewsThatOverlapCostNoMoreThanTheLimitAllows) {
   EXPECT_EQ(decode(many, {.max_memory_bytes = 100 << 20}).error().code, ErrorCode::too_large);
   const std::string bytes = many.bytes();
   EXPECT_EQ(expected_glb_bytes(as_span(bytes)), 1'000'000 * cloud_row_bytes(3));
+}
+
+// A mesh may be in many nodes: what they name together is limited as it is counted, not once all of it is listed.
+TEST(Glb, PrimitivesOfManyNodesAreCountedAsTheyAreFound) {
+  const auto in_nodes = [](Parts parts, int nodes) {
+    parts.tree["nodes"] = json::array(), parts.tree["scenes"][0]["nodes"] = json::array();
+    for (int k = 0; k < nodes; ++k) {
+      parts.tree["nodes"].push_back({{"mesh", 0}});
+      parts.tree["scenes"][0]["nodes"].push_back(k);
+    }
+    return parts;
+  };
+  const Parts one = Parts::of(random_cloud(1, 0, 53));
+  ASSERT_TRUE(decode(in_nodes(one, 10'000)));
+  const auto refused = [&](const Parts& parts, const std::string& where, const ReadOptions& options = {}) {
+    const auto scene = decode(parts, options);
+    ASSERT_FALSE(scene) << where;
+    EXPECT_EQ(scene.error().code, ErrorCode::too_large) << scene.error().message;
+    EXPECT_EQ(scene.error().where, where) << scene.error().message;
+  };
+  refused(in_nodes(one, 10'001), "a.glb:nodes[10000]");
+  // The 101st node is broken: the Gaussians of the hundred before it are too many already.
+  Parts broken = in_nodes(one, 101);
+  broken.tree["nodes"][100]["mesh"] = 7;
+  EXPECT_EQ(decode(broken).error().code, ErrorCode::corrupt_data);
+  refused(broken, "a.glb:header", {.max_gaussians = 99});
+  Parts triangles = one;
+  triangles.tree["meshes"][0]["primitives"] = json::array();
+  for (int k = 0; k < 2'000; ++k) triangles.tree["meshes"][0]["primitives"].push_back({{"mode", 4}});
+  refused(in_nodes(triangles, 600), "a.glb:nodes[500]");
+}
+
+// JSON takes 50 times its size as a tree: it is counted, also where only the size of the scene is asked for.
+TEST(Glb, JsonTakesNoMoreMemoryThanThereIs) {
+  Parts parts = Parts::of(random_cloud(1000, 0, 52));
+  parts.tree["nodes"] = json::array({{{"mesh", 0}}, {{"mesh", 0}}, {{"mesh", 0}}});
+  parts.tree["scenes"][0]["nodes"] = {0, 1, 2};
+  parts.tree["extras"] = json::array();
+  for (int k = 0; k < 10'000; ++k) parts.tree["extras"].push_back(json::object());
+  const std::string bytes = parts.bytes();
+  MemoryBudget enough(8 << 20), little(1 << 20);
+  EXPECT_EQ(expected_glb_bytes(as_span(bytes), {.memory = &enough}), 3000 * cloud_row_bytes(0));
+  EXPECT_EQ(expected_glb_bytes(as_span(bytes), {.memory = &little}), bytes.size());
+  EXPECT_EQ(little.lent(), 0u);
+  const auto scene = decode(parts, {.memory = &little});
+  ASSERT_FALSE(scene);
+  EXPECT_EQ(scene.error().code, ErrorCode::too_large);
+
+  parts.tree["extras"] = std::string(std::size_t(16) << 20, ' ');
+  const auto large = decode(parts);
+  ASSERT_FALSE(large);
+  EXPECT_EQ(large.error().code, ErrorCode::too_large);
+  EXPECT_EQ(large.error().where, "a.glb:json");
 }
 
 }  // namespace

@@ -103,6 +103,21 @@ TEST_F(SceneFiles, WritesWhatItReadAsEveryFormat) {
   }
 }
 
+TEST_F(SceneFiles, AntialiasedStaysSoInFormatsThatCanSayIt) {
+  for (const bool antialiased : {true, false}) {
+    support::write_file(folder_.path() / "a.sog",
+                        text_of(encode_sog(random_cloud(3, 1, 6), antialiased, "a.sog").value()));
+    for (const auto& [from, to, format] :
+         {std::tuple("a.sog", "b.spz", SceneFormat::spz), std::tuple("b.spz", "c.sog", SceneFormat::sog)}) {
+      const auto scene = read_scene(folder_.path() / from);
+      ASSERT_TRUE(scene) << scene.error().message;
+      EXPECT_EQ(scene->origin.antialiased, antialiased) << from;
+      ASSERT_TRUE(write_scene(folder_.path() / to, *scene, format));
+    }
+    EXPECT_EQ(read_scene(folder_.path() / "c.sog")->origin.antialiased, antialiased);
+  }
+}
+
 TEST_F(SceneFiles, ACutAtAnyByteIsAnErrorUnlessThePrefixIsWhole) {
   MemoryFile file;
   for (const auto& [name, bytes, count] : samples()) {

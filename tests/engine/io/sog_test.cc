@@ -204,7 +204,7 @@ TEST(Sog, NamesWhatDoesNotFit) {
   refused([](Parts& p) { p.files["scales.webp"] = bytes_of("RIFF0000WEBP"); }, corrupt_data, "a.sog:scales.webp");
   refused([](Parts& p) { p.files["scales.webp"] = bytes_of("\x89PNG\r\n\x1a\n and so on, and on"); }, unsupported,
           "a.sog:scales.webp");
-  refused([](Parts& p) { p.files.erase("sh0.webp"); }, not_found, "a.sog:sh0.webp");
+  refused([](Parts& p) { p.files.erase("sh0.webp"); }, corrupt_data, "a.sog:sh0.webp");
   for (const char* name : {"../secret.webp", "/etc/passwd", "a/../../b", "C:\\x", "", "a\nb"})
     refused([&](Parts& p) { p.meta["means"]["files"][1] = name; }, corrupt_data, "a.sog:meta.json:means.files[1]");
 }
@@ -232,31 +232,34 @@ TEST(Sog, APictureThatIsTooLargeForItsGaussiansIsNotDecoded) {
   EXPECT_EQ(budget.lent(), 0u);
 }
 
-/// A zip file of one file of `size` zero bytes, deflated.
-Bytes deflated_zeros(const char* name, std::size_t size) {
+/// A zip file of one file, deflated.
+Bytes deflated(const char* name, const std::string& text) {
   const support::TempDir folder;
   const auto path = folder.path() / "a.zip";
-  const std::string zeros(size, '\0');
   int error = 0;
   zip_t* const archive = zip_open(path.c_str(), ZIP_CREATE, &error);
-  const auto index = zip_file_add(archive, name, zip_source_buffer(archive, zeros.data(), zeros.size(), 0), 0);
+  const auto index = zip_file_add(archive, name, zip_source_buffer(archive, text.data(), text.size(), 0), 0);
   zip_set_file_compression(archive, zip_uint64_t(index), ZIP_CM_DEFLATE, 9);
   EXPECT_EQ(zip_close(archive), 0);
   return bytes_of(support::read_file(path));
 }
 
 TEST(Sog, AFileThatUnpacksToTooMuchIsNotUnpacked) {
-  const Bytes bomb = deflated_zeros("meta.json", std::size_t(64) << 20);
+  const auto zeros = [](std::size_t size) { return deflated("meta.json", std::string(size, '\0')); };
+  const Bytes bomb = zeros(std::size_t(64) << 20);
   EXPECT_LT(bomb.size(), 100'000u);
   const auto scene = decode(bomb);
   ASSERT_FALSE(scene);
   EXPECT_EQ(scene.error().code, ErrorCode::too_large);
   EXPECT_EQ(scene.error().where, "a.sog:meta.json");
   // Within what a meta.json may have, the budget counts it.
-  MemoryBudget little(1 << 20);
+  EXPECT_EQ(decode(zeros(256 << 10)).error().code, ErrorCode::corrupt_data);
+  EXPECT_EQ(decode(zeros((256 << 10) + 1)).error().code, ErrorCode::too_large)
+      << "a streamed scene may have a thousand";
+  MemoryBudget little(100 << 10);
   ReadOptions options;
   options.memory = &little;
-  EXPECT_EQ(decode(deflated_zeros("meta.json", 3 << 20), options).error().code, ErrorCode::too_large);
+  EXPECT_EQ(decode(zeros(200 << 10), options).error().code, ErrorCode::too_large);
 }
 
 TEST(Sog, AZipFileWithinAZipFileIsNoScene) {
@@ -278,6 +281,12 @@ TEST(Sog, AStreamedSceneMayBeZipped) {
   std::vector<NamedFile> files{{"lod-meta.json", bytes_of(lod.dump())}, {"0_0/meta.json", bytes_of(parts.meta.dump())}};
   for (const auto& [name, bytes] : parts.files) files.push_back({"0_0/" + name, bytes});
   const Bytes zip = make_zip(files).value();
+  json none = lod;
+  none["lodLevels"] = 0;
+  const auto refused = decode(make_zip(std::vector<NamedFile>{{"lod-meta.json", bytes_of(none.dump())}}).value());
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::corrupt_data);
+  EXPECT_EQ(refused.error().where, "a.sog:lod-meta.json:lodLevels");
   const auto scene = decode(zip), whole = decode(parts.zip());
   ASSERT_TRUE(scene) << scene.error().message << scene.error().where;
   ASSERT_EQ(scene->cloud.size(), 10u);
@@ -307,6 +316,11 @@ TEST_F(SogFolder, MayNotPointOutOfItself) {
   ASSERT_FALSE(link);
   EXPECT_EQ(link.error().code, ErrorCode::corrupt_data);
   EXPECT_EQ(link.error().where, "scene:scales.webp");
+  std::filesystem::remove(scene / "scales.webp");
+  const auto missing = read_scene(scene);
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().code, ErrorCode::corrupt_data);
+  EXPECT_EQ(missing.error().where, "scene:scales.webp");
   parts.meta["scales"]["files"][0] = "../scales.webp";
   write(parts, scene);
   const auto named = read_scene(scene / "meta.json");
@@ -366,11 +380,71 @@ TEST_F(SogFolder, AStreamedOneIsTheRowsOfItsTree) {
   EXPECT_EQ(read_scene(scene, {.max_gaussians = 50'000}).error().code, ErrorCode::too_large);
 }
 
+// Whole files are decoded, and each takes time: what a text of a few kilobytes can ask for is limited before that.
+TEST_F(SogFolder, AStreamedOneDecodesNoMoreThanTwiceTheLimit) {
+  const auto set = [&](const json& filenames) {
+    json children = json::array();
+    for (std::size_t k = 0; k < filenames.size(); ++k)
+      children.push_back({{"lods", {{"0", {{"file", k}, {"offset", 0}, {"count", 1}}}}}});
+    support::write_file(scene / "lod-meta.json",
+                        json{{"lodLevels", 1}, {"filenames", filenames}, {"tree", {{"children", children}}}}.dump());
+  };
+  const Parts parts = Parts::of(random_cloud(40, 0, 42));
+  for (const char* name : {"a", "b", "c"}) write(parts, scene / name);
+  set({"a/meta.json", "b/meta.json", "c/meta.json"});
+  ASSERT_TRUE(read_scene(scene, {.max_gaussians = 60}));
+  const auto limited = read_scene(scene, {.max_gaussians = 59});
+  ASSERT_FALSE(limited) << "3 rows, of files of 120";
+  EXPECT_EQ(limited.error().code, ErrorCode::too_large);
+  EXPECT_EQ(limited.error().where, "scene:lod-meta.json:filenames");
+  for (const char* again : {"a/meta.json", "a/./meta.json", "a//meta.json"}) {
+    set({"a/meta.json", "b/meta.json", again});
+    const auto twice = read_scene(scene);
+    ASSERT_FALSE(twice) << again;
+    EXPECT_EQ(twice.error().code, ErrorCode::corrupt_data);
+    EXPECT_EQ(twice.error().where, "scene:lod-meta.json:filenames[2]");
+  }
+  // One file under many names, as a zip file can have it, too.
+  json many = json::array();
+  for (int k = 0; k < 1001; ++k) {
+    const std::string name = "a/" + std::to_string(k) + ".json";
+    std::filesystem::create_hard_link(scene / "a/meta.json", scene / name);
+    many.push_back(name);
+  }
+  set(many);
+  const auto named = read_scene(scene);
+  ASSERT_FALSE(named);
+  EXPECT_EQ(named.error().code, ErrorCode::too_large);
+  EXPECT_EQ(named.error().where, "scene:lod-meta.json:filenames");
+}
+
 TEST(Sog, TellsWhatItUnpacksToByItsText) {
   const Parts parts = Parts::of(random_cloud(300, 2, 39));
   const Bytes zip = parts.zip();
   EXPECT_GE(expected_sog_bytes(zip), 300 * cloud_row_bytes(2));
   EXPECT_EQ(expected_sog_bytes(std::span(zip).first(100)), 100u);
+}
+
+TEST(Sog, TheTreeOfAStreamedSceneTakesNoMoreMemoryThanThereIs) {
+  std::string text = R"({"lodLevels": 1, "filenames": ["a/meta.json"], "tree": {"children": [{})";
+  for (int k = 0; k < 100'000; ++k) text += ",{}";
+  const Bytes bomb = deflated("lod-meta.json", text + "]}}");
+  EXPECT_LT(bomb.size(), 5'000u);
+  MemoryBudget enough(64 << 20), little(1 << 20);
+  EXPECT_EQ(decode(bomb, {.memory = &enough}).error().code, ErrorCode::unprocessable) << "a scene of no Gaussians";
+  EXPECT_EQ(decode(bomb, {.memory = &little}).error().code, ErrorCode::too_large);
+  // The text fits a budget of which its tree leaves nothing: the scene that it names counts for nothing then.
+  const Parts parts = Parts::of(random_cloud(2000, 1, 41));
+  const json leaf = {{"lods", {{"0", {{"file", 0}, {"offset", 0}, {"count", 2000}}}}}};
+  json children = json::array({leaf});
+  for (int k = 0; k < 10'000; ++k) children.push_back(json::object());
+  const json lod = {{"lodLevels", 1}, {"filenames", {"a/meta.json"}}, {"tree", {{"children", children}}}};
+  const Bytes zip = make_zip(std::vector<NamedFile>{{"lod-meta.json", bytes_of(lod.dump())},
+                                                    {"a/meta.json", bytes_of(parts.meta.dump())}})
+                        .value();
+  EXPECT_EQ(expected_sog_bytes(zip, {.memory = &enough}), 2000 * cloud_row_bytes(1));
+  EXPECT_EQ(expected_sog_bytes(zip, {.memory = &little}), zip.size());
+  EXPECT_EQ(little.lent(), 0u);
 }
 
 }  // namespace

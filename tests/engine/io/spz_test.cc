@@ -353,6 +353,32 @@ TEST(Spz, TheSameSceneInWhicheverAxesItIsStored) {
   EXPECT_EQ(encode_spz(cloud, "a.spz", {.axes = "RRU"}).error().code, ErrorCode::invalid_argument);
 }
 
+TEST(Spz, AsManyExtensionsAsAreReadAreReadAgainOnceTheyAreWritten) {
+  constexpr std::size_t most = 1 << 20;
+  for (const std::uint32_t version : {3u, 4u}) {
+    Parts parts = one_gaussian(version, 0);
+    parts.flags = 2;
+    const auto read = [&](const std::string& extensions) {
+      parts.extensions = extensions;
+      const std::string bytes = version == 4 ? parts.v4() : zipped(parts.unpacked());
+      return decode_spz(as_span(bytes), "a.spz", {});
+    };
+    const auto full = read(record(7, std::string(most - 8, 'x')));
+    ASSERT_TRUE(full) << full.error().message;
+    const auto written = encode_spz(full->cloud, "b.spz", {.extensions = full->origin.spz_extensions}).value();
+    const auto again = decode_spz(written, "b.spz", {});
+    ASSERT_TRUE(again) << again.error().message;
+    EXPECT_EQ(again->origin.spz_extensions, full->origin.spz_extensions);
+    for (const std::string& more : {record(7, std::string(most - 7, 'x')),
+                                    declares_axes(4) + record(7, std::string(most - 8, 'x')) + record(7, "")}) {
+      const auto refused = read(more);
+      ASSERT_FALSE(refused) << version;
+      EXPECT_EQ(refused.error().code, ErrorCode::too_large);
+      EXPECT_EQ(refused.error().where, "a.spz:extensions");
+    }
+  }
+}
+
 TEST(Spz, BelievesNoExtensionBeforeCheckingIt) {
   const auto refused = [](std::uint32_t version, const std::string& extensions, ErrorCode code) {
     Parts parts = one_gaussian(version, 0);
