@@ -89,10 +89,10 @@ TEST(BenchReport, HasTheFieldsThatOthersRead) {
   const auto written = encode(sample_trial());
   std::vector<std::string> names;
   for (const auto& [name, value] : written.items()) names.push_back(name);
-  EXPECT_EQ(names, (std::vector<std::string>{"case", "what", "corrector", "textured", "gaussians", "part", "seeds",
-                                             "uncovered", "open", "intervals", "untouched", "result",
-                                             "corrected_views_agree", "seconds", "stages", "peak_memory_bytes",
-                                             "warnings"}));
+  EXPECT_EQ(names,
+            (std::vector<std::string>{"case", "what", "corrector", "textured", "gaussians", "part", "seeds",
+                                      "uncovered", "open", "intervals", "untouched", "result", "corrected_views_agree",
+                                      "seconds", "stages", "peak_memory_bytes", "warnings"}));
 }
 
 TEST(CachedResult, IsNotFoundAgain) {
