@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 
 namespace engine::edit {
 namespace {
@@ -25,6 +26,13 @@ std::string handle_lost(std::size_t handle, int interval) {
 std::string anchor_is_idle(std::size_t handle) {
   return "handle " + std::to_string(handle + 1) +
          " is an anchor that holds nothing: nothing that moves is within its radius of it";
+}
+
+std::string handle_is_astray(std::size_t handle, double away) {
+  std::ostringstream distance;
+  distance << away;
+  return "handle " + std::to_string(handle + 1) + " lies " + distance.str() +
+         " from the nearest Gaussian that it moves, farther than all of them are apart: is it where it should be?";
 }
 
 std::string left_open(std::span<const Uncovered> views) {

@@ -24,5 +24,8 @@ namespace engine::edit {
 
 /// An anchor of an elastic body that grips nothing of it.
 [[nodiscard]] std::string anchor_is_idle(std::size_t handle);
+/// A handle of one that lies far from all of it.
+///   away  world units
+[[nodiscard]] std::string handle_is_astray(std::size_t handle, double away);
 
 }  // namespace engine::edit

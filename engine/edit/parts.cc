@@ -33,6 +33,13 @@ bool grips_nothing(const Array3& means, std::span<const std::uint32_t> rows, con
       rows, [&](std::uint32_t row) { return glm::distance(DVec3(means.get(row)), drag.source) <= drag.grip; });
 }
 
+/// From a point to the nearest of the rows.
+double distance_to(const Array3& means, std::span<const std::uint32_t> rows, DVec3 point) {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const std::uint32_t row : rows) nearest = std::min(nearest, glm::distance(DVec3(means.get(row)), point));
+  return nearest;
+}
+
 /// Where a part is held: where it grows out of what stays, or, if nowhere, where it stands. What it merely lies against
 /// may come apart. Anchors say which of it is meant: of an arm whose shoulder is anchored not the helmet that it holds
 /// against a leg.
@@ -92,6 +99,7 @@ Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> 
   const std::vector<deform::Drag> drags = whole_drags(request);
   const Array3 means = scene::means(scene);
   for (const auto& [group, rows] : rows_of_group) {
+    const double length = longest_edge(means, rows);
     std::vector<deform::Drag> own;
     for (std::size_t i = 0; i < drags.size(); ++i) {
       if (drags[i].group != group) continue;
@@ -99,14 +107,16 @@ Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> 
         parts.idle.push_back(i);
       else
         own.push_back(drags[i]);
+      if (const double away = distance_to(means, rows, drags[i].source); !drags[i].anchor && away > length)
+        parts.astray.push_back({i, away});
     }
     if (own.empty()) continue;  // anchors alone, and none of them near: nothing moves
     const std::vector<select::Touch>& touches = memory.contact_of(scene, rows, dragged);
     const auto count = [&](select::Touch touch) { return std::size_t(std::ranges::count(touches, touch)); };
     const std::size_t grows_out = count(select::Touch::grows_out);
     deform::Attachment attachment =
-        deform::attach(drags, group, {grows_out + count(select::Touch::stands), grows_out, longest_edge(means, rows)},
-                       request.attach, request.mode == Mode::extend);
+        deform::attach(drags, group, {grows_out + count(select::Touch::stands), grows_out, length}, request.attach,
+                       request.mode == Mode::extend);
     if (request.mode == Mode::extend) draw_out(scene, rows, touches, own, request.attach, attachment, parts);
     if (attachment.how == How::held || attachment.how == How::drawn_out)
       hold(means, rows, touches, own, attachment, parts);
@@ -114,6 +124,7 @@ Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> 
   }
   std::sort(parts.rim.begin(), parts.rim.end());
   std::sort(parts.idle.begin(), parts.idle.end());
+  std::ranges::sort(parts.astray, {}, &Parts::Astray::handle);
   return parts;
 }
 

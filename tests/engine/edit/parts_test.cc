@@ -83,8 +83,11 @@ TEST(PartsOf, AreNoneForOtherInterpolations) {
 }
 
 TEST(Among, NumbersRowsAsASceneOfTheseAloneDoes) {
-  const Parts all{
-      .attachments = {}, .rim = {3, 9}, .continuations = {{0, 1, DVec3(1, 0, 0), {1, 4}, {0.5, 1}}}, .idle = {}};
+  const Parts all{.attachments = {},
+                  .rim = {3, 9},
+                  .continuations = {{0, 1, DVec3(1, 0, 0), {1, 4}, {0.5, 1}}},
+                  .idle = {},
+                  .astray = {}};
   const Parts few = among(all, std::vector<std::uint32_t>{1, 3, 4, 9});
   EXPECT_EQ(few.rim, (std::vector<std::uint32_t>{1, 3}));
   EXPECT_EQ(few.continuations[0].tile, (std::vector<std::uint32_t>{0, 2}));
@@ -146,6 +149,21 @@ TEST(ElasticBody, PaysNoHeedToAnAnchorFarFromIt) {
   EXPECT_EQ(with->overlay, without->overlay);
   ASSERT_EQ(with->warnings.size(), 1u);
   EXPECT_NE(with->warnings[0].find("handle 2 is an anchor that holds nothing"), std::string::npos);
+}
+
+TEST(ElasticBody, SaysOfAHandleThatItLiesFarFromAllThatItMoves) {
+  const auto cloud = wall();
+  Request request = pulled(cloud, {-0.3, 0, 1});
+  const auto scene = std::make_shared<const scene::GaussianCloud>(cloud);
+  const auto near = preview({scene, nullptr}, request);
+  request.handles[0].source += DVec3(0, 0, 100);
+  *request.handles[0].target += DVec3(0, 0, 100);
+  const auto far = preview({scene, nullptr}, request);
+  ASSERT_TRUE(near && far);
+  EXPECT_TRUE(near->warnings.empty());
+  ASSERT_EQ(far->warnings.size(), 1u);
+  EXPECT_NE(far->warnings[0].find("handle 1 lies 100 from the nearest Gaussian"), std::string::npos)
+      << far->warnings[0];
 }
 
 TEST(ElasticBody, TakesAsManyIntervalsAsAsked) {
