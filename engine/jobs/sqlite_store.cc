@@ -82,6 +82,13 @@ constexpr const char* can_run =
     "ended IS NULL AND NOT claimed AND NOT EXISTS (SELECT 1 FROM jobs AS older WHERE older.ended IS NULL AND "
     "older.lane = jobs.lane AND older.number < jobs.number)";
 
+/// Columns of the job that comes next, if one can run. One that runs although nobody holds it was interrupted, and has
+/// not made way.
+std::string next_in_sql(const std::string& columns) {
+  return "SELECT " + columns + " FROM jobs WHERE " + can_run + " ORDER BY state = 'running' DESC, " +
+         turn_in_sql("jobs") + ", number LIMIT 1";
+}
+
 /// What row_checksum(...) is in SQL: fnv1a() over the values, each with its type and length.
 void row_checksum(sqlite3_context* context, int count, sqlite3_value** values) {
   ByteWriter all;
@@ -617,8 +624,7 @@ Result<std::vector<Job>> SqliteStore::list(const Filter& filter) {
 
 Result<std::optional<Job>> SqliteStore::claim() {
   return impl_->transact([&]() -> std::optional<Job> {
-    const auto found = ids(Statement(impl_->database, std::string("SELECT number FROM jobs WHERE ") + can_run +
-                                                          " ORDER BY " + turn_in_sql("jobs") + ", number LIMIT 1"));
+    const auto found = ids(Statement(impl_->database, next_in_sql("number")));
     if (found.empty()) return std::nullopt;
     return apply_in(impl_->database, found.front(), {.event = Event::claim}, impl_->now());
   });
@@ -629,9 +635,10 @@ Result<bool> SqliteStore::should_make_way(const std::string& id, std::chrono::mi
     const std::lock_guard lock(impl_->mutex);
     const Job running = find_in(impl_->database, id);
     if (running.state != JobState::running) return false;
+    // Only the next one counts: a shorter one behind it would not get the worker.
     Statement row(impl_->database,
-                  std::string("SELECT 1 FROM jobs WHERE ") + can_run + " AND expected BETWEEN 1 AND ?1 AND " +
-                      turn_in_sql("jobs") + " < ?2 LIMIT 1",
+                  "SELECT 1 FROM (" + next_in_sql("state, expected, " + turn_in_sql("jobs") + " AS turn") +
+                      ") WHERE (state = 'stop_requested' OR expected BETWEEN 1 AND ?1) AND turn < ?2",
                   std::int64_t(left.count() / 2), turn_of(running));
     return row.step();
   });
