@@ -399,6 +399,15 @@ std::string text_of(Database& database, std::string_view sql) {
   return row.step() ? row.text(0) : std::string();
 }
 
+void check_room_in(Database& database, std::size_t max_queued) {
+  const std::string waiting = text_of(database, "SELECT count(*) FROM jobs WHERE ended IS NULL AND state = 'queued'");
+  if (std::stoull(waiting) < max_queued) return;
+  throw Failure({ErrorCode::busy,
+                 "the queue is full: " + waiting + " jobs wait, its limit (max_queued) is " +
+                     std::to_string(max_queued) + "; try again later",
+                 "max_queued"});
+}
+
 std::vector<std::string> ids(Statement&& rows) {
   std::vector<std::string> found;
   while (rows.step()) found.push_back(id_of(rows.integer(0)));
@@ -550,12 +559,7 @@ Result<Submission> SqliteStore::submit(const NewJob& job, std::size_t max_queued
         return {.job = std::move(*earlier), .created = false};
       }
     }
-    const std::string waiting = text_of(database, "SELECT count(*) FROM jobs WHERE ended IS NULL AND state = 'queued'");
-    if (std::stoull(waiting) >= max_queued)
-      throw Failure({ErrorCode::busy,
-                     "the queue is full: " + waiting + " jobs wait, its limit (max_queued) is " +
-                         std::to_string(max_queued) + "; try again later",
-                     "max_queued"});
+    check_room_in(database, max_queued);
     Statement(database,
               "INSERT INTO jobs (lane, payload, idempotency_key, state, claimed, stopped_early, finished_intervals, "
               "progress, result, created, expected) VALUES (?1, ?2, ?3, 'queued', 0, 0, 0, '', '', ?4, ?5)",
@@ -565,6 +569,13 @@ Result<Submission> SqliteStore::submit(const NewJob& job, std::size_t max_queued
     Job accepted = find_in(database, id_of(sqlite3_last_insert_rowid(database.handle())));
     if (const auto witnessed = witness(accepted); !witnessed) throw Failure(witnessed.error());
     return {.job = std::move(accepted), .created = true};
+  });
+}
+
+Result<void> SqliteStore::check_room(std::size_t max_queued) {
+  return guarded([&] {
+    const std::lock_guard lock(impl_->mutex);
+    check_room_in(impl_->database, max_queued);
   });
 }
 

@@ -64,6 +64,9 @@ class Store {
   [[nodiscard]] Result<Submission> submit(const NewJob& job, std::size_t max_queued) {
     return submit(job, max_queued, [](const Job&) -> Result<void> { return {}; });
   }
+  /// Whether one more may wait, as submit() would say.
+  ///   errors  busy: as many wait already
+  [[nodiscard]] virtual Result<void> check_room(std::size_t max_queued) = 0;
   /// Puts back a record that was lost, or that is known to have become this one. Nobody holds the job afterwards.
   ///   errors  conflict: another job has its idempotency key
   [[nodiscard]] virtual Result<void> restore(const Job& job) = 0;

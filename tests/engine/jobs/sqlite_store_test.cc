@@ -140,8 +140,10 @@ TEST_F(SqliteStoreTest, RefusesMoreThanMayWaitAndNamesTheLimit) {
   ASSERT_EQ(code_of(refused), ErrorCode::busy);
   EXPECT_EQ(refused.error().where, "max_queued");
   EXPECT_NE(refused.error().message.find("(max_queued) is 3"), std::string::npos) << refused.error().message;
+  EXPECT_EQ(store->check_room(3).error().message, refused.error().message);
   claim();
-  EXPECT_TRUE(store->submit({.lane = "a", .payload = ""}, 3)) << "one that runs does not wait";
+  EXPECT_TRUE(store->check_room(3)) << "one that runs does not wait";
+  EXPECT_TRUE(store->submit({.lane = "a", .payload = ""}, 3));
 }
 
 TEST_F(SqliteStoreTest, TellsWhoIsNext) {
