@@ -256,7 +256,7 @@ TEST_F(SceneStoreTest, AVersionWhoseParentIsDeletedMeanwhileIsNotMade) {
     std::set<int> there;
     for (const auto& version : info->versions) there.insert(version.version);
     for (const auto& version : info->versions)
-      EXPECT_TRUE(!version.parent || there.contains(*version.parent)) << version.version << " in round " << round;
+      ASSERT_TRUE(!version.parent || there.contains(*version.parent)) << version.version << " in round " << round;
   }
   open();
   EXPECT_TRUE(store->find(id)) << "it is taken up again";
