@@ -24,9 +24,8 @@ using Time = std::chrono::sys_time<std::chrono::milliseconds>;
 /// - A running job that *makes way* for a shorter one at a checkpoint is queued again, and goes on from there.
 /// - *stop* keeps the last finished interval: the job ends `succeeded`, with `stopped_early`. There has to be one.
 /// - *cancel* discards. It may be asked for again and again, and it wins: whatever the job still returns is dropped.
-/// - A job whose worker went away (shutdown, kill -9) keeps its state and is claimed again before younger ones; one
-/// that
-///   was to be cancelled is then `cancelled`.
+/// - A job whose worker went away (shutdown, kill -9) keeps its state. One that ran is claimed again before any that
+///   waits; one that was to be cancelled is then `cancelled`.
 /// - A job at whose work the process has died several times in a row, at the same place and with nothing finished in
 ///   between, has `failed`: it may well be what ends the process, and would go on doing so.
 enum class JobState { queued, running, stop_requested, cancel_requested, succeeded, failed, cancelled };
@@ -70,11 +69,11 @@ inline constexpr int stretch = 4;
 /// So short are jobs that nobody minds in which order they come: the one in which they were handed in. A choice.
 inline constexpr std::chrono::milliseconds negligible{500};
 
-/// When it is a job's turn, by what it takes beyond what is negligible: its worker takes the job whose turn is
-/// earliest, of those that can run. A shorter job that is handed in within `stretch` times what this one takes goes
-/// first; none that is handed in later does, so that each job's turn comes however many shorter ones follow. Jobs of
-/// which nobody knows how long they take come in the order in which they were handed in; so does one that is only to
-/// end and keep what it has.
+/// When it is a job's turn, by what it takes beyond what is negligible: a worker takes the job whose turn is earliest,
+/// of those that can run, once none is left that was interrupted while it ran. A shorter job that is handed in within
+/// `stretch` times what this one takes goes first; none that is handed in later does, so that each job's turn comes
+/// however many shorter ones follow. Jobs of which nobody knows how long they take come in the order in which they were
+/// handed in; so does one that is only to end and keep what it has.
 [[nodiscard]] Time turn_of(const Job& job);
 
 /// What can happen to a job. Its worker brings about all but `stop`, `cancel` and `abandon`: whoever finds it claimed

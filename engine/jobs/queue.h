@@ -40,6 +40,9 @@ class Queue {
   /// answers with the job that was accepted then.
   ///   errors  busy: the queue is full; unprocessable: the key belongs to another payload or lane
   [[nodiscard]] Result<Submission> submit(const NewJob& job);
+  /// Whether there is room for another job, for whoever has work to do before submit(). Others may come first.
+  ///   errors  busy: the queue is full
+  [[nodiscard]] Result<void> check_room() { return store_.check_room(options_.max_queued); }
   /// Whether submit() would answer with an earlier job: the one under this key, if there is one.
   [[nodiscard]] Result<std::optional<Job>> find_key(const std::string& idempotency_key);
   /// The record, with the latest progress.

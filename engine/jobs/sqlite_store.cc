@@ -82,6 +82,13 @@ constexpr const char* can_run =
     "ended IS NULL AND NOT claimed AND NOT EXISTS (SELECT 1 FROM jobs AS older WHERE older.ended IS NULL AND "
     "older.lane = jobs.lane AND older.number < jobs.number)";
 
+/// Columns of the job that comes next, if one can run. One that runs although nobody holds it was interrupted, and has
+/// not made way.
+std::string next_in_sql(const std::string& columns) {
+  return "SELECT " + columns + " FROM jobs WHERE " + can_run + " ORDER BY state = 'running' DESC, " +
+         turn_in_sql("jobs") + ", number LIMIT 1";
+}
+
 /// What row_checksum(...) is in SQL: fnv1a() over the values, each with its type and length.
 void row_checksum(sqlite3_context* context, int count, sqlite3_value** values) {
   ByteWriter all;
@@ -392,6 +399,15 @@ std::string text_of(Database& database, std::string_view sql) {
   return row.step() ? row.text(0) : std::string();
 }
 
+void check_room_in(Database& database, std::size_t max_queued) {
+  const std::string waiting = text_of(database, "SELECT count(*) FROM jobs WHERE ended IS NULL AND state = 'queued'");
+  if (std::stoull(waiting) < max_queued) return;
+  throw Failure({ErrorCode::busy,
+                 "the queue is full: " + waiting + " jobs wait, its limit (max_queued) is " +
+                     std::to_string(max_queued) + "; try again later",
+                 "max_queued"});
+}
+
 std::vector<std::string> ids(Statement&& rows) {
   std::vector<std::string> found;
   while (rows.step()) found.push_back(id_of(rows.integer(0)));
@@ -543,12 +559,7 @@ Result<Submission> SqliteStore::submit(const NewJob& job, std::size_t max_queued
         return {.job = std::move(*earlier), .created = false};
       }
     }
-    const std::string waiting = text_of(database, "SELECT count(*) FROM jobs WHERE ended IS NULL AND state = 'queued'");
-    if (std::stoull(waiting) >= max_queued)
-      throw Failure({ErrorCode::busy,
-                     "the queue is full: " + waiting + " jobs wait, its limit (max_queued) is " +
-                         std::to_string(max_queued) + "; try again later",
-                     "max_queued"});
+    check_room_in(database, max_queued);
     Statement(database,
               "INSERT INTO jobs (lane, payload, idempotency_key, state, claimed, stopped_early, finished_intervals, "
               "progress, result, created, expected) VALUES (?1, ?2, ?3, 'queued', 0, 0, 0, '', '', ?4, ?5)",
@@ -558,6 +569,13 @@ Result<Submission> SqliteStore::submit(const NewJob& job, std::size_t max_queued
     Job accepted = find_in(database, id_of(sqlite3_last_insert_rowid(database.handle())));
     if (const auto witnessed = witness(accepted); !witnessed) throw Failure(witnessed.error());
     return {.job = std::move(accepted), .created = true};
+  });
+}
+
+Result<void> SqliteStore::check_room(std::size_t max_queued) {
+  return guarded([&] {
+    const std::lock_guard lock(impl_->mutex);
+    check_room_in(impl_->database, max_queued);
   });
 }
 
@@ -617,8 +635,7 @@ Result<std::vector<Job>> SqliteStore::list(const Filter& filter) {
 
 Result<std::optional<Job>> SqliteStore::claim() {
   return impl_->transact([&]() -> std::optional<Job> {
-    const auto found = ids(Statement(impl_->database, std::string("SELECT number FROM jobs WHERE ") + can_run +
-                                                          " ORDER BY " + turn_in_sql("jobs") + ", number LIMIT 1"));
+    const auto found = ids(Statement(impl_->database, next_in_sql("number")));
     if (found.empty()) return std::nullopt;
     return apply_in(impl_->database, found.front(), {.event = Event::claim}, impl_->now());
   });
@@ -629,9 +646,10 @@ Result<bool> SqliteStore::should_make_way(const std::string& id, std::chrono::mi
     const std::lock_guard lock(impl_->mutex);
     const Job running = find_in(impl_->database, id);
     if (running.state != JobState::running) return false;
+    // Only the next one counts: a shorter one behind it would not get the worker.
     Statement row(impl_->database,
-                  std::string("SELECT 1 FROM jobs WHERE ") + can_run + " AND expected BETWEEN 1 AND ?1 AND " +
-                      turn_in_sql("jobs") + " < ?2 LIMIT 1",
+                  "SELECT 1 FROM (" + next_in_sql("state, expected, " + turn_in_sql("jobs") + " AS turn") +
+                      ") WHERE (state = 'stop_requested' OR expected BETWEEN 1 AND ?1) AND turn < ?2",
                   std::int64_t(left.count() / 2), turn_of(running));
     return row.step();
   });

@@ -36,6 +36,7 @@ class SqliteStore final : public Store {
 
   using Store::submit;
   [[nodiscard]] Result<Submission> submit(const NewJob& job, std::size_t max_queued, const Witness& witness) override;
+  [[nodiscard]] Result<void> check_room(std::size_t max_queued) override;
   [[nodiscard]] Result<void> restore(const Job& job) override;
   [[nodiscard]] Result<Job> find(const std::string& id) override;
   [[nodiscard]] Result<std::optional<Job>> find_key(const std::string& idempotency_key) override;

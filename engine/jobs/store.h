@@ -64,6 +64,9 @@ class Store {
   [[nodiscard]] Result<Submission> submit(const NewJob& job, std::size_t max_queued) {
     return submit(job, max_queued, [](const Job&) -> Result<void> { return {}; });
   }
+  /// Whether one more may wait, as submit() would say.
+  ///   errors  busy: as many wait already
+  [[nodiscard]] virtual Result<void> check_room(std::size_t max_queued) = 0;
   /// Puts back a record that was lost, or that is known to have become this one. Nobody holds the job afterwards.
   ///   errors  conflict: another job has its idempotency key
   [[nodiscard]] virtual Result<void> restore(const Job& job) = 0;
@@ -72,11 +75,12 @@ class Store {
   [[nodiscard]] virtual Result<std::optional<Job>> find_key(const std::string& idempotency_key) = 0;
   /// The jobs that pass the filter, youngest first, without payloads and results.
   [[nodiscard]] virtual Result<std::vector<Job>> list(const Filter& filter) = 0;
-  /// Gives the job that can run and whose turn (turn_of()) is earliest to the caller; nothing if none can. A job can
-  /// run if nobody holds it and no older one of its lane has yet to end.
+  /// Gives the job that can run and comes first to the caller; nothing if none can. A job can run if nobody holds it
+  /// and no older one of its lane has yet to end. One that was running when its worker went away comes first: it has
+  /// not made way. Then comes the one whose turn (turn_of()) is earliest.
   [[nodiscard]] virtual Result<std::optional<Job>> claim() = 0;
-  /// Whether this job, which runs, should make way: another one that can run has an earlier turn, and takes at most
-  /// half of `left`. One that is not much shorter would only delay this one.
+  /// Whether this job, which runs, should make way: the one that claim() would give out now has an earlier turn, and is
+  /// only to end or takes at most half of `left`. One that is not much shorter would only delay this one.
   ///   left  what the rest of the job should take
   [[nodiscard]] virtual Result<bool> should_make_way(const std::string& id, std::chrono::milliseconds left) = 0;
   /// Changes a record by the rules of transition().

@@ -98,7 +98,8 @@ void add_http_options(CLI::App& command, http::ServerOptions& options, http::Acc
   add_count(command, "--max-waiting", options.workers.max_waiting,
             "Requests that may wait for their turn, and as many uploads; more are turned away", 0);
   add_count(command, "--max-requests-per-client", options.workers.max_per_client,
-            "Requests of one client that are answered or wait; with --trust-proxy, of one forwarded address");
+            "Requests of one client that are answered or wait, beside streams of events; with --trust-proxy, of one "
+            "forwarded address");
   add_count(command, "--max-uploads", options.workers.max_uploads,
             "Requests at a time whose bodies are still to come, of those answered; one client may have half of them");
   add_count(command, "--max-streams", options.dispatcher.max_streams,

@@ -154,7 +154,9 @@ class Run {
   /// Carries the edit out, or ends it with what it has where it has outlived its time.
   Result<edit::Outcome> run() {
     auto outcome = attempt();
-    if (outcome || !has_outlived_ || context_.cancel_token().stop_requested()) return outcome;
+    // Its end has to be that of its time: another error it would only meet again, or hide.
+    if (outcome || outcome.error().code != ErrorCode::cancelled) return outcome;
+    if (!has_outlived_ || context_.cancel_token().stop_requested()) return outcome;
     if (context_.finished_intervals() == 0)
       return fail(ErrorCode::too_large,
                   "the edit has not finished an interval in " + whole_seconds(workshop_.outlived_seconds) +

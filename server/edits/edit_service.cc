@@ -21,6 +21,7 @@
 #include "server/edits/records.h"
 #include "server/edits/speed_log.h"
 #include "server/edits/status.h"
+#include "server/edits/turnstile.h"
 #include "server/scenes/disk/public_errors.h"
 
 namespace server::edits {
@@ -37,6 +38,8 @@ constexpr std::size_t all_jobs = 1'000'000;
 /// An edit that takes so many times what one may be estimated to take has outlived its time. A choice: estimates are
 /// mostly within a factor of one and a half.
 constexpr double outlived = 2;
+/// So long an edit waits for others to be measured: as long as for memory. A choice.
+constexpr auto measured_within = std::chrono::seconds(10);
 constexpr auto result_is_recorded_within = std::chrono::seconds(2);
 
 double seconds_since(steady_clock::time_point start) {
@@ -184,8 +187,15 @@ struct EditService::Impl {
     if (!info) return propagate(info);
     edit::Request request_there = request;
     if (info->up) request_there.up = *info->up;
-    out.work = workload_of(version.cloud, request_there, preview, cameras, corrected, options.pictured_views,
-                           *asked.scene, speeds);
+    {
+      // One at a time: they would slow each other down. And counted, for nobody else counts what this thread renders.
+      const auto alone = measuring.enter();
+      if (!alone) return propagate(alone);
+      const auto share = engine::take_from(options.memory, measuring_bytes(out.work), "scene");
+      if (!share) return propagate(share);
+      out.work = workload_of(version.cloud, request_there, preview, cameras, corrected, options.pictured_views,
+                             *asked.scene, speeds);
+    }
     out.seconds = estimated_seconds(out.work);
     if (auto fits = admit_time(out.work, request.params, cameras, options.longest_seconds); !fits)
       return propagate(fits);
@@ -220,8 +230,9 @@ struct EditService::Impl {
   Selections own_selections;
   Selections& selections;
   engine::WorkArena arena;
-  NamedLocks scenes_in_use;  ///< By scene: shared while an edit of it is accepted, alone in while_idle().
-  NamedLocks results;        ///< By edit; see Workshop.
+  NamedLocks scenes_in_use;              ///< By scene: shared while an edit of it is accepted, alone in while_idle().
+  NamedLocks results;                    ///< By edit; see Workshop.
+  Turnstile measuring{measured_within};  ///< Of whoever uses `speeds`.
   SpeedLog speeds;
   std::unique_ptr<jobs::Store> records;
   std::unique_ptr<jobs::Queue> queue;
@@ -245,6 +256,8 @@ Result<EditService::Submission> EditService::submit(const proto::EditRequest& re
   const auto earlier = impl_->earlier(idempotency_key, job);
   if (!earlier) return propagate(earlier);
   if (*earlier) return Submission{status_of(**earlier), false};
+  // Before any work is done for a request that there is no place for.
+  if (auto room = impl_->queue->check_room(); !room) return propagate(room);
   const auto hold = impl_->scenes_in_use.lock_shared(*asked->scene);
   const auto admitted = impl_->admitted(*asked);
   if (!admitted) return propagate(admitted);

@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/core/memory_budget.h"
 #include "engine/core/parallel.h"
 #include "engine/core/result.h"
 #include "engine/jobs/queue.h"
@@ -43,6 +44,9 @@ struct ServiceOptions {
   /// Is told how long an edit took that has made its version: by stages, in seconds. Called by the worker's thread;
   /// those of an edit that was resumed are of all its runs. Empty: nobody is.
   std::function<void(const std::vector<proto::StageSeconds>&)> timed = {};
+  /// Lends what looking at a scene takes before an edit of it is accepted; outlives the service. Null: nobody counts
+  /// it.
+  engine::MemoryBudget* memory = nullptr;
   /// The loss inside masks; outlives the service. Null: the engine's own.
   engine::optim::PerceptualLoss* perceptual = nullptr;
   /// Where previews find what their selection selects; outlives the service. Null: it keeps its own.
@@ -67,10 +71,11 @@ class EditService {
   /// Accepts an edit: on disk when this returns. The scene, its version and every field are checked first, and each
   /// handle is held against the scene; a selection is carried out.
   ///   errors  invalid_argument, not_found (`where` "scene", "version"; a view of a selection), unprocessable (a handle
-  ///           without Gaussians, an empty selection; a key used for another request), unsupported, busy; those of
-  ///           admit() and admit_time()
+  ///           without Gaussians, an empty selection; a key used for another request), unsupported, busy (the
+  ///           queue is full: looked at first), unavailable (others are being measured for too long); those of admit(),
+  ///           admit_time() and MemoryBudget::take()
   [[nodiscard]] Result<Submission> submit(const proto::EditRequest& request, const std::string& idempotency_key);
-  /// What submit() would do, and what it would cost. Errors as submit().
+  /// What submit() would do, and what it would cost. Errors as submit(), but for busy: it takes no place in the queue.
   [[nodiscard]] Result<proto::EditEstimate> estimate(const proto::EditRequest& request);
   /// The deformation alone, at once. Errors as submit().
   [[nodiscard]] Result<proto::Preview> preview(const proto::EditRequest& request);

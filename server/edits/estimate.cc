@@ -92,6 +92,11 @@ JobWorkload workload_of(const scene::LayeredCloud& version, const edit::Request&
   return work;
 }
 
+std::uint64_t measuring_bytes(const JobWorkload& work) {
+  constexpr std::size_t most_pixels = std::size_t(most_measured_side) * most_measured_side;
+  return work.edit.gaussians * frame_row_bytes + std::min(work.edit.view_pixels, most_pixels) * frame_pixel_bytes;
+}
+
 double seconds_to_load(std::size_t gaussians, bool layered) {
   return load_seconds + (layered ? flatten_row_seconds * double(gaussians) : 0);
 }

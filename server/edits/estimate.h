@@ -51,6 +51,10 @@ struct JobWorkload {
                                       std::span<const engine::scene::Camera> dataset, bool corrected, int pictured,
                                       const std::string& scene, SpeedLog& log);
 
+/// Bytes that workload_of() takes for a while, about: those of one frame, as of estimated_bytes().
+///   work  of this request; memory_workload_of() is enough
+[[nodiscard]] std::uint64_t measuring_bytes(const JobWorkload& work);
+
 /// Seconds of what a job does beside the edit: before it, to read the request and put the version together, and after
 /// it, until the result is on disk as a version.
 ///   gaussians  of the version that is edited

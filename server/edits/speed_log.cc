@@ -1,6 +1,7 @@
 #include "server/edits/speed_log.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "engine/core/median.h"
@@ -22,6 +23,8 @@ double median_of(const std::deque<double>& values) {
 
 }  // namespace
 
+FrameTime SpeedLog::Frames::median() const { return {engine::median(gaussians), engine::median(pixel)}; }
+
 SpeedLog::SpeedLog(Slowness slowness) : slowness_(std::move(slowness)) {}
 
 void SpeedLog::note_slowness(double slowness) {
@@ -30,35 +33,39 @@ void SpeedLog::note_slowness(double slowness) {
 }
 
 MachineSpeed SpeedLog::speed_of(const std::string& picture, const std::function<FrameTime()>& frames) {
-  bool is_first = false, is_known = false;
+  bool is_first = false;
+  std::optional<FrameTime> known;  // in times of the yardstick; copied: other pictures may push this one out meanwhile
   {
     const std::lock_guard lock(mutex_);
     is_first = slownesses_.empty();
     const auto found = frames_.find(picture);
-    is_known = found != frames_.end() && found->second.gaussians.size() >= times_measured;
+    if (found != frames_.end() && found->second.gaussians.size() >= times_measured) {
+      found->second.last_use = ++uses_;
+      known = found->second.median();
+    }
   }
   std::vector<double> slownesses;
   for (std::size_t i = 0; i < (is_first ? slownesses_at_first : 1); ++i) slownesses.push_back(slowness_());
   FrameTime frame;
-  if (!is_known) {
+  if (!known) {
     frame = frames();
     slownesses.push_back(slowness_());
   }
 
   const std::lock_guard lock(mutex_);
   for (const double slowness : slownesses) note_slowness(slowness);
-  Frames& known = frames_[picture];
-  known.last_use = ++uses_;
-  if (!is_known) {
+  if (!known) {
     const double now = (slownesses[slownesses.size() - 2] + slownesses.back()) / 2;
-    known.gaussians.push_back(frame.gaussians / now);
-    known.pixel.push_back(frame.pixel / now);
+    Frames& measured = frames_[picture];
+    measured.last_use = ++uses_;
+    measured.gaussians.push_back(frame.gaussians / now);
+    measured.pixel.push_back(frame.pixel / now);
+    known = measured.median();
+    if (frames_.size() > pictures_kept)
+      frames_.erase(std::ranges::min_element(frames_, {}, [](const auto& entry) { return entry.second.last_use; }));
   }
   const double usual = median_of(slownesses_);
-  const MachineSpeed speed{{engine::median(known.gaussians) * usual, engine::median(known.pixel) * usual}, usual};
-  if (frames_.size() > pictures_kept)
-    frames_.erase(std::ranges::min_element(frames_, {}, [](const auto& entry) { return entry.second.last_use; }));
-  return speed;
+  return {{known->gaussians * usual, known->pixel * usual}, usual};
 }
 
 }  // namespace server::edits

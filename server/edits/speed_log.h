@@ -40,6 +40,7 @@ class SpeedLog {
   struct Frames {
     std::vector<double> gaussians, pixel;
     std::uint64_t last_use = 0;
+    [[nodiscard]] engine::edit::FrameTime median() const;  ///< There has to be one.
   };
 
   void note_slowness(double slowness);

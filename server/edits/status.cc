@@ -30,11 +30,9 @@ void fill_in(proto::EditStatus& status, proto::EditRecord record, const jobs::Jo
   const bool ended = jobs::is_final(job.state);
   const bool succeeded = job.state == jobs::JobState::succeeded;
   status.progress = record.progress;
-  if (!ended) {
+  if (!ended && job.state != jobs::JobState::queued) {  // one that waits to go on is at nothing, until its turn comes
     status.stage = std::move(record.stage);
     status.eta_seconds = record.eta_seconds;
-  }
-  if (!ended && job.state != jobs::JobState::queued) {  // one that waits to go on begins its interval again
     status.iteration = record.iteration;
     status.loss = record.loss;
   }

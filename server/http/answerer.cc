@@ -122,12 +122,13 @@ class Sink final : public EventSink {
 };
 
 /// An answer to a request that could not be read, or that there is no thread for.
-std::string raw_answer(const Refusal& refusal, const std::string& request_id) {
+std::string raw_answer(const Refusal& refusal, const std::string& request_id, const std::string& method) {
   const Answer answer = Dispatcher::refused(refusal, request_id);
   std::string text =
       "HTTP/1.1 " + std::to_string(answer.status) + " " + std::string(proto::status_phrase(answer.status)) + "\r\n";
   for (const auto& [name, value] : answer.headers) text += name + ": " + value + "\r\n";
-  return text + "Content-Length: " + std::to_string(answer.body.size()) + "\r\nConnection: close\r\n\r\n" + answer.body;
+  text += "Content-Length: " + std::to_string(answer.body.size()) + "\r\nConnection: close\r\n\r\n";
+  return method == "HEAD" ? text : text + answer.body;
 }
 
 std::string counted_method(const std::string& method) {
@@ -148,6 +149,14 @@ void report(const Visit& visit, const std::string& id, const std::string& method
        {"bytes", std::int64_t(visit.connection.bytes_written())},
        {"ms", std::round(seconds * 1e5) / 100},
        {"client", visit.client.empty() ? visit.connection.client() : visit.client}});
+}
+
+void post_refusal(Visit& visit, const Refusal& refusal, const std::string& id, const std::string& method,
+                  Metrics& metrics, spdlog::logger& logger) {
+  visit.connection.begin_answer();
+  // What the client does not take at once it does not get: it is short, and its client has been heard.
+  visit.connection.post(raw_answer(refusal, id, method));
+  report(visit, id, method, "-", refusal.status, metrics, logger);
 }
 
 class Answerer final : private httplib::Server {
@@ -334,11 +343,11 @@ Workers::Serve make_answerer(const AnswererParts& parts) {
 }
 
 void refuse(Visit& visit, const Refusal& refusal, Metrics& metrics, spdlog::logger& logger) {
-  const std::string id = random_id();
-  visit.connection.begin_answer();
-  // What the client does not take at once it does not get: it is short, and its client has been heard.
-  visit.connection.post(raw_answer(refusal, id));
-  report(visit, id, "-", "-", refusal.status, metrics, logger);
+  post_refusal(visit, refusal, random_id(), "-", metrics, logger);
+}
+
+void refuse_request(Visit& visit, const Refusal& refusal, Metrics& metrics, spdlog::logger& logger) {
+  post_refusal(visit, refusal, visit.request_id, counted_method(visit.head.method), metrics, logger);
 }
 
 }  // namespace server::http

@@ -25,7 +25,10 @@ struct AnswererParts {
 /// What one worker serves visits with. Whatever happens to a visit, its `next` says how it goes on.
 [[nodiscard]] Workers::Serve make_answerer(const AnswererParts& parts);
 
-/// Posts the answer to a request that could not be read, or that there is no room for, and reports it.
+/// Posts the answer to a request whose head could not be read, or to a connection that there is no room for, and
+/// reports it.
 void refuse(Visit& visit, const Refusal& refusal, Metrics& metrics, spdlog::logger& logger);
+/// The same to a request whose head has been read: the visit says by which id and method it goes.
+void refuse_request(Visit& visit, const Refusal& refusal, Metrics& metrics, spdlog::logger& logger);
 
 }  // namespace server::http

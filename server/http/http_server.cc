@@ -84,7 +84,7 @@ void HttpServer::Impl::hand_on(std::unique_ptr<Visit> visit) {
 void HttpServer::Impl::offer(Workers::Kind kind, std::unique_ptr<Visit> visit) {
   if (workers.offer(kind, visit)) return;
   metrics.count_refused_connection();
-  refuse(*visit, {503, "unavailable", "too many requests wait already; try again soon", ""}, metrics, logger);
+  refuse_request(*visit, {503, "unavailable", "too many requests wait already; try again soon", ""}, metrics, logger);
   visit->end_request();
   visit->next = Next::say_goodbye;
   lobby->take(std::move(visit));

@@ -35,7 +35,9 @@ engine::Result<std::unique_ptr<Lobby>> Lobby::open(engine::FileDescriptor listen
   lobby->wake_ = engine::FileDescriptor(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
   if (lobby->epoll_.get() < 0 || lobby->wake_.get() < 0)
     return engine::fail(engine::ErrorCode::unavailable, "this process may open no more files");
-  for (const int descriptor : {lobby->listening_.get(), stop_fd, lobby->wake_.get()}) lobby->watch(descriptor, EPOLLIN);
+  for (const int descriptor : {lobby->listening_.get(), stop_fd, lobby->wake_.get()})
+    if (!lobby->watch(descriptor, EPOLLIN))
+      return engine::fail(engine::ErrorCode::unavailable, "this process may watch no more files");
   return lobby;
 }
 
@@ -72,11 +74,12 @@ void Lobby::wake() const {
   while (::write(wake_.get(), &one, sizeof one) < 0 && errno == EINTR) continue;
 }
 
-void Lobby::watch(int descriptor, unsigned events) const {
+/// False where the system has no memory for it, or the user watches too much already.
+bool Lobby::watch(int descriptor, unsigned events) const {
   epoll_event event{};
   event.events = events;
   event.data.fd = descriptor;
-  ::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, descriptor, &event);
+  return ::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, descriptor, &event) == 0;
 }
 
 void Lobby::watch_no_more(int descriptor) const { ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, descriptor, nullptr); }
@@ -125,15 +128,17 @@ void Lobby::run() {
     // Also where something always happens: a client that always has a byte more gains no time by it.
     survive([&] { end_those_whose_time_is_over(); });
     take_those_handed_in();
+    Guests guests;
+    std::vector<std::unique_ptr<Visit>> handed_in;  // both go without the lock: to close a thousand takes a while
     const std::lock_guard lock(mutex_);
     if (cut_ || ended_) {
       cut_ = false;
-      guests_.clear();
+      guests.swap(guests_);
       by_due_.clear();
       unsent_bytes_ = 0;
     }
     if (ended_) {
-      handed_in_.clear();
+      handed_in.swap(handed_in_);
       listening_ = {};
       return;
     }
@@ -163,12 +168,14 @@ void Lobby::close_doors() {
 }
 
 void Lobby::accept_some() {
+  bool has_made_room = false;
   for (int i = 0; i < accepted_at_a_time; ++i) {
     const int socket = ::accept4(listening_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (socket >= 0) {
       accept(socket);
     } else if (errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM) {
-      if (make_room("")) continue;
+      // Only where our own connections are in the way, and once: what they leave others may take, and all would go.
+      if (errno == EMFILE && !std::exchange(has_made_room, true) && make_room("")) continue;
       // Connections wait in the system's own line until some of ours end.
       watch_no_more(listening_.get());
       accept_again_ = Clock::now() + accept_pause;
@@ -266,6 +273,7 @@ void Lobby::let_in(std::unique_ptr<Visit> visit) {
       if (doors_closed_) return;
       const auto text = connection.take_head();  // of what came with the request before
       if (!text || *text) return go_on_with(std::move(visit), text);
+      visit->arrived = Clock::now();
       const auto time =
           connection.head_has_begun() ? options_.connection.head_timeout : options_.connection.idle_timeout;
       return seat(std::move(visit), EPOLLIN, Clock::now() + time);
@@ -288,10 +296,15 @@ void Lobby::let_in(std::unique_ptr<Visit> visit) {
 void Lobby::seat(std::unique_ptr<Visit> visit, unsigned events, Clock::time_point due) {
   const int socket = visit->connection.socket();
   const bool head_has_begun = visit->next == Next::read_head && visit->connection.head_has_begun();
-  unsent_bytes_ += visit->connection.bytes_unsent();
-  guests_.emplace(socket, Guest{std::move(visit), Clock::now(), due, head_has_begun});
-  by_due_.emplace(due, socket);
-  watch(socket, events);
+  const auto guest = guests_.emplace(socket, Guest{std::move(visit), Clock::now(), due, head_has_begun}).first;
+  try {
+    by_due_.emplace(due, socket);
+  } catch (const std::exception&) {
+    guests_.erase(guest);  // nobody would ever look after it
+    throw;
+  }
+  unsent_bytes_ += guest->second.visit->connection.bytes_unsent();
+  if (!watch(socket, events)) const auto ended = unseat(guest);
 }
 
 void Lobby::set_due(Guests::iterator guest, Clock::time_point due) {
@@ -348,6 +361,7 @@ void Lobby::read_head(Guests::iterator guest) {
   if (!text || *text) return go_on_with(unseat(guest), text);
   if (guest->second.head_has_begun || !connection.head_has_begun()) return;
   guest->second.head_has_begun = true;
+  guest->second.visit->arrived = Clock::now();
   set_due(guest, Clock::now() + options_.connection.head_timeout);
 }
 
@@ -370,8 +384,7 @@ void Lobby::end_those_whose_time_is_over() {
     end_wait(guest);
   }
   if (accept_again_ > now) return;
-  accept_again_ = Clock::time_point::max();
-  watch(listening_.get(), EPOLLIN);
+  accept_again_ = watch(listening_.get(), EPOLLIN) ? Clock::time_point::max() : now + accept_pause;
 }
 
 void Lobby::end_wait(Guests::iterator guest) {

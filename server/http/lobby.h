@@ -48,7 +48,7 @@ class Lobby {
   ///   listening  socket, non-blocking
   ///   stop_fd    when it becomes readable, nobody new is let in, and only those go on whose request is under way
   ///   places     outlives the lobby and all visits
-  ///   errors     unavailable: the process may open no more files
+  ///   errors     unavailable: the process may open, or watch, no more files
   [[nodiscard]] static engine::Result<std::unique_ptr<Lobby>> open(engine::FileDescriptor listening, int stop_fd,
                                                                    const LobbyOptions& options, Places& places,
                                                                    LobbyHooks hooks);
@@ -85,7 +85,7 @@ class Lobby {
   template <class Step>
   void survive(const Step& step, int socket = -1);
   [[nodiscard]] int milliseconds_to_wait() const;
-  void watch(int descriptor, unsigned events) const;
+  [[nodiscard]] bool watch(int descriptor, unsigned events) const;
   void watch_no_more(int descriptor) const;
   void wake() const;
   void take_those_handed_in();
@@ -116,7 +116,7 @@ class Lobby {
   Guests guests_;
   std::set<std::pair<Clock::time_point, int>> by_due_;
   std::uint64_t unsent_bytes_ = 0;                             ///< Of the guests' answers.
-  Clock::time_point accept_again_ = Clock::time_point::max();  ///< Out of descriptors until then.
+  Clock::time_point accept_again_ = Clock::time_point::max();  ///< Nobody is let in until then.
   bool doors_closed_ = false;
 
   std::mutex mutex_;  ///< Guards what follows.

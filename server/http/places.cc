@@ -3,10 +3,12 @@
 namespace server::http {
 
 Places::Place::Place(Places& places, std::string network) : places_(places), network_(std::move(network)) {
+  {
+    const std::lock_guard lock(places_.mutex_);
+    ++places_.by_network_[network_];  // first: it may be out of memory, and nobody would take back what was counted
+    ++places_.taken_;
+  }
   places_.count_(1);
-  const std::lock_guard lock(places_.mutex_);
-  ++places_.taken_;
-  ++places_.by_network_[network_];
 }
 
 Places::Place::~Place() {

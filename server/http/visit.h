@@ -47,7 +47,8 @@ struct Visit {
   RequestHead head;
   std::string client;  ///< The address its client goes by: the connection's, or what a trusted proxy says.
   std::string request_id;
-  std::chrono::steady_clock::time_point arrived;  ///< When its head was whole.
+  /// When its head was whole; until then, when its head or the connection began.
+  std::chrono::steady_clock::time_point arrived = std::chrono::steady_clock::now();
   std::optional<CheckedRequest> checked;
   bool awaits_no_body = false;  ///< The body is here, or will be read by the worker who has the visit.
   bool is_answered = false;     ///< What is left is to send the answer.

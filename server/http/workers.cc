@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <exception>
 #include <iterator>
-#include <system_error>
 #include <utility>
 
 #include "server/http/network.h"
@@ -36,10 +35,11 @@ std::size_t Workers::takeable() const {
 
 bool Workers::start_thread(bool reserve) {
   try {
-    threads_.emplace_back([this, reserve] { work(reserve); });
+    // Made here: what is thrown on the thread itself would end the process.
+    threads_.emplace_back([this, reserve, server = make_server_()] { work(reserve, server); });
     return true;
-  } catch (const std::system_error&) {
-    return false;  // the system gives no more threads; those there are must do
+  } catch (const std::exception&) {
+    return false;  // the system gives no more threads, or no memory; those there are must do
   }
 }
 
@@ -56,8 +56,8 @@ bool Workers::offer(Kind kind, std::unique_ptr<Visit>& visit) {
     forget_if_none(load);
     return false;
   };
-  const bool may_be_refused = kind == Kind::vital || kind == Kind::request;
-  if (may_be_refused && load->second.waiting + load->second.served >= limits_.max_per_client) return refuse();
+  // What is vital is not: a proxy may ask for it under the address of a client that has all it may have.
+  if (kind == Kind::request && load->second.waiting + load->second.served >= limits_.max_per_client) return refuse();
   if (kind == Kind::vital) {
     if (vital_line_.size() > limits_.max_waiting) return refuse();
     if (!has_reserve_ && !start_thread(/*reserve=*/true)) return refuse();
@@ -72,7 +72,7 @@ bool Workers::offer(Kind kind, std::unique_ptr<Visit>& visit) {
   stand_in_line(line_, kind, load, std::move(visit));
   start_if_needed();
   if (threads_.empty()) {  // the system gives not even one
-    visit = leave_line(line_, std::prev(line_.end())).visit;
+    visit = std::move(leave_line(line_, std::prev(line_.end())).front().visit);
     return refuse();
   }
   changed_.notify_one();
@@ -86,13 +86,14 @@ void Workers::stand_in_line(Line& line, Kind kind, Loads::iterator load, std::un
   count_(1);
 }
 
-Workers::Errand Workers::leave_line(Line& line, Line::iterator place) {
-  Errand errand = std::move(*place);
-  line.erase(place);
-  --errand.load->second.waiting;
-  if (&line == &line_) (errand.kind == Kind::upload ? waiting_uploads_ : waiting_) -= 1;
+/// Takes an errand out: the only one of a line of its own.
+Workers::Line Workers::leave_line(Line& line, Line::iterator errand) {
+  Line alone;
+  alone.splice(alone.end(), line, errand);
+  --errand->load->second.waiting;
+  if (&line == &line_) (errand->kind == Kind::upload ? waiting_uploads_ : waiting_) -= 1;
   count_(-1);
-  return errand;
+  return alone;
 }
 
 /// Whose turn it is among those that may be served now; end() if there is none.
@@ -109,8 +110,7 @@ Workers::Line::iterator Workers::next_in_line() {
   return next;
 }
 
-void Workers::work(bool reserve) {
-  const Serve server = make_server_();
+void Workers::work(bool reserve, const Serve& server) {
   std::unique_lock lock(mutex_);
   while (!closed_) {
     Line& line = reserve ? vital_line_ : line_;
@@ -123,32 +123,38 @@ void Workers::work(bool reserve) {
   }
 }
 
-void Workers::serve(Errand errand, const Serve& server, std::unique_lock<std::mutex>& lock) {
-  const bool counts = errand.kind != Kind::vital, is_upload = errand.kind == Kind::upload;
-  Load& load = errand.load->second;
-  Visit& visit = *errand.visit;
+/// Nothing here takes memory where the process would end for want of it.
+void Workers::serve(Line errand, const Serve& server, std::unique_lock<std::mutex>& lock) {
+  const auto place = errand.begin();
+  const bool counts = place->kind != Kind::vital, is_upload = place->kind == Kind::upload;
+  Load& load = place->load->second;
+  Visit& visit = *place->visit;
   if (counts) {
     --idle_;
     ++busy_;
   }
   if (is_upload) ++uploads_, ++load.uploads;
   ++load.served;
-  served_.insert(&visit);
+  served_.splice(served_.end(), errand);
   lock.unlock();
-  server(visit);
+  try {
+    server(visit);
+  } catch (const std::exception&) {  // there was not even memory to report what went wrong
+    visit.next = Next::end;
+  }
   lock.lock();
-  served_.erase(&visit);
-  --load.served;
+  errand.splice(errand.end(), served_, place);
+  (visit.stepped_aside ? load.aside : load.served) -= 1;
   if (is_upload) --uploads_, --load.uploads;
   if (counts) {
     ++idle_;
     (visit.stepped_aside ? aside_ : busy_) -= 1;
   }
   visit.stepped_aside = false;
-  forget_if_none(errand.load);
+  forget_if_none(place->load);
   lock.unlock();
   try {
-    hand_on_(std::move(errand.visit));
+    hand_on_(std::move(place->visit));
     // NOLINTNEXTLINE(bugprone-empty-catch): there was no memory to remember it by, and so it has ended
   } catch (const std::exception&) {
   }
@@ -157,6 +163,10 @@ void Workers::serve(Errand errand, const Serve& server, std::unique_lock<std::mu
 
 void Workers::step_aside(Visit& visit) {
   const std::lock_guard lock(mutex_);
+  // Nor does it count as what is done for its client: a stream lasts for hours and costs next to nothing.
+  Load& load = loads_.find(network_of(visit.client))->second;
+  --load.served;
+  ++load.aside;
   visit.stepped_aside = true;
   --busy_;
   ++aside_;
@@ -168,27 +178,26 @@ void Workers::forget_if_none(Loads::iterator load) {
   if (load->second.none()) loads_.erase(load);
 }
 
-std::vector<std::unique_ptr<Visit>> Workers::empty_lines() {
-  std::vector<std::unique_ptr<Visit>> visits;
+Workers::Line Workers::empty_lines() {
+  Line ended;
   for (Line* line : {&line_, &vital_line_}) {
     while (!line->empty()) {
-      Errand errand = leave_line(*line, line->begin());
-      forget_if_none(errand.load);
-      visits.push_back(std::move(errand.visit));
+      ended.splice(ended.end(), leave_line(*line, line->begin()));
+      forget_if_none(ended.back().load);
     }
   }
-  return visits;
+  return ended;
 }
 
 void Workers::cut() {
-  std::vector<std::unique_ptr<Visit>> ended;  // goes without the lock
+  Line ended;  // goes without the lock
   const std::lock_guard lock(mutex_);
-  for (Visit* visit : served_) visit->connection.cut();
+  for (const Errand& errand : served_) errand.visit->connection.cut();
   ended = empty_lines();
 }
 
 void Workers::close() {
-  std::vector<std::unique_ptr<Visit>> ended;
+  Line ended;
   const std::lock_guard lock(mutex_);
   closed_ = true;
   ended = empty_lines();

@@ -181,6 +181,7 @@ Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& lo
   engine::MemoryBudget work_memory(options.work_memory_bytes, "--work-memory");
   options.scenes.read.memory = &work_memory;
   options.renders.memory = &work_memory;
+  options.edits.memory = &work_memory;
   auto scenes = scenes::SceneStore::open(options.scenes);
   if (!scenes && scenes.error().code == ErrorCode::conflict)  // another service has it
     return engine::fail(ErrorCode::unavailable, scenes.error().message, options.data_dir.string());

@@ -207,6 +207,11 @@ Result<int> Versions::add(const Snapshot& at, int parent, const std::string& edi
       number = *before;
       return {};
     }
+    // A version made from one that is gone would be refused at the next start, with its scene.
+    if (!place_of(manifest, parent))
+      return fail(ErrorCode::not_found,
+                  "version " + std::to_string(parent) + " of scene " + at.scene->id + " was deleted meanwhile",
+                  "version");
     number = manifest.next_version++;
     const fs::path file = folder / overlay_name(number);
     if (auto ready = make_folder(file.parent_path()); !ready) return public_error_(ready);

@@ -140,8 +140,10 @@ TEST_F(SqliteStoreTest, RefusesMoreThanMayWaitAndNamesTheLimit) {
   ASSERT_EQ(code_of(refused), ErrorCode::busy);
   EXPECT_EQ(refused.error().where, "max_queued");
   EXPECT_NE(refused.error().message.find("(max_queued) is 3"), std::string::npos) << refused.error().message;
+  EXPECT_EQ(store->check_room(3).error().message, refused.error().message);
   claim();
-  EXPECT_TRUE(store->submit({.lane = "a", .payload = ""}, 3)) << "one that runs does not wait";
+  EXPECT_TRUE(store->check_room(3)) << "one that runs does not wait";
+  EXPECT_TRUE(store->submit({.lane = "a", .payload = ""}, 3));
 }
 
 TEST_F(SqliteStoreTest, TellsWhoIsNext) {
@@ -197,9 +199,9 @@ TEST_F(SqliteStoreTest, SaysWhenAJobShouldMakeWay) {
   EXPECT_FALSE(value(store->should_make_way(longest, 1h))) << "nobody waits";
   submit("a", "", 1s);
   EXPECT_FALSE(value(store->should_make_way(longest, 1h))) << "one of its lane has to wait for it";
-  submit("b");
-  EXPECT_FALSE(value(store->should_make_way(longest, 1h))) << "nobody knows how long the other one takes";
-  const std::string shorter = submit("c", "", 10min);
+  const std::string unknown = submit("b"), shorter = submit("c", "", 10min);
+  EXPECT_FALSE(value(store->should_make_way(longest, 1h))) << "nobody knows how long the next one takes";
+  value(store->apply(unknown, {.event = Event::cancel}));
   EXPECT_TRUE(value(store->should_make_way(longest, 20min)));
   EXPECT_FALSE(value(store->should_make_way(longest, 19min))) << "what is left of it is nearly as short";
   value(store->apply(longest, {.event = Event::finish_interval, .interval = 1}));
@@ -209,6 +211,39 @@ TEST_F(SqliteStoreTest, SaysWhenAJobShouldMakeWay) {
   now += stretch * 1h;
   submit("d", "", 1s);
   EXPECT_FALSE(value(store->should_make_way(longest, 1h))) << "it has let others go first for long enough";
+}
+
+TEST_F(SqliteStoreTest, MakesWayOnlyForTheJobThatWouldComeNext) {
+  use_own_clock();
+  const std::string long_one = submit("a", "", 1h);
+  now += stretch * 50min;
+  const std::string held = submit("b", "", 1h);
+  value(store->apply(long_one, {.event = Event::claim}));
+  value(store->apply(held, {.event = Event::claim}));
+  value(store->apply(long_one, {.event = Event::finish_interval, .interval = 1}));
+  value(store->apply(long_one, {.event = Event::make_way}));
+  now += stretch * 5min;
+  const std::string shorter = submit("c", "", 6min);
+  EXPECT_FALSE(value(store->should_make_way(held, 1h))) << "the worker would go to the long one, not to the short one";
+  value(store->apply(long_one, {.event = Event::stop}));
+  EXPECT_TRUE(value(store->should_make_way(held, 1h))) << "it is only to end";
+  value(store->apply(long_one, {.event = Event::cancel}));
+  EXPECT_TRUE(value(store->should_make_way(held, 1h)));
+  EXPECT_EQ(claim(), shorter);
+}
+
+TEST_F(SqliteStoreTest, AJobThatWasInterruptedGoesOnBeforeThoseThatWait) {
+  use_own_clock();
+  const std::string longest = submit("a", "", 1h);
+  EXPECT_EQ(claim(), longest);
+  submit("b", "", 1s);
+  const std::string made_way = submit("c", "", 10min);
+  value(store->apply(made_way, {.event = Event::claim}));
+  value(store->apply(made_way, {.event = Event::make_way}));
+  reopen();
+  EXPECT_EQ(claim(), longest) << "the death of the process makes no way";
+  EXPECT_EQ(claim(), "e000002");
+  EXPECT_EQ(claim(), made_way) << "one that has made way waits like the others";
 }
 
 TEST_F(SqliteStoreTest, ReleasesWhatADeadProcessHeld) {

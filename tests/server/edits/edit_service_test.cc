@@ -465,6 +465,25 @@ TEST_F(ServiceTest, AFullQueueIsBusy) {
   EXPECT_EQ(code_of(service->submit(move_ball(scene), "")), ErrorCode::busy);
 }
 
+TEST_F(ServiceTest, LooksAtASceneWithinTheMemoryForWorkAndOnlyWhereThereIsRoomInTheQueue) {
+  service.reset();
+  engine::MemoryBudget budget(1 << 30, "--work-memory", std::chrono::milliseconds(20));
+  service = value(
+      EditService::open(*store, {.folder = dir.path() / "edits", .max_queued = 1, .threads = 1, .memory = &budget}));
+  submit(move_ball_slowly(scene));
+  wait_for(*service, "e000001", [](const auto& status) { return status.state == "running"; });
+  {
+    const auto others = value(budget.take(1 << 30, ""));
+    EXPECT_EQ(code_of(service->submit(move_ball(scene), "")), ErrorCode::unavailable);
+    EXPECT_EQ(code_of(service->estimate(move_ball(scene))), ErrorCode::unavailable);
+  }
+  submit(move_ball(scene));
+  EXPECT_EQ(budget.lent(), 0u);
+  const auto others = value(budget.take(1 << 30, ""));
+  EXPECT_EQ(code_of(service->submit(move_ball(scene), "")), ErrorCode::busy) << "nothing is measured for it";
+  service.reset();  // before the budget goes
+}
+
 TEST_F(ServiceTest, StopKeepsTheLastFinishedInterval) {
   const auto id = submit(move_ball_slowly(scene));
   wait_for_interval(*service, id, 2);

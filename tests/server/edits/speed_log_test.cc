@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
+#include <utility>
+
 namespace server::edits {
 namespace {
 
@@ -64,6 +67,24 @@ TEST_F(SpeedLogTest, ForgetsPicturesThatNobodyAsksFor) {
   EXPECT_EQ(frames, 0) << "it was asked for now and then";
   (void)measure("scene 0");
   EXPECT_EQ(frames, 1) << "it was not";
+}
+
+TEST(SpeedLog, KnowsAPictureThatOthersPushOutWhileItMeasures) {
+  bool is_crowded = false;
+  SpeedLog* all = nullptr;
+  SpeedLog log([&] {
+    if (std::exchange(is_crowded, false))
+      for (int i = 0; i < 200; ++i) (void)all->speed_of("scene " + std::to_string(i), [] { return FrameTime{1, 1}; });
+    return 1.5;
+  });
+  all = &log;
+  const auto measure = [&] { return log.speed_of("scene", [] { return FrameTime{2e-3, 1e-8}; }); };
+  for (int i = 0; i < 3; ++i) (void)measure();
+  is_crowded = true;
+  const MachineSpeed speed = measure();
+  EXPECT_DOUBLE_EQ(speed.frame.gaussians, 2e-3);
+  EXPECT_DOUBLE_EQ(speed.frame.pixel, 1e-8);
+  EXPECT_EQ(speed.slowness, 1.5);
 }
 
 }  // namespace

@@ -1,6 +1,9 @@
 // Many clients at a time, most of them slow: what they make the server wait for costs others nothing.
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <condition_variable>
 #include <fstream>
@@ -8,6 +11,7 @@
 #include <thread>
 #include <vector>
 
+#include "engine/core/file_descriptor.h"
 #include "server/http/http_server.h"
 #include "server/http/network.h"
 #include "server/http/places.h"
@@ -81,6 +85,26 @@ Router routes_with(Gate& gate, const std::filesystem::path& folder) {
   routes.add({"POST", "/swallow", swallow, Body::upload, {}, Access::open});
   return routes;
 }
+
+/// While it lives, this process may open only so many files more.
+class NoMoreFiles {
+ public:
+  explicit NoMoreFiles(std::size_t left) {
+    ::getrlimit(RLIMIT_NOFILE, &before_);
+    rlimit low = before_;
+    low.rlim_cur = std::min<rlim_t>(before_.rlim_cur, 512);
+    ::setrlimit(RLIMIT_NOFILE, &low);
+    for (int fd = ::dup(0); fd >= 0; fd = ::dup(0)) taken_.emplace_back(fd);
+    taken_.resize(taken_.size() - left);
+  }
+  ~NoMoreFiles() { ::setrlimit(RLIMIT_NOFILE, &before_); }
+  NoMoreFiles(const NoMoreFiles&) = delete;
+  NoMoreFiles& operator=(const NoMoreFiles&) = delete;
+
+ private:
+  rlimit before_{};
+  std::vector<engine::FileDescriptor> taken_;
+};
 
 class Crowd : public testing::Test {
  protected:
@@ -297,6 +321,101 @@ TEST_F(Crowd, HealthIsAnsweredWhileAllElseWaits) {
   gate.open(3);
   for (const auto& client : busy) EXPECT_EQ(client->answer().value_or(RawAnswer{}).status, 200);
   EXPECT_EQ(status("/json"), 200) << "and then it serves again";
+}
+
+TEST_F(Crowd, HealthIsAnsweredToAClientThatHasAllItMayHave) {
+  ServerOptions options;
+  options.workers.max_per_client = 2;
+  start(options);
+  const Clients busy = clients(2, gate_request());
+  ASSERT_TRUE(gate.has_seen(2));
+  EXPECT_EQ(status("/json"), 503);
+  EXPECT_EQ(status("/healthz"), 200) << "a proxy that all come through asks for it, too";
+  gate.open(2);
+}
+
+TEST_F(Crowd, StreamsOfEventsAreNoWorkOfTheirClient) {
+  ServerOptions options;
+  options.workers.max_per_client = 2;
+  options.dispatcher.max_streams = 2;
+  start(options);
+  Clients streams = clients(2, request(port(), "GET", "/events"));
+  for (const auto& stream : streams) stream->read_until("\"n\":3}");
+  const Clients busy = clients(2, gate_request());
+  ASSERT_TRUE(gate.has_seen(2));
+  EXPECT_EQ(status("/json"), 503) << "two other requests are";
+  streams.clear();
+  ASSERT_TRUE(says("splatdrag_http_streams_open 0"));
+  EXPECT_EQ(status("/json"), 503) << "and the streams' end takes nothing off them";
+  gate.open(2);
+}
+
+TEST_F(Crowd, ARequestThatIsTurnedAwayIsAnsweredUnderItsOwnName) {
+  ServerOptions options;
+  options.workers.max_per_client = 1;
+  start(options);
+  const Clients busy = clients(1, gate_request());
+  ASSERT_TRUE(gate.has_seen(1));
+  RawClient client(port());
+  client.send(request(port(), "HEAD", "/json", "X-Request-Id: mine\r\n"));
+  const auto refused = client.answer(/*has_body=*/false).value_or(RawAnswer{});
+  EXPECT_EQ(refused.status, 503);
+  EXPECT_EQ(refused.header("x-request-id"), "mine");
+  EXPECT_TRUE(client.is_closed_within(patience)) << "HEAD has no body";
+  gate.open(1);
+  server->server->stop();
+  EXPECT_NE(server->log.text().find("\"request_id\":\"mine\",\"method\":\"HEAD\",\"route\":\"-\",\"status\":503"),
+            std::string::npos)
+      << server->log.text();
+}
+
+TEST_F(Crowd, WhoIsTurnedAwayHasTakenNoLongerThanItWasThere) {
+  const auto began = std::chrono::steady_clock::now();
+  ServerOptions options = impatient();
+  options.lobby.max_connections_per_client = 2;
+  start(options);
+  RawClient slow(port());
+  slow.send("GET /js");
+  EXPECT_EQ(slow.answer().value_or(RawAnswer{}).status, 408);
+  const Clients busy = clients(2, gate_request());
+  ASSERT_TRUE(gate.has_seen(2));
+  EXPECT_EQ(status("/json"), 429);
+  gate.open(2);
+  server->server->stop();
+  const std::chrono::duration<double, std::milli> there = std::chrono::steady_clock::now() - began;
+  for (const char* refused : {"\"status\":408", "\"status\":429"}) {
+    const std::string log = server->log.text();
+    const std::size_t line = log.find(refused), time = log.find("\"ms\":", line);
+    ASSERT_NE(line, std::string::npos) << log;
+    ASSERT_NE(time, std::string::npos) << log;
+    EXPECT_LE(std::stod(log.substr(time + 5)), there.count()) << log.substr(line, 200);
+  }
+}
+
+TEST_F(Crowd, WhereNoFileCanBeOpenedOneThatWaitsMakesRoom) {
+  start();
+  const Clients idle = clients(4, "");
+  ASSERT_TRUE(says("splatdrag_http_connections_open 4"));
+  {
+    const NoMoreFiles full(/*left=*/1);  // for the client itself
+    RawClient newest(port());
+    newest.send(request(port(), "GET", "/json"));
+    EXPECT_EQ(newest.answer().value_or(RawAnswer{}).status, 200);
+  }
+  EXPECT_TRUE(says("splatdrag_http_connections_cut_total 1"));
+  EXPECT_TRUE(idle[0]->is_closed_within(patience));
+  idle[3]->send(request(port(), "GET", "/json"));
+  EXPECT_EQ(idle[3]->answer().value_or(RawAnswer{}).status, 200) << "another one is still there";
+}
+
+TEST_F(Crowd, WhereNoFileCanBeOpenedAndNobodyWaitsItIsTriedAgain) {
+  start();
+  auto full = std::make_unique<NoMoreFiles>(/*left=*/1);
+  RawClient newest(port());
+  newest.send(request(port(), "GET", "/json"));
+  std::this_thread::sleep_for(100ms);
+  full.reset();
+  EXPECT_EQ(newest.answer().value_or(RawAnswer{}).status, 200);
 }
 
 TEST_F(Crowd, WhoHasNothingInWorkComesBeforeWhoHas) {

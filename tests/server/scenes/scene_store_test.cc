@@ -232,6 +232,36 @@ TEST_F(SceneStoreTest, AVersionThatIsDeletedWhileOthersReadItIsThereOrNot) {
   }
 }
 
+TEST_F(SceneStoreTest, AVersionWhoseParentIsDeletedMeanwhileIsNotMade) {
+  const std::string id = add(20'000);  // so that its overlays take a while to write
+  const GaussianCloud cloud = cloud_of(id, "0");
+  int refused = 0;
+  for (int round = 0; round < 200 && refused < 3; ++round) {
+    const auto parent = store->add_version(id, 0, "e1" + std::to_string(10'000 + round), small_edit(cloud));
+    ASSERT_TRUE(parent);
+    std::thread remover([&] {
+      std::this_thread::sleep_for(std::chrono::microseconds(300 * (round % 20)));
+      EXPECT_TRUE(store->remove_version(id, std::to_string(*parent)));
+    });
+    const auto made =
+        store->add_version(id, *parent, "e2" + std::to_string(10'000 + round), small_edit(cloud_of(id, "0"), 2));
+    remover.join();
+    if (!made) {
+      EXPECT_EQ(made.error().code, ErrorCode::not_found) << made.error().message;
+      EXPECT_EQ(made.error().where, "version");
+      ++refused;
+    }
+    const auto info = store->find(id);
+    ASSERT_TRUE(info);
+    std::set<int> there;
+    for (const auto& version : info->versions) there.insert(version.version);
+    for (const auto& version : info->versions)
+      ASSERT_TRUE(!version.parent || there.contains(*version.parent)) << version.version << " in round " << round;
+  }
+  open();
+  EXPECT_TRUE(store->find(id)) << "it is taken up again";
+}
+
 TEST_F(SceneStoreTest, NeverKeepsAPoisonedVersion) {
   const std::string id = add();
   Overlay overlay = small_edit(cloud_of(id, "0"));
