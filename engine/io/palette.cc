@@ -209,8 +209,9 @@ Codebook codebook_of(std::span<const float> values) {
 
   // Half of the entries where the values are dense, half at equal steps: tails need some, too.
   std::vector<double> centres;
-  for (std::size_t k = 0; k < codebook_entries / 2; ++k) {
-    const double t = (double(k) + 0.5) / double(codebook_entries / 2);
+  constexpr std::size_t half = codebook_entries / 2;
+  for (std::size_t k = 0; k < half; ++k) {
+    const double t = (double(k) + 0.5) / double(half);
     centres.push_back(double(sorted[std::size_t(t * double(sorted.size()))]));
     centres.push_back(double(low) + t * (double(high) - double(low)));
   }

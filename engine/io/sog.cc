@@ -431,6 +431,35 @@ class Sog {
     plan.count += piece.count;
   }
 
+  /// Reads what the files say that the plan's pieces are in: whether these are there, and of which degree.
+  Result<void> find_files(const std::string& name, Plan& plan) {
+    const std::uint64_t most_rows = 2 * std::min<std::uint64_t>(options_.max_gaussians, std::uint64_t{1} << 32);
+    std::uint64_t rows = 0;  // of the files that the level is in
+    for (const Piece& piece : plan.pieces) {
+      auto known = plan.metas.find(piece.file);
+      if (known == plan.metas.end()) {
+        auto meta = meta_of(plan.names[piece.file]);
+        if (!meta) return propagate(meta);
+        plan.sh_degree = std::max(plan.sh_degree, meta->version == 2 ? meta->sh_degree : meta->has_sh ? 3 : 0);
+        rows += meta->count;
+        known = plan.metas.emplace(piece.file, std::move(*meta)).first;
+        // Whole files are decoded, however few of their rows a level has.
+        if (plan.metas.size() > max_level_files || rows > most_rows)
+          return fail(ErrorCode::too_large,
+                      "the level lies in more than " + std::to_string(max_level_files) +
+                          " files, or in files of more than " + std::to_string(most_rows) +
+                          " Gaussians together, twice the limit (max_gaussians)",
+                      where(name) + ":filenames");
+      }
+      if (piece.offset + piece.count > known->second.count)
+        return fail(ErrorCode::corrupt_data,
+                    "rows " + std::to_string(piece.offset) + " to " + std::to_string(piece.offset + piece.count) +
+                        " of " + std::to_string(known->second.count),
+                    where(plan.names[piece.file]));
+    }
+    return {};
+  }
+
   /// Which rows of which files make the level that is asked for, in the order of the tree.
   Result<Plan> plan_of(const std::string& name) {
     const auto document = parsed(name, max_lod_meta_bytes);
@@ -481,30 +510,7 @@ class Sog {
       if (more) node = open.back().nodes.at(open.back().next++);
     }
     if (error) return tl::make_unexpected(std::move(*error));
-    const std::uint64_t most_rows = 2 * std::min<std::uint64_t>(options_.max_gaussians, std::uint64_t{1} << 32);
-    std::uint64_t rows = 0;  // of the files that the level is in
-    for (const Piece& piece : plan.pieces) {
-      auto known = plan.metas.find(piece.file);
-      if (known == plan.metas.end()) {
-        auto meta = meta_of(plan.names[piece.file]);
-        if (!meta) return propagate(meta);
-        plan.sh_degree = std::max(plan.sh_degree, meta->version == 2 ? meta->sh_degree : meta->has_sh ? 3 : 0);
-        rows += meta->count;
-        known = plan.metas.emplace(piece.file, std::move(*meta)).first;
-        // Whole files are decoded, however few of their rows a level has.
-        if (plan.metas.size() > max_level_files || rows > most_rows)
-          return fail(ErrorCode::too_large,
-                      "the level lies in more than " + std::to_string(max_level_files) +
-                          " files, or in files of more than " + std::to_string(most_rows) +
-                          " Gaussians together, twice the limit (max_gaussians)",
-                      where(name) + ":filenames");
-      }
-      if (piece.offset + piece.count > known->second.count)
-        return fail(ErrorCode::corrupt_data,
-                    "rows " + std::to_string(piece.offset) + " to " + std::to_string(piece.offset + piece.count) +
-                        " of " + std::to_string(known->second.count),
-                    where(plan.names[piece.file]));
-    }
+    if (auto found = find_files(name, plan); !found) return propagate(found);
     return plan;
   }
 
@@ -792,27 +798,73 @@ std::vector<std::uint32_t> sog_order(const scene::GaussianCloud& cloud) {
   return order;
 }
 
+namespace {
+
+/// The pictures of a file, as they are made.
+class Pictures {
+ public:
+  ///   n     rows
+  ///   file  for error addresses
+  Pictures(std::size_t n, const std::string& file) : n_(n), file_(file) {}
+
+  Result<void> add(const char* name, const BytePicture& picture) {
+    auto bytes = encode_webp(picture, file_);
+    if (!bytes) return propagate(bytes);
+    files_.push_back({name, std::move(*bytes)});
+    return {};
+  }
+  /// A picture whose pixel i is made by fill(i-th row in order, its four bytes).
+  template <class Fill>
+  Result<void> add_rows(const char* name, Fill&& fill) {
+    BytePicture picture = picture_for(n_);
+    parallel_for(n_, rows_per_task, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) fill(i, picture.pixel(i));
+    });
+    return add(name, picture);
+  }
+  [[nodiscard]] std::vector<NamedFile> take() { return std::move(files_); }
+
+ private:
+  std::size_t n_;
+  const std::string& file_;
+  std::vector<NamedFile> files_;
+};
+
+/// The bands beyond 0, as a palette and each row's entry of it.
+Result<void> add_sh(const scene::GaussianCloud& cloud, const std::vector<std::uint32_t>& order, Pictures& pictures,
+                    json& meta) {
+  if (cloud.sh_degree == 0) return {};
+  const ShPalette palette = sh_palette(cloud, order);
+  meta["shN"] = {{"count", palette.count()},
+                 {"bands", cloud.sh_degree},
+                 {"codebook", as_json(palette.codebook)},
+                 {"files", json::array({"shN_centroids.webp", "shN_labels.webp"})}};
+  BytePicture centroids;
+  centroids.width = palette_columns * palette.coefficients;
+  centroids.height = (palette.count() + palette_columns - 1) / palette_columns;
+  centroids.rgba.assign(4 * centroids.pixels(), 0);
+  for (std::size_t i = 0; i < centroids.pixels(); ++i) centroids.pixel(i)[3] = 255;
+  for (std::size_t j = 0; j < palette.entries.size(); ++j)  // entries lie one after the other: 64 fill a row of pixels
+    centroids.pixel(j / 3)[j % 3] = palette.entries[j];
+  if (auto added = pictures.add("shN_centroids.webp", centroids); !added) return propagate(added);
+  if (auto added = pictures.add_rows("shN_labels.webp",
+                                     [&](std::size_t i, std::uint8_t* rgba) {
+                                       rgba[0] = std::uint8_t(palette.labels[i] & 255u);
+                                       rgba[1] = std::uint8_t(palette.labels[i] >> 8);
+                                     });
+      !added)
+    return propagate(added);
+  return {};
+}
+
+}  // namespace
+
 Result<std::vector<std::byte>> encode_sog(const scene::GaussianCloud& cloud, bool antialiased,
                                           const std::string& file) {
   const auto order = sog_order(cloud);
   const std::size_t n = order.size(), coefficients = scene::sh_coefficients(cloud.sh_degree);
   const Positions positions(cloud);
-  std::vector<NamedFile> files;
-  const auto add = [&](const char* name, const BytePicture& picture) -> Result<void> {
-    auto bytes = encode_webp(picture, file);
-    if (!bytes) return propagate(bytes);
-    files.push_back({name, std::move(*bytes)});
-    return {};
-  };
-  /// A picture whose pixel i is made by fill(i-th row in order, its four bytes).
-  const auto add_rows = [&](const char* name, auto&& fill) -> Result<void> {
-    BytePicture picture = picture_for(n);
-    parallel_for(n, rows_per_task, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) fill(i, picture.pixel(i));
-    });
-    return add(name, picture);
-  };
-
+  Pictures pictures(n, file);
   std::vector<float> values;
   for (const auto* axis : {&cloud.log_scale.x, &cloud.log_scale.y, &cloud.log_scale.z})
     values.insert(values.end(), axis->begin(), axis->end());
@@ -827,63 +879,43 @@ Result<std::vector<std::byte>> encode_sog(const scene::GaussianCloud& cloud, boo
   meta["means"] = {
       {"mins", positions.low}, {"maxs", positions.high}, {"files", json::array({"means_l.webp", "means_u.webp"})}};
   for (const int shift : {0, 8})
-    if (auto added = add_rows(shift == 0 ? "means_l.webp" : "means_u.webp",
-                              [&](std::size_t i, std::uint8_t* rgba) {
-                                const auto q = positions.pack(cloud.mean.get(order[i]));
-                                for (std::size_t c = 0; c < 3; ++c) rgba[c] = std::uint8_t(q[c] >> shift & 255u);
-                              });
+    if (auto added = pictures.add_rows(shift == 0 ? "means_l.webp" : "means_u.webp",
+                                       [&](std::size_t i, std::uint8_t* rgba) {
+                                         const auto q = positions.pack(cloud.mean.get(order[i]));
+                                         for (std::size_t c = 0; c < 3; ++c)
+                                           rgba[c] = std::uint8_t(q[c] >> shift & 255u);
+                                       });
         !added)
       return propagate(added);
   meta["scales"] = {{"codebook", as_json(scales)}, {"files", json::array({"scales.webp"})}};
-  if (auto added = add_rows("scales.webp",
-                            [&](std::size_t i, std::uint8_t* rgba) {
-                              const Vec3 scale = cloud.log_scale.get(order[i]);
-                              for (std::size_t c = 0; c < 3; ++c) rgba[c] = scales.nearest(scale[int(c)]);
-                            });
+  if (auto added = pictures.add_rows("scales.webp",
+                                     [&](std::size_t i, std::uint8_t* rgba) {
+                                       const Vec3 scale = cloud.log_scale.get(order[i]);
+                                       for (std::size_t c = 0; c < 3; ++c) rgba[c] = scales.nearest(scale[int(c)]);
+                                     });
       !added)
     return propagate(added);
   meta["quats"] = {{"files", json::array({"quats.webp"})}};
-  if (auto added = add_rows("quats.webp",
-                            [&](std::size_t i, std::uint8_t* rgba) {
-                              const auto bytes = pack_rotation(cloud.rotation.get(order[i]));
-                              std::ranges::copy(bytes, rgba);
-                            });
+  if (auto added = pictures.add_rows("quats.webp",
+                                     [&](std::size_t i, std::uint8_t* rgba) {
+                                       const auto bytes = pack_rotation(cloud.rotation.get(order[i]));
+                                       std::ranges::copy(bytes, rgba);
+                                     });
       !added)
     return propagate(added);
   meta["sh0"] = {{"codebook", as_json(colours)}, {"files", json::array({"sh0.webp"})}};
-  if (auto added = add_rows("sh0.webp",
-                            [&](std::size_t i, std::uint8_t* rgba) {
-                              for (std::size_t c = 0; c < 3; ++c)
-                                rgba[c] = colours.nearest(cloud.sh_row(order[i])[c * coefficients]);
-                              rgba[3] = byte_of_logit(cloud.opacity_logit[order[i]]);
-                            });
+  if (auto added = pictures.add_rows("sh0.webp",
+                                     [&](std::size_t i, std::uint8_t* rgba) {
+                                       for (std::size_t c = 0; c < 3; ++c)
+                                         rgba[c] = colours.nearest(cloud.sh_row(order[i])[c * coefficients]);
+                                       rgba[3] = byte_of_logit(cloud.opacity_logit[order[i]]);
+                                     });
       !added)
     return propagate(added);
-  if (cloud.sh_degree > 0) {
-    const ShPalette palette = sh_palette(cloud, order);
-    meta["shN"] = {{"count", palette.count()},
-                   {"bands", cloud.sh_degree},
-                   {"codebook", as_json(palette.codebook)},
-                   {"files", json::array({"shN_centroids.webp", "shN_labels.webp"})}};
-    BytePicture centroids;
-    centroids.width = palette_columns * palette.coefficients;
-    centroids.height = (palette.count() + palette_columns - 1) / palette_columns;
-    centroids.rgba.assign(4 * centroids.pixels(), 0);
-    for (std::size_t i = 0; i < centroids.pixels(); ++i) centroids.pixel(i)[3] = 255;
-    for (std::size_t j = 0; j < palette.entries.size();
-         ++j)  // entries lie one after the other: 64 fill a row of pixels
-      centroids.pixel(j / 3)[j % 3] = palette.entries[j];
-    if (auto added = add("shN_centroids.webp", centroids); !added) return propagate(added);
-    if (auto added = add_rows("shN_labels.webp",
-                              [&](std::size_t i, std::uint8_t* rgba) {
-                                rgba[0] = std::uint8_t(palette.labels[i] & 255u);
-                                rgba[1] = std::uint8_t(palette.labels[i] >> 8);
-                              });
-        !added)
-      return propagate(added);
-  }
+  if (auto added = add_sh(cloud, order, pictures, meta); !added) return propagate(added);
   const std::string text = meta.dump();
   const auto bytes = std::as_bytes(std::span(text));
+  std::vector<NamedFile> files = pictures.take();
   files.insert(files.begin(), {meta_name, {bytes.begin(), bytes.end()}});  // first: a reader needs it first
   auto zip = make_zip(files);
   if (!zip) return propagate(zip);

@@ -78,7 +78,7 @@ Result<ZipArchive> ZipArchive::open(std::span<const std::byte> bytes, const std:
   const int code = zip_error_code_zip(&error);
   zip_error_fini(&error);
   if (!archive.archive_) return failed(code, file);
-  (void)source.release();  // the archive's now
+  [[maybe_unused]] const auto* const given = source.release();  // the archive's now
   const zip_int64_t count = zip_get_num_entries(archive.archive_.get(), 0);
   for (zip_int64_t i = 0; i < count; ++i)
     if (const char* name = zip_get_name(archive.archive_.get(), zip_uint64_t(i), 0)) {
@@ -143,7 +143,7 @@ Result<std::vector<std::byte>> make_zip(std::span<const NamedFile> files) {
       return broken();
   }
   if (zip_close(archive.get()) != 0) return broken();
-  (void)archive.release();
+  [[maybe_unused]] const auto* const closed = archive.release();
   zip_stat_t stat;
   zip_stat_init(&stat);
   if (zip_source_stat(sink.get(), &stat) != 0 || (stat.valid & ZIP_STAT_SIZE) == 0 || zip_source_open(sink.get()) != 0)

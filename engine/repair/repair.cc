@@ -353,7 +353,8 @@ Result<Repair::Background> Repair::complete_background(WorkingScene& working, Ro
     if (closing.data[i] > 0) surface.data[i] = closing.data[i];
     if (surface.data[i] > 0) now.trust.data[i] = 0, goes_on = true;
     if (closing.data[i] > 0) {
-      const DVec2 pixel(double(i % std::size_t(view.width)) + 0.5, double(i / std::size_t(view.width)) + 0.5);
+      const std::size_t x = i % std::size_t(view.width), y = i / std::size_t(view.width);
+      const DVec2 pixel(double(x) + 0.5, double(y) + 0.5);
       const Vec3 color = closure_->color_at(point_at(view, pixel, double(closing.data[i])));
       for (int c = 0; c < 3; ++c) now.color.plane(c)[i] = color[c];
       now.trust.data[i] = hint_of_closure;
