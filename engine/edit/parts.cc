@@ -27,12 +27,6 @@ double longest_edge(const Array3& means, std::span<const std::uint32_t> rows) {
   return std::max({size.x, size.y, size.z});
 }
 
-/// Is nothing of the rows within the grip of the drag?
-bool grips_nothing(const Array3& means, std::span<const std::uint32_t> rows, const deform::Drag& drag) {
-  return std::ranges::none_of(
-      rows, [&](std::uint32_t row) { return glm::distance(DVec3(means.get(row)), drag.source) <= drag.grip; });
-}
-
 /// From a point to the nearest of the rows.
 double distance_to(const Array3& means, std::span<const std::uint32_t> rows, DVec3 point) {
   double nearest = std::numeric_limits<double>::infinity();
@@ -103,12 +97,13 @@ Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> 
     std::vector<deform::Drag> own;
     for (std::size_t i = 0; i < drags.size(); ++i) {
       if (drags[i].group != group) continue;
-      if (drags[i].anchor && grips_nothing(means, rows, drags[i]))
+      const double away = distance_to(means, rows, drags[i].source);
+      if (drags[i].anchor && away > drags[i].grip) {
         parts.idle.push_back(i);
-      else
-        own.push_back(drags[i]);
-      if (const double away = distance_to(means, rows, drags[i].source); !drags[i].anchor && away > length)
-        parts.astray.push_back({i, away});
+        continue;
+      }
+      own.push_back(drags[i]);
+      if (!drags[i].anchor && away > length) parts.astray.push_back({i, away});
     }
     if (own.empty()) continue;  // anchors alone, and none of them near: nothing moves
     const std::vector<select::Touch>& touches = memory.contact_of(scene, rows, dragged);

@@ -11,10 +11,8 @@
 namespace engine::select {
 namespace {
 
-constexpr double kept = 0.5;      // of the part, at least: choices, both
-constexpr double inmost = 0.2;    // of the part, from where walks begin
-constexpr float least = 1e-3f;    // as in neighbourhood.cc: a walk without any way would have no end
-constexpr double nothing = 1e-9;  // edges of a border: below, rounding
+constexpr double kept = 0.5;    // of the part, at least: choices, both
+constexpr double inmost = 0.2;  // of the part, from where walks begin
 
 /// The nodes, by steps from the rest: the rest first.
 std::vector<std::uint32_t> by_steps_from_rest(const neighbours::NeighbourGraph& graph,
@@ -41,7 +39,7 @@ double firmness(const neighbours::NeighbourGraph& graph, std::span<const float> 
   for (std::size_t k = 0; k < rest; ++k) given[by_steps[k]] = Given::outside;
   for (std::size_t k = core; k < by_steps.size(); ++k) given[by_steps[k]] = Given::inside;
   std::vector<float> weight(alike.begin(), alike.end());
-  for (float& one : weight) one = std::max(one, least);
+  for (float& one : weight) one = std::max(one, least_weight);
   const std::vector<double> potential = random_walk(graph, weight, given);
 
   std::vector<std::uint32_t> order(by_steps.begin() + std::ptrdiff_t(rest), by_steps.end());
@@ -49,7 +47,8 @@ double firmness(const neighbours::NeighbourGraph& graph, std::span<const float> 
     return potential[a] != potential[b] ? potential[a] > potential[b] : a < b;
   });
   std::vector<std::uint8_t> is_in(graph.size(), 0);
-  double leaving = 0, edges = 0, weakest = std::numeric_limits<double>::infinity();
+  double leaving = 0, weakest = std::numeric_limits<double>::infinity();
+  std::ptrdiff_t edges = 0;  // that leave
   for (std::size_t i = 0; i < order.size(); ++i) {
     const std::uint32_t node = order[i];
     is_in[node] = 1;
@@ -57,12 +56,12 @@ double firmness(const neighbours::NeighbourGraph& graph, std::span<const float> 
       const std::uint32_t other = graph.to[edge];
       if (graph.length[edge] > neighbours::joining_spacings * std::min(graph.spacing[node], graph.spacing[other]))
         continue;  // a gap
-      const double sign = is_in[other] != 0 ? -1 : 1;
+      const int sign = is_in[other] != 0 ? -1 : 1;
       leaving += sign * double(alike[edge]), edges += sign;
     }
     const bool is_level = i + 1 == order.size() || potential[order[i + 1]] != potential[node];
     if (is_level && double(i + 1) >= kept * double(order.size()))
-      weakest = std::min(weakest, edges > nothing ? leaving / edges : 0.0);
+      weakest = std::min(weakest, edges > 0 ? leaving / double(edges) : 0.0);
   }
   return std::max(weakest, 0.0);
 }

@@ -28,10 +28,6 @@ constexpr double beside_scene = 4.0;           // times that distance: farther a
 constexpr double most_of_rows = 0.98;          // that masks name: the others may be floaters
 constexpr double reach_by_rows = 1.5;          // times the distance of those from their middle
 constexpr double far_border = 0.9;             // of the reach: from here on, rows are taken for outside
-// Across the sharpest border some of a walk goes on: else pieces of one thing that hardly touch would have nothing to
-// do with each other, and the solver no end. Chosen on the captured cases mug, turn, plant and rod: 1e-4 gives the same
-// where both converge, and takes three times as many steps.
-constexpr float least_weight = 1e-3f;
 
 std::vector<double> squared_distances(const Array3& mean, DVec3 from) {
   std::vector<double> out(mean.size());

@@ -9,21 +9,10 @@
 namespace engine::select {
 namespace {
 
-/// A strip of a surface, 20 wide and 60 long, cut into rows of 20 nodes. Edges along it between rows 19 and 20 and
-/// between rows 29 and 30 have these weights, all others 1.
-WeightedGraph strip(float at_20, float at_30) {
-  constexpr std::uint32_t wide = 20, rows = 60;
-  std::vector<WeightedEdge> edges;
-  for (std::uint32_t row = 0; row < rows; ++row)
-    for (std::uint32_t i = 0; i < wide; ++i) {
-      const std::uint32_t node = row * wide + i;
-      if (i + 1 < wide) edges.push_back({node, node + 1});
-      const float along = row == 19 ? at_20 : row == 29 ? at_30 : 1.0f;
-      if (row + 1 < rows) edges.push_back({node, node + wide, along});
-    }
-  WeightedGraph out = graph_of(wide * rows, edges);
+/// A strip of 60 rows of 20 nodes, joined by these weights between rows 19 and 20 and between rows 29 and 30.
+WeightedGraph joined_strip(float at_20, float at_30) {
+  WeightedGraph out = strip({19, at_20}, {29, at_30});
   out.graph.length.assign(out.graph.to.size(), 1.0f);
-  out.graph.spacing.assign(out.graph.size(), 1.0f);
   return out;
 }
 
@@ -35,31 +24,31 @@ std::vector<std::uint8_t> first_rows(const WeightedGraph& on, std::size_t rows) 
 }
 
 TEST(Firmness, IsOneAcrossASurfaceThatGoesOn) {
-  const WeightedGraph on = strip(1, 1);
+  const WeightedGraph on = joined_strip(1, 1);
   EXPECT_NEAR(firmness(on.graph, on.weight, first_rows(on, 20)), 1, 1e-6);
 }
 
 TEST(Firmness, IsThatOfTheBorderWhereThePartEnds) {
-  const WeightedGraph on = strip(0.05f, 1);
+  const WeightedGraph on = joined_strip(0.05f, 1);
   EXPECT_NEAR(firmness(on.graph, on.weight, first_rows(on, 20)), 0.05, 1e-6);
 }
 
 TEST(Firmness, IsThatOfAWeakerBorderWithinThePart) {
-  const WeightedGraph on = strip(0.05f, 1);
+  const WeightedGraph on = joined_strip(0.05f, 1);
   EXPECT_NEAR(firmness(on.graph, on.weight, first_rows(on, 30)), 0.05, 1e-6) << "with a rim of what it stands on";
 }
 
 TEST(Firmness, DoesNotLookForBordersThatKeepLessThanHalf) {
-  const WeightedGraph on = strip(0.05f, 0.5f);
+  const WeightedGraph on = joined_strip(0.05f, 0.5f);
   EXPECT_NEAR(firmness(on.graph, on.weight, first_rows(on, 30)), 0.05, 1e-6);
   EXPECT_NEAR(firmness(on.graph, on.weight, first_rows(on, 50)), 0.5, 1e-6) << "20 of 50 are less than half";
 }
 
 TEST(Firmness, IsNothingWithoutARestOrAPartOrAWay) {
-  WeightedGraph on = strip(1, 1);
+  WeightedGraph on = joined_strip(1, 1);
   EXPECT_EQ(firmness(on.graph, on.weight, first_rows(on, 60)), 0);
   EXPECT_EQ(firmness(on.graph, on.weight, first_rows(on, 0)), 0);
-  const WeightedGraph apart = strip(0, 1);
+  const WeightedGraph apart = joined_strip(0, 1);
   EXPECT_EQ(firmness(apart.graph, apart.weight, first_rows(apart, 20)), 0);
   // Beyond a gap that nothing spans, neighbours are not next to each other.
   for (std::uint32_t node = 0; node < on.graph.size(); ++node)
@@ -69,7 +58,7 @@ TEST(Firmness, IsNothingWithoutARestOrAPartOrAWay) {
 }
 
 TEST(Firmness, OfASingleNodeIsThatOfItsEdges) {
-  const WeightedGraph on = strip(1, 1);
+  const WeightedGraph on = joined_strip(1, 1);
   std::vector<std::uint8_t> one(on.graph.size(), 0);
   one[210] = 1;
   EXPECT_NEAR(firmness(on.graph, on.weight, one), 1, 1e-6);

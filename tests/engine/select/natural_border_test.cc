@@ -44,16 +44,7 @@ TEST(NaturalBorder, IsWhereEdgesAreWeakNotHalfway) {
 
 /// Strips of a surface, 20 wide and 10, 10 and 40 long, end to end, joined weakly: rows of 20 nodes.
 WeightedGraph three_strips(float first_joint, float second_joint) {
-  constexpr std::uint32_t wide = 20, rows = 60;
-  std::vector<WeightedEdge> edges;
-  for (std::uint32_t row = 0; row < rows; ++row)
-    for (std::uint32_t i = 0; i < wide; ++i) {
-      const std::uint32_t node = row * wide + i;
-      if (i + 1 < wide) edges.push_back({node, node + 1});
-      const float along = row == 9 ? first_joint : row == 19 ? second_joint : 1.0f;
-      if (row + 1 < rows) edges.push_back({node, node + wide, along});
-    }
-  return graph_of(wide * rows, edges);
+  return strip({9, first_joint}, {19, second_joint});
 }
 
 TEST(NaturalBorder, IsTheOneThatEndsALargerPieceOfTwoAlike) {

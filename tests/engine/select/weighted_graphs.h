@@ -47,6 +47,25 @@ inline std::vector<WeightedEdge> chain(std::uint32_t from, std::uint32_t to, flo
   return out;
 }
 
+/// Where a strip is joined otherwise: the edges along it from this row to the next one.
+struct Joint {
+  std::uint32_t after_row = 0;
+  float weight = 1;
+};
+/// A strip of a surface, 20 wide and 60 long: rows of 20 nodes, joined by edges of weight 1 but at two joints.
+inline WeightedGraph strip(Joint first, Joint second) {
+  constexpr std::uint32_t wide = 20, rows = 60;
+  std::vector<WeightedEdge> edges;
+  for (std::uint32_t row = 0; row < rows; ++row)
+    for (std::uint32_t i = 0; i < wide; ++i) {
+      const std::uint32_t node = row * wide + i;
+      if (i + 1 < wide) edges.push_back({node, node + 1});
+      const float along = row == first.after_row ? first.weight : row == second.after_row ? second.weight : 1.0f;
+      if (row + 1 < rows) edges.push_back({node, node + wide, along});
+    }
+  return graph_of(wide * rows, edges);
+}
+
 /// A square grid of side^2 nodes.
 inline std::vector<WeightedEdge> grid(std::uint32_t side) {
   std::vector<WeightedEdge> out;
