@@ -237,17 +237,9 @@ std::uint32_t pack_11_10_11(Vec3 value, Vec3 low, Vec3 high) {
 }
 
 std::uint32_t pack_rotation_once(Quat rotation) {
-  std::array<double, 4> q = {rotation.w, rotation.x, rotation.y, rotation.z};
-  double square = 0;
-  for (const double c : q) square += c * c;
-  if (square == 0) q = {square = 1, 0, 0, 0};  // no rotation to speak of: the identity
-  std::size_t largest = 0;
-  for (std::size_t c = 1; c < 4; ++c)
-    if (std::abs(q[c]) > std::abs(q[largest])) largest = c;
-  const double scale = (q[largest] < 0 ? -1.0 : 1.0) / std::sqrt(square);
+  const auto [largest, rest] = smallest_three(rotation);
   auto word = std::uint32_t(largest);
-  for (std::size_t c = 0; c < 4; ++c)
-    if (c != largest) word = word << 10 | pack_unorm(q[c] * scale / std::numbers::sqrt2 + 0.5, 0, 1, 10);
+  for (const double component : rest) word = word << 10 | pack_unorm(component, 0, 1, 10);
   return word;
 }
 

@@ -2,8 +2,11 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <numbers>
 
 #include "engine/core/vec.h"
 #include "engine/scene/opacity.h"
@@ -21,6 +24,28 @@ inline std::uint8_t nearest_byte(double value) { return std::uint8_t(std::clamp(
 inline float logit_of_byte(std::uint8_t u) { return float(scene::logit(std::clamp(double(u), 0.25, 254.75) / 255.0)); }
 
 inline std::uint8_t byte_of_logit(float logit) { return nearest_byte(255.0 / (1.0 + std::exp(-double(logit)))); }
+
+/// A rotation as its three smallest components: what the largest one is, the unit length says.
+struct SmallestThree {
+  std::size_t largest = 0;  ///< Which is left out, of (w, x, y, z).
+  std::array<double, 3>
+      rest{};  ///< The others in order, 0 to 1 for -1/sqrt(2) to 1/sqrt(2), the largest being positive.
+};
+/// Of a rotation of any length; of (0, 0, 0, 0), which is none, the identity.
+inline SmallestThree smallest_three(Quat rotation) {
+  std::array<double, 4> q = {rotation.w, rotation.x, rotation.y, rotation.z};
+  double square = 0;
+  for (const double c : q) square += c * c;
+  if (square == 0) q = {square = 1, 0, 0, 0};
+  SmallestThree out;
+  for (std::size_t c = 1; c < 4; ++c)
+    if (std::abs(q[c]) > std::abs(q[out.largest])) out.largest = c;
+  const double scale = (q[out.largest] < 0 ? -1.0 : 1.0) / std::sqrt(square);
+  std::size_t next = 0;
+  for (std::size_t c = 0; c < 4; ++c)
+    if (c != out.largest) out.rest[next++] = q[c] * scale / std::numbers::sqrt2 + 0.5;
+  return out;
+}
 
 /// A packed rotation that gives itself again when it is unpacked and packed, so that a scene that was read and is
 /// written again has the same bytes. Where two components are nearly the largest, or none of the four is left out,

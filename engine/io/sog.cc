@@ -644,18 +644,9 @@ struct Positions {
 };
 
 std::array<std::uint8_t, 4> pack_rotation_once(Quat rotation) {
-  std::array<double, 4> q = {rotation.w, rotation.x, rotation.y, rotation.z};
-  double square = 0;
-  for (const double c : q) square += c * c;
-  if (square == 0) q = {square = 1, 0, 0, 0};  // no rotation to speak of: the identity
-  std::size_t largest = 0;
-  for (std::size_t c = 1; c < 4; ++c)
-    if (std::abs(q[c]) > std::abs(q[largest])) largest = c;
-  const double scale = (q[largest] < 0 ? -1.0 : 1.0) / std::sqrt(square);
+  const auto [largest, rest] = smallest_three(rotation);
   std::array<std::uint8_t, 4> bytes{};
-  std::size_t next = 0;
-  for (std::size_t c = 0; c < 4; ++c)
-    if (c != largest) bytes[next++] = nearest_byte((q[c] * scale / std::numbers::sqrt2 + 0.5) * 255.0);
+  for (std::size_t c = 0; c < rest.size(); ++c) bytes[c] = nearest_byte(rest[c] * 255.0);
   bytes[3] = std::uint8_t(rotation_mode + int(largest));
   return bytes;
 }
