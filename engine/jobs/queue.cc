@@ -76,6 +76,7 @@ Result<Job> Queue::stop(const std::string& id) {
 }
 
 Result<Job> Queue::cancel(const std::string& id) {
+  const std::lock_guard lock(ends_mutex_);
   auto job = store_.apply(id, {.event = Event::cancel});
   if (!job) return job;
   if (const auto running = find_running(id)) running->interrupt.request_stop();
@@ -88,6 +89,7 @@ Result<Job> Queue::cancel(const std::string& id) {
 }
 
 Result<void> Queue::remove(const std::string& id) {
+  const std::lock_guard lock(ends_mutex_);
   const auto job = store_.find(id);
   if (!job) return propagate(job);
   const bool has_ended = is_final(job->state);
@@ -103,6 +105,7 @@ Result<void> Queue::remove(const std::string& id) {
 }
 
 Result<void> Queue::expire() {
+  const std::lock_guard lock(ends_mutex_);
   const auto expired = store_.expire(options_.retention);
   if (!expired) return propagate(expired);
   for (const std::string& id : *expired) remove_traces(options_.folder, id);

@@ -84,7 +84,11 @@ class Queue {
   Store& store_;
   const QueueOptions options_;
   std::vector<Error> findings_;  ///< Only open() writes it.
-  mutable std::mutex mutex_;     ///< Guards the two below.
+  /// Held from the record of a job's end, or of its removal, until its note and its files are as the record says. A
+  /// record can be read before its worker has put away what is beside it: who removes the job then would find a folder
+  /// under change, and its note written anew.
+  std::mutex ends_mutex_;
+  mutable std::mutex mutex_;  ///< Guards the two below.
   std::map<std::string, std::shared_ptr<RunningJob>> running_;
   std::uint64_t revision_ = 0;
   mutable std::condition_variable changed_;

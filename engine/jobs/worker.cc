@@ -194,27 +194,33 @@ Result<JobResult> Worker::call(JobContext& context) const {
   }
 }
 
+Result<void> Worker::try_to_record_end(const std::string& id, const Change& change) {
+  const std::lock_guard lock(queue_.ends_mutex_);
+  const auto job = queue_.store_.apply(id, change);
+  if (!job) return propagate(job);
+  if (!is_final(job->state)) return {};
+  queue_.note_end(*job);
+  if (job->state == JobState::cancelled) {
+    std::error_code ignored;
+    fs::remove_all(queue_.folder_of(id), ignored);
+  } else {
+    remove_files(queue_.folder_of(id), checkpoint_prefix);
+  }
+  return {};
+}
+
 void Worker::record_end(const std::string& id, const Change& change) {
   for (;;) {
     const auto last_revision = queue_.revision();
-    const auto job = queue_.store_.apply(id, change);
-    if (job) {
-      if (is_final(job->state)) queue_.note_end(*job);
-      if (job->state == JobState::cancelled) {
-        std::error_code ignored;
-        fs::remove_all(queue_.folder_of(id), ignored);
-      } else if (is_final(job->state)) {
-        remove_files(queue_.folder_of(id), checkpoint_prefix);
-      }
-      return;
-    }
-    set_trouble(job.error());
+    const auto recorded = try_to_record_end(id, change);
+    if (recorded) return;
+    set_trouble(recorded.error());
     // A failed job's own files may be what took the last bytes.
-    if (std::error_code ignored; change.event == Event::fail && job.error().code == ErrorCode::no_space &&
+    if (std::error_code ignored; change.event == Event::fail && recorded.error().code == ErrorCode::no_space &&
                                  fs::remove_all(queue_.folder_of(id), ignored) > 0 && !ignored)
       continue;
     // Whoever opens the store next finds the job claimed by nobody and takes it up at its last checkpoint.
-    if (draining_ || !worth_retrying(job.error())) return;
+    if (draining_ || !worth_retrying(recorded.error())) return;
     queue_.wait_for_change(last_revision, options_.retry_period);
   }
 }

@@ -114,6 +114,8 @@ class Worker {
   void run(const Job& job);
   [[nodiscard]] Result<JobResult> call(JobContext& context) const;
   void record_end(const std::string& id, const Change& change);
+  /// Once: the record, then the note and the files beside it.
+  [[nodiscard]] Result<void> try_to_record_end(const std::string& id, const Change& change);
   void set_trouble(std::optional<Error> error);
   void set_current(std::shared_ptr<Queue::RunningJob> running);
 

@@ -411,6 +411,24 @@ TEST_F(WorkerTest, RemovesARecordWithItsFiles) {
   EXPECT_EQ(code_of(queue->find(id)), ErrorCode::not_found);
 }
 
+// The record says that a job has ended before its worker has put away what is beside it.
+TEST_F(WorkerTest, NothingIsLeftOfAJobThatIsRemovedTheMomentItEnds) {
+  start([](JobContext& context) -> Result<JobResult> {
+    if (auto saved = context.save_checkpoint(1, "x"); !saved) return propagate(saved);
+    return JobResult{};
+  });
+  for (int i = 0; i < 40; ++i) {
+    const std::string id = submit();
+    const auto deadline = std::chrono::steady_clock::now() + patience;
+    while (value(queue->find(id)).state != JobState::succeeded && std::chrono::steady_clock::now() < deadline)
+      std::this_thread::yield();
+    value(queue->remove(id));
+    queue->wait_for_change(queue->revision(), 1ms);
+    for (const auto& left : fs::directory_iterator(dir.path() / "jobs"))
+      EXPECT_FALSE(left.path().filename().string().starts_with(id)) << left.path();
+  }
+}
+
 TEST_F(WorkerTest, ExpiresEndedJobsAsItWorks) {
   queue = value(Queue::open(*store, {.folder = dir.path() / "jobs", .retention = {.max_count = 1}}));
   for (int i = 0; i < 3; ++i) submit();
