@@ -24,6 +24,7 @@ constexpr std::size_t rows_clicked = 4;        // of those nearest to a point, t
 constexpr std::size_t rows_near_click = 24;    // that are looked at for that: the mean of a large disc may be far off
 constexpr double reach_by_points = 4.0;        // times the distance of the points
 constexpr double reach_by_scene = 0.25;        // of the distance within which half of the rows lie
+constexpr double reach_of_whole = 0.8;         // of the same: room for the border around the thing, and for more
 constexpr double beside_scene = 4.0;           // times that distance: farther away, there is nothing worth mention
 constexpr double most_of_rows = 0.98;          // that masks name: the others may be floaters
 constexpr double reach_by_rows = 1.5;          // times the distance of those from their middle
@@ -68,7 +69,8 @@ Surroundings surroundings_of(const Array3& mean, const Grow& grow) {
   std::vector<double> squared = squared_distances(mean, middle);
   const auto half = squared.begin() + std::ptrdiff_t(squared.size() / 2);
   std::nth_element(squared.begin(), half, squared.end());
-  const double half_of_scene = std::sqrt(*half), by_scene = reach_by_scene * half_of_scene;
+  const double by_scene_share = grow.whole || grow.wider != 0 ? reach_of_whole : reach_by_scene;
+  const double half_of_scene = std::sqrt(*half), by_scene = by_scene_share * half_of_scene;
   // An outside point that is nowhere near the scene says nothing of the thing's size.
   if (nearest <= beside_scene * half_of_scene) farthest = std::max(farthest, nearest);
   const double by_points = farthest > 0 ? by_steps(reach_by_points * farthest) : 0;
@@ -184,12 +186,13 @@ void Neighbourhood::take_far_nodes(std::vector<Given>& given) const {
   }
 }
 
-Result<std::vector<std::uint32_t>> Neighbourhood::grow(const scene::GaussianCloud& cloud, const Grow& grow) const {
+Result<Grown> Neighbourhood::grow(const scene::GaussianCloud& cloud, const Grow& grow) const {
   const auto seeds = seeds_of(cloud, grow);
   if (!seeds) return propagate(seeds);
   const std::vector<double> potential = random_walk(graph_, weight_, seeds->given);
-  const std::vector<std::uint8_t> inside = natural_border(graph_, weight_, potential, seeds->given, seeds->clicked);
-  return rows_where_marked(inside);
+  const NaturalBorder border =
+      natural_border(graph_, weight_, potential, seeds->given, seeds->clicked, {grow.whole, grow.wider});
+  return Grown{rows_where_marked(border.inside), border.wider};
 }
 
 std::vector<std::uint32_t> Neighbourhood::settle(std::span<const Given> given) const {
