@@ -28,7 +28,8 @@ constexpr double reach_of_whole = 0.8;         // of the same: room for the bord
 constexpr double beside_scene = 4.0;           // times that distance: farther away, there is nothing worth mention
 constexpr double most_of_rows = 0.98;          // that masks name: the others may be floaters
 constexpr double reach_by_rows = 1.5;          // times the distance of those from their middle
-constexpr double far_border = 0.9;             // of the reach: from here on, rows are taken for outside
+constexpr double more_by_far_end = 1.25;  // times the rows of a whole: more is another thing, as all around the mug
+constexpr double far_border = 0.9;        // of the reach: from here on, rows are taken for outside
 
 std::vector<double> squared_distances(const Array3& mean, DVec3 from) {
   std::vector<double> out(mean.size());
@@ -189,10 +190,42 @@ void Neighbourhood::take_far_nodes(std::vector<Given>& given) const {
 Result<Grown> Neighbourhood::grow(const scene::GaussianCloud& cloud, const Grow& grow) const {
   const auto seeds = seeds_of(cloud, grow);
   if (!seeds) return propagate(seeds);
-  const std::vector<double> potential = random_walk(graph_, weight_, seeds->given);
-  const NaturalBorder border =
-      natural_border(graph_, weight_, potential, seeds->given, seeds->clicked, {grow.whole, grow.wider});
+  const NaturalBorder border = grow.whole ? whole_border(*seeds, grow.wider) : border_of(*seeds, {false, grow.wider});
   return Grown{rows_where_marked(border.inside), border.wider};
+}
+
+NaturalBorder Neighbourhood::border_of(const Seeds& seeds, const BorderChoice& choice) const {
+  const std::vector<double> potential = random_walk(graph_, weight_, seeds.given);
+  return natural_border(graph_, weight_, potential, seeds.given, seeds.clicked, choice);
+}
+
+NaturalBorder Neighbourhood::whole_border(const Seeds& seeds, int wider) const {
+  const NaturalBorder first = border_of(seeds, {true, 0});
+  const Seeds both = with_far_end(seeds, first.inside);
+  const NaturalBorder second = border_of(both, {true, 0});
+  const auto size = [](const NaturalBorder& border) {
+    return double(std::count(border.inside.begin(), border.inside.end(), std::uint8_t{1}));
+  };
+  const bool is_better = size(second) <= more_by_far_end * size(first);
+  if (wider == 0) return is_better ? second : first;
+  return border_of(is_better ? both : seeds, {true, wider});
+}
+
+Neighbourhood::Seeds Neighbourhood::with_far_end(Seeds seeds, std::span<const std::uint8_t> inside) const {
+  const auto place = [&](std::uint32_t node) {
+    const float* at = points_.data() + std::size_t(3) * node;
+    return DVec3(at[0], at[1], at[2]);
+  };
+  const DVec3 click = place(seeds.clicked.inside[0]);
+  std::uint32_t far_end = seeds.clicked.inside[0];
+  double farthest = 0;
+  for (std::uint32_t node = 0; node < inside.size(); ++node) {
+    if (inside[node] == 0) continue;
+    if (const double away = distance(place(node), click); away > farthest) farthest = away, far_end = node;
+  }
+  seeds.given[far_end] = Given::inside;
+  seeds.clicked.inside.push_back(far_end);
+  return seeds;
 }
 
 std::vector<std::uint32_t> Neighbourhood::settle(std::span<const Given> given) const {
