@@ -28,8 +28,9 @@ constexpr double reach_of_whole = 0.8;         // of the same: room for the bord
 constexpr double beside_scene = 4.0;           // times that distance: farther away, there is nothing worth mention
 constexpr double most_of_rows = 0.98;          // that masks name: the others may be floaters
 constexpr double reach_by_rows = 1.5;          // times the distance of those from their middle
-constexpr double more_by_far_end = 1.25;  // times the rows of a whole: more is another thing, as all around the mug
-constexpr double far_border = 0.9;        // of the reach: from here on, rows are taken for outside
+constexpr int far_ends = 2;                    // that a whole is grown from, beside the clicks
+constexpr double more_by_far_ends = 1.25;  // times the rows of a whole: more is another thing, as all around the mug
+constexpr double far_border = 0.9;         // of the reach: from here on, rows are taken for outside
 
 std::vector<double> squared_distances(const Array3& mean, DVec3 from) {
   std::vector<double> out(mean.size());
@@ -200,32 +201,38 @@ NaturalBorder Neighbourhood::border_of(const Seeds& seeds, const BorderChoice& c
 }
 
 NaturalBorder Neighbourhood::whole_border(const Seeds& seeds, int wider) const {
-  const NaturalBorder first = border_of(seeds, {true, 0});
-  const Seeds both = with_far_end(seeds, first.inside);
-  const NaturalBorder second = border_of(both, {true, 0});
+  Seeds tried = seeds, best_seeds = seeds;
+  NaturalBorder best = border_of(seeds, {true, 0});
+  std::vector<std::uint8_t> found = best.inside;
   const auto size = [](const NaturalBorder& border) {
     return double(std::count(border.inside.begin(), border.inside.end(), std::uint8_t{1}));
   };
-  const bool is_better = size(second) <= more_by_far_end * size(first);
-  if (wider == 0) return is_better ? second : first;
-  return border_of(is_better ? both : seeds, {true, wider});
+  const double most = more_by_far_ends * size(best);
+  for (int i = 0; i < far_ends; ++i) {
+    click_far_end(found, tried);
+    NaturalBorder border = border_of(tried, {true, 0});
+    if (size(border) > most || size(border) <= size(best)) continue;
+    best = std::move(border), best_seeds = tried;
+  }
+  return wider == 0 ? best : border_of(best_seeds, {true, wider});
 }
 
-Neighbourhood::Seeds Neighbourhood::with_far_end(Seeds seeds, std::span<const std::uint8_t> inside) const {
+void Neighbourhood::click_far_end(std::span<const std::uint8_t> inside, Seeds& seeds) const {
   const auto place = [&](std::uint32_t node) {
     const float* at = points_.data() + std::size_t(3) * node;
     return DVec3(at[0], at[1], at[2]);
   };
-  const DVec3 click = place(seeds.clicked.inside[0]);
   std::uint32_t far_end = seeds.clicked.inside[0];
   double farthest = 0;
   for (std::uint32_t node = 0; node < inside.size(); ++node) {
     if (inside[node] == 0) continue;
-    if (const double away = distance(place(node), click); away > farthest) farthest = away, far_end = node;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const std::uint32_t click : seeds.clicked.inside)
+      nearest = std::min(nearest, distance(place(node), place(click)));
+    if (nearest > farthest) farthest = nearest, far_end = node;
   }
   seeds.given[far_end] = Given::inside;
   seeds.clicked.inside.push_back(far_end);
-  return seeds;
 }
 
 std::vector<std::uint32_t> Neighbourhood::settle(std::span<const Given> given) const {

@@ -95,12 +95,12 @@ class Neighbourhood {
   std::uint32_t claim(const scene::GaussianCloud& cloud, DVec3 point, Given side,
                       std::map<std::uint32_t, Claim>& claims) const;
   [[nodiscard]] NaturalBorder border_of(const Seeds& seeds, const BorderChoice& choice) const;
-  /// Of the whole: grown from the clicks, and once more with a click at the far end of what was found. What is under a
-  /// thing, or behind, hangs together with that end rather than with the one that was clicked on. The second time
-  /// counts unless it has taken another thing.
+  /// Of the whole: grown from the clicks, and again with clicks at far ends of what was found. What is under a thing,
+  /// or behind, hangs together with those rather than with what was clicked on. The largest counts that has not taken
+  /// another thing.
   [[nodiscard]] NaturalBorder whole_border(const Seeds& seeds, int wider) const;
-  /// With the node inside that is farthest from the first click as one more click.
-  [[nodiscard]] Seeds with_far_end(Seeds seeds, std::span<const std::uint8_t> inside) const;
+  /// Makes the node inside that is farthest from all inside clicks one more of them.
+  void click_far_end(std::span<const std::uint8_t> inside, Seeds& seeds) const;
   /// The rows of marked nodes, ascending.
   [[nodiscard]] std::vector<std::uint32_t> rows_where_marked(std::span<const std::uint8_t> nodes) const;
   /// Gives what lies at the reach to the outside.

@@ -59,7 +59,7 @@ TEST(GrowOnTheDemoScene, TakesTheWholeOfAThingByOneClick) {
       const Agreement found =
           agreement(demo(), object, select(demo().cloud, {{Op::add, one_click(object, camera)}}).value().rows);
       EXPECT_GT(found.recall, recall) << demo().object_names[object] << ", " << camera.name;
-      EXPECT_GT(found.precision, 0.94) << demo().object_names[object] << ", " << camera.name;
+      EXPECT_GT(found.precision, 0.93) << demo().object_names[object] << ", " << camera.name;
     }
 }
 
