@@ -7,7 +7,8 @@ import { warnings } from "./request_panel.js";
 import { describe, sentence, share } from "./selection.js";
 
 const HANDS = [
-  ["handle", "Handles", "Click to place a handle, drag its dot to where it should go (S)"],
+  ["thing", "Drag", "Click a thing and drag it to where it should go (D)"],
+  ["handle", "Handles", "Click to place a handle, drag its dot to where it should go (H)"],
   ["select", "Select", "Say what moves (S)"],
 ];
 export const SELECT_TOOLS = [
@@ -37,7 +38,7 @@ export function buildTools(editor) {
   const row = (label, testid, options, changed) => segments({ label, testid, options, changed });
 
   const hand = row("What the pointer does", "hand", HANDS, (value) =>
-    selecting.use(value === "select" ? store.state.selectTool : null),
+    value === "select" ? selecting.use(store.state.selectTool) : selecting.takeThings(value === "thing"),
   );
   const tool = row("Select by", "select-tool", SELECT_TOOLS, (value) => selecting.use(value));
   const op = choice({ label: "What is done with it", testid: "select-op", options: OPS, changed: set("selectOp") });
@@ -76,10 +77,10 @@ export function buildTools(editor) {
     h("div", { class: "row tight" }, undo, redo),
   );
 
-  const shown = ["selectMode", "selectTool", "selectOp", "clickKind", "nextThing", "selectDepth", "brushRadius"];
+  const shown = ["selectMode", "thingMode", "selectTool", "selectOp", "clickKind", "nextThing", "selectDepth", "brushRadius"];
   store.watch([...shown, "selection", "handles"], (state) => {
     const { selectMode, selectTool } = state;
-    hand.update(selectMode ? "select" : "handle");
+    hand.update(selectMode ? "select" : state.thingMode ? "thing" : "handle");
     tools.hidden = !selectMode;
     tool.update(selectTool);
     op.update(state.selectOp);

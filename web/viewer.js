@@ -6,6 +6,7 @@ import {
   centredOn,
   dollied,
   dragged,
+  ellipseOf,
   onTheWire,
   orbited,
   panned,
@@ -19,13 +20,15 @@ import { shownVersion } from "./editor.js";
 import { AdaptiveSide, FrameQueue, Recent } from "./frames.js";
 import { Overlay } from "./overlay.js";
 import { partOf } from "./requests.js";
-import { clicksOf, thinned } from "./selection.js";
+import { clicksOf, proposalOf, thinned } from "./selection.js";
+import { add, sub } from "./vectors.js";
 
 // All of these are choices, tried by hand.
 const MAX_SIDE = 1600; // Pixels of the longer side of a picture at rest: sharp enough on a large window.
 const STILL_AFTER_MS = 160; // Without a movement, before the picture is requested at its full size.
 const CLICK_PX = 4; // A pointer that moves less than this has clicked, not dragged.
 const ORBIT_PER_PX = 0.0055; // Radians: half a turn across 570 pixels.
+const THING_PX = 14; // A thing is taken hold of within this of its middle, however small it is.
 const SKETCH_PX = 2; // A line that is drawn has a corner this often at most.
 const MAX_CACHED_PICTURES = 6; // Enough to go back and forth between two versions and three layers.
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }; // Right, down.
@@ -79,7 +82,7 @@ export class Viewer {
     store.watch(["handles", "selected", "selection", "selectMode", "region", "problem", "pose"], () =>
       this.#drawOverlay(),
     );
-    store.watch(["selectMode", "selectTool", "brushRadius"], () => this.#toolChanged());
+    store.watch(["selectMode", "selectTool", "thingMode", "brushRadius"], () => this.#toolChanged());
     new ResizeObserver(() => this.#resized()).observe(this.#view);
   }
 
@@ -253,6 +256,7 @@ export class Viewer {
     clearTimeout(this.#thumbnailTimer);
     this.#thumbnailTimer = setTimeout(() => {
       if (this.#displayed?.job.layer !== "color" || this.#displayed.job.selection) return;
+      if (String(this.#displayed.job.version).startsWith("p")) return; // nothing that anybody has kept
       if (this.#displayed.job.scene !== this.#state.scene?.id) return;
       const small = Object.assign(document.createElement("canvas"), THUMBNAIL);
       const { width, height } = this.#displayed.picture;
@@ -288,10 +292,29 @@ export class Viewer {
     if (this.#gesture?.kind === "draw") this.giveUpDrag();
   }
 
-  /** What the pointer does: "handle", "grow", "brush" or "lasso". */
+  /** What the pointer does: "thing", "handle", "grow", "brush" or "lasso". */
   get tool() {
-    const { selectMode, selectTool } = this.#state;
-    return selectMode ? selectTool : "handle";
+    const { selectMode, selectTool, thingMode } = this.#state;
+    return selectMode ? selectTool : thingMode ? "thing" : "handle";
+  }
+
+  /** Is a place of the picture on what is selected, where that is seen now? As far as its bounds tell. */
+  #onThing({ x, y }) {
+    const { selection, selectionAnswer: answer, selectionWaits, handles, comparing } = this.#state;
+    const { camera } = this;
+    if (selection.length === 0 || comparing || !camera) return false;
+    const handle = handles.at(-1);
+    const shift = handle?.target ? sub(handle.target, handle.source) : [0, 0, 0];
+    // The service may still be looking for the border of what was clicked on: that point is on it.
+    const inside = proposalOf(selection)?.inside[0];
+    const clicked = inside && project(camera, add(inside, shift));
+    if (clicked && Math.hypot(clicked.x - x, clicked.y - y) <= THING_PX) return true;
+    if (!answer?.count || selectionWaits) return false;
+    const { low, high } = answer.bounds;
+    const seen = ellipseOf(camera, { low: add(low, shift), high: add(high, shift) });
+    if (!seen) return false;
+    const [rx, ry] = [Math.max(seen.rx, THING_PX), Math.max(seen.ry, THING_PX)];
+    return ((x - seen.x) / rx) ** 2 + ((y - seen.y) / ry) ** 2 <= 1;
   }
 
   // --- the hand --------------------------------------------------------------------------------------------------
@@ -329,6 +352,8 @@ export class Viewer {
     } else if (this.#pointers.size === 1 && !this.#gesture) {
       const from = this.#place(event);
       this.#gesture = { kind: this.#kindOf(event), from, button: event.button, other: event.altKey };
+      const takes = this.tool === "thing" && event.button === 0 && !event.shiftKey && this.#onThing(from);
+      if (takes) Object.assign(this.#gesture, { kind: "thing", drag: this.#editor.dragThing(this.camera, from) });
       if (this.#gesture.kind === "draw") this.#gesture.drag = this.#sketch(from, event.altKey);
     }
   }
@@ -388,6 +413,7 @@ export class Viewer {
     const to = this.#place(event);
     this.#pointerAt = to;
     if (this.tool === "brush" && event.pointerType !== "touch") this.#overlay.cursor(to, this.#state.brushRadius);
+    if (!this.#gesture) attrs(this.#view, { "data-over": this.tool === "thing" && this.#onThing(to) ? "thing" : null });
     const from = this.#pointers.get(event.pointerId);
     const gesture = this.#gesture;
     if (!from || !gesture) return;
@@ -426,10 +452,11 @@ export class Viewer {
       return;
     }
     this.#gesture = null;
-    if (gesture.drag) return gesture.drag.end();
+    // What was taken hold of and not moved was clicked on.
+    if (gesture.drag && (gesture.started || gesture.kind !== "thing")) return gesture.drag.end();
     if (gesture.started) return;
     const { kind, button, from, other } = gesture;
-    if (kind === "orbit" && button === 0) this.#click(from, other);
+    if ((kind === "orbit" || kind === "thing") && button === 0) this.#click(from, other);
     else if (this.tool === "grow" && button === 2) this.#click(from, true);
   }
 
@@ -445,6 +472,11 @@ export class Viewer {
     const { tool, camera } = this;
     const { selecting } = this.#editor;
     if (tool === "handle") this.#editor.place(camera, x, y);
+    else if (tool === "thing") {
+      // What has been moved is not where the version has it: a click on it says nothing new.
+      const moved = this.#state.handles.some((handle) => handle.target);
+      if (!moved || !this.#onThing({ x, y })) selecting.propose(camera, x, y);
+    }
     else if (tool === "grow") selecting.click(camera, x, y, other);
     else if (tool === "brush") selecting.draw("brush", camera, [[x, y]], other);
   }
@@ -513,7 +545,7 @@ export class Viewer {
           seen.x + step * arrow[0],
           seen.y + step * arrow[1],
           this.#state.constraint,
-          handle.normal,
+          { normal: handle.normal, up: this.#editor.worldUp },
         ),
       });
   }
