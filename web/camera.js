@@ -208,6 +208,16 @@ export function dollied(pose, factor, least) {
   return { ...pose, eye: addScaled(pose.target, unit(back), wanted) };
 }
 
+/** Moves the camera to `factor` times its distance from what is at the pivot's depth under a pixel position, which stays
+ *  where it is in the picture; but no nearer to the pivot than `least`. */
+export function zoomedAt(camera, x, y, factor, least) {
+  const { width, height, ...pose } = camera;
+  const point = onViewPlane(camera, x, y, pose.target);
+  const allowed = Math.max(factor, Math.min(1, least / distance(pose.eye, pose.target)));
+  const scaled = (p) => addScaled(point, sub(p, point), allowed);
+  return { ...pose, eye: scaled(pose.eye), target: scaled(pose.target) };
+}
+
 /** Moves camera and pivot so that `point` is the pivot, seen from the same direction and distance. */
 export function centredOn(pose, point) {
   return { ...pose, eye: add(pose.eye, sub(point, pose.target)), target: point };

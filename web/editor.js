@@ -76,6 +76,9 @@ const LASTING_KEYS = [
 ];
 const STORED_KEYS = ["pose", "version", "handles", "selection", "viewName", ...LASTING_KEYS];
 
+/** How one compares: where there are no keys, by the button. */
+const HOLD = globalThis.matchMedia?.("(hover: none)").matches ? "Hold the button" : "Hold B";
+
 /** The members of an object that have these names, as far as it has them. */
 const only = (names, from) =>
   Object.fromEntries(names.filter((name) => from[name] !== undefined).map((name) => [name, from[name]]));
@@ -783,7 +786,7 @@ export class Editor {
     }
     if (drafted?.better === edit.id && this.state.version === drafted.version) {
       this.showVersion(edit.result_version);
-      return say(`Version ${edit.result_version} is what the draft was for. Hold B to compare.`);
+      return say(`Version ${edit.result_version} is what the draft was for. ${HOLD} to compare.`);
     }
     if (this.state.version !== edit.version)
       return say(`Version ${edit.result_version} is ready.`, {
@@ -791,7 +794,7 @@ export class Editor {
         run: () => this.showVersion(edit.result_version),
       });
     this.#finish(edit);
-    say(`Version ${edit.result_version} is ready. Hold B to compare it with version ${edit.version}.`);
+    say(`Version ${edit.result_version} is ready. ${HOLD} to compare it with version ${edit.version}.`);
   }
 
   /** Shows what an edit has made of the version on the screen. What was dragged is where it should be: handles, selection

@@ -47,7 +47,7 @@ buildTabs();
 listenToKeys();
 listenToDrops();
 
-byId("help").addEventListener("click", showHelp);
+byId("help").addEventListener("click", help);
 byId("sign-out").addEventListener("click", async () => {
   await api.deleteSession().catch(() => {});
   location.reload();
@@ -60,6 +60,7 @@ document.addEventListener("visibilitychange", () => {
 });
 store.watch(["scene"], ({ scene }) => {
   text(byId("scene-title"), scene?.name ?? "");
+  byId("scene-title").hidden = !scene;
   document.title = scene ? `${scene.name} · splatdrag` : "splatdrag";
 });
 store.watch(["info"], ({ info }) => {
@@ -69,6 +70,10 @@ store.watch(["info"], ({ info }) => {
 });
 
 start();
+
+function help() {
+  showHelp({ letterKeys: memory.letterKeys, setLetterKeys: (on) => (memory.letterKeys = on) });
+}
 
 async function start() {
   try {
@@ -181,7 +186,10 @@ function listenToKeys() {
     b: () => store.set({ comparing: true }),
   };
   document.addEventListener("keydown", (event) => {
-    if (event.key === "?" && !event.target.closest?.("input, dialog")) return showHelp();
+    // Who dictates, or brushes against keys, turns single characters off (WCAG 2.1.4); keys with a name stay.
+    const character = event.key.length === 1 && !event.ctrlKey && !event.metaKey;
+    if (character && !memory.letterKeys) return;
+    if (event.key === "?" && !event.target.closest?.("input, dialog")) return help();
     if (busy(event)) return;
     const key = event.key.toLowerCase();
     if ((event.ctrlKey || event.metaKey) && key === "z") {

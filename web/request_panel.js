@@ -234,7 +234,7 @@ export function buildRequestPanel(editor) {
       const ready = state.scene !== null && isStated(state);
       const moves = changesScene(state);
       preview.disabled = !ready || !moves;
-      estimate.disabled = !ready || state.submitting;
+      estimate.disabled = !ready || !moves || state.submitting; // anchors alone ask for nothing
       run.disabled = !ready || !moves || state.submitting;
       attrs(preview, { "aria-busy": String(state.previewing) });
       text(preview, state.previewing ? "Previewing…" : "Preview");

@@ -14,10 +14,11 @@ import {
   pictureSize,
   project,
   samePose,
+  zoomedAt,
 } from "./camera.js";
 import { attrs, byId, text } from "./dom.js";
 import { shownVersion } from "./editor.js";
-import { AdaptiveSide, FrameQueue, Recent } from "./frames.js";
+import { AdaptiveSide, FrameQueue, Recent, serverTime } from "./frames.js";
 import { Overlay } from "./overlay.js";
 import { partOf } from "./requests.js";
 import { clicksOf, proposalOf, thinned } from "./selection.js";
@@ -26,6 +27,8 @@ import { add, sub } from "./vectors.js";
 // All of these are choices, tried by hand.
 const MAX_SIDE = 1600; // Pixels of the longer side of a picture at rest: sharp enough on a large window.
 const STILL_AFTER_MS = 160; // Without a movement, before the picture is requested at its full size.
+const PICTURES_AT_ONCE = 3; // While moving: what covers the way there and back of most networks.
+const DOUBLE_CLICK_MS = 400; // A second click sooner than this, at the same place, is no click of its own.
 const CLICK_PX = 4; // A pointer that moves less than this has clicked, not dragged.
 const ORBIT_PER_PX = 0.0055; // Radians: half a turn across 570 pixels.
 const THING_PX = 14; // A thing is taken hold of within this of its middle, however small it is.
@@ -54,6 +57,7 @@ export class Viewer {
   #pointers = new Map();
   #gesture = null;
   #pointerAt = null;
+  #clicked = { at: -Infinity, x: 0, y: 0 };
   #movingUntil = 0;
   #stillTimer = null;
   #busyTimer = null;
@@ -65,6 +69,7 @@ export class Viewer {
       load: (job, signal) => this.#load(job, signal),
       onPicture: (picture, job) => this.#arrived(picture, job),
       onError: (error, job) => this.#failed(error, job),
+      atOnce: PICTURES_AT_ONCE,
     });
     this.#overlay = new Overlay(byId("overlay"), {
       grab: (id, event) => this.#grab(id, event),
@@ -171,7 +176,7 @@ export class Viewer {
 
   async #load(job, signal) {
     const requestedAt = performance.now();
-    const blob = await api.render(
+    const { blob, timing } = await api.render(
       job.scene,
       job.version,
       {
@@ -184,7 +189,7 @@ export class Viewer {
       signal,
     );
     const picture = await createImageBitmap(blob);
-    if (!job.large) this.#adaptive.record(performance.now() - requestedAt);
+    if (!job.large) this.#adaptive.record(serverTime(timing) ?? performance.now() - requestedAt);
     return { picture, ms: performance.now() - requestedAt };
   }
 
@@ -332,6 +337,11 @@ export class Viewer {
     });
     on("contextmenu", (event) => event.preventDefault());
     on("wheel", (event) => this.#wheel(event), { passive: false });
+    on("dblclick", (event) => {
+      if (event.target.closest("button, a, input, select")) return;
+      this.#pointerAt = this.#place(event);
+      this.focusHere();
+    });
     on("keydown", (event) => this.#key(event));
   }
 
@@ -456,6 +466,11 @@ export class Viewer {
     if (gesture.drag && (gesture.started || gesture.kind !== "thing")) return gesture.drag.end();
     if (gesture.started) return;
     const { kind, button, from, other } = gesture;
+    const { at, x, y } = this.#clicked;
+    const again = performance.now() - at < DOUBLE_CLICK_MS && Math.hypot(from.x - x, from.y - y) < 2 * CLICK_PX;
+    this.#clicked = { at: performance.now(), ...from };
+    // The first of two clicks has done what a click does.
+    if (again && button === 0) return;
     if ((kind === "orbit" || kind === "thing") && button === 0) this.#click(from, other);
     else if (this.tool === "grow" && button === 2) this.#click(from, true);
   }
@@ -495,7 +510,9 @@ export class Viewer {
 
   #wheel(event) {
     event.preventDefault();
-    if (this.camera) this.#turn((pose) => dollied(pose, wheelFactor(event), this.#nearest()));
+    if (!this.camera) return;
+    const { x, y } = this.#place(event);
+    this.#turn((pose) => zoomedAt({ ...pose, ...this.#size }, x, y, wheelFactor(event), this.#nearest()));
   }
 
   /** The wheel turned over a handle's dot: towards the user, a larger sphere. */

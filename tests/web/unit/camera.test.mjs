@@ -27,6 +27,7 @@ import {
   sphereOutline,
   unitsPerPixel,
   upOf,
+  zoomedAt,
 } from "../../../web/camera.js";
 import { add, cross, distance, dot, length, scale, sub, unit } from "../../../web/vectors.js";
 
@@ -177,6 +178,16 @@ test("a level drag stays at its height, follows the pointer, and does not run aw
     near(moved[1], from[1], 1e-9);
     assert.ok(length(sub(moved, from)) < 20, `${moved} at ${y}`);
   }
+});
+
+test("zooming keeps what is under the pointer where it is", () => {
+  const under = onViewPlane(camera, 500, 90, camera.target);
+  const nearer = zoomedAt(camera, 500, 90, 0.4, 1e-3);
+  const seen = project({ ...nearer, width: camera.width, height: camera.height }, under);
+  near([seen.x, seen.y], [500, 90], 1e-6);
+  near(distance(nearer.eye, nearer.target), 0.4 * distance(camera.eye, camera.target));
+  const least = zoomedAt(camera, 500, 90, 1e-9, 0.5);
+  near(distance(least.eye, least.target), 0.5);
 });
 
 test("a box fills an ellipse of the picture; one that is partly behind the camera none", () => {
