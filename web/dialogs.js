@@ -154,7 +154,7 @@ export function showHelp({ letterKeys, setLetterKeys }) {
     [". and ,", "more, less of the thing that is taken"],
     ["D, H", "drag things, place handles"],
     ["S", "select what moves, and back"],
-    ["1, 2, 3", "select by clicks, brush, lasso"],
+    ["1, 2, 3, 4", "select by clicks, brush, lasso, rectangle"],
     ["Right click, or Alt", "selecting: what is not meant"],
     ["V, L, X, Y, Z, N", "drag in the view's plane, level, along an axis, along the normal"],
     ["[ and ]", "previous, next view"],

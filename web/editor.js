@@ -423,6 +423,12 @@ export class Editor {
     return this.#drag(handle, { camera, at, settings, ended: () => this.state.draftOnRelease && this.runDraft() });
   }
 
+  /** Takes away what is selected, for good. */
+  removeThing() {
+    this.#place({ mode: "remove", handles: [] });
+    return this.runDraft();
+  }
+
   /** Lets go of what is selected, wherever it was dragged. */
   letGo() {
     this.#place({ handles: [], selection: [] });
@@ -649,8 +655,8 @@ export class Editor {
 
   /** What a draft was to repair has been changed, or undone: it is no longer wanted. */
   #draftOutdated() {
-    const { draft, drafted, handles, version } = this.state;
-    if (draft && handles.every((h) => !h.target)) this.#giveUpDraft();
+    const { draft, drafted, version } = this.state;
+    if (draft && !changesScene(this.state)) this.#giveUpDraft();
     if (drafted && version !== drafted.version) this.store.set({ drafted: null });
   }
 
@@ -800,7 +806,9 @@ export class Editor {
   /** Shows what an edit has made of the version on the screen. What was dragged is where it should be: handles, selection
    *  and the box have done their work. Undo brings them back, and the version that they were on. */
   #finish(edit) {
-    this.#place({ handles: [], selection: [], region: null, heal: [], version: edit.result_version });
+    // Removing is no habit: what is taken next is to be moved.
+    const mode = this.state.mode === "remove" ? "move" : this.state.mode;
+    this.#place({ handles: [], selection: [], region: null, heal: [], mode, version: edit.result_version });
     this.selecting.use(null);
   }
 

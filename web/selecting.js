@@ -3,7 +3,18 @@
 import * as api from "./api.js";
 import { onTheWire } from "./camera.js";
 import { FrameQueue } from "./frames.js";
-import { furtherBorders, inverted, polygonOf, proposalOf, strokeOf, thingAt, widened, withClick } from "./selection.js";
+import {
+  furtherBorders,
+  inverted,
+  polygonOf,
+  proposalOf,
+  rectangleOf,
+  spread,
+  strokeOf,
+  thingAt,
+  widened,
+  withClick,
+} from "./selection.js";
 
 /** What there is before anything is selected. Tool, depth, radius and tint outlive a reload. */
 export const NOTHING_SELECTED = {
@@ -12,7 +23,7 @@ export const NOTHING_SELECTED = {
   selectionWaits: false, // Whether that is of an earlier selection.
   thingMode: true, // The pointer takes hold of whole things; else it places and drags handles.
   selectMode: false, // The pointer selects, whatever it does else.
-  selectTool: "grow", // "grow", "brush" or "lasso"
+  selectTool: "grow", // "grow", "brush", "lasso" or "rectangle"
   selectOp: "add",
   clickKind: "inside", // Of a click to grow: on the thing ("inside"), or not.
   nextThing: false, // The next click begins another thing.
@@ -148,14 +159,14 @@ export class Selecting {
     if (by > 0 ? more : less) this.place(widened(selection, by, selectionAnswer));
   }
 
-  /** A stroke of the brush, or a lasso.
+  /** A stroke of the brush, a lasso, or a rectangle.
    *    points  [x, y], pixels of the camera
    *    other   subtracts where adding is switched on, and the other way round */
   draw(tool, camera, points, other = false) {
     const { selection, selectOp, selectDepth: depth, brushRadius: radius } = this.#state;
     const drawn = { op: other ? OPPOSITE[selectOp] : selectOp, camera: onTheWire(camera), points, radius, depth };
-    const made = tool === "brush" ? strokeOf(drawn) : polygonOf(drawn);
-    if (!made) return this.say("Draw the lasso around what you mean.", { seconds: 3 });
+    const made = { brush: strokeOf, lasso: polygonOf, rectangle: rectangleOf }[tool](drawn);
+    if (!made) return this.say(`Draw the ${tool} around what you mean.`, { seconds: 3 });
     this.store.set({ tab: "drag" });
     this.place([...selection, made]);
   }
@@ -167,6 +178,12 @@ export class Selecting {
 
   remove(index) {
     this.place(this.#state.selection.filter((_, i) => i !== index));
+  }
+
+  /** Wider (1) or narrower (-1) all around. */
+  spread(by) {
+    const { selection, selectionAnswer: answer, selectionWaits } = this.#state;
+    if (answer?.count > 0 && !selectionWaits) this.place(spread(selection, by, answer));
   }
 
   invert() {

@@ -74,6 +74,27 @@ export function polygonOf({ op, camera, points, depth }) {
   return corners.length < 3 ? null : operation(op, { polygon: { camera, points: corners, depth } });
 }
 
+/** What a rectangle between two corners shows; null if that is no area. */
+export function rectangleOf({ points, ...drawn }) {
+  const [[x0, y0], [x1, y1]] = [points[0], points.at(-1)];
+  if (Math.min(Math.abs(x1 - x0), Math.abs(y1 - y0)) < 3) return null;
+  const corners = [
+    [x0, y0],
+    [x1, y0],
+    [x1, y1],
+    [x0, y1],
+  ];
+  return polygonOf({ ...drawn, points: corners });
+}
+
+/** A selection made wider (1) or narrower (-1) all around, by about two Gaussians: as far as they would be from each
+ *  other if they covered a square as long as its bounds. */
+export function spread(selection, by, { count, bounds: { low, high } }) {
+  const longest = Math.max(...low.map((l, i) => high[i] - l));
+  const distance = Number(((2 * longest) / Math.sqrt(count)).toPrecision(3));
+  return distance > 0 ? [...selection, by > 0 ? { expand: distance } : { shrink: distance }] : selection;
+}
+
 /** The other way round. Twice is as it was. */
 export function inverted(selection) {
   return selection.at(-1)?.invert ? selection.slice(0, -1) : [...selection, { invert: true }];

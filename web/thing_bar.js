@@ -18,6 +18,9 @@ export function buildThingBar(editor) {
     editor.holdThing();
     requestAnimationFrame(() => document.querySelector("[data-testid=handle-0-target]")?.focus());
   });
+  const remove = button("Remove", "thing-remove", "Take it away for good, and complete what it hid", () =>
+    editor.removeThing(),
+  );
   const repair = button("Repair", "thing-repair", "Run it as a draft", () => editor.runDraft(), {
     class: "small primary",
   });
@@ -33,7 +36,7 @@ export function buildThingBar(editor) {
     { class: "small primary" },
   );
   const undo = button("Undo", "thing-undo", "Back to before (Ctrl + Z)", () => editor.undo());
-  byId("thing-bar").append(line, problem, less, more, hold, repair, drop, cancel, better, undo);
+  byId("thing-bar").append(line, problem, less, more, hold, remove, repair, drop, cancel, better, undo);
 
   store.watch(
     [
@@ -52,6 +55,7 @@ export function buildThingBar(editor) {
         [less, idle && !moved && proposalOf(selection)],
         [more, idle && !moved && proposalOf(selection)],
         [hold, idle && !moved],
+        [remove, idle && !moved],
         [repair, idle && moved],
         [drop, idle],
         [cancel, draft !== null],

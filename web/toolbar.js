@@ -41,6 +41,8 @@ const HINTS = {
   ],
 };
 
+HINTS.rectangle = HINTS.lasso.map((text) => text.replace("Draw around", "Draw a rectangle around"));
+
 export function buildToolbar(editor, viewer) {
   const { store } = editor;
   const icon = (label, testid, title, onclick) =>

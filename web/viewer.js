@@ -297,7 +297,7 @@ export class Viewer {
     if (this.#gesture?.kind === "draw") this.giveUpDrag();
   }
 
-  /** What the pointer does: "thing", "handle", "grow", "brush" or "lasso". */
+  /** What the pointer does: "thing", "handle", "grow", "brush", "lasso" or "rectangle". */
   get tool() {
     const { selectMode, selectTool, thingMode } = this.#state;
     return selectMode ? selectTool : thingMode ? "thing" : "handle";
@@ -370,13 +370,13 @@ export class Viewer {
 
   /** What a pointer that goes down on the picture begins. Where the left button draws, the right one orbits. */
   #kindOf({ button, shiftKey }) {
-    const draws = this.tool === "brush" || this.tool === "lasso";
+    const draws = ["brush", "lasso", "rectangle"].includes(this.tool);
     if (button === 1 || shiftKey) return "pan";
     if (draws) return button === 2 ? "orbit" : "draw";
     return button === 2 ? "pan" : "orbit";
   }
 
-  /** A stroke or a lasso that is being drawn. Returns {move(x, y), end(), giveUp()}. */
+  /** A stroke, a lasso or a rectangle that is being drawn. Returns {move(x, y), end(), giveUp()}. */
   #sketch({ x, y }, other) {
     const { tool, camera } = this;
     const selecting = this.#editor.selecting;
@@ -391,7 +391,7 @@ export class Viewer {
     show();
     return {
       move: (toX, toY) => {
-        points = thinned([...points, [toX, toY]], SKETCH_PX);
+        points = tool === "rectangle" ? [points[0], [toX, toY]] : thinned([...points, [toX, toY]], SKETCH_PX);
         show();
       },
       end: () => {

@@ -1,17 +1,12 @@
 // Click, drag, done: a newcomer's first minutes, in a real browser, and what comes of them.
 import assert from 'node:assert/strict';
-import { mkdirSync } from 'node:fs';
 import { readFile } from 'node:fs/promises';
 import { createRequire } from 'node:module';
 import path from 'node:path';
 import { after, before, describe, test } from 'node:test';
-import { project } from '../../web/camera.js';
-import { launch, openPage, patience } from './support/browser.mjs';
+import { handOn, launch, openPage } from './support/browser.mjs';
 import { run, Service, temporaryFolder } from './support/program.mjs';
 import { datasetZip, demoScene } from './support/scenes.mjs';
-
-const shots = process.env.SPLATDRAG_SHOTS;
-if (shots) mkdirSync(shots, { recursive: true });
 
 let browser, axeSource;
 before(async () => {
@@ -24,46 +19,6 @@ after(() => browser?.close());
 const ball = { middle: [-0.28, -0.21, -0.62], radius: 0.21 };
 const add = (a, b) => a.map((x, i) => x + b[i]);
 const sub = (a, b) => a.map((x, i) => x - b[i]);
-
-/// The hand on the picture of an open page.
-const handOn = ({ page, id }) => {
-  const state = (wanted) => page.waitForFunction((name) => {
-    const bar = document.querySelector('[data-testid=thing-bar]');
-    return !bar.hidden && bar.dataset.state === name;
-  }, wanted, { timeout: 120_000 });
-  return {
-    state,
-    /// Until the picture on the screen is the full one of a version.
-    shown: (version) => page.waitForFunction((wanted) => {
-      const view = document.querySelector('[data-testid=view]');
-      return view?.dataset.version === String(wanted) && view.dataset.quality === 'full';
-    }, version, { timeout: patience }),
-    /// Where a point of the world is on the screen, once the page has remembered where it looks from.
-    onScreen: async (point) => {
-      await page.waitForTimeout(600);  // it saves a little later
-      const pose = await page.evaluate(() => {
-        const name = Object.keys(localStorage).find((key) => key.startsWith('splatdrag.scene.'));
-        return JSON.parse(localStorage.getItem(name)).pose;
-      });
-      const box = await id('view').boundingBox();
-      const { x, y } = project({ ...pose, width: box.width, height: box.height }, point);
-      return [box.x + x, box.y + y];
-    },
-    /// How many Gaussians are taken, once the page knows and the picture shows them.
-    count: async () => Number(await (await page.waitForFunction(() => {
-      const { count, waits } = document.querySelector('[data-testid=selection-count]').dataset;
-      const { selection, quality } = document.querySelector('[data-testid=view]').dataset;
-      return count > 0 && waits === undefined && selection && quality === 'full' && count;
-    })).jsonValue()),
-    drag: async (from, to, { drop = true } = {}) => {
-      await page.mouse.move(...from);
-      await page.mouse.down();
-      await page.mouse.move(...to, { steps: 12 });
-      if (drop) await page.mouse.up();
-    },
-    shot: (name) => shots && page.screenshot({ path: path.join(shots, `${name}.png`) }),
-  };
-};
 
 /// How near two versions look through some views, in dB, within the discs that a ball fills where it is and elsewhere:
 /// [dB for each middle]. Decoded where decoders are: in the page.
@@ -237,6 +192,25 @@ describe('a thing of a small scene', () => {
     await page.context().close();
   });
 
+  test('is removed by one press, which can be undone', async () => {
+    const { page, id, hand, complaints } = await opened();
+    await page.mouse.click(...await hand.onScreen(mug));
+    const count = await hand.count();
+    await id('thing-remove').click();
+    await hand.state('repairing');
+    await hand.state('done');
+    const [edit] = (await service.client.get('/v1/edits')).json().edits;
+    assert.deepEqual([edit.request.mode, edit.request.handles, edit.gaussians.removed >= count], ['remove', [], true]);
+    await hand.shown(edit.result_version);
+    await hand.shot('removed');
+    await id('thing-undo').click();
+    await hand.shown(0);
+    assert.equal(await hand.count(), count, 'it is there and taken, as before');
+    await service.client.delete(`/v1/scenes/${edit.scene}/versions/${edit.result_version}`);
+    assert.deepEqual(complaints, []);
+    await page.context().close();
+  });
+
   test('a preview that nobody kept is not how the scene is remembered', async () => {
     const { page, id, hand } = await opened();
     const remembered = () => page.evaluate(() => JSON.parse(localStorage.getItem(Object.keys(localStorage).find((key) => key.startsWith('splatdrag.scene.')))).thumbnail);
@@ -337,9 +311,9 @@ describe('a thing of a small scene', () => {
     await page.waitForFunction(() => /^p\d/.test(document.querySelector('[data-testid=view]').dataset.version));
     await touch('touchEnd', at);
     await hand.state('done');
-    await hand.shown(1);
-    await hand.shot('phone-done');
     const [edit] = (await service.client.get('/v1/edits')).json().edits;
+    await hand.shown(edit.result_version);
+    await hand.shot('phone-done');
     assert.equal(edit.handles[0].gaussians, count);
     assert.deepEqual(complaints, []);
     await page.context().close();

@@ -262,6 +262,28 @@ describe('selecting', () => {
     await desk.page.waitForFunction((n) => document.querySelector('[data-testid=selection-count]').dataset.count === String(n), whole);
   });
 
+  test('a rectangle goes around a thing, and what is selected is made wider and narrower', async () => {
+    const { page, id, drag, count, answerTo } = desk;
+    const until = (n) => page.waitForFunction((m) => document.querySelector('[data-testid=selection-count]').dataset.count === String(m), n);
+    await id('select-tool-rectangle').click();
+    const { asked } = await answerTo(() => drag([0.16, 0.58], [0.2, 0.7], [0.27, 0.74]));
+    assert.equal(asked[1].polygon.points.length, 4);
+    const more = await count();
+    assert.ok(more > whole);
+    await id('undo').click();
+    await until(whole);
+    const { asked: wider, answer } = await answerTo(() => id('expand-selection').click());
+    assert.ok(wider[1].expand > 0 && answer.count > whole, `${answer.count} of ${whole}`);
+    await until(answer.count);
+    const { answer: less } = await answerTo(() => id('shrink-selection').click());
+    assert.ok(less.count < answer.count);
+    await until(less.count);
+    await id('undo').click();
+    await id('undo').click();
+    await until(whole);
+    await count();
+  });
+
   test('what is selected is removed without a handle', async () => {
     const { page, id, complaints } = desk;
     const shown = () => page.getByTestId('picture').evaluate((canvas, [fx, fy]) =>

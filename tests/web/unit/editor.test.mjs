@@ -317,6 +317,22 @@ test("a draft whose request is still on its way when it is given up is cancelled
   assert.deepEqual([editor.state.draft, editor.state.edits], [null, []]);
 });
 
+test("a thing is removed by one press, and what is taken next is to be moved again", async () => {
+  const asked = [];
+  service["POST /v1/edits"] = (body) => (asked.push(body), edit());
+  await take();
+  await editor.removeThing();
+  await settle();
+  assert.deepEqual([asked[0].mode, asked[0].preset, asked[0].handles], ["remove", "draft", []]);
+  assert.equal(editor.state.draft.id, "e000001", "it is not outdated for want of a handle");
+  versionComes();
+  streams[0].send(edit({ state: "succeeded", progress: 1, result_version: 1, request: asked[0] }));
+  await settle();
+  assert.deepEqual([editor.state.version, editor.state.mode], [1, "move"]);
+  editor.undo();
+  assert.deepEqual([editor.state.version, editor.state.mode, editor.state.selection.length], [0, "remove", 1]);
+});
+
 test("who drags a thing has changed their mind about removing it", async () => {
   service["POST /v1/edits"] = () => edit();
   editor.settle({ mode: "remove" });

@@ -9,8 +9,10 @@ import {
   inverted,
   polygonOf,
   proposalOf,
+  rectangleOf,
   sentence,
   share,
+  spread,
   strokeOf,
   thingAt,
   thinned,
@@ -140,6 +142,23 @@ test("one click proposes the whole thing, which can be made more or less of, bor
     less: false,
   });
   assert.deepEqual(furtherBorders(null), { more: true, less: true });
+});
+
+test("a rectangle is a polygon of four corners, whichever way it was drawn; a line is none", () => {
+  const drawn = { op: "add", camera: CAMERA, depth: "through" };
+  const { polygon } = rectangleOf({ ...drawn, points: [[90, 80], [50, 50], [10, 20]] });
+  assert.deepEqual(polygon.points, [[90, 80], [10, 80], [10, 20], [90, 20]]);
+  assert.equal(polygon.depth, "through");
+  assert.equal(rectangleOf({ ...drawn, points: [[90, 80], [10, 81]] }), null);
+  assert.equal(rectangleOf({ ...drawn, points: [[90, 80]] }), null);
+});
+
+test("a selection is made wider and narrower in proportion to its size", () => {
+  const answer = { count: 1600, bounds: { low: [0, 0, 0], high: [1, 4, 2] } };
+  assert.deepEqual(spread(thingAt([0, 0, 0]), 1, answer).at(-1), { expand: 0.2 });
+  assert.deepEqual(spread(thingAt([0, 0, 0]), -1, answer).at(-1), { shrink: 0.2 });
+  const point = { count: 3, bounds: { low: [1, 1, 1], high: [1, 1, 1] } };
+  assert.equal(spread(thingAt([0, 0, 0]), 1, point).length, 1, "what has no size has nothing to go by");
 });
 
 test("a selection made by hand is no proposal", () => {
