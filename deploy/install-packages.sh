@@ -21,7 +21,7 @@ packages=(
   curl jq                                              # the demo talks to the service
 )
 if [[ "${1:-}" == tests ]]; then
-  packages+=(chromium)
+  packages+=(chromium webp)  # webp: the README's animation
   # A newer Node.js from elsewhere will do.
   if ! command -v node >/dev/null || ! command -v npm >/dev/null; then
     packages+=(nodejs npm)

@@ -24,6 +24,7 @@ using engine::name_of;  // of an enumerator, such as "subtract"
 constexpr std::size_t max_operations = 256;
 constexpr std::size_t max_points = 4'096;  ///< Of one operation.
 constexpr std::size_t max_masks = 64;      ///< Of one operation.
+constexpr int max_wider = 64;              ///< Borders farther out or in.
 constexpr std::size_t max_ranges = 100'000;
 constexpr std::size_t max_image_bytes = std::size_t{16} << 20;  ///< Of a mask, as base64.
 constexpr double max_pixel_position = 1e6;
@@ -80,6 +81,8 @@ struct Stroke {
 struct Grow {
   std::vector<Point> inside, outside;  ///< 1 or more on the thing; on what is not meant.
   std::optional<double> reach;         ///< World units, above 0, from inside[0].
+  bool whole = false;                  ///< All of the thing, where a part of it ends nearly as sharply.
+  int wider = 0;                       ///< Borders farther out, -64 to 64; below 0: farther in.
   bool operator==(const Grow&) const = default;
 };
 

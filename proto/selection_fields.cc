@@ -77,11 +77,13 @@ Action read_stroke(const JsonField& field) {
 }
 
 Action read_grow(const JsonField& field) {
-  const Members members(field, {"inside", "outside", "reach"});
+  const Members members(field, {"inside", "outside", "reach", "whole", "wider"});
   Grow grow;
   if (const auto f = members.required("inside")) grow.inside = read_points(*f, 1);
   if (const auto f = members.optional("outside")) grow.outside = read_points(*f, 0);
   if (const auto f = members.optional("reach")) grow.reach = f->length();
+  if (const auto f = members.optional("whole")) grow.whole = f->boolean();
+  if (const auto f = members.optional("wider")) grow.wider = f->whole(-max_wider, max_wider);
   return grow;
 }
 
@@ -188,6 +190,8 @@ ordered_json encode(const Grow& grow) {
   ordered_json out{{"inside", grow.inside}};
   if (!grow.outside.empty()) out["outside"] = grow.outside;
   if (grow.reach) out["reach"] = *grow.reach;
+  if (grow.whole) out["whole"] = true;
+  if (grow.wider != 0) out["wider"] = grow.wider;
   return out;
 }
 ordered_json encode(const Masks& masks) {

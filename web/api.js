@@ -120,11 +120,11 @@ export const views = (id) => json(`/v1/scenes/${part(id)}/views`);
 
 const versionPath = (id, version) => `/v1/scenes/${part(id)}/versions/${part(version)}`;
 
-/** A picture, as a Blob. `body`: {camera, what, format, ...}. */
+/** A picture: {blob, timing}, its Server-Timing. `body`: {camera, what, format, ...}. */
 export async function render(id, version, body, signal) {
   const response = await send(`${versionPath(id, version)}/render`, jsonBody("POST", body, { signal }));
   try {
-    return await response.blob();
+    return { blob: await response.blob(), timing: response.headers.get("Server-Timing") };
   } catch (error) {
     throw wasGivenUp(error) ? error : unreachable();
   }

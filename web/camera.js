@@ -11,6 +11,10 @@ const DEFAULT_FOV = 50;
 
 // An orbit stops this far from looking straight along the up axis, where left and right have no meaning.
 const POLE_MARGIN = (3 * Math.PI) / 180;
+// A plane whose angle to a ray has less than this sine is seen edge-on; choices, as the next two.
+const EDGE_ON = 0.05;
+const FARTHEST = 4; // Times the distance at which a drag began.
+const FACES_CAMERA = 0.97; // Cosine of the angle between an axis and the way to the camera: 14 degrees.
 // Nothing nearer than this fraction of the distance to the pivot is drawn over the picture.
 const NEAR = 1e-4;
 
@@ -94,14 +98,35 @@ export function onLine(camera, x, y, through, axis) {
   return addScaled(through, axis, along);
 }
 
+/** The point under a pixel position on the plane through `through` at right angles to the unit vector `normal`. Where
+ *  the plane is seen nearly edge-on, or only its horizon is there, the point under it on the plane that faces the
+ *  camera, moved along `normal` into the plane: still somewhere that a hand can follow. */
+export function onPlane(camera, x, y, through, normal) {
+  const { origin, direction } = rayThrough(camera, x, y);
+  const facing = dot(direction, normal);
+  const away = Math.abs(facing) < EDGE_ON ? Infinity : dot(sub(through, origin), normal) / facing;
+  // Towards the horizon the plane runs away from under the hand.
+  if (away > 0 && away < FARTHEST * distance(through, origin)) return addScaled(origin, direction, away);
+  const point = onViewPlane(camera, x, y, through);
+  return addScaled(point, normal, -dot(sub(point, through), normal));
+}
+
 /** Where a dragged point goes.
  *    from        where it was when the drag began
  *    x, y        where it is asked to be, pixels
- *    constraint  "view" (the plane that faces the camera), "x", "y", "z", or "normal" (along `normal`, if there is one)
- */
-export function dragged(camera, from, x, y, constraint, normal = null) {
+ *    constraint  "view" (the plane that faces the camera), "level" (the plane at right angles to `up`), "x", "y", "z", or
+ *                "normal" (along `normal`, if there is one)
+ *  An axis that nearly faces the camera says nothing about where a pixel is on it: there the point goes along it by as
+ *  much as the hand moves up (towards the camera) or down. */
+export function dragged(camera, from, x, y, constraint, { normal = null, up = DEFAULT_UP } = {}) {
+  if (constraint === "level") return onPlane(camera, x, y, from, unit(up, DEFAULT_UP));
   const axis = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1], normal: normal && unit(normal) }[constraint];
-  return axis ? onLine(camera, x, y, from, axis) : onViewPlane(camera, x, y, from);
+  if (!axis) return onViewPlane(camera, x, y, from);
+  const towards = dot(axis, unit(sub(camera.eye, from)));
+  if (Math.abs(towards) < FACES_CAMERA) return onLine(camera, x, y, from, axis);
+  const seen = project(camera, from);
+  const up_px = seen ? seen.y - y : 0;
+  return addScaled(from, axis, Math.sign(towards) * up_px * unitsPerPixel(camera, from));
 }
 
 /** World units that a pixel covers at the depth of a point; 0 behind the camera. */
@@ -143,6 +168,19 @@ export function boxEdges(center, size) {
   return edges;
 }
 
+/** The ellipse that a box fills in the picture, {x, y, rx, ry}: within the rectangle around its corners. Null if some of
+ *  it is behind the camera. */
+export function ellipseOf(camera, { low, high }) {
+  const corners = boxEdges(
+    low.map((l, i) => (l + high[i]) / 2),
+    low.map((l, i) => high[i] - l),
+  ).map(([corner]) => project(camera, corner));
+  if (corners.some((corner) => !corner)) return null;
+  const [left, right] = [Math.min, Math.max].map((of) => of(...corners.map(({ x }) => x)));
+  const [top, bottom] = [Math.min, Math.max].map((of) => of(...corners.map(({ y }) => y)));
+  return { x: (left + right) / 2, y: (top + bottom) / 2, rx: (right - left) / 2, ry: (bottom - top) / 2 };
+}
+
 /** Turns the camera about its target: `yaw` about the world's up axis, `pitch` about its own horizontal, radians.
  *  Positive values move the scene right and down, as a hand on it would. */
 export function orbited(pose, yaw, pitch, worldUp) {
@@ -168,6 +206,16 @@ export function dollied(pose, factor, least) {
   const back = sub(pose.eye, pose.target);
   const wanted = Math.max(length(back) * factor, least);
   return { ...pose, eye: addScaled(pose.target, unit(back), wanted) };
+}
+
+/** Moves the camera to `factor` times its distance from what is at the pivot's depth under a pixel position, which stays
+ *  where it is in the picture; but no nearer to the pivot than `least`. */
+export function zoomedAt(camera, x, y, factor, least) {
+  const { width, height, ...pose } = camera;
+  const point = onViewPlane(camera, x, y, pose.target);
+  const allowed = Math.max(factor, Math.min(1, least / distance(pose.eye, pose.target)));
+  const scaled = (p) => addScaled(point, sub(p, point), allowed);
+  return { ...pose, eye: scaled(pose.eye), target: scaled(pose.target) };
 }
 
 /** Moves camera and pivot so that `point` is the pivot, seen from the same direction and distance. */

@@ -130,28 +130,45 @@ export function showPictures(title, pictures) {
   );
 }
 
-export function showHelp() {
+/**   letterKeys, setLetterKeys(on)  whether single letters are keys for commands */
+export function showHelp({ letterKeys, setLetterKeys }) {
+  const touch = [
+    ["Tap", "take the thing under the finger, or what the tool does"],
+    ["Drag a thing that is taken", "move it; let go, and it is repaired"],
+    ["Drag beside it", "orbit"],
+    ["Two fingers", "move sideways, nearer, farther"],
+    ["Tap twice", "turn about that point"],
+    ["Hold to compare", "see it as it was before"],
+  ];
   const keys = [
-    ["Drag", "orbit"],
+    ["Click", "take the thing under the pointer; with Handles: place one; with Select: select"],
+    ["Drag a thing that is taken", "move it; let go, and it is repaired"],
+    ["Drag beside it", "orbit"],
     ["Right drag, or Shift + drag", "move sideways"],
     ["Wheel, or + and −", "nearer, farther"],
-    ["Click", "place a handle on the surface"],
-    ["Drag a handle's dot", "set where it goes"],
+    ["Double click, or F", "turn about the point under the pointer"],
+    ["Drag a handle's dot", "set where it goes; the arrow keys move it, too"],
     ["Wheel over a dot", "its radius"],
     ["Arrow keys", "orbit; with Shift: move sideways"],
-    ["Enter", "place a handle, or a point that selects, in the middle of the picture"],
-    ["F", "turn about the point under the pointer"],
-    ["S", "select what moves, and back to handles"],
-    ["1, 2, 3", "select by clicks, brush, lasso"],
+    ["Enter", "click in the middle of the picture"],
+    [". and ,", "more, less of the thing that is taken"],
+    ["D, H", "drag things, place handles"],
+    ["S", "select what moves, and back"],
+    ["1, 2, 3, 4", "select by clicks, brush, lasso, rectangle"],
     ["Right click, or Alt", "selecting: what is not meant"],
+    ["V, L, X, Y, Z, N", "drag in the view's plane, level, along an axis, along the normal"],
     ["[ and ]", "previous, next view"],
     ["R", "back to the start"],
     ["B (hold)", "compare with before"],
     ["P", "preview"],
     ["Del", "remove the selected handle"],
-    ["Ctrl + Z, Ctrl + Shift + Z", "undo, redo what you placed"],
-    ["Esc", "give a drag up; end selecting; no handle"],
+    ["Ctrl + Z, Ctrl + Shift + Z", "undo, redo"],
+    ["Esc", "give a drag up; end selecting; let go"],
+    ["?", "this help"],
   ];
+  const rows = matchMedia("(hover: none)").matches ? touch : keys;
+  const letters = h("input", { type: "checkbox", testid: "letter-keys", checked: letterKeys });
+  letters.addEventListener("change", () => setLetterKeys(letters.checked));
   const dialog = modal(
     h(
       "dialog",
@@ -165,28 +182,21 @@ export function showHelp() {
       h(
         "ol",
         { class: "steps" },
-        h("li", {}, "Click a part of the scene: a handle takes hold of the Gaussians within its radius."),
+        h("li", {}, "Click a thing: all of it is found and tinted. “More” and “Less” widen and narrow it."),
+        h("li", {}, "Drag it to where it should go, and let go: what it uncovers is repaired, as a draft."),
+        h("li", {}, "“Run it well” takes longer and does it better. Each result is a new version; the old ones stay."),
         h(
           "li",
           {},
-          "To say more exactly what moves, select it: click it, paint over it or draw around it. What is selected is tinted.",
-        ),
-        h(
-          "li",
-          {},
-          "Drag the handle's dot to where that part should go. A handle without a target is an anchor: what it holds stays.",
-        ),
-        h(
-          "li",
-          {},
-          "Look at the preview, change what you like, then run the edit. The result is a new version; the old one stays.",
+          "For a part of a thing, select it (clicks, brush, lasso), or place handles: each holds the Gaussians within its radius. One without a target is an anchor: what it holds stays.",
         ),
       ),
       h(
         "dl",
         { class: "keys" },
-        keys.flatMap(([key, what]) => [h("dt", {}, key), h("dd", {}, what)]),
+        rows.flatMap(([key, what]) => [h("dt", {}, key), h("dd", {}, what)]),
       ),
+      h("label", { class: "toggle" }, letters, "Single letters are keys for these commands"),
     ),
   );
 }

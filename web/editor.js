@@ -15,6 +15,7 @@ import {
 } from "./camera.js";
 import { History } from "./history.js";
 import { changesScene, previewKey, requestOf } from "./requests.js";
+import { proposalOf } from "./selection.js";
 import { NOTHING_SELECTED, Selecting } from "./selecting.js";
 import { follow, hasEnded, merged } from "./watch.js";
 
@@ -54,16 +55,29 @@ export const NOTHING_OPEN = {
   problem: null, // {error, key, from: "preview" | "run"}: what the service refused.
   estimate: null, // {key, ...}: what the service expects of a run.
   submitting: false,
+  draftOnRelease: true, // A thing that was dragged is repaired as a draft as soon as it is let go.
+  draft: null, // {id} of the draft that is under way; id null until the service has it.
+  drafted: null, // {version, base, request}: what the last draft made, of which version, of which request.
   edits: [],
   tab: "drag",
 };
 
+/** What undo brings back, all at once: a drag is meant on a version, in a mode, with settings. */
+const PLACED_KEYS = [
+  ...["version", "handles", "selection", "region", "mode", "preset", "params", "heal", "attach", "crumbs"],
+];
+/** What goes from the screen when another version comes. */
+const OF_THE_VERSION = { comparing: false, compareWith: null, preview: null, problem: null, estimate: null };
+
 // What outlives a reload: as it is; and all, of which open() puts back what still fits the scene.
 const LASTING_KEYS = [
   ...["region", "mode", "preset", "crumbs", "prompt", "params", "autoPreview", "layer", "tab", "constraint"],
-  ...["selectTool", "selectDepth", "brushRadius", "tinted"],
+  ...["thingMode", "selectTool", "selectDepth", "brushRadius", "tinted", "draftOnRelease"],
 ];
 const STORED_KEYS = ["pose", "version", "handles", "selection", "viewName", ...LASTING_KEYS];
+
+/** How one compares: where there are no keys, by the button. */
+const HOLD = globalThis.matchMedia?.("(hover: none)").matches ? "Hold the button" : "Hold B";
 
 /** The members of an object that have these names, as far as it has them. */
 const only = (names, from) =>
@@ -93,13 +107,17 @@ export class Editor {
   #placing = null;
   #nextId = 1;
   #pending = null; // {body, key} of a submission whose answer never came.
+  #abandoned = new Set(); // Ids of edits that were begun and that nobody wants to hear of.
   #opened = 0;
   #lastView = null;
 
   /**   say(message, options)  a short message to the user */
   constructor(store, memory, say) {
     Object.assign(this, { store, memory, say });
-    this.selecting = new Selecting(store, { place: (selection) => this.#place({ selection }), say });
+    this.selecting = new Selecting(store, {
+      place: (selection, more = {}) => this.#place({ selection, ...more }),
+      say,
+    });
     store.watch(["handles", "selection", "version", "scene", "dragging"], () => this.#countSoon());
     store.watch(["layer", "version", "preview"], ({ layer, version, preview }) => {
       // Version 0 does not differ from itself.
@@ -121,6 +139,7 @@ export class Editor {
       ],
       () => this.#requestChanged(),
     );
+    store.watch(["handles", "selection", "version", "mode"], () => this.#draftOutdated());
     store.watch(STORED_KEYS, () => this.#saveSoon());
   }
 
@@ -166,6 +185,7 @@ export class Editor {
     for (const abort of [this.#counting, this.#previewing, this.#placing]) abort?.abort();
     this.#previewing = null;
     this.#pending = null;
+    this.#abandoned.clear();
     this.#history.clear();
     if (this.state.scene) this.#save();
     this.store.set({ ...NOTHING_OPEN });
@@ -267,34 +287,52 @@ export class Editor {
   /** Looks at, and from now on edits, another version. Handles were placed on the old one: they stay, since versions
    *  share the frame, and can be undone. */
   showVersion(version) {
-    this.store.set({ version, comparing: false, compareWith: null, preview: null, problem: null, estimate: null });
+    this.store.set({ version, ...OF_THE_VERSION });
   }
 
-  // --- what is placed: handles and the selection -------------------------------------------------------------------
+  // --- what is placed: handles, the selection, and how they are meant ----------------------------------------------
 
-  /** What undo brings back: {handles, selection}; the same object as long as both are. */
+  /** What undo brings back; the same object as long as all of it is. */
   #present() {
-    const { handles, selection } = this.state;
-    if (this.#placed?.handles !== handles || this.#placed.selection !== selection)
-      this.#placed = { handles, selection };
+    const present = only(PLACED_KEYS, this.state);
+    if (PLACED_KEYS.some((key) => this.#placed?.[key] !== present[key])) this.#placed = present;
     return this.#placed;
   }
 
-  /** Puts handles, a selection, or both in place of what is there. */
-  #place({ handles = this.state.handles, selection = this.state.selection }, note = true) {
+  /** Puts something in place of what is there. */
+  #place(patch, note = true) {
     if (note) this.#history.note(this.#present());
-    const { selected } = this.state;
-    this.store.set({ handles, selection, selected: handles.some((h) => h.id === selected) ? selected : null });
+    const { selected, version } = this.state;
+    const { handles = this.state.handles } = patch;
+    const moves = patch.version !== undefined && patch.version !== version;
+    this.store.set({
+      ...patch,
+      selected: handles.some((h) => h.id === selected) ? selected : null,
+      ...(moves ? OF_THE_VERSION : {}),
+    });
+  }
+
+  /** Changes how the drag is meant: mode, preset, params, region and the like. */
+  settle(patch) {
+    this.#place(patch);
   }
 
   undo() {
-    const placed = this.#history.undo(this.#present());
-    if (placed) this.#place(placed, false);
+    this.#step((present) => this.#history.undo(present));
   }
 
   redo() {
-    const placed = this.#history.redo(this.#present());
-    if (placed) this.#place(placed, false);
+    this.#step((present) => this.#history.redo(present));
+  }
+
+  /** What was placed on a version that has been deleted since is passed over. */
+  #step(next) {
+    for (;;) {
+      const placed = next(this.#present());
+      if (!placed) return;
+      if (this.state.scene && !this.state.scene.versions.some((v) => v.version === placed.version)) continue;
+      return this.#place(placed, false);
+    }
   }
 
   get canUndo() {
@@ -319,21 +357,25 @@ export class Editor {
       const picked = await api.pick(scene.id, version, { camera: onTheWire(camera), x, y }, abort.signal);
       if (abort.signal.aborted) return;
       if (!picked.hit) return this.say("There is nothing here to take hold of.", { seconds: 3 });
-      const handle = {
-        id: this.#nextId++,
-        source: picked.point,
-        normal: picked.normal ?? null,
-        target: null,
-        radius: this.#defaultRadius(),
-        grip: null,
-        group: this.state.handles.at(-1)?.group ?? 0,
-      };
+      const handle = this.#newHandle(picked.point, picked.normal);
       this.#place({ handles: [...this.state.handles, handle] });
       // The handle is on the version, not on what a preview has made of it.
       this.store.set({ selected: handle.id, tab: "drag" });
     } catch (error) {
       if (!api.wasGivenUp(error)) this.say(`No handle could be placed: ${error.message}`, { kind: "bad" });
     }
+  }
+
+  #newHandle(source, normal = null) {
+    return {
+      id: this.#nextId++,
+      source,
+      normal,
+      target: null,
+      radius: this.#defaultRadius(),
+      grip: null,
+      group: this.state.handles.at(-1)?.group ?? 0,
+    };
   }
 
   /** The point of the surface under a pixel; null if there is none. */
@@ -364,8 +406,48 @@ export class Editor {
    *    at  {x, y} where the pointer took hold, pixels
    *  Returns {move(x, y), end(), giveUp()}. */
   dragTarget(id, camera, at) {
+    const { handles } = this.state;
+    return this.#drag(
+      handles.find((h) => h.id === id),
+      { camera, at },
+    );
+  }
+
+  /** Drags what is selected as a body, by the handle that is there or one that comes with the first movement; letting
+   *  go repairs it as a draft, if that is wished. As dragTarget(). */
+  dragThing(camera, at) {
+    const { handles, selection, selectionAnswer, mode } = this.state;
+    const handle = handles.at(-1) ?? this.#newHandle(proposalOf(selection)?.inside[0] ?? selectionAnswer.centre);
+    // What is removed goes nowhere: who drags has changed their mind.
+    const settings = mode === "remove" ? { mode: "move" } : {};
+    return this.#drag(handle, { camera, at, settings, ended: () => this.state.draftOnRelease && this.runDraft() });
+  }
+
+  /** Takes away what is selected, for good. */
+  removeThing() {
+    this.#place({ mode: "remove", handles: [] });
+    return this.runDraft();
+  }
+
+  /** Lets go of what is selected, wherever it was dragged. */
+  letGo() {
+    this.#place({ handles: [], selection: [] });
+  }
+
+  /** Where what is selected would be held: a handle there, to be moved by keys or numbers. */
+  holdThing() {
+    const { handles, selection, selectionAnswer } = this.state;
+    if (handles.length > 0) return this.select(handles.at(-1).id);
+    const source = proposalOf(selection)?.inside[0] ?? selectionAnswer?.centre;
+    if (!source) return;
+    const handle = this.#newHandle(source);
+    this.#place({ handles: [{ ...handle, target: source }] });
+    this.store.set({ selected: handle.id });
+  }
+
+  #drag(handle, { camera, at, settings = {}, ended = () => {} }) {
     const before = this.#present();
-    const handle = before.handles.find((h) => h.id === id);
+    const { id } = handle;
     const from = handle.target ?? handle.source;
     const seen = project(camera, from) ?? at;
     const [gripX, gripY] = [seen.x - at.x, seen.y - at.y];
@@ -373,13 +455,22 @@ export class Editor {
     this.store.set({ selected: id });
     return {
       move: (x, y) => {
-        if (!moved) this.#history.note(before);
+        if (!moved) {
+          this.#giveUpDraft();
+          this.#history.note(before);
+          const there = this.state.handles.some((h) => h.id === id);
+          this.#place({ ...settings, handles: there ? this.state.handles : [...this.state.handles, handle] }, false);
+        }
         moved = true;
-        const target = dragged(camera, from, x + gripX, y + gripY, this.state.constraint, handle.normal);
-        this.store.set({ dragging: true });
+        const axes = { normal: handle.normal, up: this.worldUp };
+        const target = dragged(camera, from, x + gripX, y + gripY, this.state.constraint, axes);
+        this.store.set({ dragging: true, selected: id });
         this.change(id, { target }, false);
       },
-      end: () => this.store.set({ dragging: false }),
+      end: () => {
+        this.store.set({ dragging: false });
+        if (moved) ended();
+      },
       giveUp: () => {
         if (moved) this.undo();
         this.store.set({ dragging: false });
@@ -526,6 +617,66 @@ export class Editor {
     this.store.set({ submitting: false });
   }
 
+  /** Repairs what is on the screen as a draft. Its result is shown when it is there. */
+  async runDraft() {
+    this.#giveUpDraft();
+    const draft = { id: null };
+    this.store.set({ draft, drafted: null });
+    const request = { ...this.request(), preset: "draft" };
+    try {
+      const edit = await api.createEdit(request, freshKey());
+      if (this.state.draft !== draft) return this.#abandon(edit.id);
+      this.store.set({ draft: { id: edit.id }, edits: merged(this.state.edits, edit) });
+      this.#followAll();
+    } catch (error) {
+      if (this.state.draft !== draft) return;
+      this.store.set({ draft: null, problem: { error, key: JSON.stringify(this.request()), from: "run" } });
+    }
+  }
+
+  /** Ends the draft under way, which nobody waits for any more. */
+  #giveUpDraft() {
+    const { draft } = this.state;
+    if (!draft) return;
+    this.store.set({ draft: null });
+    if (draft.id) this.#abandon(draft.id);
+  }
+
+  cancelDraft() {
+    this.#giveUpDraft();
+  }
+
+  /** The service need not go on with an edit, and nobody wants to hear of it. It may have ended meanwhile. */
+  #abandon(id) {
+    this.#abandoned.add(id);
+    this.store.set({ edits: this.state.edits.filter((e) => e.id !== id) });
+    api.cancelEdit(id).catch(() => {});
+  }
+
+  /** What a draft was to repair has been changed, or undone: it is no longer wanted. */
+  #draftOutdated() {
+    const { draft, drafted, version } = this.state;
+    if (draft && !changesScene(this.state)) this.#giveUpDraft();
+    if (drafted && version !== drafted.version) this.store.set({ drafted: null });
+  }
+
+  /** Runs what the last draft was made of once more, on the same version, as well as it can be done. */
+  async runBetter() {
+    const { drafted } = this.state;
+    if (!drafted) return;
+    const { request, base } = drafted;
+    const { preset: _, ...rest } = request;
+    this.store.set({ submitting: true });
+    try {
+      const edit = await api.createEdit({ ...rest, scene: this.state.scene.id, version: base, preset: "standard" }, freshKey());
+      this.store.set({ drafted: { ...drafted, better: edit.id }, edits: merged(this.state.edits, edit) });
+      this.#followAll();
+    } catch (error) {
+      this.say(`It could not be run: ${error.detail ?? error.message}`, { kind: "bad" });
+    }
+    this.store.set({ submitting: false });
+  }
+
   /** Puts a request on the screen, in place of what is there. */
   load(request) {
     const { selection = [] } = request;
@@ -540,18 +691,21 @@ export class Editor {
       rotation: handle.rotation ?? null, // a request may have these; the page has no field for them yet
       scale: handle.scale ?? null,
     }));
-    this.#place({ handles, selection });
-    this.store.set({
+    this.#place({
+      handles,
+      selection,
       attach: request.attach ?? null,
       crumbs: request.crumbs ?? null,
       heal: request.heal ?? [],
-      selectMode: false,
-      selected: null,
       mode: request.mode ?? "move",
       preset: request.preset ?? "",
-      prompt: request.prompt ?? null,
       region: request.region ?? null,
       params: request.params ?? {},
+    });
+    this.store.set({
+      selectMode: false,
+      selected: null,
+      prompt: request.prompt ?? null,
       problem: null,
       tab: "drag",
     });
@@ -574,7 +728,7 @@ export class Editor {
   /** Follows every edit that has not ended: the oldest of them, which runs or is next to, by events; the others, which
    *  wait, by asking. Browsers allow few connections at once. */
   #followAll() {
-    const open = this.state.edits.filter((e) => !hasEnded(e)).reverse();
+    const open = this.state.edits.filter((e) => !hasEnded(e) && !this.#abandoned.has(e.id)).reverse();
     open.forEach((edit, i) => {
       const how = i === 0 ? "events" : "ask";
       const current = this.#following.get(edit.id);
@@ -595,6 +749,11 @@ export class Editor {
   }
 
   #editUpdated(edit) {
+    if (this.#abandoned.has(edit.id)) {
+      if (!hasEnded(edit)) return;
+      this.#following.delete(edit.id);
+      return this.#followAll();
+    }
     const before = this.state.edits.find((e) => e.id === edit.id);
     this.store.set({ edits: merged(this.state.edits, edit) });
     if (!hasEnded(edit)) return;
@@ -610,6 +769,9 @@ export class Editor {
   }
 
   async #editEnded(edit) {
+    const { draft, drafted } = this.state;
+    const isDraft = draft?.id === edit.id;
+    if (isDraft && (edit.state !== "succeeded" || edit.result_version === null)) this.store.set({ draft: null });
     if (edit.state === "failed") {
       this.say(`The edit failed: ${edit.error?.detail ?? "no reason was given"}`, { kind: "bad", seconds: 12 });
       return;
@@ -623,16 +785,31 @@ export class Editor {
     }
     if (opening !== this.#opened) return;
     const say = (text, action) => this.say(text, { kind: "good", seconds: 10, action });
+    if (isDraft) {
+      this.#finish(edit);
+      const done = { version: edit.result_version, base: edit.version, request: edit.request, edit: edit.id };
+      return this.store.set({ draft: null, drafted: done });
+    }
+    if (drafted?.better === edit.id && this.state.version === drafted.version) {
+      this.showVersion(edit.result_version);
+      return say(`Version ${edit.result_version} is what the draft was for. ${HOLD} to compare.`);
+    }
     if (this.state.version !== edit.version)
       return say(`Version ${edit.result_version} is ready.`, {
         label: "Show",
         run: () => this.showVersion(edit.result_version),
       });
-    // What was dragged is where it should be: handles and selection have done their work. They can be had back by undo.
-    this.#place({ handles: [], selection: [] });
+    this.#finish(edit);
+    say(`Version ${edit.result_version} is ready. ${HOLD} to compare it with version ${edit.version}.`);
+  }
+
+  /** Shows what an edit has made of the version on the screen. What was dragged is where it should be: handles, selection
+   *  and the box have done their work. Undo brings them back, and the version that they were on. */
+  #finish(edit) {
+    // Removing is no habit: what is taken next is to be moved.
+    const mode = this.state.mode === "remove" ? "move" : this.state.mode;
+    this.#place({ handles: [], selection: [], region: null, heal: [], mode, version: edit.result_version });
     this.selecting.use(null);
-    this.showVersion(edit.result_version);
-    say(`Version ${edit.result_version} is ready. Hold B to compare it with version ${edit.version}.`);
   }
 
   async stopEdit(id) {

@@ -1,6 +1,7 @@
 // Requests for pictures while the camera moves: how large, and in which order.
 
-/** Chooses the size of pictures while moving so that one comes back in about `goal` ms. */
+/** Chooses the size of pictures while moving so that the service works about `goal` ms on one. The way there and back
+ *  has no say in it: smaller pictures would not come sooner for it. */
 export class AdaptiveSide {
   #side;
 
@@ -14,7 +15,7 @@ export class AdaptiveSide {
     return Math.round(this.#side / 16) * 16;
   }
 
-  /** A picture of the present size took `ms` from question to screen. */
+  /** A picture of the present size took the service `ms`. */
   record(ms) {
     const { min, max, goal } = this.limits;
     // Cost grows with the area, in part: half of the correction, and no more than a third at once, so that one slow
@@ -24,57 +25,76 @@ export class AdaptiveSide {
   }
 }
 
-/** Requests one picture at a time; of the requests made meanwhile, only the latest is carried out next. An older answer
- *  can therefore never replace a newer one.
+/** How long the service worked on a picture, ms, by its Server-Timing header; null where that says nothing. */
+export function serverTime(header) {
+  const times = [...(header ?? "").matchAll(/;\s*dur=([\d.]+)/g)].map(([, ms]) => Number(ms));
+  return times.length > 0 ? times.reduce((sum, ms) => sum + ms, 0) : null;
+}
+
+/** Requests pictures, a few at a time; of the requests made meanwhile, only the latest is carried out next. An answer
+ *  that comes after that of a later request is dropped: an older picture never replaces a newer one.
  *    load(job, signal)        returns the picture
  *    onPicture(picture, job)  is called when it has arrived
  *    onError(error, job)      is called when loading failed, but not for a picture that was given up
- *  A job is {key, large, ...}: equal keys are equal pictures; a large one is given up as soon as another is requested. */
+ *    atOnce                   so many small ones are under way at most: the way there and back then costs no pictures
+ *  A job is {key, large, ...}: equal keys are equal pictures; a large one goes alone, and is given up as soon as another
+ *  is requested. */
 export class FrameQueue {
-  #running = null;
+  #running = []; // In the order in which they were requested.
   #next = null;
+  #count = 0;
+  #latest = 0; // Number of the latest request that was answered.
 
-  constructor({ load, onPicture, onError }) {
-    Object.assign(this, { load, onPicture, onError });
+  constructor({ load, onPicture, onError, atOnce = 1 }) {
+    Object.assign(this, { load, onPicture, onError, atOnce });
   }
 
   get busy() {
-    return this.#running !== null;
+    return this.#running.length > 0;
   }
 
   request(job) {
-    if (!this.#running) {
-      this.#start(job);
-    } else if (this.#running.job.key === job.key && !this.#running.abort.signal.aborted) {
+    const last = this.#running.at(-1);
+    if (last?.job.key === job.key && !last.abort.signal.aborted) {
       this.#next = null;
-    } else {
-      this.#next = job;
-      if (this.#running.job.large) this.#running.abort.abort();
+      return;
     }
+    if (this.#hasRoomFor(job)) return this.#start(job);
+    this.#next = job;
+    for (const one of this.#running) if (one.job.large) one.abort.abort();
+  }
+
+  #hasRoomFor({ large }) {
+    if (this.#running.length === 0) return true;
+    return !large && this.#running.length < this.atOnce && !this.#running.some((one) => one.job.large);
   }
 
   /** Gives everything up. */
   clear() {
     this.#next = null;
-    this.#running?.abort.abort();
+    for (const one of this.#running) one.abort.abort();
   }
 
   async #start(job) {
-    const abort = new AbortController();
-    this.#running = { job, abort };
+    const one = { job, abort: new AbortController(), number: ++this.#count };
+    this.#running.push(one);
     let outcome;
     try {
-      const picture = await this.load(job, abort.signal);
+      const picture = await this.load(job, one.abort.signal);
       outcome = () => this.onPicture(picture, job);
     } catch (error) {
       outcome = () => this.onError(error, job);
     }
-    this.#running = null;
-    if (!abort.signal.aborted) outcome();
+    this.#running = this.#running.filter((other) => other !== one);
+    if (!one.abort.signal.aborted && one.number > this.#latest) {
+      this.#latest = one.number;
+      outcome();
+    }
     // The call may itself have led to a new request, which is then under way.
     const next = this.#next;
+    if (!next || !this.#hasRoomFor(next)) return;
     this.#next = null;
-    if (next && !this.#running) this.#start(next);
+    this.#start(next);
   }
 }
 

@@ -13,7 +13,7 @@ const SLIDER = { low: 1e-3, high: 2, steps: 400 };
 const NO_HANDLES = {
   spheres: "No handles yet. Click a part of the scene to take hold of it, then drag the dot to where it should go.",
   selection:
-    "What is selected moves with a handle: take “Handles”, click on it, then drag the dot to where it should go.",
+    "Drag what is selected to where it should go. Or take “Handles”: each click on it places one, whose dot you drag.",
   removal: "What is selected will be removed. It needs no handle.",
 };
 

@@ -12,6 +12,7 @@ import { buildRequestPanel, importFile } from "./request_panel.js";
 import { buildScenes, SCENE_FILES } from "./scenes.js";
 import { buildSelectionPanel, buildTools, SELECT_TOOLS } from "./selection_panel.js";
 import { SceneMemory, Store } from "./store.js";
+import { buildThingBar } from "./thing_bar.js";
 import { buildToolbar } from "./toolbar.js";
 import { buildVersions } from "./versions.js";
 import { Viewer } from "./viewer.js";
@@ -33,6 +34,7 @@ const scenes = buildScenes(byId("home"), { store, memory, open: goTo });
 const viewer = new Viewer(editor);
 buildToolbar(editor, viewer);
 buildTools(editor);
+buildThingBar(editor);
 const run = buildRequestPanel(editor);
 const versions = buildVersions(editor);
 byId("tab-drag").append(
@@ -45,7 +47,7 @@ buildTabs();
 listenToKeys();
 listenToDrops();
 
-byId("help").addEventListener("click", showHelp);
+byId("help").addEventListener("click", help);
 byId("sign-out").addEventListener("click", async () => {
   await api.deleteSession().catch(() => {});
   location.reload();
@@ -58,6 +60,7 @@ document.addEventListener("visibilitychange", () => {
 });
 store.watch(["scene"], ({ scene }) => {
   text(byId("scene-title"), scene?.name ?? "");
+  byId("scene-title").hidden = !scene;
   document.title = scene ? `${scene.name} · splatdrag` : "splatdrag";
 });
 store.watch(["info"], ({ info }) => {
@@ -67,6 +70,10 @@ store.watch(["info"], ({ info }) => {
 });
 
 start();
+
+function help() {
+  showHelp({ letterKeys: memory.letterKeys, setLetterKeys: (on) => (memory.letterKeys = on) });
+}
 
 async function start() {
   try {
@@ -154,22 +161,35 @@ function listenToKeys() {
     event.target.closest?.("input, select, textarea, dialog") ||
     document.querySelector("dialog[open]") ||
     byId("workspace").hidden;
-  const constraints = { v: "view", x: "x", y: "y", z: "z", n: "normal" };
+  const constraints = { v: "view", l: "level", x: "x", y: "y", z: "z", n: "normal" };
   const plain = {
     "[": () => editor.stepView(-1),
     "]": () => editor.stepView(1),
     r: () => editor.home(),
     f: () => viewer.focusHere(),
     p: () => editor.preview(),
+    d: () => editor.selecting.takeThings(true),
+    h: () => editor.selecting.takeThings(false),
+    ".": () => editor.selecting.widen(1),
+    ",": () => editor.selecting.widen(-1),
     s: () => editor.selecting.toggle(),
     ...Object.fromEntries(SELECT_TOOLS.map(([tool], i) => [String(i + 1), () => editor.selecting.use(tool)])),
     delete: () => editor.state.selected !== null && editor.remove(editor.state.selected),
     backspace: () => editor.state.selected !== null && editor.remove(editor.state.selected),
-    escape: () => viewer.giveUpDrag() || (editor.state.selectMode ? editor.selecting.use(null) : editor.select(null)),
+    escape: () =>
+      viewer.giveUpDrag() ||
+      (editor.state.selectMode
+        ? editor.selecting.use(null)
+        : editor.state.thingMode && editor.state.handles.length === 0
+          ? editor.selecting.clear()
+          : editor.select(null)),
     b: () => store.set({ comparing: true }),
   };
   document.addEventListener("keydown", (event) => {
-    if (event.key === "?" && !event.target.closest?.("input, dialog")) return showHelp();
+    // Who dictates, or brushes against keys, turns single characters off (WCAG 2.1.4); keys with a name stay.
+    const character = event.key.length === 1 && !event.ctrlKey && !event.metaKey;
+    if (character && !memory.letterKeys) return;
+    if (event.key === "?" && !event.target.closest?.("input, dialog")) return help();
     if (busy(event)) return;
     const key = event.key.toLowerCase();
     if ((event.ctrlKey || event.metaKey) && key === "z") {

@@ -129,10 +129,17 @@ export class Overlay {
     if (!line) return attrs(this.#sketch, { d: null });
     const { tool, points, radius, subtracts } = line;
     const brush = tool === "brush";
+    const [[x0, y0], [x1, y1]] = [points[0], points.at(-1)];
+    const corners = [
+      [x0, y0],
+      [x1, y0],
+      [x1, y1],
+      [x0, y1],
+    ];
     attrs(this.#sketch, {
-      class: `sketch ${tool}${subtracts ? " subtracts" : ""}`,
+      class: `sketch ${brush ? "brush" : "lasso"}${subtracts ? " subtracts" : ""}`,
       // A dot is a line of no length.
-      d: path(points.length > 1 ? points : [points[0], points[0]], !brush),
+      d: tool === "rectangle" ? path(corners, true) : path(points.length > 1 ? points : [points[0], points[0]], !brush),
       "stroke-width": brush ? 2 * radius : 2,
     });
   }

@@ -10,6 +10,7 @@ import { whatMoves } from "./selection.js";
 
 const CONSTRAINTS = [
   ["view", "View", "In the plane that faces you (V)"],
+  ["level", "Level", "At its height above the ground (L)"],
   ["x", "X", "Along the x axis (X)"],
   ["y", "Y", "Along the y axis (Y)"],
   ["z", "Z", "Along the z axis (Z)"],
@@ -23,7 +24,7 @@ export function buildRequestPanel(editor) {
   const { store } = editor;
   const setParam = (name, value) => {
     const { [name]: _, ...rest } = store.state.params;
-    store.set({ params: value === null || value === "" ? rest : { ...rest, [name]: value } });
+    editor.settle({ params: value === null || value === "" ? rest : { ...rest, [name]: value } });
   };
 
   // --- how targets are dragged, and what the drag does
@@ -41,7 +42,7 @@ export function buildRequestPanel(editor) {
       ["extend", "Extend", "What is dragged is drawn out: what lies between is filled"],
       ["remove", "Remove", "What is selected, or in the handles' spheres, goes; what it hid is completed"],
     ],
-    changed: (value) => store.set({ mode: value }),
+    changed: (value) => editor.settle({ mode: value }),
   });
 
   // --- region
@@ -49,18 +50,18 @@ export function buildRequestPanel(editor) {
     label: "Only within a box",
     testid: "region-on",
     title: "Only Gaussians inside of the box are dragged",
-    changed: (on) => store.set({ region: on ? boxAround(editor) : null }),
+    changed: (on) => editor.settle({ region: on ? boxAround(editor) : null }),
   });
   const centre = pointField({
     label: "Box centre",
     testid: "region-center",
-    changed: (p) => store.set({ region: { ...store.state.region, center: p } }),
+    changed: (p) => editor.settle({ region: { ...store.state.region, center: p } }),
   });
   const size = pointField({
     label: "Box size",
     testid: "region-size",
     min: 0,
-    changed: (p) => p.every((e) => e > 0) && store.set({ region: { ...store.state.region, size: p } }),
+    changed: (p) => p.every((e) => e > 0) && editor.settle({ region: { ...store.state.region, size: p } }),
   });
   const regionProblem = problemPlace("region-problem");
   const regionFields = h("div", {}, labelled("Centre", centre.element), labelled("Size (full edges)", size.element));
@@ -70,7 +71,7 @@ export function buildRequestPanel(editor) {
     label: "Preset",
     testid: "preset",
     options: [["", "default"]],
-    changed: (value) => store.set({ preset: value }),
+    changed: (value) => editor.settle({ preset: value }),
   });
   const crumbs = choice({
     label: "Crumbs",
@@ -80,7 +81,7 @@ export function buildRequestPanel(editor) {
       ["remove", "go away"],
       ["keep", "stay"],
     ],
-    changed: (value) => store.set({ crumbs: value || null }),
+    changed: (value) => editor.settle({ crumbs: value || null }),
   });
   const crumbsField = labelled("Crumbs", crumbs.element);
   crumbsField.title = "Small pieces of the part that the selection has left out";
@@ -233,7 +234,7 @@ export function buildRequestPanel(editor) {
       const ready = state.scene !== null && isStated(state);
       const moves = changesScene(state);
       preview.disabled = !ready || !moves;
-      estimate.disabled = !ready || state.submitting;
+      estimate.disabled = !ready || !moves || state.submitting; // anchors alone ask for nothing
       run.disabled = !ready || !moves || state.submitting;
       attrs(preview, { "aria-busy": String(state.previewing) });
       text(preview, state.previewing ? "Previewing…" : "Preview");

@@ -3,15 +3,27 @@
 import * as api from "./api.js";
 import { onTheWire } from "./camera.js";
 import { FrameQueue } from "./frames.js";
-import { inverted, polygonOf, strokeOf, withClick } from "./selection.js";
+import {
+  furtherBorders,
+  inverted,
+  polygonOf,
+  proposalOf,
+  rectangleOf,
+  spread,
+  strokeOf,
+  thingAt,
+  widened,
+  withClick,
+} from "./selection.js";
 
 /** What there is before anything is selected. Tool, depth, radius and tint outlive a reload. */
 export const NOTHING_SELECTED = {
   selection: [], // Operations, as on the wire.
   selectionAnswer: null, // {key, version, id, count, ...} or {key, version, error}: what the service last said.
   selectionWaits: false, // Whether that is of an earlier selection.
-  selectMode: false, // The pointer selects; else it places and drags handles.
-  selectTool: "grow", // "grow", "brush" or "lasso"
+  thingMode: true, // The pointer takes hold of whole things; else it places and drags handles.
+  selectMode: false, // The pointer selects, whatever it does else.
+  selectTool: "grow", // "grow", "brush", "lasso" or "rectangle"
   selectOp: "add",
   clickKind: "inside", // Of a click to grow: on the thing ("inside"), or not.
   nextThing: false, // The next click begins another thing.
@@ -28,7 +40,7 @@ export class Selecting {
   #again = null;
   #lost = null; // Id of a selection that had to be posted again, until it has been seen.
 
-  /**   place(selection)        puts a selection on the screen; can be undone
+  /**   place(selection, more)  puts a selection on the screen, and more of what is placed; can be undone
    *    say(message, options)   a short message to the user */
   constructor(store, { place, say }) {
     Object.assign(this, { store, place, say });
@@ -104,16 +116,11 @@ export class Selecting {
   /** A click to grow.
    *    other  the other kind of point than the one that is switched on */
   async click(camera, x, y, other = false) {
-    const { scene, version, clickKind } = this.#state;
+    const { clickKind } = this.#state;
     const kind = (clickKind === "outside") !== other ? "outside" : "inside";
-    let picked;
-    try {
-      picked = await api.pick(scene.id, version, { camera: onTheWire(camera), x, y });
-    } catch (error) {
-      return this.say(`Nothing could be selected: ${error.message}`, { kind: "bad" });
-    }
-    const { scene: present, version: shown, selection, selectOp: op, nextThing: fresh } = this.#state;
-    if (present?.id !== scene.id || shown !== version) return;
+    const picked = await this.#pick(camera, x, y);
+    if (!picked) return;
+    const { selection, selectOp: op, nextThing: fresh } = this.#state;
     if (!picked.hit) return this.say("There is nothing here to select.", { seconds: 3 });
     const next = withClick(selection, { op, kind, point: picked.point, fresh });
     if (!next) return this.say("First click the thing itself, then what is not part of it.", { seconds: 4 });
@@ -121,14 +128,45 @@ export class Selecting {
     this.place(next);
   }
 
-  /** A stroke of the brush, or a lasso.
+  /** What the version shows there, as the service picks it; null where it does not say, or nobody wants to know any
+   *  more. */
+  async #pick(camera, x, y) {
+    const { scene, version } = this.#state;
+    let picked;
+    try {
+      picked = await api.pick(scene.id, version, { camera: onTheWire(camera), x, y });
+    } catch (error) {
+      this.say(`Nothing could be selected: ${error.message}`, { kind: "bad" });
+      return null;
+    }
+    const { scene: present, version: shown } = this.#state;
+    return present?.id === scene.id && shown === version ? picked : null;
+  }
+
+  /** A click that takes the whole thing under it, in place of what was selected; where nothing is, lets go. */
+  async propose(camera, x, y) {
+    const picked = await this.#pick(camera, x, y);
+    if (!picked) return;
+    this.store.set({ tab: "drag", nextThing: false });
+    this.place(picked.hit ? thingAt(picked.point) : [], { handles: [] });
+  }
+
+  /** More of the proposed thing (1), or less (-1): the next border. */
+  widen(by) {
+    const { selection, selectionAnswer, selectionWaits } = this.#state;
+    if (!proposalOf(selection) || selectionWaits) return;
+    const { more, less } = furtherBorders(selectionAnswer);
+    if (by > 0 ? more : less) this.place(widened(selection, by, selectionAnswer));
+  }
+
+  /** A stroke of the brush, a lasso, or a rectangle.
    *    points  [x, y], pixels of the camera
    *    other   subtracts where adding is switched on, and the other way round */
   draw(tool, camera, points, other = false) {
     const { selection, selectOp, selectDepth: depth, brushRadius: radius } = this.#state;
     const drawn = { op: other ? OPPOSITE[selectOp] : selectOp, camera: onTheWire(camera), points, radius, depth };
-    const made = tool === "brush" ? strokeOf(drawn) : polygonOf(drawn);
-    if (!made) return this.say("Draw the lasso around what you mean.", { seconds: 3 });
+    const made = { brush: strokeOf, lasso: polygonOf, rectangle: rectangleOf }[tool](drawn);
+    if (!made) return this.say(`Draw the ${tool} around what you mean.`, { seconds: 3 });
     this.store.set({ tab: "drag" });
     this.place([...selection, made]);
   }
@@ -142,6 +180,12 @@ export class Selecting {
     this.place(this.#state.selection.filter((_, i) => i !== index));
   }
 
+  /** Wider (1) or narrower (-1) all around. */
+  spread(by) {
+    const { selection, selectionAnswer: answer, selectionWaits } = this.#state;
+    if (answer?.count > 0 && !selectionWaits) this.place(spread(selection, by, answer));
+  }
+
   invert() {
     this.place(inverted(this.#state.selection));
   }
@@ -152,7 +196,12 @@ export class Selecting {
 
   // --- tools -----------------------------------------------------------------------------------------------------
 
-  /** Takes a tool in hand; null: the one for handles. */
+  /** Takes whole things in hand, or handles. */
+  takeThings(things) {
+    this.store.set({ thingMode: things, selectMode: false });
+  }
+
+  /** Takes a tool in hand; null: whatever it was before, things or handles. */
   use(tool) {
     if (!tool) return this.store.set({ selectMode: false });
     // Depth and changes have no tint: what is selected has to be seen.

@@ -39,6 +39,29 @@ export function withClick(selection, { op, kind, point, fresh = false }) {
   return selection.map((o, i) => (i === at ? grown : o));
 }
 
+/** What one click proposes: the whole of the thing that the point is on. */
+export const thingAt = (point) => [{ grow: { inside: [point], whole: true } }];
+
+/** The grow of a selection that is such a proposal, widened or not; null for any other selection. */
+export function proposalOf(selection) {
+  const { op, grow } = selection[0] ?? {};
+  return selection.length === 1 && op === undefined && grow?.whole && grow.inside.length === 1 ? grow : null;
+}
+
+/** A proposal with its border so many natural borders farther out (below 0: in) than the service says that it is. */
+export function widened(selection, by, answer = null) {
+  const { wider = 0, ...grow } = proposalOf(selection);
+  const last = /there is no border farther \w+ than wider = (-?\d+)/.exec((answer?.warnings ?? []).join("\n"))?.[1];
+  const sum = (last === undefined ? wider : Number(last)) + by;
+  return [{ grow: sum === 0 ? grow : { ...grow, wider: sum } }];
+}
+
+/** On which sides of a proposal the service knows a further border: {more, less}. Both until it has said otherwise. */
+export function furtherBorders(answer) {
+  const last = /there is no border farther (out|in) /.exec((answer?.warnings ?? []).join("\n"))?.[1];
+  return { more: last !== "out", less: last !== "in" };
+}
+
 /** A line drawn with the brush.
  *    camera  as the service takes it; points and radius are pixels of it */
 export function strokeOf({ op, camera, points, radius, depth }) {
@@ -49,6 +72,27 @@ export function strokeOf({ op, camera, points, radius, depth }) {
 export function polygonOf({ op, camera, points, depth }) {
   const corners = tenths(thinned(points, 3));
   return corners.length < 3 ? null : operation(op, { polygon: { camera, points: corners, depth } });
+}
+
+/** What a rectangle between two corners shows; null if that is no area. */
+export function rectangleOf({ points, ...drawn }) {
+  const [[x0, y0], [x1, y1]] = [points[0], points.at(-1)];
+  if (Math.min(Math.abs(x1 - x0), Math.abs(y1 - y0)) < 3) return null;
+  const corners = [
+    [x0, y0],
+    [x1, y0],
+    [x1, y1],
+    [x0, y1],
+  ];
+  return polygonOf({ ...drawn, points: corners });
+}
+
+/** A selection made wider (1) or narrower (-1) all around, by about two Gaussians: as far as they would be from each
+ *  other if they covered a square as long as its bounds. */
+export function spread(selection, by, { count, bounds: { low, high } }) {
+  const longest = Math.max(...low.map((l, i) => high[i] - l));
+  const distance = Number(((2 * longest) / Math.sqrt(count)).toPrecision(3));
+  return distance > 0 ? [...selection, by > 0 ? { expand: distance } : { shrink: distance }] : selection;
 }
 
 /** The other way round. Twice is as it was. */
@@ -64,8 +108,9 @@ export function clicksOf(selection) {
 
 const OPS = { add: "Add", subtract: "Subtract", intersect: "Keep only" };
 const NAMES = {
-  grow: ({ inside, outside = [] }) =>
-    `a thing: ${counted(inside.length, "point")} on it${outside.length ? `, ${outside.length} not` : ""}`,
+  grow: ({ inside, outside = [], whole = false, wider = 0 }) =>
+    `a ${whole ? "whole thing" : "thing"}: ${counted(inside.length, "point")} on it${outside.length ? `, ${outside.length} not` : ""}` +
+    (wider ? `, ${counted(Math.abs(wider), "border")} ${wider > 0 ? "wider" : "narrower"}` : ""),
   stroke: ({ depth }) => `a brush stroke${depth === "through" ? ", through" : ""}`,
   polygon: ({ depth }) => `a lasso${depth === "through" ? ", through" : ""}`,
   sphere: () => "a sphere",

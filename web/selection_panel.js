@@ -7,13 +7,15 @@ import { warnings } from "./request_panel.js";
 import { describe, sentence, share } from "./selection.js";
 
 const HANDS = [
-  ["handle", "Handles", "Click to place a handle, drag its dot to where it should go (S)"],
+  ["thing", "Drag", "Click a thing and drag it to where it should go (D)"],
+  ["handle", "Handles", "Click to place a handle, drag its dot to where it should go (H)"],
   ["select", "Select", "Say what moves (S)"],
 ];
 export const SELECT_TOOLS = [
   ["grow", "Click", "Click a thing: it is selected up to its border (1)"],
   ["brush", "Brush", "Paint over what is meant (2)"],
   ["lasso", "Lasso", "Draw around what is meant (3)"],
+  ["rectangle", "Frame", "Draw a rectangle around what is meant, from corner to corner (4)"],
 ];
 const OPS = [
   ["add", "Add", "To what is selected"],
@@ -37,7 +39,7 @@ export function buildTools(editor) {
   const row = (label, testid, options, changed) => segments({ label, testid, options, changed });
 
   const hand = row("What the pointer does", "hand", HANDS, (value) =>
-    selecting.use(value === "select" ? store.state.selectTool : null),
+    value === "select" ? selecting.use(store.state.selectTool) : selecting.takeThings(value === "thing"),
   );
   const tool = row("Select by", "select-tool", SELECT_TOOLS, (value) => selecting.use(value));
   const op = choice({ label: "What is done with it", testid: "select-op", options: OPS, changed: set("selectOp") });
@@ -76,10 +78,11 @@ export function buildTools(editor) {
     h("div", { class: "row tight" }, undo, redo),
   );
 
-  const shown = ["selectMode", "selectTool", "selectOp", "clickKind", "nextThing", "selectDepth", "brushRadius"];
-  store.watch([...shown, "selection", "handles"], (state) => {
+  const shown = ["selectMode", "thingMode", "selectTool", "selectOp", "clickKind", "nextThing", "selectDepth", "brushRadius"];
+  const undone = ["version", "handles", "selection", "region", "mode", "preset", "params", "crumbs"];
+  store.watch([...shown, ...undone], (state) => {
     const { selectMode, selectTool } = state;
-    hand.update(selectMode ? "select" : "handle");
+    hand.update(selectMode ? "select" : state.thingMode ? "thing" : "handle");
     tools.hidden = !selectMode;
     tool.update(selectTool);
     op.update(state.selectOp);
@@ -105,6 +108,10 @@ export function buildSelectionPanel(editor) {
   const button = (label, testid, title, onclick) =>
     h("button", { type: "button", class: "small", testid, title, onclick }, label);
   const invert = button("Invert", "invert-selection", "Select all that is not selected now", () => selecting.invert());
+  const wider = button("Wider", "expand-selection", "Take along what is next to it, all around", () => selecting.spread(1));
+  const narrower = button("Narrower", "shrink-selection", "Leave out what is at its edge, all around", () =>
+    selecting.spread(-1),
+  );
   const clear = button("Clear", "clear-selection", "Select nothing", () => selecting.clear());
   const tinted = toggle({
     label: "Tint",
@@ -130,18 +137,20 @@ export function buildSelectionPanel(editor) {
     ({ i }) => i,
     () => stepRow(selecting),
   );
-  const tools = h("div", { class: "row" }, tinted.element, invert, clear);
+  const tools = h("div", { class: "row" }, tinted.element, clear);
+  const changes = h("div", { class: "row wrap" }, invert, wider, narrower);
   const element = h(
     "section",
     { class: "selection", "aria-label": "Selection" },
     h("div", { class: "row between" }, h("h2", {}, "Selection"), tools),
-    ...[empty, held, problem, notes, list],
+    ...[empty, held, problem, notes, list, changes],
   );
 
   store.watch(["selection", "selectionAnswer", "selectionWaits", "tinted", "scene", "version"], (state) => {
     const { selection, selectionAnswer: answer } = state;
     empty.hidden = selection.length > 0;
-    for (const part of [tools, held, list]) part.hidden = selection.length === 0;
+    for (const part of [tools, held, list, changes]) part.hidden = selection.length === 0;
+    wider.disabled = narrower.disabled = state.selectionWaits || !answer?.count;
     tinted.update(state.tinted);
     text(held, countLine(state));
     attrs(held, { "data-waits": state.selectionWaits, "data-count": answer?.count ?? null });

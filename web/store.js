@@ -42,12 +42,30 @@ export class Store {
 }
 
 const PREFIX = "splatdrag.scene.";
+const LETTER_KEYS = "splatdrag.letter_keys";
 
 /** What is kept for each scene in the browser's storage, by id. A record of another scene that had the same id (of
  *  another service at this address) is not used: `created` tells them apart. */
 export class SceneMemory {
   constructor(storage) {
     this.storage = storage;
+  }
+
+  /** Whether single letters are keys for commands. */
+  get letterKeys() {
+    try {
+      return this.storage.getItem(LETTER_KEYS) !== "off";
+    } catch {
+      return true;
+    }
+  }
+
+  set letterKeys(on) {
+    try {
+      this.storage.setItem(LETTER_KEYS, on ? "on" : "off");
+    } catch {
+      // As below.
+    }
   }
 
   load(scene) {

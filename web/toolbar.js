@@ -14,6 +14,11 @@ const LAYERS = [
 
 /** What to do first with each tool, and what the pointer does. */
 const HINTS = {
+  thing: [
+    "Click a thing, then drag it",
+    "All of it is found, tinted, and goes where you drag it. Let go: the hole is repaired.",
+    "Click: take a thing · Drag it: move · Drag beside: orbit · Wheel: nearer",
+  ],
   handle: [
     "Click the part you want to move",
     "A handle takes hold of it. Then drag its dot to where it should go.",
@@ -35,6 +40,8 @@ const HINTS = {
     "Drag: draw · Alt + drag: the opposite · Right drag: orbit · Wheel: nearer",
   ],
 };
+
+HINTS.rectangle = HINTS.lasso.map((text) => text.replace("Draw around", "Draw a rectangle around"));
 
 export function buildToolbar(editor, viewer) {
   const { store } = editor;
@@ -115,7 +122,7 @@ export function buildToolbar(editor, viewer) {
   const hint = h("strong", {});
   const hintMore = h("span", {});
   byId("hint").append(hint, hintMore);
-  store.watch(["selectMode", "selectTool"], () => {
+  store.watch(["selectMode", "selectTool", "thingMode"], () => {
     const [lead, more, keys] = HINTS[viewer.tool];
     text(hint, lead);
     text(hintMore, more);
@@ -125,7 +132,7 @@ export function buildToolbar(editor, viewer) {
   store.watch(
     [
       ...["scene", "version", "views", "viewName", "viewsKind", "layer", "comparing", "compareWith", "preview"],
-      ...["handles", "selection", "mode", "selectMode"],
+      ...["handles", "selection", "mode", "selectMode", "thingMode"],
     ],
     (state) => {
       const { scene } = state;
@@ -164,9 +171,8 @@ export function buildToolbar(editor, viewer) {
       );
       attrs(chip, { class: previewing ? "chip preview" : state.comparing ? "chip compare" : "chip" });
       back.hidden = !previewing;
-      byId("hint").hidden = state.selectMode
-        ? state.selection.length > 0
-        : isStated(state) || scene.versions.length > 1;
+      const begun = isStated(state) || scene.versions.length > 1;
+      byId("hint").hidden = state.selection.length > 0 || (!state.selectMode && begun);
     },
   );
 }

@@ -42,8 +42,13 @@ export async function showUpload(place, file, send, done) {
     text(state, "Not accepted");
     text(close, "Dismiss");
     close.addEventListener("click", () => row.remove());
-    showProblem(problem, error);
+    showProblem(problem, namedAs(file.name, error));
   }
+}
+
+/** An error of the service about what was uploaded, by the name that the user knows: it has no name for the service. */
+export function namedAs(name, { detail, message, where = "" }) {
+  return { detail: detail || message, where: where.replace(/^upload(?=[:/[]|$)/, name) };
 }
 
 /** A form for a path below the service's scene folder; hidden until that is known to be there.

@@ -6,6 +6,7 @@ import {
   centredOn,
   dollied,
   dragged,
+  ellipseOf,
   onTheWire,
   orbited,
   panned,
@@ -13,19 +14,24 @@ import {
   pictureSize,
   project,
   samePose,
+  zoomedAt,
 } from "./camera.js";
 import { attrs, byId, text } from "./dom.js";
 import { shownVersion } from "./editor.js";
-import { AdaptiveSide, FrameQueue, Recent } from "./frames.js";
+import { AdaptiveSide, FrameQueue, Recent, serverTime } from "./frames.js";
 import { Overlay } from "./overlay.js";
 import { partOf } from "./requests.js";
-import { clicksOf, thinned } from "./selection.js";
+import { clicksOf, proposalOf, thinned } from "./selection.js";
+import { add, sub } from "./vectors.js";
 
 // All of these are choices, tried by hand.
 const MAX_SIDE = 1600; // Pixels of the longer side of a picture at rest: sharp enough on a large window.
 const STILL_AFTER_MS = 160; // Without a movement, before the picture is requested at its full size.
+const PICTURES_AT_ONCE = 3; // While moving: what covers the way there and back of most networks.
+const DOUBLE_CLICK_MS = 400; // A second click sooner than this, at the same place, is no click of its own.
 const CLICK_PX = 4; // A pointer that moves less than this has clicked, not dragged.
 const ORBIT_PER_PX = 0.0055; // Radians: half a turn across 570 pixels.
+const THING_PX = 14; // A thing is taken hold of within this of its middle, however small it is.
 const SKETCH_PX = 2; // A line that is drawn has a corner this often at most.
 const MAX_CACHED_PICTURES = 6; // Enough to go back and forth between two versions and three layers.
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }; // Right, down.
@@ -51,6 +57,7 @@ export class Viewer {
   #pointers = new Map();
   #gesture = null;
   #pointerAt = null;
+  #clicked = { at: -Infinity, x: 0, y: 0 };
   #movingUntil = 0;
   #stillTimer = null;
   #busyTimer = null;
@@ -62,6 +69,7 @@ export class Viewer {
       load: (job, signal) => this.#load(job, signal),
       onPicture: (picture, job) => this.#arrived(picture, job),
       onError: (error, job) => this.#failed(error, job),
+      atOnce: PICTURES_AT_ONCE,
     });
     this.#overlay = new Overlay(byId("overlay"), {
       grab: (id, event) => this.#grab(id, event),
@@ -79,7 +87,7 @@ export class Viewer {
     store.watch(["handles", "selected", "selection", "selectMode", "region", "problem", "pose"], () =>
       this.#drawOverlay(),
     );
-    store.watch(["selectMode", "selectTool", "brushRadius"], () => this.#toolChanged());
+    store.watch(["selectMode", "selectTool", "thingMode", "brushRadius"], () => this.#toolChanged());
     new ResizeObserver(() => this.#resized()).observe(this.#view);
   }
 
@@ -168,7 +176,7 @@ export class Viewer {
 
   async #load(job, signal) {
     const requestedAt = performance.now();
-    const blob = await api.render(
+    const { blob, timing } = await api.render(
       job.scene,
       job.version,
       {
@@ -181,7 +189,7 @@ export class Viewer {
       signal,
     );
     const picture = await createImageBitmap(blob);
-    if (!job.large) this.#adaptive.record(performance.now() - requestedAt);
+    if (!job.large) this.#adaptive.record(serverTime(timing) ?? performance.now() - requestedAt);
     return { picture, ms: performance.now() - requestedAt };
   }
 
@@ -253,6 +261,7 @@ export class Viewer {
     clearTimeout(this.#thumbnailTimer);
     this.#thumbnailTimer = setTimeout(() => {
       if (this.#displayed?.job.layer !== "color" || this.#displayed.job.selection) return;
+      if (String(this.#displayed.job.version).startsWith("p")) return; // nothing that anybody has kept
       if (this.#displayed.job.scene !== this.#state.scene?.id) return;
       const small = Object.assign(document.createElement("canvas"), THUMBNAIL);
       const { width, height } = this.#displayed.picture;
@@ -288,10 +297,29 @@ export class Viewer {
     if (this.#gesture?.kind === "draw") this.giveUpDrag();
   }
 
-  /** What the pointer does: "handle", "grow", "brush" or "lasso". */
+  /** What the pointer does: "thing", "handle", "grow", "brush", "lasso" or "rectangle". */
   get tool() {
-    const { selectMode, selectTool } = this.#state;
-    return selectMode ? selectTool : "handle";
+    const { selectMode, selectTool, thingMode } = this.#state;
+    return selectMode ? selectTool : thingMode ? "thing" : "handle";
+  }
+
+  /** Is a place of the picture on what is selected, where that is seen now? As far as its bounds tell. */
+  #onThing({ x, y }) {
+    const { selection, selectionAnswer: answer, selectionWaits, handles, comparing } = this.#state;
+    const { camera } = this;
+    if (selection.length === 0 || comparing || !camera) return false;
+    const handle = handles.at(-1);
+    const shift = handle?.target ? sub(handle.target, handle.source) : [0, 0, 0];
+    // The service may still be looking for the border of what was clicked on: that point is on it.
+    const inside = proposalOf(selection)?.inside[0];
+    const clicked = inside && project(camera, add(inside, shift));
+    if (clicked && Math.hypot(clicked.x - x, clicked.y - y) <= THING_PX) return true;
+    if (!answer?.count || selectionWaits) return false;
+    const { low, high } = answer.bounds;
+    const seen = ellipseOf(camera, { low: add(low, shift), high: add(high, shift) });
+    if (!seen) return false;
+    const [rx, ry] = [Math.max(seen.rx, THING_PX), Math.max(seen.ry, THING_PX)];
+    return ((x - seen.x) / rx) ** 2 + ((y - seen.y) / ry) ** 2 <= 1;
   }
 
   // --- the hand --------------------------------------------------------------------------------------------------
@@ -309,6 +337,11 @@ export class Viewer {
     });
     on("contextmenu", (event) => event.preventDefault());
     on("wheel", (event) => this.#wheel(event), { passive: false });
+    on("dblclick", (event) => {
+      if (event.target.closest("button, a, input, select")) return;
+      this.#pointerAt = this.#place(event);
+      this.focusHere();
+    });
     on("keydown", (event) => this.#key(event));
   }
 
@@ -329,19 +362,21 @@ export class Viewer {
     } else if (this.#pointers.size === 1 && !this.#gesture) {
       const from = this.#place(event);
       this.#gesture = { kind: this.#kindOf(event), from, button: event.button, other: event.altKey };
+      const takes = this.tool === "thing" && event.button === 0 && !event.shiftKey && this.#onThing(from);
+      if (takes) Object.assign(this.#gesture, { kind: "thing", drag: this.#editor.dragThing(this.camera, from) });
       if (this.#gesture.kind === "draw") this.#gesture.drag = this.#sketch(from, event.altKey);
     }
   }
 
   /** What a pointer that goes down on the picture begins. Where the left button draws, the right one orbits. */
   #kindOf({ button, shiftKey }) {
-    const draws = this.tool === "brush" || this.tool === "lasso";
+    const draws = ["brush", "lasso", "rectangle"].includes(this.tool);
     if (button === 1 || shiftKey) return "pan";
     if (draws) return button === 2 ? "orbit" : "draw";
     return button === 2 ? "pan" : "orbit";
   }
 
-  /** A stroke or a lasso that is being drawn. Returns {move(x, y), end(), giveUp()}. */
+  /** A stroke, a lasso or a rectangle that is being drawn. Returns {move(x, y), end(), giveUp()}. */
   #sketch({ x, y }, other) {
     const { tool, camera } = this;
     const selecting = this.#editor.selecting;
@@ -356,7 +391,7 @@ export class Viewer {
     show();
     return {
       move: (toX, toY) => {
-        points = thinned([...points, [toX, toY]], SKETCH_PX);
+        points = tool === "rectangle" ? [points[0], [toX, toY]] : thinned([...points, [toX, toY]], SKETCH_PX);
         show();
       },
       end: () => {
@@ -388,6 +423,7 @@ export class Viewer {
     const to = this.#place(event);
     this.#pointerAt = to;
     if (this.tool === "brush" && event.pointerType !== "touch") this.#overlay.cursor(to, this.#state.brushRadius);
+    if (!this.#gesture) attrs(this.#view, { "data-over": this.tool === "thing" && this.#onThing(to) ? "thing" : null });
     const from = this.#pointers.get(event.pointerId);
     const gesture = this.#gesture;
     if (!from || !gesture) return;
@@ -426,10 +462,16 @@ export class Viewer {
       return;
     }
     this.#gesture = null;
-    if (gesture.drag) return gesture.drag.end();
+    // What was taken hold of and not moved was clicked on.
+    if (gesture.drag && (gesture.started || gesture.kind !== "thing")) return gesture.drag.end();
     if (gesture.started) return;
     const { kind, button, from, other } = gesture;
-    if (kind === "orbit" && button === 0) this.#click(from, other);
+    const { at, x, y } = this.#clicked;
+    const again = performance.now() - at < DOUBLE_CLICK_MS && Math.hypot(from.x - x, from.y - y) < 2 * CLICK_PX;
+    this.#clicked = { at: performance.now(), ...from };
+    // The first of two clicks has done what a click does.
+    if (again && button === 0) return;
+    if ((kind === "orbit" || kind === "thing") && button === 0) this.#click(from, other);
     else if (this.tool === "grow" && button === 2) this.#click(from, true);
   }
 
@@ -445,6 +487,11 @@ export class Viewer {
     const { tool, camera } = this;
     const { selecting } = this.#editor;
     if (tool === "handle") this.#editor.place(camera, x, y);
+    else if (tool === "thing") {
+      // What has been moved is not where the version has it: a click on it says nothing new.
+      const moved = this.#state.handles.some((handle) => handle.target);
+      if (!moved || !this.#onThing({ x, y })) selecting.propose(camera, x, y);
+    }
     else if (tool === "grow") selecting.click(camera, x, y, other);
     else if (tool === "brush") selecting.draw("brush", camera, [[x, y]], other);
   }
@@ -463,7 +510,9 @@ export class Viewer {
 
   #wheel(event) {
     event.preventDefault();
-    if (this.camera) this.#turn((pose) => dollied(pose, wheelFactor(event), this.#nearest()));
+    if (!this.camera) return;
+    const { x, y } = this.#place(event);
+    this.#turn((pose) => zoomedAt({ ...pose, ...this.#size }, x, y, wheelFactor(event), this.#nearest()));
   }
 
   /** The wheel turned over a handle's dot: towards the user, a larger sphere. */
@@ -513,7 +562,7 @@ export class Viewer {
           seen.x + step * arrow[0],
           seen.y + step * arrow[1],
           this.#state.constraint,
-          handle.normal,
+          { normal: handle.normal, up: this.#editor.worldUp },
         ),
       });
   }

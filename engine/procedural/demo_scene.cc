@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 #include "engine/procedural/materials.h"
@@ -118,6 +119,18 @@ DemoScene make_demo_scene(const DemoOptions& options) {
   DemoScene demo;
   demo.cameras = make_arc_cameras(options.views, options.width, options.height);
   Surfels surfels = make_surfels(still_life.objects, still_life.light, demo.cameras, options.gaussians, options.seed);
+  if (options.ball_shift != DVec3(0.0)) {
+    const Surfels unseen = make_unseen_surfels(surfels, still_life.objects, still_life.light, demo.cameras,
+                                               options.gaussians, options.seed);
+    std::vector<std::uint32_t> all(unseen.cloud.size());
+    std::iota(all.begin(), all.end(), 0u);
+    scene::append_rows(surfels.cloud, unseen.cloud, all);
+    surfels.object.insert(surfels.object.end(), unseen.object.begin(), unseen.object.end());
+    const std::size_t ball = still_life.objects.size() - 1;
+    for (std::size_t row = 0; row < surfels.cloud.size(); ++row)
+      if (surfels.object[row] == ball)
+        surfels.cloud.mean.set(row, Vec3(DVec3(surfels.cloud.mean.get(row)) + options.ball_shift));
+  }
   demo.cloud = std::move(surfels.cloud);
   demo.object = std::move(surfels.object);
   for (const Object& object : still_life.objects) demo.object_names.push_back(object.name);

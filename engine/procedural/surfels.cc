@@ -203,23 +203,29 @@ std::vector<Site> sites_at_spacing(const std::vector<Ground>& grounds, float spa
   return sites;
 }
 
+struct SitesAtSpacing {
+  std::vector<Site> sites;
+  float spacing = 0;  ///< World units.
+};
+
 /// Sites for `count` Gaussians, by trying spacings.
 ///
 /// At spacing s there are about a / s^2 + b / s of them: a the area that is seen, b the length of the rims around it,
 /// where Gaussians that are half hidden stay. Two smaller tries tell a and b, so that the first large one mostly fits.
-std::vector<Site> sites_for_count(const std::vector<Ground>& grounds, std::size_t count, std::uint64_t seed,
-                                  const WantedSite& wanted_site) {
+SitesAtSpacing sites_for_count(const std::vector<Ground>& grounds, std::size_t count, std::uint64_t seed,
+                               const WantedSite& wanted_site) {
   const double tolerance = 0.008 * double(count);
   double last_density = 0, last_found = 0;           // density = 1 / spacing
   double density = 0.05 * std::sqrt(double(count));  // about a tenth of the Gaussians, if objects are of unit size
-  std::vector<Site> best, above;                     // the nearest to count; the fewest that are no fewer than count
-  auto miss = [&](const std::vector<Site>& p) { return std::abs(double(p.size()) - double(count)); };
+  SitesAtSpacing best, above;                        // the nearest to count; the fewest that are no fewer than count
+  auto miss = [&](const SitesAtSpacing& p) { return std::abs(double(p.sites.size()) - double(count)); };
   for (int attempt = 0; attempt < 12; ++attempt) {
-    std::vector<Site> sites = sites_at_spacing(grounds, float(1 / density), seed, wanted_site);
-    if (sites.empty()) return sites;
-    const double found = double(sites.size());
-    if (sites.size() >= count && (above.empty() || sites.size() < above.size())) above = sites;
-    if (best.empty() || miss(sites) < miss(best)) best = std::move(sites);
+    const float spacing = float(1 / density);
+    SitesAtSpacing tried{sites_at_spacing(grounds, spacing, seed, wanted_site), spacing};
+    if (tried.sites.empty()) return tried;
+    const double found = double(tried.sites.size());
+    if (tried.sites.size() >= count && (above.sites.empty() || tried.sites.size() < above.sites.size())) above = tried;
+    if (best.sites.empty() || miss(tried) < miss(best)) best = std::move(tried);
     if (miss(best) <= tolerance) return best;
 
     double rim = 0;
@@ -233,9 +239,9 @@ std::vector<Site> sites_for_count(const std::vector<Ground>& grounds, std::size_
   }
   // Rows come and go with the spacing, and of a few Gaussians no spacing may give the wanted number: leave out evenly
   // what is too many.
-  if (above.empty()) return best;
-  std::vector<Site> thinned;
-  for (std::size_t i = 0; i < count; ++i) thinned.push_back(above[i * above.size() / count]);
+  if (above.sites.empty()) return best;
+  SitesAtSpacing thinned{{}, above.spacing};
+  for (std::size_t i = 0; i < count; ++i) thinned.sites.push_back(above.sites[i * above.sites.size() / count]);
   return thinned;
 }
 
@@ -350,11 +356,27 @@ Surfels make_surfels(std::span<const Object> objects, const Light& light, std::s
   const std::vector<Eye> eyes = eyes_of(cameras);
   const Occluders occluders(objects);
   const std::vector<Ground> grounds = lay_ground(objects);
-  const auto sites =
+  const auto [sites, spacing] =
       sites_for_count(grounds, count, seed, [&](const Ground& ground, const Site& site, Rng& rng, std::size_t& first) {
         return is_seen(ground, site, eyes, occluders, rng, first);
       });
-  return paint_sites(objects, light, eyes, occluders, grounds, sites, count, seed);
+  Surfels surfels = paint_sites(objects, light, eyes, occluders, grounds, sites, count, seed);
+  surfels.spacing = spacing;
+  return surfels;
+}
+
+Surfels make_unseen_surfels(const Surfels& seen, std::span<const Object> objects, const Light& light,
+                            std::span<const scene::Camera> cameras, std::size_t count, std::uint64_t seed) {
+  const std::vector<Eye> eyes = eyes_of(cameras);
+  const Occluders occluders(objects);
+  const std::vector<Ground> grounds = lay_ground(objects);
+  const auto sites = sites_at_spacing(grounds, seen.spacing, seed,
+                                      [&](const Ground& ground, const Site& site, Rng& rng, std::size_t& first) {
+                                        return !is_seen(ground, site, eyes, occluders, rng, first);
+                                      });
+  Surfels surfels = paint_sites(objects, light, eyes, occluders, grounds, sites, count, seed);
+  surfels.spacing = seen.spacing;
+  return surfels;
 }
 
 Surfels cover_all(std::span<const Object> objects, const Light& light, std::span<const scene::Camera> cameras,

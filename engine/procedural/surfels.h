@@ -17,6 +17,7 @@ namespace engine::procedural {
 struct Surfels {
   scene::GaussianCloud cloud;         ///< SH degree 1: glazed things look a little different from each side.
   std::vector<std::uint16_t> object;  ///< [N] number of the object each Gaussian belongs to.
+  float spacing = 0;                  ///< Of Gaussians where a patch's density is 1, world units.
 };
 
 /// Covers what the cameras can see of the objects with about `count` Gaussians; what no camera can see stays empty.
@@ -28,6 +29,13 @@ struct Surfels {
 ///   returns  the same bytes for the same arguments, for any number of threads
 [[nodiscard]] Surfels make_surfels(std::span<const Object> objects, const Light& light,
                                    std::span<const scene::Camera> cameras, std::size_t count, std::uint64_t seed);
+
+/// What make_surfels() has left out because no camera can see it: with it, things are closed all over, and what stands
+/// may be taken away.
+///   seen  what it returned for the same other arguments
+[[nodiscard]] Surfels make_unseen_surfels(const Surfels& seen, std::span<const Object> objects, const Light& light,
+                                          std::span<const scene::Camera> cameras, std::size_t count,
+                                          std::uint64_t seed);
 
 /// Covers the objects all over, inside and behind too, whether any camera sees it or not.
 ///   spacing  of Gaussians where a patch's density is 1, world units

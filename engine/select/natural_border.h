@@ -15,6 +15,20 @@ struct ClickedNodes {
   std::vector<std::uint32_t> inside, outside;
 };
 
+/// Which of the natural borders is meant.
+struct BorderChoice {
+  /// Of the borders that are nearly as weak as the weakest, the farthest out: of a ball with stripes the ball, where a
+  /// stripe ends as sharply as it does.
+  bool whole = false;
+  int wider = 0;  ///< So many borders farther out than that; below 0: farther in.
+};
+
+/// A border, and what is within.
+struct NaturalBorder {
+  std::vector<std::uint8_t> inside;  ///< [nodes] 1: inside.
+  int wider = 0;                     ///< As chosen; nearer to 0 where there are fewer borders on that side.
+};
+
 /// Divides the graph at a level of the potentials: nodes at or above it are inside. Of all levels the one where the
 /// pieces that the clicks are on, inside and outside, are joined to the rest most weakly: on either side, the sum, over
 /// the clicks, of a piece's border ratio, times the number of these pieces. The border ratio is the weight of the edges
@@ -22,15 +36,15 @@ struct ClickedNodes {
 /// less. On a surface, a border grows as the root of what it encloses: so neither large pieces are preferred nor small
 /// ones, as they are by conductance, which divides by the weight itself. Where there are clicks on both sides, levels
 /// near one half are preferred a little: it decides where nothing else does. Where nothing is given for the outside,
-/// all that can be reached is inside.
+/// all that can be reached is inside. Farther out and in there are other borders: levels that are joined more weakly
+/// than any that enclose somewhat more or less.
 ///   weight     [edges] 0 or more, the same both ways
 ///   potential  [nodes] of random_walk()
 ///   given      [nodes]; clicked nodes are given for their side
-///   returns    [nodes] 1: inside
 /// Source: sweeps over level sets, Andersen, Chung and Lang 2006, "Local graph partitioning using PageRank vectors";
 /// the ratio, and that outside pieces count alike, are ours.
-[[nodiscard]] std::vector<std::uint8_t> natural_border(const neighbours::NeighbourGraph& graph,
-                                                       std::span<const float> weight, std::span<const double> potential,
-                                                       std::span<const Given> given, const ClickedNodes& clicked);
+[[nodiscard]] NaturalBorder natural_border(const neighbours::NeighbourGraph& graph, std::span<const float> weight,
+                                           std::span<const double> potential, std::span<const Given> given,
+                                           const ClickedNodes& clicked, const BorderChoice& choice = {});
 
 }  // namespace engine::select

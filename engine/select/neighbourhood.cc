@@ -24,10 +24,13 @@ constexpr std::size_t rows_clicked = 4;        // of those nearest to a point, t
 constexpr std::size_t rows_near_click = 24;    // that are looked at for that: the mean of a large disc may be far off
 constexpr double reach_by_points = 4.0;        // times the distance of the points
 constexpr double reach_by_scene = 0.25;        // of the distance within which half of the rows lie
+constexpr double reach_of_whole = 0.8;         // of the same: room for the border around the thing, and for more
 constexpr double beside_scene = 4.0;           // times that distance: farther away, there is nothing worth mention
 constexpr double most_of_rows = 0.98;          // that masks name: the others may be floaters
 constexpr double reach_by_rows = 1.5;          // times the distance of those from their middle
-constexpr double far_border = 0.9;             // of the reach: from here on, rows are taken for outside
+constexpr int far_ends = 2;                    // that a whole is grown from, beside the clicks
+constexpr double more_by_far_ends = 1.25;  // times the rows of a whole: more is another thing, as all around the mug
+constexpr double far_border = 0.9;         // of the reach: from here on, rows are taken for outside
 
 std::vector<double> squared_distances(const Array3& mean, DVec3 from) {
   std::vector<double> out(mean.size());
@@ -68,7 +71,8 @@ Surroundings surroundings_of(const Array3& mean, const Grow& grow) {
   std::vector<double> squared = squared_distances(mean, middle);
   const auto half = squared.begin() + std::ptrdiff_t(squared.size() / 2);
   std::nth_element(squared.begin(), half, squared.end());
-  const double half_of_scene = std::sqrt(*half), by_scene = reach_by_scene * half_of_scene;
+  const double by_scene_share = grow.whole || grow.wider != 0 ? reach_of_whole : reach_by_scene;
+  const double half_of_scene = std::sqrt(*half), by_scene = by_scene_share * half_of_scene;
   // An outside point that is nowhere near the scene says nothing of the thing's size.
   if (nearest <= beside_scene * half_of_scene) farthest = std::max(farthest, nearest);
   const double by_points = farthest > 0 ? by_steps(reach_by_points * farthest) : 0;
@@ -184,12 +188,51 @@ void Neighbourhood::take_far_nodes(std::vector<Given>& given) const {
   }
 }
 
-Result<std::vector<std::uint32_t>> Neighbourhood::grow(const scene::GaussianCloud& cloud, const Grow& grow) const {
+Result<Grown> Neighbourhood::grow(const scene::GaussianCloud& cloud, const Grow& grow) const {
   const auto seeds = seeds_of(cloud, grow);
   if (!seeds) return propagate(seeds);
-  const std::vector<double> potential = random_walk(graph_, weight_, seeds->given);
-  const std::vector<std::uint8_t> inside = natural_border(graph_, weight_, potential, seeds->given, seeds->clicked);
-  return rows_where_marked(inside);
+  const NaturalBorder border = grow.whole ? whole_border(*seeds, grow.wider) : border_of(*seeds, {false, grow.wider});
+  return Grown{rows_where_marked(border.inside), border.wider};
+}
+
+NaturalBorder Neighbourhood::border_of(const Seeds& seeds, const BorderChoice& choice) const {
+  const std::vector<double> potential = random_walk(graph_, weight_, seeds.given);
+  return natural_border(graph_, weight_, potential, seeds.given, seeds.clicked, choice);
+}
+
+NaturalBorder Neighbourhood::whole_border(const Seeds& seeds, int wider) const {
+  Seeds tried = seeds, best_seeds = seeds;
+  NaturalBorder best = border_of(seeds, {true, 0});
+  std::vector<std::uint8_t> found = best.inside;
+  const auto size = [](const NaturalBorder& border) {
+    return double(std::count(border.inside.begin(), border.inside.end(), std::uint8_t{1}));
+  };
+  const double most = more_by_far_ends * size(best);
+  for (int i = 0; i < far_ends; ++i) {
+    click_far_end(found, tried);
+    NaturalBorder border = border_of(tried, {true, 0});
+    if (size(border) > most || size(border) <= size(best)) continue;
+    best = std::move(border), best_seeds = tried;
+  }
+  return wider == 0 ? best : border_of(best_seeds, {true, wider});
+}
+
+void Neighbourhood::click_far_end(std::span<const std::uint8_t> inside, Seeds& seeds) const {
+  const auto place = [&](std::uint32_t node) {
+    const float* at = points_.data() + std::size_t(3) * node;
+    return DVec3(at[0], at[1], at[2]);
+  };
+  std::uint32_t far_end = seeds.clicked.inside[0];
+  double farthest = 0;
+  for (std::uint32_t node = 0; node < inside.size(); ++node) {
+    if (inside[node] == 0) continue;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const std::uint32_t click : seeds.clicked.inside)
+      nearest = std::min(nearest, distance(place(node), place(click)));
+    if (nearest > farthest) farthest = nearest, far_end = node;
+  }
+  seeds.given[far_end] = Given::inside;
+  seeds.clicked.inside.push_back(far_end);
 }
 
 std::vector<std::uint32_t> Neighbourhood::settle(std::span<const Given> given) const {

@@ -35,7 +35,8 @@ constexpr std::size_t max_neighbourhood = 250'000;
 
 /// The surroundings of an operation. Without a reach: a quarter of the distance within which half of the scene's rows
 /// lie; or four times as far as the farthest inside point, or as the nearest outside one if that is farther, but not
-/// four times as far as half of the rows, rounded up to a power of the square root of 2. The farther of the two.
+/// four times as far as half of the rows, rounded up to a power of the square root of 2. The farther of the two. Who
+/// asks for the whole, or for a border farther out, looks at four fifths of that distance.
 /// Precondition: validate() holds, and the scene has a row.
 [[nodiscard]] Surroundings surroundings_of(const Array3& mean, const Grow& grow);
 
@@ -43,6 +44,12 @@ constexpr std::size_t max_neighbourhood = 250'000;
 /// without a row.
 ///   rows  [N] 1 for each of them
 [[nodiscard]] std::optional<Surroundings> surroundings_of(const Array3& mean, std::span<const std::uint8_t> rows);
+
+/// What grows.
+struct Grown {
+  std::vector<std::uint32_t> rows;  ///< Of the cloud, ascending.
+  int wider = 0;  ///< Grow::wider, or nearer to 0 where there are fewer borders: NaturalBorder::wider.
+};
 
 /// The rows around a point, joined to their neighbours by edges that are the weaker the more likely a border runs
 /// between the two. Immutable.
@@ -61,10 +68,9 @@ class Neighbourhood {
   /// count for nothing.
   ///   cloud    that this was made of
   ///   grow     with this object's surroundings
-  ///   returns  rows of the cloud, ascending
   ///   errors   unprocessable, `where` = "inside[1]": no row within reach, the point is beyond it, or outside points
   ///            cover all rows around the inside points more
-  [[nodiscard]] Result<std::vector<std::uint32_t>> grow(const scene::GaussianCloud& cloud, const Grow& grow) const;
+  [[nodiscard]] Result<Grown> grow(const scene::GaussianCloud& cloud, const Grow& grow) const;
 
   /// For each node that is not given, the side at which a random walk from it rather ends; where there is no way to
   /// either, the outside. The rows that are inside, given or not, ascending.
@@ -88,6 +94,13 @@ class Neighbourhood {
   /// Claims the nodes that a point lies on; returns the one that covers it most.
   std::uint32_t claim(const scene::GaussianCloud& cloud, DVec3 point, Given side,
                       std::map<std::uint32_t, Claim>& claims) const;
+  [[nodiscard]] NaturalBorder border_of(const Seeds& seeds, const BorderChoice& choice) const;
+  /// Of the whole: grown from the clicks, and again with clicks at far ends of what was found. What is under a thing,
+  /// or behind, hangs together with those rather than with what was clicked on. The largest counts that has not taken
+  /// another thing.
+  [[nodiscard]] NaturalBorder whole_border(const Seeds& seeds, int wider) const;
+  /// Makes the node inside that is farthest from all inside clicks one more of them.
+  void click_far_end(std::span<const std::uint8_t> inside, Seeds& seeds) const;
   /// The rows of marked nodes, ascending.
   [[nodiscard]] std::vector<std::uint32_t> rows_where_marked(std::span<const std::uint8_t> nodes) const;
   /// Gives what lies at the reach to the outside.

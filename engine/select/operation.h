@@ -69,6 +69,8 @@ struct Grow {
   std::vector<DVec3> inside;    ///< One or more, on the thing.
   std::vector<DVec3> outside;   ///< On what is not meant; may be empty.
   std::optional<double> reach;  ///< No row farther than this from inside[0] is taken. Above 0.
+  bool whole = false;           ///< Rather all of the thing than a part of it that ends as sharply: see BorderChoice.
+  int wider = 0;                ///< So many natural borders farther out than the one chosen by itself; below 0: in.
 };
 
 /// Which pixels of a view belong to the thing.
@@ -135,6 +137,7 @@ constexpr std::size_t max_views = 64;         ///< That are rendered: of masks, 
 constexpr std::size_t max_pixels = 1u << 24;  ///< Of one such view.
 constexpr std::size_t max_searches = 32;      ///< Of neighbours: grow, masks, expand, shrink, largest.
 constexpr std::size_t max_ranges = 100'000;   ///< Of rows.
+constexpr int max_wider = 64;                 ///< Borders farther out or in: a thing has a dozen.
 constexpr double max_pixel_position = 1e6;    ///< Pixels: a point farther from a picture is a mistake.
 constexpr double max_world_number = 1e38;     ///< World units: no mean, a float, lies farther.
 

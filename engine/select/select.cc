@@ -75,9 +75,13 @@ Result<RowSet> Selector::rows_of(const Grow& grow, const std::string& where, Sel
   RowSet named(cloud_.size(), 0);
   if (cloud_.size() == 0) return named;
   const Neighbourhood& around = neighbourhood(surroundings_of(cloud_.mean, grow));
-  const auto rows = around.grow(cloud_, grow);
-  if (!rows) return fail(rows.error().code, rows.error().message, where + ".grow." + rows.error().where);
-  for (const std::uint32_t row : *rows) named[row] = 1;
+  const auto grown = around.grow(cloud_, grow);
+  if (!grown) return fail(grown.error().code, grown.error().message, where + ".grow." + grown.error().where);
+  for (const std::uint32_t row : grown->rows) named[row] = 1;
+  if (grown->wider != grow.wider)
+    so_far.warnings.push_back({"there is no border farther " + std::string(grow.wider > 0 ? "out" : "in") +
+                                   " than wider = " + std::to_string(grown->wider),
+                               where});
   if (around.is_cut_short())
     so_far.warnings.push_back({cut_short("to the first inside point: lower the reach, or grow larger things in several "
                                          "operations"),

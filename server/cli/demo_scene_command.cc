@@ -26,6 +26,7 @@ struct DemoSceneOptions {
   std::string out;
   procedural::DemoOptions demo;
   std::string size = "640x480";
+  std::vector<double> ball_shift;
   bool render = false;
   ComputeOptions compute;
 };
@@ -57,6 +58,8 @@ Result<void> run(DemoSceneOptions options, Terminal& terminal) {
   if (!size) return engine::fail(size.error().code, size.error().message, "--size");
   options.demo.width = size->width;
   options.demo.height = size->height;
+  if (!options.ball_shift.empty())
+    options.demo.ball_shift = {options.ball_shift[0], options.ball_shift[1], options.ball_shift[2]};
   if (auto valid = procedural::validate(options.demo); !valid) return valid;
 
   return compute(options.compute, [&](const Machine&) -> Result<void> {
@@ -93,6 +96,12 @@ void add_demo_scene_command(CLI::App& program, Action& action) {
   command->add_option("--seed", options->demo.seed, "Of all that is random")->type_name("S");
   command->add_option("--views", options->demo.views, "Cameras, 1 to 1000")->type_name("V");
   command->add_option("--size", options->size, "Size of their pictures, pixels")->type_name("WxH");
+  command
+      ->add_option("--ball-shift", options->ball_shift,
+                   "How far the ball stands from its place, world units: what a drag of it should come to")
+      ->expected(3)
+      ->delimiter(',')
+      ->type_name("X,Y,Z");
   command->add_flag("--render", options->render, "Also render the views into images/, as the dataset's photos");
   add_compute_options(*command, options->compute);
   command->callback([options, &action] { action = [options](Terminal& terminal) { return run(*options, terminal); }; });

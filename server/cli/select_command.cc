@@ -170,7 +170,8 @@ void add_select_command(CLI::App& program, Action& action) {
       "  {\"plane\": {\"point\": [x, y, z], \"normal\": [x, y, z]}}\n"
       "  {\"polygon\": {\"view\": NAME, \"points\": [[x, y], ...], \"depth\": \"visible\" or \"through\"}}\n"
       "  {\"stroke\": {\"view\": NAME, \"points\": [[x, y], ...], \"radius\": px}}\n"
-      "  {\"grow\": {\"inside\": [[x, y, z], ...], \"outside\": [[x, y, z], ...], \"reach\": r}}\n"
+      "  {\"grow\": {\"inside\": [[x, y, z], ...], \"outside\": [[x, y, z], ...], \"reach\": r, \"whole\": true, "
+      "\"wider\": n}}\n"
       "  {\"masks\": [{\"view\": NAME, \"image\": PNG as base64}, ...]}\n"
       "  {\"rows\": [[from, to], ...]}, to being exclusive\n"
       "  {\"expand\": r}, {\"shrink\": r}, {\"largest\": n}, {\"invert\": true}: of what is selected so far");

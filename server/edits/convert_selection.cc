@@ -142,7 +142,7 @@ class Actions {
     return select::Stroke{fixed(given.viewpoint), to_vecs(given.points), given.radius, to_engine(given.depth)};
   }
   static Action convert(const on_wire::Grow& given) {
-    return select::Grow{to_vecs(given.inside), to_vecs(given.outside), given.reach};
+    return select::Grow{to_vecs(given.inside), to_vecs(given.outside), given.reach, given.whole, given.wider};
   }
   Action convert(const on_wire::Masks& given) {
     select::Masks masks;

@@ -34,6 +34,8 @@ TEST(Selection, ReadsEveryAction) {
   EXPECT_EQ(grow.inside, (std::vector<Point>{{-0.28, -0.21, -0.62}, {-0.2, -0.3, -0.6}}));
   EXPECT_EQ(grow.outside, (std::vector<Point>{{0.1, 0.05, -0.6}}));
   EXPECT_EQ(grow.reach, 1.5);
+  EXPECT_TRUE(grow.whole);
+  EXPECT_EQ(grow.wider, 1);
   EXPECT_EQ(read->at(1).action, selection::Action(selection::Sphere{{-0.28, -0.21, -0.62}, 0.3}));
   EXPECT_EQ(read->at(2).op, selection::Op::intersect);
   EXPECT_EQ(read->at(2).action, selection::Action(selection::Box{{0, 0, 0}, {4, 2, 2}, {0.5, 0.5, 0.5, 0.5}}));
@@ -108,6 +110,9 @@ TEST(Selection, NamesTheFieldThatIsWrong) {
                  "selection[0].stroke.depth");
   expect_refused(only(R"({"grow": {"inside": []}})"), "selection[0].grow.inside");
   expect_refused(only(R"({"grow": {"inside": [[0, 0, 0], [0, 0, 1e30]]}})"), "selection[0].grow.inside[1][2]");
+  expect_refused(only(R"({"grow": {"inside": [[0, 0, 0]], "whole": 1}})"), "selection[0].grow.whole");
+  expect_refused(only(R"({"grow": {"inside": [[0, 0, 0]], "wider": 65}})"), "selection[0].grow.wider");
+  expect_refused(only(R"({"grow": {"inside": [[0, 0, 0]], "wider": 0.5}})"), "selection[0].grow.wider");
   expect_refused(only(R"({"masks": []})"), "selection[0].masks");
   expect_refused(only(R"({"masks": [{"view": "a", "image": "data:image/png;base64,iVBORw0KGgo="}]})"),
                  "selection[0].masks[0].image");

@@ -1,48 +1,23 @@
 // The page in a real browser, with a real mouse: from the upload to the download.
 import assert from 'node:assert/strict';
-import { existsSync } from 'node:fs';
 import { readFile, writeFile } from 'node:fs/promises';
 import path from 'node:path';
 import { after, before, describe, test } from 'node:test';
-import { loadBrowser } from './support/packages.mjs';
+import { launch, openPage, patience } from './support/browser.mjs';
 import { Service, temporaryFolder } from './support/program.mjs';
 import { datasetZip, demoScene, fox } from './support/scenes.mjs';
 
-const browserProgram = process.env.SPLATDRAG_BROWSER ?? '/usr/bin/chromium';
-assert.ok(existsSync(browserProgram), `There is no browser at ${browserProgram}: install Debian's chromium, or name one in SPLATDRAG_BROWSER.`);
 const screenshot = process.env.SPLATDRAG_SCREENSHOT;
-const patience = 30_000;
 
 let browser, demo, zipFile;
 before(async () => {
-  const chromium = await loadBrowser();
-  browser = await chromium.launch({
-    executablePath: browserProgram,
-    args: ['--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update', '--disable-sync'],
-  });
+  browser = await launch();
   demo = await demoScene({ gaussians: 20_000, views: 24, size: '800x600', photos: false });
   zipFile = path.join(temporaryFolder(), 'demo.zip');
   await writeFile(zipFile, await datasetZip(demo.folder));
 });
 after(() => browser?.close());
-
-/// A new page of a service that notes what a user would never see: errors in the console, requests to elsewhere.
-const open = async (service, { viewport = { width: 1280, height: 800 } } = {}) => {
-  const context = await browser.newContext({ viewport, acceptDownloads: true });
-  const page = await context.newPage();
-  page.setDefaultTimeout(patience);
-  const complaints = [];
-  page.on('console', (message) => {
-    const expected = /status of 401/.test(message.text());  // asked before signing in
-    if (message.type() === 'error' && !expected) complaints.push(message.text());
-  });
-  page.on('pageerror', (error) => complaints.push(String(error)));
-  page.on('request', (request) => {
-    if (!request.url().startsWith(service.url.origin) && !/^(blob|data):/.test(request.url())) complaints.push(`went to ${request.url()}`);
-  });
-  await page.goto(service.url.href);
-  return { page, complaints, id: (name) => page.getByTestId(name) };
-};
+const open = (service, options) => openPage(browser, service, options);
 
 describe('the page', () => {
   let service, client, page, id, complaints;
@@ -82,6 +57,7 @@ describe('the page', () => {
 
   /// With the mouse: a handle on the ball that stands in the picture, and its target beside it.
   const placeAndDrag = async () => {
+    await id('hand-handle').click();
     const box = await id('view').boundingBox();
     await page.mouse.click(box.x + box.width * 0.4, box.y + box.height * 0.655);
     await id('handle-card-0').waitFor();
@@ -284,6 +260,28 @@ describe('selecting', () => {
     assert.ok(await count() > whole);
     await id('selection-remove-1').click();
     await desk.page.waitForFunction((n) => document.querySelector('[data-testid=selection-count]').dataset.count === String(n), whole);
+  });
+
+  test('a rectangle goes around a thing, and what is selected is made wider and narrower', async () => {
+    const { page, id, drag, count, answerTo } = desk;
+    const until = (n) => page.waitForFunction((m) => document.querySelector('[data-testid=selection-count]').dataset.count === String(m), n);
+    await id('select-tool-rectangle').click();
+    const { asked } = await answerTo(() => drag([0.16, 0.58], [0.2, 0.7], [0.27, 0.74]));
+    assert.equal(asked[1].polygon.points.length, 4);
+    const more = await count();
+    assert.ok(more > whole);
+    await id('undo').click();
+    await until(whole);
+    const { asked: wider, answer } = await answerTo(() => id('expand-selection').click());
+    assert.ok(wider[1].expand > 0 && answer.count > whole, `${answer.count} of ${whole}`);
+    await until(answer.count);
+    const { answer: less } = await answerTo(() => id('shrink-selection').click());
+    assert.ok(less.count < answer.count);
+    await until(less.count);
+    await id('undo').click();
+    await id('undo').click();
+    await until(whole);
+    await count();
   });
 
   test('what is selected is removed without a handle', async () => {

@@ -52,6 +52,29 @@ TEST(DemoScene, HasNothingWhereNoCameraSees) {
   }
 }
 
+TEST(DemoScene, WithItsBallCarriedElsewhereIsTheSameButForThatAndClosedAllOver) {
+  const DemoScene demo = make_demo_scene(small);
+  DemoOptions carried = small;
+  carried.ball_shift = {0.75, 0, -0.125};
+  const DemoScene after = make_demo_scene(carried);
+  ASSERT_GT(after.cloud.size(), demo.cloud.size());
+  const auto is_ball = [&](std::size_t i) { return after.object_names[after.object[i]] == "ball"; };
+  for (std::size_t i = 0; i < demo.cloud.size(); ++i) {
+    ASSERT_EQ(after.object[i], demo.object[i]);
+    const DVec3 from(demo.cloud.mean.get(i)), to = is_ball(i) ? from + carried.ball_shift : from;
+    ASSERT_EQ(after.cloud.mean.get(i), Vec3(to)) << i;
+    ASSERT_EQ(after.cloud.sh_row(i)[0], demo.cloud.sh_row(i)[0]) << "light stays: row " << i;
+  }
+  bool below_pot = false, below_ball = false;
+  for (std::size_t i = demo.cloud.size(); i < after.cloud.size(); ++i) {
+    const Vec3 p = after.cloud.mean.get(i);
+    if (after.object_names[after.object[i]] == "table") below_pot |= std::hypot(p.x + 0.62f, p.z - 0.28f) < 0.2f;
+    if (is_ball(i)) below_ball |= p.y > -0.05f && std::abs(p.x - 0.47f) < 0.2f;
+  }
+  EXPECT_TRUE(below_pot) << "the table, where the pot stands on it";
+  EXPECT_TRUE(below_ball) << "the side that the ball lay on";
+}
+
 TEST(DemoScene, LooksDifferentFromEachSideOnGlazedThingsOnly) {
   const DemoScene demo = make_demo_scene(small);
   ASSERT_EQ(demo.cloud.sh_degree, 1);

@@ -46,6 +46,40 @@ TEST(GrowOnTheDemoScene, TakesAnAppleOffABook) { expect_taken(apple_on_books, "a
 TEST(GrowOnTheDemoScene, TakesAnAppleItWasNotMadeFor) { expect_taken(apple_on_table, "apple", 0, 0.97, 0.96); }
 TEST(GrowOnTheDemoScene, TakesThePotWithCorrections) { expect_taken(pot, "pot", 10, 0.85, 0.75); }
 
+/// A click in the middle of what a camera shows of the thing.
+Grow one_click(std::size_t object, const scene::Camera& camera) {
+  Grow grow{{clicks_on(demo(), object, camera, 0).inside.at(0)}, {}, {}};
+  grow.whole = true;
+  return grow;
+}
+
+TEST(GrowOnTheDemoScene, TakesTheWholeOfAThingByOneClick) {
+  for (const auto& [object, recall] : {std::pair{ball, 0.95}, {apple_on_table, 0.95}, {mug, 0.84}})
+    for (const scene::Camera& camera : demo().cameras) {
+      const Agreement found =
+          agreement(demo(), object, select(demo().cloud, {{Op::add, one_click(object, camera)}}).value().rows);
+      EXPECT_GT(found.recall, recall) << demo().object_names[object] << ", " << camera.name;
+      EXPECT_GT(found.precision, 0.93) << demo().object_names[object] << ", " << camera.name;
+    }
+}
+
+TEST(GrowOnTheDemoScene, TakesMoreOrLessOfAThingByBorders) {
+  Selector selector(demo().cloud);
+  Grow grow = one_click(ball, demo().cameras[0]);
+  std::vector<std::size_t> counts;
+  for (grow.wider = -3; grow.wider <= 1; ++grow.wider) {
+    const Selected found = selector.select({{Op::add, grow}}).value();
+    EXPECT_TRUE(found.warnings.empty()) << grow.wider << ": " << found.warnings.at(0).message;
+    counts.push_back(found.count);
+  }
+  for (std::size_t i = 0; i + 1 < counts.size(); ++i) EXPECT_LT(1.1 * double(counts[i]), double(counts[i + 1])) << i;
+  grow.wider = 64;
+  const Selected all = selector.select({{Op::add, grow}}).value();
+  ASSERT_EQ(all.warnings.size(), 1u);
+  EXPECT_EQ(all.warnings[0].where, "selection[0]");
+  EXPECT_EQ(all.warnings[0].message.find("there is no border farther out than wider = "), 0u);
+}
+
 TEST(MasksOfTheDemoScene, AreLiftedToTheirThings) {
   for (const std::size_t object : {ball, mug, apple_on_table}) {
     Masks masks;

@@ -11,15 +11,17 @@ namespace engine::select {
 namespace {
 
 /// The nodes inside, after clicks on nodes.
-std::vector<std::uint32_t> inside(const WeightedGraph& on, const ClickedNodes& clicked) {
+std::vector<std::uint32_t> inside(const WeightedGraph& on, const ClickedNodes& clicked, const BorderChoice& choice = {},
+                                  int* wider = nullptr) {
   std::vector<Given> given(on.graph.size(), Given::no);
   for (const std::uint32_t node : clicked.inside) given[node] = Given::inside;
   for (const std::uint32_t node : clicked.outside) given[node] = Given::outside;
   const std::vector<double> potential = random_walk(on.graph, on.weight, given);
   std::vector<std::uint32_t> out;
-  const auto label = natural_border(on.graph, on.weight, potential, given, clicked);
-  for (std::uint32_t node = 0; node < label.size(); ++node)
-    if (label[node] != 0) out.push_back(node);
+  const NaturalBorder border = natural_border(on.graph, on.weight, potential, given, clicked, choice);
+  for (std::uint32_t node = 0; node < border.inside.size(); ++node)
+    if (border.inside[node] != 0) out.push_back(node);
+  if (wider) *wider = border.wider;
   return out;
 }
 
@@ -80,6 +82,34 @@ TEST(NaturalBorder, AnOutsideClickTakesMoreThanItsOwnNode) {
   const std::size_t taken = inside(even, {{side * 7 + 2}, {side * 7 + 12}}).size();
   EXPECT_GT(taken, 70u);
   EXPECT_LT(taken, 155u);
+}
+
+TEST(NaturalBorder, OfTheWholeIsTheOneFarthestOutOfThoseNearlyAsWeak) {
+  EXPECT_EQ(inside(three_strips(0.05f, 0.06f), {{10}, {1190}}, {.whole = true}), numbers(0, 400));
+  EXPECT_EQ(inside(three_strips(0.01f, 0.4f), {{10}, {1190}}, {.whole = true}), numbers(0, 200))
+      << "what is joined to more than itself is no whole";
+}
+
+TEST(NaturalBorder, CanBeTakenFartherOutAndIn) {
+  const WeightedGraph strips = three_strips(0.05f, 0.4f);
+  int wider = 0;
+  EXPECT_EQ(inside(strips, {{10}, {1190}}, {}, &wider), numbers(0, 200));
+  EXPECT_EQ(inside(strips, {{10}, {1190}}, {.wider = 1}, &wider), numbers(0, 400));
+  EXPECT_EQ(wider, 1);
+  EXPECT_EQ(inside(three_strips(0.05f, 0.06f), {{10}, {1190}}, {.whole = true, .wider = -1}), numbers(0, 200))
+      << "counted from where the whole ends";
+}
+
+TEST(NaturalBorder, SaysHowFarItWentWhereThereAreNoMore) {
+  int wider = 0;
+  const auto farthest = inside(three_strips(0.05f, 0.2f), {{10}, {1190}}, {.wider = 60}, &wider);
+  EXPECT_LT(wider, 60);
+  EXPECT_GE(wider, 1);
+  EXPECT_EQ(inside(three_strips(0.05f, 0.2f), {{10}, {1190}}, {.wider = wider}), farthest);
+  const auto inmost = inside(three_strips(0.05f, 0.2f), {{10}, {1190}}, {.wider = -60}, &wider);
+  EXPECT_LE(wider, 0);
+  EXPECT_GE(inmost.size(), 1u);
+  EXPECT_LE(inmost.size(), 200u);
 }
 
 TEST(NaturalBorder, TakesAllThatCanBeReachedWhereNothingIsOutside) {

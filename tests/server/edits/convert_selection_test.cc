@@ -90,7 +90,7 @@ TEST(SelectionToEngine, CarriesEveryAction) {
       {.action = on_wire::Sphere{{1, 2, 3}, 4}},
       {.op = on_wire::Op::subtract, .action = on_wire::Box{{1, 2, 3}, {4, 5, 6}, {0.5, 0.5, -0.5, 0.5}}},
       {.op = on_wire::Op::intersect, .action = on_wire::Plane{{1, 2, 3}, {0, 0, 1}}},
-      {.action = on_wire::Grow{{{1, 1, 1}}, {{2, 2, 2}}, 7}},
+      {.action = on_wire::Grow{{{1, 1, 1}}, {{2, 2, 2}}, 7, true, -3}},
       {.action = on_wire::Rows{{{2, 5}}}},
       {.action = on_wire::Expand{0.5}},
       {.action = on_wire::Shrink{0.25}},
@@ -110,6 +110,8 @@ TEST(SelectionToEngine, CarriesEveryAction) {
   EXPECT_EQ(std::get<select::Plane>(selection[2].action).normal, DVec3(0, 0, 1));
   EXPECT_EQ(std::get<select::Grow>(selection[3].action).outside, std::vector<DVec3>{DVec3(2)});
   EXPECT_EQ(std::get<select::Grow>(selection[3].action).reach, 7);
+  EXPECT_TRUE(std::get<select::Grow>(selection[3].action).whole);
+  EXPECT_EQ(std::get<select::Grow>(selection[3].action).wider, -3);
   EXPECT_EQ(std::get<select::Rows>(selection[4].action).ranges[0].to, 5u);
   EXPECT_EQ(std::get<select::Expand>(selection[5].action).distance, 0.5);
   EXPECT_EQ(std::get<select::Shrink>(selection[6].action).distance, 0.25);

@@ -7,6 +7,7 @@ import {
   centredOn,
   dollied,
   dragged,
+  ellipseOf,
   firstPose,
   focal,
   isPose,
@@ -26,6 +27,7 @@ import {
   sphereOutline,
   unitsPerPixel,
   upOf,
+  zoomedAt,
 } from "../../../web/camera.js";
 import { add, cross, distance, dot, length, scale, sub, unit } from "../../../web/vectors.js";
 
@@ -120,8 +122,8 @@ test("a drag in the view plane keeps the depth and lands under the pointer", () 
 test("a drag that ends where it began moves nothing", () => {
   const from = [0.2, 0.4, 2];
   const { x, y } = project(camera, from);
-  for (const constraint of ["view", "x", "y", "z", "normal"])
-    near(dragged(camera, from, x, y, constraint, [0.3, -0.2, 0.9]), from, 1e-9);
+  for (const constraint of ["view", "level", "x", "y", "z", "normal"])
+    near(dragged(camera, from, x, y, constraint, { normal: [0.3, -0.2, 0.9] }), from, 1e-9);
 });
 
 test("a drag along an axis stays on it and follows the pointer", () => {
@@ -134,15 +136,66 @@ test("a drag along an axis stays on it and follows the pointer", () => {
   ]) {
     const wanted = add(from, scale(axis, 0.7));
     const { x, y } = project(camera, wanted);
-    near(dragged(camera, from, x, y, constraint, [1, 2, -1]), wanted, 1e-8);
-    const off = dragged(camera, from, x + 9, y - 7, constraint, [1, 2, -1]);
+    near(dragged(camera, from, x, y, constraint, { normal: [1, 2, -1] }), wanted, 1e-8);
+    const off = dragged(camera, from, x + 9, y - 7, constraint, { normal: [1, 2, -1] });
     near(length(cross(sub(off, from), axis)), 0, 1e-9);
   }
 });
 
 test("a handle without a normal is dragged in the view plane instead", () => {
   const from = [0.2, 0.4, 2];
-  near(dragged(camera, from, 50, 60, "normal", null), dragged(camera, from, 50, 60, "view"));
+  near(dragged(camera, from, 50, 60, "normal", { normal: null }), dragged(camera, from, 50, 60, "view"));
+});
+
+test("a drag along an axis that faces the camera does not jump", () => {
+  const from = [0.2, 0.4, 2];
+  const { x, y } = project(camera, from);
+  const { direction } = rayThrough(camera, x, y);
+  for (const tilt of [0, 0.02, 0.2]) {
+    const normal = unit(add(scale(direction, -1), [0, tilt, 0]));
+    for (const pixels of [1, 5, 40]) {
+      const moved = dragged(camera, from, x, y - pixels, "normal", { normal });
+      near(length(cross(sub(moved, from), normal)), 0, 1e-9);
+      near(dot(sub(moved, from), normal), pixels * unitsPerPixel(camera, from), 1e-9);
+    }
+  }
+});
+
+test("a level drag stays at its height, follows the pointer, and does not run away to the horizon", () => {
+  const up = [0, -1, 0];
+  const from = [0.2, 0.4, 2];
+  const above = { ...camera, eye: [0, -3, -3], target: from, up };
+  for (const [dx, dy] of [[60, 20], [-90, -40]]) {
+    const { x, y } = project(above, from);
+    const moved = dragged(above, from, x + dx, y + dy, "level", { up });
+    near(moved[1], from[1], 1e-9);
+    const seen = project(above, moved);
+    near([seen.x, seen.y], [x + dx, y + dy], 1e-6);
+  }
+  const flat = { ...camera, eye: [0.2, 0.4, -3], target: from, up };
+  for (const y of [0, 100, 149, 151, 299]) {
+    const moved = dragged(flat, from, 250, y, "level", { up });
+    near(moved[1], from[1], 1e-9);
+    assert.ok(length(sub(moved, from)) < 20, `${moved} at ${y}`);
+  }
+});
+
+test("zooming keeps what is under the pointer where it is", () => {
+  const under = onViewPlane(camera, 500, 90, camera.target);
+  const nearer = zoomedAt(camera, 500, 90, 0.4, 1e-3);
+  const seen = project({ ...nearer, width: camera.width, height: camera.height }, under);
+  near([seen.x, seen.y], [500, 90], 1e-6);
+  near(distance(nearer.eye, nearer.target), 0.4 * distance(camera.eye, camera.target));
+  const least = zoomedAt(camera, 500, 90, 1e-9, 0.5);
+  near(distance(least.eye, least.target), 0.5);
+});
+
+test("a box fills an ellipse of the picture; one that is partly behind the camera none", () => {
+  const seen = ellipseOf(camera, { low: [-0.1, -0.2, 1.9], high: [0.3, 0.2, 2.1] });
+  const middle = project(camera, [0.1, 0, 2]);
+  assert.ok(Math.hypot(seen.x - middle.x, seen.y - middle.y) < 10);
+  assert.ok(seen.rx > 5 && seen.ry > 5);
+  assert.equal(ellipseOf(camera, { low: [-100, -100, -100], high: [100, 100, 100] }), null);
 });
 
 test("along the line of sight a pixel says nothing, so nothing moves", () => {

@@ -182,6 +182,167 @@ test("when its edit is done, the page shows the result and the handles have done
   assert.equal(editor.state.version, 0);
 });
 
+/** From now on the scene has a version 1, made from 0. */
+function versionComes() {
+  service["GET /v1/scenes/s000001"] = () => ({
+    ...scene(),
+    versions: [...scene().versions, { version: 1, parent: 0 }],
+  });
+}
+
+test("after a run, undo brings back the version together with what was placed on it", async () => {
+  service["POST /v1/edits"] = () => edit();
+  await editor.place(CAMERA, 200, 150);
+  editor.settle({ region: { center: [0, 0, 0], size: [1, 1, 1] } });
+  await editor.run();
+  versionComes();
+  streams[0].send(edit({ state: "succeeded", progress: 1, result_version: 1 }));
+  await settle();
+  assert.deepEqual([editor.state.version, editor.state.handles, editor.state.region], [1, [], null], "the box, too");
+  editor.undo();
+  assert.deepEqual([editor.state.version, editor.state.handles.length], [0, 1]);
+  assert.ok(editor.state.region);
+  editor.redo();
+  assert.deepEqual([editor.state.version, editor.state.handles.length], [1, 0], "no old handle on the new version");
+});
+
+test("undo passes over what was placed on a version that is gone", async () => {
+  versionComes();
+  await editor.reloadScene();
+  editor.showVersion(1);
+  service["POST /v1/scenes/s000001/versions/1/pick"] = service["POST /v1/scenes/s000001/versions/0/pick"];
+  await editor.place(CAMERA, 200, 150);
+  await editor.place(CAMERA, 200, 150);
+  editor.showVersion(0);
+  service["GET /v1/scenes/s000001"] = scene;
+  await editor.reloadScene();
+  editor.undo();
+  assert.equal(editor.state.version, 0);
+  assert.equal(editor.canUndo, false);
+});
+
+test("undo covers mode, preset and parameters as it covers handles", () => {
+  editor.settle({ mode: "extend" });
+  editor.settle({ preset: "draft", params: { views: 4 } });
+  editor.undo();
+  assert.deepEqual([editor.state.mode, editor.state.preset, editor.state.params], ["extend", "", {}]);
+  editor.undo();
+  assert.equal(editor.state.mode, "move");
+  editor.redo();
+  assert.equal(editor.state.mode, "extend");
+});
+
+/** A thing that is taken, as a click takes it. */
+async function take() {
+  service["POST /v1/scenes/s000001/versions/0/select"] = () => ({
+    id: "q000001",
+    count: 7,
+    bounds: { low: [0, 0, 0], high: [1, 1, 1] },
+    centre: [0.5, 0.5, 0.5],
+    undecided: 0,
+    warnings: [],
+  });
+  service["POST /v1/previews"] = () => ({ version: "p000001", handles: [{ gaussians: 7 }], gaussians: { crumbs: 0 } });
+  await editor.selecting.propose(CAMERA, 200, 150);
+  await settle();
+}
+
+/** Drags it to the right by so many pixels, and lets go. */
+function dragBy(pixels) {
+  const drag = editor.dragThing(CAMERA, { x: 230, y: 150 });
+  drag.move(230 + pixels, 150);
+  drag.end();
+}
+
+test("a thing that is dragged and let go is repaired as a draft, and its result shown", async () => {
+  const asked = [];
+  service["POST /v1/edits"] = (body) => (asked.push(body), edit());
+  await take();
+  assert.deepEqual(editor.state.selection, [{ grow: { inside: [[0.5, 0, 0]], whole: true } }]);
+  dragBy(30);
+  await settle();
+  assert.equal(asked.length, 1);
+  assert.deepEqual([asked[0].preset, asked[0].mode, asked[0].handles.length], ["draft", "move", 1]);
+  assert.deepEqual(asked[0].handles[0].source, [0.5, 0, 0], "by the point that was clicked on");
+  assert.ok(asked[0].handles[0].target[0] > 0.5);
+  assert.equal(editor.state.draft.id, "e000001");
+  versionComes();
+  streams[0].send(edit({ state: "succeeded", progress: 1, result_version: 1, request: asked[0] }));
+  await settle();
+  assert.deepEqual([editor.state.version, editor.state.draft, editor.state.selection], [1, null, []]);
+  await editor.runBetter();
+  assert.deepEqual([asked[1].preset, asked[1].version], ["standard", 0], "the same drag, on the version before");
+  assert.deepEqual(asked[1].handles, asked[0].handles);
+});
+
+test("a draft is given up when the thing is dragged on, and never takes the screen", async () => {
+  let n = 0;
+  const cancelled = [];
+  for (const id of ["e000001", "e000002"])
+    service[`POST /v1/edits/${id}/cancel`] = () => (cancelled.push(id), edit({ id, state: "cancel_requested" }));
+  service["POST /v1/edits"] = () => edit({ id: `e00000${++n}` });
+  await take();
+  dragBy(30);
+  await settle();
+  dragBy(60);
+  await settle();
+  assert.deepEqual(cancelled, ["e000001"]);
+  assert.equal(editor.state.draft.id, "e000002");
+  assert.deepEqual(
+    editor.state.edits.map((e) => e.id),
+    ["e000002"],
+  );
+  streams[0].send(edit({ id: "e000001", state: "succeeded", progress: 1, result_version: 1 }));
+  await settle();
+  assert.equal(editor.state.version, 0);
+  editor.undo();
+  editor.undo();
+  await settle();
+  assert.deepEqual(cancelled, ["e000001", "e000002"], "undone, it is not wanted either");
+});
+
+test("a draft whose request is still on its way when it is given up is cancelled when it is there", async () => {
+  let answer;
+  const cancelled = [];
+  service["POST /v1/edits"] = () => new Promise((resolve) => (answer = () => resolve(edit())));
+  service["POST /v1/edits/e000001/cancel"] = () => (cancelled.push(1), edit({ state: "cancelled" }));
+  await take();
+  dragBy(30);
+  await settle();
+  editor.letGo();
+  await settle();
+  answer();
+  await settle();
+  assert.equal(cancelled.length, 1);
+  assert.deepEqual([editor.state.draft, editor.state.edits], [null, []]);
+});
+
+test("a thing is removed by one press, and what is taken next is to be moved again", async () => {
+  const asked = [];
+  service["POST /v1/edits"] = (body) => (asked.push(body), edit());
+  await take();
+  await editor.removeThing();
+  await settle();
+  assert.deepEqual([asked[0].mode, asked[0].preset, asked[0].handles], ["remove", "draft", []]);
+  assert.equal(editor.state.draft.id, "e000001", "it is not outdated for want of a handle");
+  versionComes();
+  streams[0].send(edit({ state: "succeeded", progress: 1, result_version: 1, request: asked[0] }));
+  await settle();
+  assert.deepEqual([editor.state.version, editor.state.mode], [1, "move"]);
+  editor.undo();
+  assert.deepEqual([editor.state.version, editor.state.mode, editor.state.selection.length], [0, "remove", 1]);
+});
+
+test("who drags a thing has changed their mind about removing it", async () => {
+  service["POST /v1/edits"] = () => edit();
+  editor.settle({ mode: "remove" });
+  await take();
+  dragBy(30);
+  assert.equal(editor.state.mode, "move");
+  editor.undo();
+  assert.equal(editor.state.mode, "remove");
+});
+
 test("a result of another version than the one looked at does not take the screen", async () => {
   service["POST /v1/edits"] = () => edit({ version: 3 });
   await editor.place(CAMERA, 200, 150);

@@ -1,10 +1,10 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { AdaptiveSide, FrameQueue, Recent } from "../../../web/frames.js";
+import { AdaptiveSide, FrameQueue, Recent, serverTime } from "../../../web/frames.js";
 
 /** A queue whose loads are answered by hand. */
-function byHand() {
+function byHand(atOnce) {
   const loads = [];
   const shown = [];
   const failed = [];
@@ -16,6 +16,7 @@ function byHand() {
       }),
     onPicture: (picture, job) => shown.push([picture, job.key]),
     onError: (error, job) => failed.push([error.message, job.key]),
+    atOnce,
   });
   return { queue, loads, shown, failed };
 }
@@ -90,6 +91,46 @@ test("a queue that was cleared shows nothing more", async () => {
   assert.deepEqual(shown, []);
   assert.equal(loads.length, 1);
   assert.equal(queue.busy, false);
+});
+
+test("several are on their way at once, and an older one never replaces a newer one", async () => {
+  const { queue, loads, shown } = byHand(3);
+  for (const key of ["a", "b", "c", "d", "e"]) queue.request({ key });
+  const asked = () => loads.map((a) => a.job.key).join("");
+  assert.equal(asked(), "abc");
+  loads[1].resolve("B");
+  await settle();
+  assert.equal(asked(), "abce", "of those wished for meanwhile the latest");
+  loads[0].resolve("A");
+  loads[3].resolve("E");
+  await settle();
+  loads[2].resolve("C");
+  await settle();
+  assert.deepEqual(
+    shown.map(([, key]) => key),
+    ["b", "e"],
+  );
+  assert.equal(queue.busy, false);
+});
+
+test("a large picture goes alone", async () => {
+  const { queue, loads } = byHand(3);
+  queue.request({ key: "a" });
+  queue.request({ key: "large", large: true });
+  assert.equal(loads.length, 1, "it waits for the small ones");
+  loads[0].resolve("A");
+  await settle();
+  assert.equal(loads[1].job.key, "large");
+  queue.request({ key: "b" });
+  await settle();
+  assert.ok(loads[1].signal.aborted);
+  assert.equal(loads[2].job.key, "b");
+});
+
+test("the service says how long it worked", () => {
+  assert.equal(serverTime("render;dur=30.5, encode;dur=4.5"), 35);
+  assert.equal(serverTime(null), null);
+  assert.equal(serverTime("cache"), null);
 });
 
 test("slow answers make moving pictures smaller, quick ones larger, within limits", () => {

@@ -5,13 +5,19 @@ import { test } from "node:test";
 import {
   clicksOf,
   describe,
+  furtherBorders,
   inverted,
   polygonOf,
+  proposalOf,
+  rectangleOf,
   sentence,
   share,
+  spread,
   strokeOf,
+  thingAt,
   thinned,
   whatMoves,
+  widened,
   withClick,
 } from "../../../web/selection.js";
 
@@ -117,9 +123,54 @@ test("every operation of the contract has a name for people", () => {
     readFileSync(new URL("../../../proto/examples/selection.json", import.meta.url), "utf8"),
   );
   for (const step of selection) assert.match(describe(step), /^[A-Z][^{}]+$/, JSON.stringify(step));
-  assert.equal(describe(selection[0]), "Add a thing: 2 points on it, 1 not");
+  assert.equal(describe(selection[0]), "Add a whole thing: 2 points on it, 1 not, 1 border wider");
   assert.equal(describe({ op: "subtract", rows: [[0, 1]] }), "Subtract 1 range of rows");
   assert.equal(describe({ largest: 1 }), "Keep the largest piece");
+});
+
+test("one click proposes the whole thing, which can be made more or less of, border by border", () => {
+  const thing = thingAt([1, 2, 3]);
+  assert.deepEqual(thing, [{ grow: { inside: [[1, 2, 3]], whole: true } }]);
+  assert.equal(widened(thing, 1)[0].grow.wider, 1);
+  assert.deepEqual(widened(widened(thing, 1), -1), thing, "back where it was, the same text");
+  assert.equal(widened(widened(thing, -1), -1)[0].grow.wider, -2);
+  const last = { warnings: ["selection[0]: there is no border farther out than wider = 2"] };
+  assert.equal(widened(widened(thing, 3), -1, last)[0].grow.wider, 1, "from the last one that there is");
+  assert.deepEqual(furtherBorders(last), { more: false, less: true });
+  assert.deepEqual(furtherBorders({ warnings: ["selection[0]: there is no border farther in than wider = -4"] }), {
+    more: true,
+    less: false,
+  });
+  assert.deepEqual(furtherBorders(null), { more: true, less: true });
+});
+
+test("a rectangle is a polygon of four corners, whichever way it was drawn; a line is none", () => {
+  const drawn = { op: "add", camera: CAMERA, depth: "through" };
+  const { polygon } = rectangleOf({ ...drawn, points: [[90, 80], [50, 50], [10, 20]] });
+  assert.deepEqual(polygon.points, [[90, 80], [10, 80], [10, 20], [90, 20]]);
+  assert.equal(polygon.depth, "through");
+  assert.equal(rectangleOf({ ...drawn, points: [[90, 80], [10, 81]] }), null);
+  assert.equal(rectangleOf({ ...drawn, points: [[90, 80]] }), null);
+});
+
+test("a selection is made wider and narrower in proportion to its size", () => {
+  const answer = { count: 1600, bounds: { low: [0, 0, 0], high: [1, 4, 2] } };
+  assert.deepEqual(spread(thingAt([0, 0, 0]), 1, answer).at(-1), { expand: 0.2 });
+  assert.deepEqual(spread(thingAt([0, 0, 0]), -1, answer).at(-1), { shrink: 0.2 });
+  const point = { count: 3, bounds: { low: [1, 1, 1], high: [1, 1, 1] } };
+  assert.equal(spread(thingAt([0, 0, 0]), 1, point).length, 1, "what has no size has nothing to go by");
+});
+
+test("a selection made by hand is no proposal", () => {
+  assert.ok(proposalOf(thingAt([0, 0, 0])));
+  assert.ok(proposalOf(widened(thingAt([0, 0, 0]), 2)));
+  for (const selection of [
+    [],
+    [{ grow: { inside: [[0, 0, 0]] } }],
+    [...thingAt([0, 0, 0]), { expand: 0.1 }],
+    [{ op: "subtract", ...thingAt([0, 0, 0])[0] }],
+  ])
+    assert.equal(proposalOf(selection), null, JSON.stringify(selection));
 });
 
 test("what the service says of a selection is a sentence", () => {

@@ -3,6 +3,8 @@ import { test } from "node:test";
 
 import { History } from "../../../web/history.js";
 import { SceneMemory, Store } from "../../../web/store.js";
+import { namedAs } from "../../../web/uploads.js";
+import { memoryStorage } from "./stand_ins.mjs";
 
 const settle = () => new Promise((resolve) => setImmediate(resolve));
 
@@ -91,4 +93,22 @@ test("history forgets what is too long ago", () => {
   assert.equal(history.undo(4), 3);
   assert.equal(history.undo(3), 2);
   assert.equal(history.undo(2), undefined);
+});
+
+test("single letters are keys until they are turned off, which outlives a reload", () => {
+  const storage = memoryStorage();
+  const memory = new SceneMemory(storage);
+  assert.equal(memory.letterKeys, true);
+  memory.letterKeys = false;
+  assert.equal(new SceneMemory(storage).letterKeys, false);
+  memory.letterKeys = true;
+  assert.equal(new SceneMemory(storage).letterKeys, true);
+});
+
+test("what was uploaded has the name that the user knows", () => {
+  const named = (where) => namedAs("chair.ply", { detail: "no", where }).where;
+  assert.equal(named("upload:vertex[3].x"), "chair.ply:vertex[3].x");
+  assert.equal(named("upload"), "chair.ply");
+  assert.equal(named("uploads"), "uploads");
+  assert.equal(named(undefined), "");
 });

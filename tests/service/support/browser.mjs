@@ -1,0 +1,82 @@
+// A browser for tests, and pages in it that note what a user would never see.
+import assert from 'node:assert/strict';
+import { existsSync, mkdirSync } from 'node:fs';
+import path from 'node:path';
+import { project } from '../../../web/camera.js';
+import { loadBrowser } from './packages.mjs';
+
+const program = process.env.SPLATDRAG_BROWSER ?? '/usr/bin/chromium';
+
+const shots = process.env.SPLATDRAG_SHOTS;
+if (shots) mkdirSync(shots, { recursive: true });
+
+/// Waits for a page end after so many milliseconds, in failure.
+export const patience = 30_000;
+
+/// Starts the browser; close() ends it.
+export const launch = async () => {
+  assert.ok(existsSync(program), `There is no browser at ${program}: install Debian's chromium, or name one in SPLATDRAG_BROWSER.`);
+  const chromium = await loadBrowser();
+  return chromium.launch({
+    executablePath: program,
+    args: ['--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update', '--disable-sync'],
+  });
+};
+
+/// A new page of a service: {page, complaints, id}. `complaints`: errors in the console, requests to elsewhere.
+///   context  more options of its context, such as hasTouch
+export const openPage = async (browser, service, { viewport = { width: 1280, height: 800 }, ...context } = {}) => {
+  const page = await (await browser.newContext({ viewport, acceptDownloads: true, ...context })).newPage();
+  page.setDefaultTimeout(patience);
+  const complaints = [];
+  page.on('console', (message) => {
+    const expected = /status of 401/.test(message.text());  // asked before signing in
+    if (message.type() === 'error' && !expected) complaints.push(message.text());
+  });
+  page.on('pageerror', (error) => complaints.push(String(error)));
+  page.on('request', (request) => {
+    if (!request.url().startsWith(service.url.origin) && !/^(blob|data):/.test(request.url())) complaints.push(`went to ${request.url()}`);
+  });
+  await page.goto(service.url.href);
+  return { page, complaints, id: (name) => page.getByTestId(name) };
+};
+
+/// The hand on the picture of an open page.
+export const handOn = ({ page, id }) => {
+  const state = (wanted) => page.waitForFunction((name) => {
+    const bar = document.querySelector('[data-testid=thing-bar]');
+    return !bar.hidden && bar.dataset.state === name;
+  }, wanted, { timeout: 120_000 });
+  return {
+    state,
+    /// Until the picture on the screen is the full one of a version.
+    shown: (version) => page.waitForFunction((wanted) => {
+      const view = document.querySelector('[data-testid=view]');
+      return view?.dataset.version === String(wanted) && view.dataset.quality === 'full';
+    }, version, { timeout: patience }),
+    /// Where a point of the world is on the screen, once the page has remembered where it looks from.
+    onScreen: async (point) => {
+      await page.waitForTimeout(600);  // it saves a little later
+      const pose = await page.evaluate(() => {
+        const name = Object.keys(localStorage).find((key) => key.startsWith('splatdrag.scene.'));
+        return JSON.parse(localStorage.getItem(name)).pose;
+      });
+      const box = await id('view').boundingBox();
+      const { x, y } = project({ ...pose, width: box.width, height: box.height }, point);
+      return [box.x + x, box.y + y];
+    },
+    /// How many Gaussians are taken, once the page knows and the picture shows them.
+    count: async () => Number(await (await page.waitForFunction(() => {
+      const { count, waits } = document.querySelector('[data-testid=selection-count]').dataset;
+      const { selection, quality } = document.querySelector('[data-testid=view]').dataset;
+      return count > 0 && waits === undefined && selection && quality === 'full' && count;
+    })).jsonValue()),
+    drag: async (from, to, { drop = true } = {}) => {
+      await page.mouse.move(...from);
+      await page.mouse.down();
+      await page.mouse.move(...to, { steps: 12 });
+      if (drop) await page.mouse.up();
+    },
+    shot: (name) => shots && page.screenshot({ path: path.join(shots, `${name}.png`) }),
+  };
+};

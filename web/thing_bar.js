@@ -1,0 +1,98 @@
+// On the picture: what was taken hold of, how it is made more or less of, and what becomes of it once it is let go.
+
+import { attrs, byId, h, text } from "./dom.js";
+import { statusLine } from "./edits.js";
+import { duration, gaussians } from "./format.js";
+import { furtherBorders, proposalOf, sentence } from "./selection.js";
+
+export function buildThingBar(editor) {
+  const { store, selecting } = editor;
+  const button = (label, testid, title, onclick, extra = {}) =>
+    h("button", { type: "button", class: "small", testid, title, onclick, ...extra }, label);
+
+  const line = h("span", { class: "thing-line", role: "status", testid: "thing-line" });
+  const problem = h("span", { class: "thing-problem", role: "alert", hidden: true, testid: "thing-problem" });
+  const less = button("\u2212 Less", "thing-less", "Only up to the next border within (,)", () => selecting.widen(-1));
+  const more = button("+ More", "thing-more", "Up to the next border beyond (.)", () => selecting.widen(1));
+  const hold = button("By keys", "thing-hold", "A handle to move by arrow keys, or by numbers in the panel", () => {
+    editor.holdThing();
+    requestAnimationFrame(() => document.querySelector("[data-testid=handle-0-target]")?.focus());
+  });
+  const remove = button("Remove", "thing-remove", "Take it away for good, and complete what it hid", () =>
+    editor.removeThing(),
+  );
+  const repair = button("Repair", "thing-repair", "Run it as a draft", () => editor.runDraft(), {
+    class: "small primary",
+  });
+  const drop = button("Let go", "thing-drop", "Nothing is taken any more (Esc)", () => editor.letGo());
+  const cancel = button("Stop", "thing-cancel", "Give up the repair; it stays where you dragged it", () =>
+    editor.cancelDraft(),
+  );
+  const better = button(
+    "Run it well",
+    "thing-better",
+    "Runs the same drag once more with the preset standard: slower, and better",
+    () => editor.runBetter(),
+    { class: "small primary" },
+  );
+  const undo = button("Undo", "thing-undo", "Back to before (Ctrl + Z)", () => editor.undo());
+  byId("thing-bar").append(line, problem, less, more, hold, remove, repair, drop, cancel, better, undo);
+
+  store.watch(
+    [
+      ...["thingMode", "selectMode", "selection", "selectionAnswer", "selectionWaits", "handles", "dragging", "draft"],
+      ...["drafted", "edits", "problem", "version", "submitting", "draftOnRelease"],
+    ],
+    (state) => {
+      const { selection, selectionAnswer: answer, selectionWaits, draft, drafted, dragging } = state;
+      const moved = state.handles.some((handle) => handle.target);
+      const taken = selection.length > 0;
+      const done = drafted !== null && !taken;
+      byId("thing-bar").hidden = state.selectMode || !state.thingMode || !(taken || done);
+      const idle = taken && !dragging && !draft;
+      const borders = furtherBorders(selectionWaits ? null : answer);
+      for (const [element, shows] of [
+        [less, idle && !moved && proposalOf(selection)],
+        [more, idle && !moved && proposalOf(selection)],
+        [hold, idle && !moved],
+        [remove, idle && !moved],
+        [repair, idle && moved],
+        [drop, idle],
+        [cancel, draft !== null],
+        [better, done && !drafted.better],
+        [undo, done],
+      ])
+        element.hidden = !shows;
+      less.disabled = selectionWaits || !borders.less;
+      more.disabled = selectionWaits || !borders.more;
+      better.disabled = state.submitting;
+      text(line, lineOf(state));
+      const refused = taken ? (answer?.error && sentence(answer.error.detail)) || state.problem?.error.detail : null;
+      problem.hidden = !refused;
+      text(problem, refused ?? "");
+      attrs(byId("thing-bar"), {
+        "data-state": done ? "done" : draft ? "repairing" : dragging ? "dragging" : moved ? "moved" : "taken",
+      });
+    },
+  );
+}
+
+function lineOf({ selection, selectionAnswer: answer, selectionWaits, draft, drafted, edits, dragging, handles }) {
+  if (draft) {
+    const edit = edits.find((e) => e.id === draft.id);
+    return edit ? `Repairing: ${statusLine(edit)}` : "Repairing\u2026";
+  }
+  if (dragging) return "Let go where it should be";
+  if (selection.length === 0) {
+    if (!drafted) return "";
+    const better = edits.find((e) => e.id === drafted.better);
+    if (better) return better.state === "succeeded" ? "Done well." : `Running it well: ${statusLine(better)}`;
+    const edit = edits.find((e) => e.id === drafted.edit);
+    const seconds = edit?.started && edit?.ended ? (new Date(edit.ended) - new Date(edit.started)) / 1000 : null;
+    return `Done, as a draft${seconds === null ? "" : ` in ${duration(seconds)}`}.`;
+  }
+  if (selectionWaits || !answer) return "Looking for where it ends\u2026";
+  if (answer.error) return "";
+  const moved = handles.some((handle) => handle.target);
+  return `${gaussians(answer.count)}${moved ? "" : ": drag it"}`;
+}
