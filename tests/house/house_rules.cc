@@ -27,7 +27,7 @@ const std::vector<Reserved>& reserved() {
       {"OpenEXR/", {"engine/io"}},
       {"zlib.h", {"engine/io"}},
       {"zstd.h", {"engine/io"}},
-      {"nlohmann/", {"engine/io", "proto", "server/cli", "server/scenes/catalogue"}},
+      {"nlohmann/", {"engine/io", "engine/weights", "proto", "server/cli", "server/scenes/catalogue"}},
       {"tbb/", {"engine/core"}},
       {"oneapi/", {"engine/core"}},
       {"sqlite3.h", {"engine/jobs"}},
