@@ -2,7 +2,7 @@
 # Installs what splatdrag needs on Debian 12. Asks nothing, and does nothing where all is installed.
 #
 #   install-packages.sh          to build and run it
-#   install-packages.sh tests    to run all tests, too: a browser, and Node.js to drive it
+#   install-packages.sh tests    to run all tests, too: a browser, Node.js to drive it, and what diffusion models need
 #   install-packages.sh lint     to check the sources, too: clang-format, clang-tidy, and yamllint for the contract
 #   install-packages.sh fuzz     to fuzz the readers, too: clang and its runtime
 set -euo pipefail
@@ -21,7 +21,7 @@ packages=(
   curl jq                                              # the demo talks to the service
 )
 if [[ "${1:-}" == tests ]]; then
-  packages+=(chromium)
+  packages+=(chromium libtorch-dev libutf8proc-dev)
   # A newer Node.js from elsewhere will do.
   if ! command -v node >/dev/null || ! command -v npm >/dev/null; then
     packages+=(nodejs npm)

@@ -209,6 +209,12 @@ void widen(std::span<const std::byte> bytes, std::span<float> into, float (*wide
   }
 }
 
+Result<void> check_finite(std::span<const float> values, const std::string& where) {
+  if (const auto at = first_not_finite(values))
+    return fail(ErrorCode::corrupt_data, "not a finite number", where + "[" + std::to_string(*at) + "]");
+  return {};
+}
+
 }  // namespace
 
 std::string text_of(const Shape& shape) {
@@ -289,6 +295,14 @@ const StoredTensor* TensorFile::find(std::string_view tensor) const {
   return found == tensors_.end() ? nullptr : &found->second;
 }
 
+Result<std::span<const float>> floats_in_place(const StoredTensor& tensor, const std::string& where) {
+  const auto address = reinterpret_cast<std::uintptr_t>(tensor.bytes.data());
+  if (tensor.dtype != "F32" || address % alignof(float) != 0) return std::span<const float>();
+  const std::span<const float> values(reinterpret_cast<const float*>(tensor.bytes.data()), tensor.elements());
+  if (const auto checked = check_finite(values, where); !checked) return propagate(checked);
+  return values;
+}
+
 Result<void> read_floats(const StoredTensor& tensor, const std::string& where, std::span<float> into) {
   assert(into.size() == tensor.elements());
   if (into.empty()) return {};
@@ -300,9 +314,7 @@ Result<void> read_floats(const StoredTensor& tensor, const std::string& where, s
     widen(tensor.bytes, into, from_bfloat);
   else
     return fail(ErrorCode::unsupported, "its numbers are " + tensor.dtype + "; F16, BF16 and F32 are read", where);
-  if (const auto at = first_not_finite(into))
-    return fail(ErrorCode::corrupt_data, "not a finite number", where + "[" + std::to_string(*at) + "]");
-  return {};
+  return check_finite(into, where);
 }
 
 std::string encode_tensors(const std::map<std::string, FloatTensor>& tensors,

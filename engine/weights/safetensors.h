@@ -74,6 +74,11 @@ class TensorFile {
 ///   errors  unsupported: neither F16, BF16 nor F32; corrupt_data: NaN or infinity, `where` with its index
 [[nodiscard]] Result<void> read_floats(const StoredTensor& tensor, const std::string& where, std::span<float> into);
 
+/// The numbers of an F32 tensor where they lie, which costs nothing; empty for other types, and where the address is
+/// not that of a float.
+///   errors  corrupt_data: NaN or infinity, as of read_floats()
+[[nodiscard]] Result<std::span<const float>> floats_in_place(const StoredTensor& tensor, const std::string& where);
+
 /// A tensor to write.
 struct FloatTensor {
   Shape shape;

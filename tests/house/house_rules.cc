@@ -23,6 +23,8 @@ const std::vector<Reserved>& reserved() {
       {"Eigen/", {"engine/elastic", "engine/repair"}, false},
       {"torch/", {"engine/diffusion"}, false},
       {"ATen/", {"engine/diffusion"}, false},
+      {"c10/", {"engine/diffusion"}, false},
+      {"utf8proc", {"engine/diffusion"}, false},
       {"OpenImageIO/", {"engine/io"}},
       {"OpenEXR/", {"engine/io"}},
       {"zlib.h", {"engine/io"}},

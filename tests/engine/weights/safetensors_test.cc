@@ -69,6 +69,25 @@ TEST(Safetensors, ANumberThatIsNoneIsNamedByItsPlace) {
   ASSERT_FALSE(read);
   EXPECT_EQ(read.error().code, ErrorCode::corrupt_data);
   EXPECT_EQ(read.error().where, "a:x[2]");
+  EXPECT_EQ(floats_in_place(*file->find("x"), "a:x").error().where, "a:x[2]");
+}
+
+TEST(Safetensors, FloatsAreFoundWhereTheyLie) {
+  const std::string entries =
+      R"("x":{"dtype":"F32","shape":[2],"data_offsets":[0,8]},"h":{"dtype":"F16","shape":[1],"data_offsets":[8,10]})";
+  const std::string data("\x00\x00\x80\x3f\x00\x00\x00\xc0\x00\x3c", 10);
+  const auto aligned =
+      TensorFile::parse(file_of("{" + std::string((8 - (entries.size() + 2) % 8) % 8, ' ') + entries + "}", data), "a");
+  ASSERT_TRUE(aligned) << aligned.error().message;
+  const auto found = floats_in_place(*aligned->find("x"), "a:x");
+  ASSERT_TRUE(found);
+  EXPECT_EQ(static_cast<const void*>(found->data()), aligned->find("x")->bytes.data());
+  EXPECT_EQ(std::vector<float>(found->begin(), found->end()), (std::vector<float>{1, -2}));
+  EXPECT_TRUE(floats_in_place(*aligned->find("h"), "a:h")->empty()) << "a half is no float";
+  const auto crooked =
+      TensorFile::parse(file_of("{" + std::string((9 - (entries.size() + 2) % 8) % 8, ' ') + entries + "}", data), "a");
+  EXPECT_TRUE(floats_in_place(*crooked->find("x"), "a:x")->empty()) << "no float lies at an odd address";
+  EXPECT_EQ(floats(*crooked->find("x")), (std::vector<float>{1, -2})) << "but it is read";
 }
 
 TEST(Safetensors, OtherTypesAreListedAndNotReadAsNumbers) {
