@@ -21,7 +21,8 @@ packages=(
   curl jq                                              # the demo talks to the service
 )
 if [[ "${1:-}" == tests ]]; then
-  packages+=(chromium libtorch-dev libutf8proc-dev)
+  packages+=(chromium)
+  packages+=(libtorch-dev libopenblas0-pthread libutf8proc-dev)  # diffusion models; without OpenBLAS, ten times slower
   # A newer Node.js from elsewhere will do.
   if ! command -v node >/dev/null || ! command -v npm >/dev/null; then
     packages+=(nodejs npm)
