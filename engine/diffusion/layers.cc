@@ -61,7 +61,8 @@ Tensor layer_norm(const Layer& layer, const Tensor& x, double eps) {
 
 Tensor attention(const Tensor& q, const Tensor& k, const Tensor& v, int heads, const Tensor& mask) {
   const std::int64_t batch = q.size(0), queries = q.size(1), width = q.size(2);
-  const double scale = 1 / std::sqrt(double(width / heads));
+  const std::int64_t head_width = width / heads;
+  const double scale = 1 / std::sqrt(double(head_width));
   const Tensor scaled = by_heads(q, heads) * scale;
   const Tensor keys = by_heads(k, heads).transpose(1, 2), values = by_heads(v, heads);
   const std::int64_t slice = std::max<std::int64_t>(1, max_products / (batch * heads * k.size(1)));
@@ -74,7 +75,7 @@ Tensor attention(const Tensor& q, const Tensor& k, const Tensor& v, int heads, c
     parts.push_back(at::bmm(products.softmax(-1), values));
   }
   const Tensor out = parts.size() == 1 ? parts.front() : at::cat(parts, 1);
-  return out.reshape({batch, heads, queries, width / heads}).permute({0, 2, 1, 3}).reshape({batch, queries, width});
+  return out.reshape({batch, heads, queries, head_width}).permute({0, 2, 1, 3}).reshape({batch, queries, width});
 }
 
 Tensor resnet(const Layer& layer, const Tensor& x, const Tensor* embedding, int groups, double eps) {

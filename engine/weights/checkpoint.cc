@@ -111,7 +111,7 @@ Result<Checkpoint> Checkpoint::open_file(const fs::path& path, const Configs& co
   return checkpoint;
 }
 
-Result<Checkpoint> Checkpoint::of_file(TensorFile file, std::optional<Configs> configs) {
+Result<Checkpoint> Checkpoint::of_file(TensorFile file, const std::optional<Configs>& configs) {
   Checkpoint checkpoint;
   checkpoint.single_ = true;
   checkpoint.open_clip_ = file.find("cond_stage_model.model.token_embedding.weight") != nullptr;

@@ -32,7 +32,7 @@ class Checkpoint {
   /// One file of networks that are not those of 1.x or 2.x-base in size.
   [[nodiscard]] static Result<Checkpoint> open_file(const std::filesystem::path& path, const Configs& configs);
   /// The same of a file that is in memory. Without configurations, those of the generation that it is of.
-  [[nodiscard]] static Result<Checkpoint> of_file(TensorFile file, std::optional<Configs> configs = {});
+  [[nodiscard]] static Result<Checkpoint> of_file(TensorFile file, const std::optional<Configs>& configs = {});
 
   [[nodiscard]] const Configs& configs() const { return configs_; }
   /// The folder that has vocab.json and merges.txt; of one file, the folder `tokenizer` beside it.
