@@ -33,6 +33,15 @@ pkg_check_modules(libzip REQUIRED IMPORTED_TARGET libzip>=1.7)
 pkg_check_modules(libwebp REQUIRED IMPORTED_TARGET libwebp>=1.2)  # SOG's pictures, to the bit
 # Checksums of stored files. XXH3's output is fixed since 0.8.0.
 pkg_check_modules(libxxhash REQUIRED IMPORTED_TARGET libxxhash>=0.8)
+# Networks, for correction by a diffusion model (engine/diffusion): where both are found. Debian's libtorch, or another
+# build of it that CMAKE_PREFIX_PATH leads to; and of Unicode what a prompt needs.
+find_package(Torch 1.13 QUIET)
+pkg_check_modules(libutf8proc QUIET IMPORTED_TARGET libutf8proc>=2.6)  # what 2.8's file says it is
+set(SPLATDRAG_DIFFUSION OFF)
+if(Torch_FOUND AND libutf8proc_FOUND)
+  set(SPLATDRAG_DIFFUSION ON)
+endif()
+message(STATUS "Diffusion models (libtorch-dev, libutf8proc-dev): ${SPLATDRAG_DIFFUSION}")
 if(SPLATDRAG_TESTS)
   find_package(GTest 1.12 REQUIRED)
 endif()

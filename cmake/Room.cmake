@@ -6,7 +6,7 @@
 # USES are the room's arrows: the only rooms whose headers it may include (tests/house holds the #include lines
 # against them). LINKS are third-party libraries. Tests live in tests/<folder>/ and carry the label of their list:
 # unit (milliseconds each), golden (reference vectors and real captures), slow. Their names begin with the folder. The
-# target all_LABEL builds all programs of a label.
+# target all_LABEL builds all programs of a label. TEST_ENVIRONMENT are variables, NAME=VALUE, that they run with.
 
 add_library(splatdrag_warnings INTERFACE)
 target_compile_options(splatdrag_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
@@ -44,15 +44,17 @@ function(splatdrag_tests target label folder library)
     target_compile_options(${target} PRIVATE -fno-sanitize=null,alignment,object-size,vptr)
     # To start a program under a sanitizer takes longer than most tests do: one process for all of a program's.
     add_test(NAME ${folder}/${label} COMMAND ${target})
-    set_tests_properties(${folder}/${label} PROPERTIES LABELS ${label} TIMEOUT 1800)
+    set_tests_properties(${folder}/${label} PROPERTIES LABELS ${label} TIMEOUT 1800
+                         ENVIRONMENT "${ROOM_TEST_ENVIRONMENT}")
   else()
     include(GoogleTest)
-    gtest_discover_tests(${target} TEST_PREFIX ${folder}/ DISCOVERY_TIMEOUT 60 PROPERTIES LABELS ${label} TIMEOUT 900)
+    gtest_discover_tests(${target} TEST_PREFIX ${folder}/ DISCOVERY_TIMEOUT 60
+                         PROPERTIES LABELS ${label} TIMEOUT 900 ENVIRONMENT "${ROOM_TEST_ENVIRONMENT}")
   endif()
 endfunction()
 
 function(splatdrag_room kind folder name)
-  cmake_parse_arguments(ROOM "" "" "SOURCES;USES;LINKS;TEST_LINKS;TESTS;GOLDEN_TESTS;SLOW_TESTS" ${ARGN})
+  cmake_parse_arguments(ROOM "" "" "SOURCES;USES;LINKS;TEST_LINKS;TEST_ENVIRONMENT;TESTS;GOLDEN_TESTS;SLOW_TESTS" ${ARGN})
   if(ROOM_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "room ${name}: unknown arguments ${ROOM_UNPARSED_ARGUMENTS}")
   endif()
@@ -72,9 +74,9 @@ function(splatdrag_room kind folder name)
 endfunction()
 
 function(engine_room name)
-  cmake_parse_arguments(ROOM "" "" "SOURCES;USES;LINKS;TEST_LINKS;TESTS;GOLDEN_TESTS;SLOW_TESTS" ${ARGN})
+  cmake_parse_arguments(ROOM "" "" "SOURCES;USES;LINKS;TEST_LINKS;TEST_ENVIRONMENT;TESTS;GOLDEN_TESTS;SLOW_TESTS" ${ARGN})
   list(TRANSFORM ROOM_USES PREPEND engine_)
   splatdrag_room(engine engine/${name} engine_${name} SOURCES ${ROOM_SOURCES} USES ${ROOM_USES} LINKS ${ROOM_LINKS}
-                 TEST_LINKS ${ROOM_TEST_LINKS} TESTS ${ROOM_TESTS} GOLDEN_TESTS ${ROOM_GOLDEN_TESTS}
+                 TEST_LINKS ${ROOM_TEST_LINKS} TEST_ENVIRONMENT ${ROOM_TEST_ENVIRONMENT} TESTS ${ROOM_TESTS} GOLDEN_TESTS ${ROOM_GOLDEN_TESTS}
                  SLOW_TESTS ${ROOM_SLOW_TESTS})
 endfunction()

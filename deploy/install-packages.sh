@@ -2,7 +2,7 @@
 # Installs what splatdrag needs on Debian 12. Asks nothing, and does nothing where all is installed.
 #
 #   install-packages.sh          to build and run it
-#   install-packages.sh tests    to run all tests, too: a browser, and Node.js to drive it
+#   install-packages.sh tests    to run all tests, too: a browser, Node.js to drive it, and what diffusion models need
 #   install-packages.sh lint     to check the sources, too: clang-format, clang-tidy, and yamllint for the contract
 #   install-packages.sh fuzz     to fuzz the readers, too: clang and its runtime
 set -euo pipefail
@@ -22,6 +22,7 @@ packages=(
 )
 if [[ "${1:-}" == tests ]]; then
   packages+=(chromium webp)  # webp: the README's animation
+  packages+=(libtorch-dev libopenblas0-pthread libutf8proc-dev)  # diffusion models; without OpenBLAS, ten times slower
   # A newer Node.js from elsewhere will do.
   if ! command -v node >/dev/null || ! command -v npm >/dev/null; then
     packages+=(nodejs npm)

@@ -1,4 +1,4 @@
-// Typed fields of JSON that nobody has checked yet. For the .cc files of this room.
+// Typed fields of JSON that nobody has checked yet. For the .cc files of this room and of engine/weights.
 #pragma once
 
 #include <algorithm>

@@ -1,0 +1,33 @@
+// What libtorch throws, as errors.
+#pragma once
+
+#include <exception>
+#include <new>
+#include <string>
+#include <string_view>
+
+#include "engine/core/result.h"
+
+namespace engine::diffusion {
+
+/// work(), which returns a Result, with whatever libtorch throws turned into an error. Each function of this room that
+/// others call goes through it.
+///   where  of the error
+///   errors too_large: there was no memory for a tensor; internal: anything else, which is a mistake in this room
+template <class Work>
+auto guarded(const std::string& where, Work&& work) -> decltype(work()) {
+  try {
+    return work();
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::too_large, "it does not fit into the memory of this machine", where);
+  } catch (const std::exception& failure) {
+    const std::string_view what = failure.what();
+    // Its allocators have no type of exception of their own.
+    if (what.find("can't allocate memory") != std::string_view::npos ||
+        what.find("out of memory") != std::string_view::npos)
+      return fail(ErrorCode::too_large, "it does not fit into the memory of this machine", where);
+    return fail(ErrorCode::internal, "libtorch: " + std::string(what.substr(0, what.find('\n'))), where);
+  }
+}
+
+}  // namespace engine::diffusion

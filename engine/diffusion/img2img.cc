@@ -1,0 +1,37 @@
+#include "engine/diffusion/img2img.h"
+
+#include <ATen/TensorOperators.h>
+#include <ATen/core/Tensor.h>
+#include <ATen/ops/cat.h>
+#include <ATen/ops/full.h>
+
+#include <vector>
+
+#include "engine/diffusion/unet.h"
+
+namespace engine::diffusion {
+
+Tensor guided_noise(const Model& unet, const weights::UNetConfig& config, const Tensor& latents, int timestep,
+                    const Tensor& contexts, double guidance) {
+  const bool guided = guidance != 1;
+  const Tensor t = at::full({guided ? 2 : 1}, timestep, at::kLong);
+  if (!guided) return predict_noise(unet, config, latents, t, contexts.narrow(0, 1, 1));
+  const Tensor both = predict_noise(unet, config, at::cat({latents, latents}), t, contexts);
+  const Tensor without = both.narrow(0, 0, 1), with = both.narrow(0, 1, 1);
+  return without + (with - without) * guidance;
+}
+
+Result<void> denoise(const Model& unet, const weights::UNetConfig& config, Scheduler& scheduler, Tensor& latents,
+                     const Tensor& contexts, double guidance, const NoiseSource& noise, const std::stop_token& stop) {
+  const auto count = std::size_t(latents.numel());
+  std::vector<float> fresh(scheduler.takes_noise() ? count : 0);
+  for (const int timestep : scheduler.timesteps()) {
+    if (stop.stop_requested()) return fail(ErrorCode::cancelled, "the correction was cancelled");
+    const Tensor predicted = guided_noise(unet, config, latents, timestep, contexts, guidance).contiguous();
+    if (!fresh.empty()) noise(fresh);
+    scheduler.step({latents.data_ptr<float>(), count}, {predicted.data_ptr<float>(), count}, fresh);
+  }
+  return {};
+}
+
+}  // namespace engine::diffusion

@@ -1,0 +1,69 @@
+// The layers that the networks of Stable Diffusion are made of.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "engine/diffusion/adapter.h"
+#include "engine/diffusion/parameters.h"
+#include "engine/diffusion/tensor.h"
+
+namespace engine::diffusion {
+
+/// Is shown what layers give, by their names.
+using Probe = std::function<void(const std::string& layer, const Tensor& out)>;
+
+/// A network as it is used: its tensors, and what is added to them.
+struct Model {
+  Parameters parameters;
+  const Adapter* adapter = nullptr;  ///< Null: none.
+  Probe probe = {};
+};
+
+/// A layer, or a part of a network, by its name. Lives as long as its model.
+class Layer {
+ public:
+  explicit Layer(const Model& model, std::string name = {}) : model_(&model), name_(std::move(name)) {}
+
+  /// A layer within: Layer(model, "mid_block") / "resnets.0".
+  [[nodiscard]] Layer operator/(const std::string& part) const {
+    return Layer(*model_, name_.empty() ? part : name_ + "." + part);
+  }
+  [[nodiscard]] Layer operator/(int part) const { return *this / std::to_string(part); }
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] const Tensor& tensor(const char* part) const { return model_->parameters.at(name_ + "." + part); }
+  [[nodiscard]] bool has(const char* part) const { return model_->parameters.contains(name_ + "." + part); }
+  /// The model's adapter, if there is one and it adapts this layer.
+  [[nodiscard]] const Adapter* adapter() const {
+    return model_->adapter != nullptr && model_->adapter->adapts(name_) ? model_->adapter : nullptr;
+  }
+  /// Shows what this layer gives, and gives it.
+  [[nodiscard]] Tensor shown(Tensor out) const;
+
+ private:
+  const Model* model_;
+  std::string name_;
+};
+
+/// W x + b, or W x where the layer has no bias. x is [..., in].
+[[nodiscard]] Tensor linear(const Layer& layer, const Tensor& x);
+/// x is [B, in, h, w]; the kernel's size is that of the layer's tensor.
+[[nodiscard]] Tensor convolution(const Layer& layer, const Tensor& x, int stride = 1, int padding = 1);
+[[nodiscard]] Tensor group_norm(const Layer& layer, const Tensor& x, int groups, double eps);  ///< x is [B, C, ...].
+[[nodiscard]] Tensor layer_norm(const Layer& layer, const Tensor& x, double eps);              ///< x is [..., C].
+
+/// softmax(q k^T / sqrt(d)) v for each of `heads` parts of width d, in slices of queries so that no more than a quarter
+/// of a gigabyte of products is held.
+///   q, k, v  [B, n, heads d], [B, m, heads d] twice
+///   mask     [n, m], added to the products; an undefined tensor is none
+[[nodiscard]] Tensor attention(const Tensor& q, const Tensor& k, const Tensor& v, int heads, const Tensor& mask);
+
+/// norm, SiLU, 3 x 3 convolution, twice; the input is added. x is [B, C, h, w].
+///   embedding  [B, E], put through SiLU and a matrix and added in between; null: there is none
+[[nodiscard]] Tensor resnet(const Layer& layer, const Tensor& x, const Tensor* embedding, int groups, double eps);
+
+/// Twice the size, by repetition, then a 3 x 3 convolution ("conv").
+[[nodiscard]] Tensor upsample(const Layer& layer, const Tensor& x);
+
+}  // namespace engine::diffusion

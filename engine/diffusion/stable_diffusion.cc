@@ -1,0 +1,148 @@
+#include "engine/diffusion/stable_diffusion.h"
+
+#include <ATen/TensorOperators.h>
+#include <ATen/core/Tensor.h>
+#include <ATen/core/grad_mode.h>
+#include <ATen/ops/cat.h>
+#include <ATen/ops/empty.h>
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "engine/core/rng.h"
+#include "engine/diffusion/autoencoder.h"
+#include "engine/diffusion/guard.h"
+#include "engine/diffusion/img2img.h"
+#include "engine/diffusion/text_encoder.h"
+#include "engine/diffusion/tokenizer.h"
+#include "engine/weights/checkpoint.h"
+
+namespace engine::diffusion {
+namespace {
+
+/// Streams of random numbers, of a picture's seed.
+enum class Stream : std::uint64_t { latents, first_noise, later_noise };
+
+void fill_normal(std::span<float> values, std::uint64_t seed, Stream stream, std::uint64_t call = 0) {
+  Rng rng(seed, std::uint64_t(stream) + call);
+  for (float& value : values) value = rng.normal();
+}
+
+std::span<float> numbers_of(Tensor& tensor) { return {tensor.data_ptr<float>(), std::size_t(tensor.numel())}; }
+
+Tensor as_tensor(const scene::Image& picture) {
+  Tensor tensor = at::empty({1, picture.channels, picture.height, picture.width}, at::kFloat);
+  std::ranges::transform(picture.data, tensor.data_ptr<float>(), [](float value) { return 2 * value - 1; });
+  return tensor;
+}
+
+scene::Image as_picture(const Tensor& tensor) {
+  const Tensor flat = (tensor * 0.5 + 0.5).clamp(0, 1).contiguous();
+  scene::Image picture(int(flat.size(3)), int(flat.size(2)), int(flat.size(1)));
+  std::copy_n(flat.data_ptr<float>(), picture.data.size(), picture.data.begin());
+  return picture;
+}
+
+}  // namespace
+
+struct StableDiffusion::Networks {
+  weights::Configs configs;
+  Tokenizer tokenizer;
+  Parameters unet, autoencoder, text_encoder;
+
+  /// [1, 77, width]
+  [[nodiscard]] Result<Tensor> context_of(const std::string& prompt, const Adapter* adapter) const {
+    const auto pieces = tokenizer.encode(prompt, std::size_t(configs.text_encoder.positions));
+    if (!pieces) return propagate(pieces);
+    Tensor numbers = at::empty({1, std::int64_t(pieces->size())}, at::kLong);
+    std::ranges::copy(*pieces, numbers.data_ptr<std::int64_t>());
+    return encode_text({text_encoder, adapter}, configs.text_encoder, numbers);
+  }
+};
+
+struct StableDiffusion::Adapters {
+  std::optional<Adapter> unet, text_encoder;
+
+  static const Adapter* pointer(const std::optional<Adapter>& adapter) { return adapter ? &*adapter : nullptr; }
+};
+
+Result<StableDiffusion> StableDiffusion::open(const std::filesystem::path& path) {
+  const auto checkpoint = weights::Checkpoint::open(path);
+  if (!checkpoint) return propagate(checkpoint);
+  auto vocabulary = weights::read_vocabulary(checkpoint->tokenizer_folder(), checkpoint->is_open_clip());
+  if (!vocabulary) return propagate(vocabulary);
+  const int pieces = checkpoint->configs().text_encoder.vocabulary;
+  for (const auto& [piece, number] : vocabulary->numbers)
+    if (number >= pieces)
+      return fail(ErrorCode::corrupt_data, "the text encoder has " + std::to_string(pieces) + " pieces only",
+                  "vocab.json:" + piece);
+  auto unet = Parameters::load(*checkpoint, weights::Network::unet);
+  if (!unet) return propagate(unet);
+  auto autoencoder = Parameters::load(*checkpoint, weights::Network::autoencoder);
+  if (!autoencoder) return propagate(autoencoder);
+  auto text_encoder = Parameters::load(*checkpoint, weights::Network::text_encoder);
+  if (!text_encoder) return propagate(text_encoder);
+  StableDiffusion opened;
+  opened.networks_ = std::make_shared<const Networks>(
+      Networks{checkpoint->configs(), Tokenizer(std::move(*vocabulary)), *unet, *autoencoder, *text_encoder});
+  opened.adapters_ = std::make_shared<const Adapters>();
+  return opened;
+}
+
+void StableDiffusion::adapt(const weights::AdapterWeights& weights, double factor) {
+  auto adapters = std::make_shared<Adapters>();
+  if (!weights.unet.empty()) adapters->unet.emplace(weights.unet).scale_by(factor);
+  if (!weights.text_encoder.empty()) adapters->text_encoder.emplace(weights.text_encoder).scale_by(factor);
+  adapters_ = std::move(adapters);
+}
+
+int StableDiffusion::side_multiple() const {
+  const weights::Configs& all = networks_->configs;
+  return all.autoencoder.pixels_per_latent() << (all.unet.channels.size() - 1);
+}
+
+const weights::Configs& StableDiffusion::configs() const { return networks_->configs; }
+
+Result<scene::Image> StableDiffusion::repaint(const scene::Image& picture, const RepaintOptions& options,
+                                              const std::stop_token& stop) const {
+  const weights::Configs& all = networks_->configs;
+  const int multiple = side_multiple();
+  if (picture.channels != 3 || picture.width < 1 || picture.height < 1 || picture.width % multiple != 0 ||
+      picture.height % multiple != 0)
+    return fail(ErrorCode::invalid_argument,
+                "expected a picture of three channels with sides that are multiples of " + std::to_string(multiple),
+                "picture");
+  if (!(options.guidance >= 1 && options.guidance <= 100))
+    return fail(ErrorCode::invalid_argument, "expected 1 to 100", "guidance");
+  if (const auto valid = validate(options.sampling, all.noise); !valid) return propagate(valid);
+
+  return guarded("repaint", [&]() -> Result<scene::Image> {
+    const at::NoGradGuard no_gradients;
+    const auto scheduler = make_scheduler(all.noise, options.sampling);
+    if (scheduler->timesteps().empty()) return picture;
+    const Adapter* text_adapter = Adapters::pointer(adapters_->text_encoder);
+    const auto negative = networks_->context_of(options.negative_prompt, text_adapter);
+    if (!negative) return propagate(negative);
+    const auto positive = networks_->context_of(options.prompt, text_adapter);
+    if (!positive) return propagate(positive);
+
+    const Model autoencoder{networks_->autoencoder}, unet{networks_->unet, Adapters::pointer(adapters_->unet)};
+    const Tensor moments = encode_moments(autoencoder, all.autoencoder, as_tensor(picture));
+    Tensor noise = at::empty({1, all.autoencoder.latent_channels, moments.size(2), moments.size(3)}, at::kFloat);
+    fill_normal(numbers_of(noise), options.seed, Stream::latents);
+    Tensor latents = sample_latents(all.autoencoder, moments, noise).contiguous();
+    fill_normal(numbers_of(noise), options.seed, Stream::first_noise);
+    scheduler->add_noise(numbers_of(latents), numbers_of(noise), scheduler->timesteps().front());
+    std::uint64_t call = 0;
+    const NoiseSource later = [&](std::span<float> into) {
+      fill_normal(into, options.seed, Stream::later_noise, call++);
+    };
+    const auto done =
+        denoise(unet, all.unet, *scheduler, latents, at::cat({*negative, *positive}), options.guidance, later, stop);
+    if (!done) return propagate(done);
+    return as_picture(decode_latents(autoencoder, all.autoencoder, latents));
+  });
+}
+
+}  // namespace engine::diffusion

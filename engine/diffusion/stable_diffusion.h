@@ -1,0 +1,57 @@
+// Stable Diffusion on pictures: what the rest of the engine sees of the networks.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <stop_token>
+#include <string>
+
+#include "engine/core/result.h"
+#include "engine/diffusion/scheduler.h"
+#include "engine/scene/image.h"
+#include "engine/weights/adapter_file.h"
+
+namespace engine::diffusion {
+
+/// How a picture is repainted.
+struct RepaintOptions {
+  std::string prompt = {}, negative_prompt = {};
+  double guidance = 7.5;  ///< 1 or more: how much more the prompt counts than the lack of it; 1 halves the time.
+  SamplerOptions sampling = {};
+  std::uint64_t seed = 0;  ///< Same seed, same picture, at a fixed number of libtorch's threads.
+};
+
+/// The networks of a checkpoint, with their tokenizer. Its tensors are shared by all copies, and never change; a thread
+/// of its own may use each copy.
+class StableDiffusion {
+ public:
+  /// errors  those of weights::Checkpoint::open(), weights::read_vocabulary() and Parameters::load(); corrupt_data: the
+  ///         vocabulary has more pieces than the text encoder
+  [[nodiscard]] static Result<StableDiffusion> open(const std::filesystem::path& path);
+
+  /// Puts an adapter on the networks, or takes it off (no layers).
+  ///   factor  multiplies its scales
+  void adapt(const weights::AdapterWeights& weights, double factor = 1);
+
+  /// Sides of pictures are multiples of this: 64 for Stable Diffusion 1.x and 2.x.
+  [[nodiscard]] int side_multiple() const;
+  [[nodiscard]] const weights::Configs& configs() const;
+
+  /// The picture as the prompt describes it; the less strength, the nearer to what it was. Without a step (little
+  /// strength) it is given back as it is.
+  ///   picture  [3], 0 to 1, sides multiples of side_multiple()
+  ///   stop     asked before each call of the UNet
+  ///   returns  of the same size, within 0 to 1
+  ///   errors   invalid_argument (`where`: picture, prompt, or the name of an option); cancelled; too_large
+  [[nodiscard]] Result<scene::Image> repaint(const scene::Image& picture, const RepaintOptions& options,
+                                             const std::stop_token& stop = {}) const;
+
+ private:
+  struct Networks;
+  struct Adapters;
+  std::shared_ptr<const Networks> networks_;
+  std::shared_ptr<const Adapters> adapters_;
+};
+
+}  // namespace engine::diffusion
