@@ -63,7 +63,7 @@ void grow_first(benchmark::State& state) {
     std::size_t selected = 0, looked_at = 0;
     for (auto _ : state) {
       const select::Neighbourhood around(demo.cloud, select::surroundings_of(demo.cloud.mean, grow));
-      selected = around.grow(demo.cloud, grow).value().size();
+      selected = around.grow(demo.cloud, grow).value().rows.size();
       looked_at = around.rows().size();
     }
     state.counters["selected"] = double(selected);
