@@ -280,6 +280,52 @@ TEST_F(Cli, EditWritesSceneReportAndPictures) {
   EXPECT_EQ(files_in("out/deep"), 2u + 9u) << "and nothing else";
 }
 
+TEST_F(Cli, EditWritesTheFormatThatTheNameOfItsOutputSays) {
+  const std::string edit = "edit --pictures 0 --scene " + demo("scene.ply") + " --request " + quick("ball") + " --out ";
+  ASSERT_EQ(splatdrag(edit + at("folder")).status, 0);
+  const auto edited = io::read_scene(at("folder/scene.ply"));
+  ASSERT_TRUE(edited) << edited.error().message;
+  for (const auto& [name, format] : {std::pair{"files/ball.ply", io::SceneFormat::ply},
+                                     {"files/ball.compressed.ply", io::SceneFormat::compressed_ply},
+                                     {"files/ball.spz", io::SceneFormat::spz},
+                                     {"files/ball.sog", io::SceneFormat::sog},
+                                     {"files/ball.glb", io::SceneFormat::glb},
+                                     {"files/ball.SPLAT", io::SceneFormat::splat}}) {
+    SCOPED_TRACE(name);
+    const Finished run = splatdrag(edit + at(name));
+    ASSERT_EQ(run.status, 0) << run.err;
+    EXPECT_NE(run.out.find(name), std::string::npos) << run.out;
+    const auto found = io::detect_format(at(name));
+    ASSERT_TRUE(found) << found.error().message;
+    EXPECT_EQ(*found, format);
+    const auto scene = io::read_scene(at(name));
+    ASSERT_TRUE(scene) << scene.error().message;
+    EXPECT_EQ(scene->cloud.size(), edited->cloud.size());
+    const bool rounds =
+        format == io::SceneFormat::compressed_ply || format == io::SceneFormat::spz || format == io::SceneFormat::sog;
+    EXPECT_EQ(run.err.find(" rounds positions") != std::string::npos, rounds) << run.err;
+  }
+  EXPECT_EQ(support::read_file(at("files/ball.ply")), support::read_file(at("folder/scene.ply")));
+  EXPECT_EQ(report("files")["gaussians"]["output"], edited->cloud.size()) << "the report lies beside the scene";
+  fs::create_directories(at("named.spz"));
+  ASSERT_EQ(splatdrag(edit + at("named.spz")).status, 0);
+  EXPECT_TRUE(fs::exists(at("named.spz/scene.ply"))) << "a folder stays one, however it is called";
+}
+
+TEST_F(Cli, EditComesBackInTheFormatItCameInAndNeverOverItself) {
+  ASSERT_EQ(splatdrag("convert --in " + demo("scene.ply") + " --out " + at("in.spz")).status, 0);
+  const std::string before = support::read_file(at("in.spz"));
+  const std::string edit = "edit --pictures 0 --scene " + at("in.spz") + " --request " + quick("ball") + " --out ";
+  EXPECT_EQ(splatdrag(edit + at("in.spz")).status, 9);
+  EXPECT_EQ(support::read_file(at("in.spz")), before);
+  const Finished run = splatdrag(edit + at("edited.spz"));
+  ASSERT_EQ(run.status, 0) << run.err;
+  const auto was = io::read_scene(at("in.spz")), is = io::read_scene(at("edited.spz"));
+  ASSERT_TRUE(was && is);
+  EXPECT_EQ(is->cloud.size(), report(".")["gaussians"]["output"]);
+  EXPECT_EQ(is->cloud.sh_degree, was->cloud.sh_degree);
+}
+
 TEST_F(Cli, EditWithoutAPresetOptimisesAndCorrects) {
   json document = json::parse(support::read_file(demo("drags/ball.json")));
   ASSERT_FALSE(document.contains("preset"));
