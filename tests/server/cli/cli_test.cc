@@ -171,10 +171,34 @@ TEST_F(Cli, FitDoesNotEndBecauseACheckpointCannotBeWritten) {
   EXPECT_TRUE(io::read_scene(at("fit/scene.ply")));
 }
 
+TEST_F(Cli, FitStartsFromRandomPointsWhereThereAreNone) {
+  fs::remove(at("demo/sparse/0/points3D.txt"));
+  const std::string fit = "fit --iterations 150 --max-gaussians 3000 --dataset " + at("demo") + " --out ";
+  const Finished run = splatdrag(fit + at("fit"));
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_NE(run.err.find("no sparse points; starting from random ones"), std::string::npos) << run.err;
+  const json said = report("fit");
+  EXPECT_EQ(said["start_gaussians"], 3000);
+  EXPECT_GT(said["training"]["psnr_db"], said["curve"][0]["psnr_db"].get<double>() + 5) << said;
+  const Finished asked = splatdrag(fit + at("asked") + " --init random");
+  ASSERT_EQ(asked.status, 0) << asked.err;
+  EXPECT_EQ(asked.err.find("warning"), std::string::npos) << asked.err;
+  EXPECT_EQ(support::read_file(at("asked/scene.ply")), support::read_file(at("fit/scene.ply")));
+}
+
+TEST_F(Cli, FitIsToldOneStartOnly) {
+  const std::string fit = "fit --iterations 3 --dataset " + at("demo") + " --out " + at("fit") + " --init ";
+  for (const std::string& start : {std::string("scene"), "random --scene " + demo("scene.ply")}) {
+    const Finished run = splatdrag(fit + start);
+    EXPECT_EQ(run.status, 2) << run.err;
+    EXPECT_NE(run.err.find("--init"), std::string::npos) << run.err;
+  }
+}
+
 TEST_F(Cli, FitNeedsPointsOrASceneToStartFrom) {
   fs::remove(at("demo/sparse/0/points3D.txt"));
   const std::string fit = "fit --iterations 3 --out " + at("fit") + " --dataset " + at("demo");
-  const Finished without = splatdrag(fit);
+  const Finished without = splatdrag(fit + " --init points");
   EXPECT_EQ(without.status, 6);
   EXPECT_NE(without.err.find("--scene"), std::string::npos) << without.err;
   const Finished with = splatdrag(fit + " --scene " + demo("scene.ply"));
