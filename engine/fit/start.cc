@@ -2,14 +2,17 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "engine/core/median.h"
 #include "engine/neighbours/point_index.h"
 #include "engine/scene/opacity.h"
 #include "engine/scene/sh.h"
+#include "engine/train/random_streams.h"
 
 namespace engine::fit {
 namespace {
@@ -34,6 +37,43 @@ std::vector<float> spacing(std::span<const float> positions) {
     distance[i] = found > 1 ? float(std::sqrt(sum / double(found - 1))) : 0.0f;
   }
   return distance;
+}
+
+// Of random_points(), all choices:
+constexpr double ball_part = 0.5;            // radius of the ball, as a part of the cameras' distance
+constexpr double seeing_part = 1.0 / 3;      // of the cameras that have a point in their pictures
+constexpr std::size_t least_seeing = 2;      // cameras; what one sees alone may be at any depth
+constexpr std::size_t draws_per_point = 64;  // at most: a volume that is less of the ball is as good as none
+constexpr double least_spread = 1e-6;        // of axes: below it rounding alone says where they meet
+constexpr double nearest_depth_part = 0.05;  // of the cameras' distance: what is nearer hides the scene behind it
+constexpr std::array<std::uint8_t, 3> grey{128, 128, 128};
+
+/// The place whose squared distances from the cameras' axes sum to the least.
+Result<DVec3> focus_of(std::span<const scene::Camera> cameras) {
+  const auto none = [](const char* what) { return fail(ErrorCode::unprocessable, what, "cameras"); };
+  if (cameras.size() < least_seeing) return none("Cameras have a volume in common from two of them on.");
+  // Relative to the first camera: coordinates far from the origin would lose digits in the sums.
+  const DVec3 origin = cameras.front().centre();
+  DMat3 across_all(0.0);
+  DVec3 sum(0.0);
+  for (const scene::Camera& camera : cameras) {
+    const DVec3 axis = camera.ray_direction({camera.cx, camera.cy});
+    const DMat3 across = DMat3(1.0) - glm::outerProduct(axis, axis);
+    across_all += across;
+    sum += across * (camera.centre() - origin);
+  }
+  // The determinant of the mean is 0 for parallel axes, and grows with the square of the angles between them.
+  const double count = double(cameras.size());
+  if (!(glm::determinant(across_all / count) > least_spread))
+    return none("The cameras look in the same direction: nothing says how far away the scene is.");
+  return origin + glm::inverse(across_all) * sum;
+}
+
+bool is_in_picture(const scene::Camera& camera, DVec3 point, double nearest_depth) {
+  const DVec3 in_cam = camera.cam_from_world(point);
+  if (!(in_cam.z >= nearest_depth)) return false;
+  const DVec2 pixel = camera.pixel_from_cam(in_cam);
+  return pixel.x >= 0 && pixel.y >= 0 && pixel.x < camera.width && pixel.y < camera.height;
 }
 
 DVec3 median_position(std::span<const ColoredPoint> points) {
@@ -72,6 +112,37 @@ scene::GaussianCloud gaussians_at(std::span<const ColoredPoint> points, int sh_d
       cloud.sh_row(i)[c * coefficients] = float((double(points[i].rgb[c]) / 255.0 - 0.5) / scene::sh_c0);
   }
   return cloud;
+}
+
+Result<std::vector<ColoredPoint>> random_points(std::span<const scene::Camera> cameras, std::size_t count,
+                                                std::uint64_t seed) {
+  assert(count >= 1);
+  const auto focus = focus_of(cameras);
+  if (!focus) return propagate(focus);
+  std::vector<double> distances;
+  for (const scene::Camera& camera : cameras) distances.push_back(glm::distance(camera.centre(), *focus));
+  const double distance = median(distances), radius = ball_part * distance;
+  const std::size_t enough = std::max(least_seeing, std::size_t(std::ceil(seeing_part * double(cameras.size()))));
+
+  std::vector<ColoredPoint> points;
+  points.reserve(count);
+  Rng rng = train::stream({.seed = seed}, train::Purpose::start, 0);
+  for (std::size_t draw = 0; draw < draws_per_point * count && points.size() < count; ++draw) {
+    DVec3 local;
+    for (int axis = 0; axis < 3; ++axis) local[axis] = double(rng.uniform(-1.0f, 1.0f));
+    if (glm::dot(local, local) > 1) continue;  // in the cube, but not in its ball
+    const DVec3 place = *focus + radius * local;
+    std::size_t seeing = 0;
+    for (const scene::Camera& camera : cameras)
+      seeing += std::size_t(is_in_picture(camera, place, nearest_depth_part * distance));
+    if (seeing >= enough) points.push_back({place, grey});
+  }
+  if (points.size() < count)
+    return fail(ErrorCode::unprocessable,
+                "Hardly any place is in the pictures of " + std::to_string(enough) + " of the " +
+                    std::to_string(cameras.size()) + " cameras: nothing says where the scene is.",
+                "cameras");
+  return points;
 }
 
 scene::GaussianCloud with_sh_degree(const scene::GaussianCloud& cloud, int sh_degree) {

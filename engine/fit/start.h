@@ -4,10 +4,14 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
+#include "engine/core/result.h"
 #include "engine/core/vec.h"
+#include "engine/scene/camera.h"
 #include "engine/scene/gaussian_cloud.h"
 
 namespace engine::fit {
@@ -27,6 +31,16 @@ struct ColoredPoint {
 ///   points     finite, no coordinate beyond max_coordinate
 ///   sh_degree  of the result; bands beyond 0 are zero
 [[nodiscard]] scene::GaussianCloud gaussians_at(std::span<const ColoredPoint> points, int sh_degree);
+
+/// Points to begin with where nothing is known of the scene but its cameras: evenly random in the volume that they have
+/// in common, grey. That is a ball around the place that their axes come nearest to, half as large as the cameras are
+/// far away from it (the median), without what is not in the pictures of at least a third of the cameras, and of two.
+///   cameras  may differ in anything
+///   count    1 or more
+///   errors   unprocessable, `where` is "cameras": fewer than two, axes that are parallel (they have no place in
+///            common), or hardly any place in the pictures of enough of them
+[[nodiscard]] Result<std::vector<ColoredPoint>> random_points(std::span<const scene::Camera> cameras, std::size_t count,
+                                                              std::uint64_t seed);
 
 /// The cloud with room for more bands (zero), or without those beyond `sh_degree`.
 [[nodiscard]] scene::GaussianCloud with_sh_degree(const scene::GaussianCloud& cloud, int sh_degree);

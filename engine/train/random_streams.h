@@ -18,8 +18,8 @@ struct RandomKey {
   int correction = 0;      ///< Correction within the interval, 0 to 255.
 };
 
-/// What a stream is for: the order of views, or the positions of children.
-enum class Purpose : std::uint8_t { order, split };
+/// What a stream is for: the order of views, the positions of children, or those that a fit begins with.
+enum class Purpose : std::uint8_t { order, split, start };
 
 /// The stream for a purpose at an iteration (below 2^32).
 inline Rng stream(const RandomKey& key, Purpose purpose, std::size_t iteration) {

@@ -1,14 +1,11 @@
 // splatdrag convert: a scene from one file format to another.
-#include <array>
-#include <cstdio>
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "engine/io/scene_file.h"
-#include "engine/io/scene_loss.h"
 #include "server/cli/commands.h"
 #include "server/cli/folders.h"
+#include "server/cli/scene_writing.h"
 
 namespace server::cli {
 namespace {
@@ -21,33 +18,6 @@ struct ConvertOptions {
   int level = 0;
 };
 
-/// What the format cannot hold of this scene at all.
-std::vector<std::string> dropped(const io::SceneFile& scene, io::SceneFormat format) {
-  std::vector<std::string> lost;
-  if (format == io::SceneFormat::ply) return lost;
-  const std::string name = "." + std::string(io::extension_of(format));
-  if (format == io::SceneFormat::splat && scene.cloud.sh_degree > 0)
-    lost.push_back(name + " holds no view-dependent colour: SH of degree 1 and up is dropped");
-  if (scene.cloud.extra_stride > 0) lost.push_back(name + " holds no further properties: they are dropped");
-  return lost;
-}
-
-/// What the origin's file said and the format cannot.
-std::vector<std::string> unsaid(const io::SceneOrigin& origin, io::SceneFormat format) {
-  std::vector<std::string> lost;
-  if (!origin.spz_extensions.empty() && format != io::SceneFormat::spz)
-    lost.push_back(std::to_string(origin.spz_extensions.size()) + " extensions of the .spz file are dropped");
-  if (origin.antialiased && format != io::SceneFormat::spz && format != io::SceneFormat::sog)
-    lost.push_back("that the scene was trained with anti-aliasing is dropped");
-  return lost;
-}
-
-std::string in_numbers(const io::AttributeLoss& loss) {
-  std::array<char, 64> text{};
-  std::snprintf(text.data(), text.size(), "%.3g at most, %.2g on average", loss.largest, loss.mean);
-  return text.data();
-}
-
 Result<void> run(const ConvertOptions& options, Terminal& terminal) {
   const auto format = io::format_for(options.out);
   if (!format) return propagate(format);
@@ -55,20 +25,8 @@ Result<void> run(const ConvertOptions& options, Terminal& terminal) {
   const io::ReadOptions reading{.level = options.level};
   const auto scene = io::read_scene(options.in, reading);
   if (!scene) return propagate(scene);
-  const auto warn = [&](const std::string& lost) { terminal.err << "warning: " << lost << '\n'; };
-  for (const std::string& left_out : scene->origin.left_out) warn("left out: " + left_out);
-  for (const std::string& lost : dropped(*scene, *format)) warn(lost);
-  for (const std::string& lost : unsaid(scene->origin, *format)) warn(lost);
-  if (auto written = io::write_scene(options.out, *scene, *format); !written) return written;
-  if (*format != io::SceneFormat::ply) {
-    // What was written is read again: no formula, but what a reader will find.
-    const auto back = io::read_scene(options.out);
-    if (!back) return propagate(back);
-    for (const io::AttributeLoss& loss : io::scene_loss(*scene, *back, *format))
-      if (loss.largest > 0)
-        warn("." + std::string(io::extension_of(*format)) + " rounds " + loss.attribute + ": " + in_numbers(loss) +
-             " (" + loss.unit + ")");
-  }
+  for (const std::string& left_out : scene->origin.left_out) terminal.err << "warning: left out: " << left_out << '\n';
+  if (auto written = write_and_tell(options.out, *scene, *format, terminal); !written) return written;
   terminal.out << options.out << ": " << scene->cloud.size() << " Gaussians\n";
   return {};
 }

@@ -23,6 +23,7 @@
 #include "server/cli/folders.h"
 #include "server/cli/progress_display.h"
 #include "server/cli/request_file.h"
+#include "server/cli/scene_writing.h"
 #include "server/edits/convert.h"
 #include "server/edits/convert_selection.h"
 #include "server/pictures/picture_names.h"
@@ -42,6 +43,21 @@ struct EditOptions {
   int pictures = 3;
   ComputeOptions compute;
 };
+
+/// Where the results go, and as what the scene is written.
+struct Destination {
+  path folder, scene_file;
+  io::SceneFormat format = io::SceneFormat::ply;
+};
+
+/// A name that ends like a scene file is that of the scene, the rest goes beside it; any other is that of a folder. So
+/// is one that exists as a folder, however it ends.
+Destination destination_of(const path& out) {
+  const auto format = io::format_for(out);
+  std::error_code unreachable;  // then it is none
+  if (!format || std::filesystem::is_directory(out, unreachable)) return {out, out / "scene.ply"};
+  return {out.has_parent_path() ? out.parent_path() : path("."), out, *format};
+}
 
 /// Errors of the engine name a field of the request; the user knows that field by its place in the file.
 void locate_in_file(engine::Error& error, const EditOptions& options, const proto::RequestFile& file) {
@@ -119,9 +135,9 @@ Result<std::vector<ViewPictures>> write_pictures(const path& folder, const scene
   return written;
 }
 
-void summarise(std::ostream& out, const path& folder, const EditReport& report) {
+void summarise(std::ostream& out, const Destination& to, const EditReport& report) {
   const edit::Report& edit = report.edit;
-  out << (folder / "scene.ply").string() << ": " << edit.output_gaussians << " Gaussians, "
+  out << to.scene_file.string() << ": " << edit.output_gaussians << " Gaussians, "
       << edit.input_gaussians - edit.removed << " of the " << edit.input_gaussians << " before and " << edit.copies
       << " new ones\n";
   for (std::size_t i = 0; i < edit.handles.size(); ++i)
@@ -130,7 +146,7 @@ void summarise(std::ostream& out, const path& folder, const EditReport& report) 
     out << "crumbs that the selection had left out, and that went "
         << (report.request.crumbs == proto::Crumbs::remove ? "away: " : "along: ") << edit.crumbs << " Gaussians\n";
   for (const ViewPictures& pictures : report.pictures) {
-    out << (folder / pictures.after).string() << ": outside the mask ";
+    out << (to.folder / pictures.after).string() << ": outside the mask ";
     if (std::isfinite(pictures.psnr_outside_db))
       out << std::round(10 * pictures.psnr_outside_db) / 10 << " dB against " << pictures.before << '\n';
     else
@@ -156,23 +172,23 @@ std::vector<std::string> all_warnings(std::vector<std::string> warnings, const e
 }
 
 /// Everything in the output folder; the scene first, because it is what nobody wants to lose.
-Result<void> write_results(const path& folder, std::size_t pictured_views, const io::SceneFile& input,
-                           const edit::Outcome& outcome, EditReport& report) {
-  const io::SceneFile edited{scene::flatten(input.cloud, outcome.overlay), input.layout};
-  if (auto saved = io::write_scene(folder / "scene.ply", edited, io::SceneFormat::ply); !saved) return saved;
-  auto pictures = write_pictures(folder, input.cloud, edited.cloud, outcome, pictured_views);
+Result<void> write_results(const Destination& to, std::size_t pictured_views, const io::SceneFile& input,
+                           const edit::Outcome& outcome, EditReport& report, Terminal& terminal) {
+  const io::SceneFile edited{scene::flatten(input.cloud, outcome.overlay), input.layout, input.origin};
+  if (auto saved = write_and_tell(to.scene_file, edited, to.format, terminal); !saved) return saved;
+  auto pictures = write_pictures(to.folder, input.cloud, edited.cloud, outcome, pictured_views);
   if (!pictures) return propagate(pictures);
   report.pictures = std::move(*pictures);
   const std::string json = to_json(report);
-  return engine::write_file(folder / "report.json", std::as_bytes(std::span(json)));
+  return engine::write_file(to.folder / "report.json", std::as_bytes(std::span(json)));
 }
 
 Result<void> run(const EditOptions& options, Terminal& terminal) {
-  const path folder = options.out;
+  const Destination to = destination_of(options.out);
   auto request = load_request(options);
   if (!request) return propagate(request);
-  if (auto safe = keep_input_safe(options.scene, folder / "scene.ply"); !safe) return safe;
-  if (auto made = make_folder(folder); !made) return made;
+  if (auto safe = keep_input_safe(options.scene, to.scene_file); !safe) return safe;
+  if (auto made = make_folder(to.folder); !made) return made;
 
   return compute(options.compute, [&](const Machine& machine) -> Result<void> {
     const auto input = io::read_scene(options.scene);
@@ -195,8 +211,8 @@ Result<void> run(const EditOptions& options, Terminal& terminal) {
     report.edit = outcome->report;
     report.edit.warnings = all_warnings(*selected, outcome->report, request->file.request);
     for (const std::string& warning : report.edit.warnings) terminal.err << "warning: " << warning << '\n';
-    auto written = write_results(folder, std::size_t(options.pictures), *input, *outcome, report);
-    if (written) summarise(terminal.out, folder, report);
+    auto written = write_results(to, std::size_t(options.pictures), *input, *outcome, report, terminal);
+    if (written) summarise(terminal.out, to, report);
     return written;
   });
 }
@@ -222,10 +238,11 @@ void add_edit_command(CLI::App& program, Action& action) {
   command->add_option("--name", options->name, "Which request of a file of several")->type_name("NAME");
   command
       ->add_option("--out", options->out,
-                   "Folder for scene.ply, report.json and pictures of the best views; files of these names are "
-                   "replaced")
+                   "Folder for scene.ply, report.json and pictures of the best views; or the edited scene's file, in "
+                   "the format of its extension (.ply, .compressed.ply, .splat, .spz, .sog, .glb), and the rest goes "
+                   "beside it. Files of these names are replaced")
       ->required()
-      ->type_name("DIR");
+      ->type_name("DIR|FILE");
   command->add_option("--pictures", options->pictures, "Views to show before, after and with the mask")
       ->check(CLI::Range(0, 1000))
       ->type_name("N");

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <iomanip>
 #include <iterator>
+#include <map>
 #include <memory>
 #include <optional>
 #include <sstream>
@@ -47,8 +48,19 @@ constexpr std::size_t photos_per_milestone = 50;  // that a line is measured on,
 constexpr double min_visible_share = 0.1;  // of the start; with less, poses or units are hardly those of the points
 constexpr const char* checkpoint_name = "fit.checkpoint";
 
+constexpr std::size_t random_start = 10'000;  // points, at most as many as there may be Gaussians
+
+/// What a fit begins with.
+enum class Init {
+  automatic,  ///< A scene that is given, else the sparse points, else random points.
+  random,     ///< Random points in the volume that the cameras have in common.
+  points,     ///< The dataset's sparse points.
+  scene       ///< The scene that is given.
+};
+
 struct FitCommandOptions {
   std::string dataset, scene, out;
+  Init init = Init::automatic;
   int max_side = 1600, hold_out = 0;
   double checkpoint_every = 20;  // seconds; a checkpoint costs a tenth of one or so
   bool restart = false;
@@ -91,8 +103,27 @@ Result<Photos> load_photos(const io::Dataset& dataset, const FitCommandOptions& 
   return photos;
 }
 
+/// A scene and --init that contradict each other are a mistake of which nobody can tell which half is meant.
+Result<void> check_init(const FitCommandOptions& options) {
+  const auto wrong = [](const char* what) { return fail(ErrorCode::invalid_argument, what, "--init"); };
+  const bool given = !options.scene.empty();
+  if (options.init == Init::scene && !given) return wrong("there is no scene to start from: give one with --scene");
+  if (given && options.init != Init::scene && options.init != Init::automatic)
+    return wrong("a scene to start from is given with --scene, and --init says another start: leave one of them out");
+  return {};
+}
+
+Result<scene::GaussianCloud> random_cloud(const std::vector<fit::Photo>& photos, const FitCommandOptions& options) {
+  std::vector<scene::Camera> cameras;
+  for (const fit::Photo& photo : photos) cameras.push_back(photo.camera);
+  const auto points = fit::random_points(cameras, std::min(random_start, options.fit.max_gaussians), options.fit.seed);
+  if (points) return fit::gaussians_at(*points, 0);
+  return fail(points.error().code, points.error().message + " Give a scene with --scene.", options.dataset);
+}
+
 /// What the fit begins with.
-Result<scene::GaussianCloud> load_start(const io::Dataset& dataset, const FitCommandOptions& options) {
+Result<scene::GaussianCloud> load_start(const io::Dataset& dataset, const std::vector<fit::Photo>& photos,
+                                        const FitCommandOptions& options, Terminal& terminal) {
   if (!options.scene.empty()) {
     auto start = io::read_scene(options.scene);
     if (!start) return propagate(start);
@@ -103,9 +134,15 @@ Result<scene::GaussianCloud> load_start(const io::Dataset& dataset, const FitCom
     start->cloud.extra_stride = 0, start->cloud.extra.clear();
     return std::move(start->cloud);
   }
-  if (dataset.points.empty())
-    return fail(ErrorCode::unprocessable, "this dataset has no sparse points to start from: give a scene with --scene",
-                options.dataset);
+  if (options.init == Init::random) return random_cloud(photos, options);
+  if (dataset.points.empty()) {
+    if (options.init == Init::points)
+      return fail(ErrorCode::unprocessable,
+                  "this dataset has no sparse points to start from: give a scene with --scene, or --init random",
+                  options.dataset);
+    terminal.err << "warning: this dataset has no sparse points; starting from random ones\n";
+    return random_cloud(photos, options);
+  }
   std::vector<fit::ColoredPoint> points;
   for (const io::Point& point : dataset.points) {
     for (int axis = 0; axis < 3; ++axis)
@@ -241,6 +278,7 @@ void summarise(std::ostream& out, const path& file, const FitReport& report) {
 Result<void> run(const FitCommandOptions& options, Terminal& terminal) {
   const path folder = options.out;
   if (auto valid = fit::validate(options.fit); !valid) return valid;
+  if (auto valid = check_init(options); !valid) return valid;
   if (!options.scene.empty())
     if (auto safe = keep_input_safe(options.scene, folder / "scene.ply"); !safe) return safe;
   if (auto made = make_folder(folder); !made) return made;
@@ -251,11 +289,12 @@ Result<void> run(const FitCommandOptions& options, Terminal& terminal) {
     return fail(ErrorCode::conflict, "files of the dataset would be replaced: choose another folder", "--out");
 
   return compute(options.compute, [&](const Machine& machine) -> Result<void> {
-    const auto dataset = io::read_dataset(options.dataset, {.points = options.scene.empty()});
+    const auto dataset =
+        io::read_dataset(options.dataset, {.points = options.scene.empty() && options.init != Init::random});
     if (!dataset) return propagate(dataset);
     auto photos = load_photos(*dataset, options);
     if (!photos) return propagate(photos);
-    const auto start = load_start(*dataset, options);
+    const auto start = load_start(*dataset, photos->training, options, terminal);
     if (!start) return propagate(start);
 
     if (auto checked = check_visibility(*start, photos->training, terminal); !checked) return checked;
@@ -295,12 +334,22 @@ void add_fit_command(CLI::App& program, Action& action) {
   CLI::App* const command = program.add_subcommand("fit", "Makes a scene from photos with known cameras");
   const auto options = std::make_shared<FitCommandOptions>();
   fit::FitOptions& fit = options->fit;
+  const std::map<std::string, Init> init_names{
+      {"auto", Init::automatic}, {"random", Init::random}, {"points", Init::points}, {"scene", Init::scene}};
   command
       ->add_option("--dataset", options->dataset,
-                   "Folder with photos, their cameras and, unless --scene is given, sparse points (COLMAP or INRIA)")
+                   "Folder with photos, their cameras and, if there are any, sparse points (COLMAP, transforms.json or "
+                   "an INRIA model)")
       ->required()
       ->type_name("DIR");
   command->add_option("--scene", options->scene, "Scene to start from instead of the sparse points")->type_name("FILE");
+  command
+      ->add_option(
+          "--init", options->init,
+          "What to start from: the sparse points, random points in the volume that the cameras have in common, "
+          "or the scene; auto is the first there is of scene, points and random")
+      ->transform(CLI::CheckedTransformer(init_names, CLI::ignore_case))
+      ->type_name("auto|random|points|scene");
   command
       ->add_option("--out", options->out,
                    "Folder for scene.ply and report.json; while at work also fit.checkpoint, from which the same "

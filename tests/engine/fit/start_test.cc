@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <span>
 #include <vector>
 
 #include "engine/render/project.h"
@@ -81,6 +82,64 @@ TEST(WithShDegree, KeepsWhatBothHave) {
   EXPECT_EQ(more.sh_row(1)[4], 0.0f);
   EXPECT_EQ(with_sh_degree(more, 1), cloud);
   EXPECT_EQ(with_sh_degree(cloud, 0).sh, (std::vector<float>{1, 5, 9, 13, 17, 21}));
+}
+
+/// `count` cameras on a ring, `distance` from a point that all look at.
+std::vector<scene::Camera> ring(std::size_t count, double distance, DVec3 around) {
+  std::vector<scene::Camera> cameras;
+  for (std::size_t k = 0; k < count; ++k) {
+    const double angle = 6.2831853 * double(k) / double(count);
+    const DVec3 eye = around + distance * DVec3(std::cos(angle), -0.3, std::sin(angle));
+    cameras.push_back(scene::look_at(eye, around, DVec3(0, -1, 0), 0.8, 64, 48));
+  }
+  return cameras;
+}
+
+TEST(RandomPoints, LieAroundWhatTheCamerasLookAtAndInTheirPictures) {
+  for (const DVec3 around : {DVec3(0.0), DVec3(1e6, -2e6, 3e6)}) {
+    const auto cameras = ring(9, 4.0, around);
+    const auto points = random_points(cameras, 500, 7);
+    ASSERT_TRUE(points) << points.error().message;
+    ASSERT_EQ(points->size(), 500u);
+    DVec3 mean(0.0);
+    for (const ColoredPoint& point : *points) {
+      mean += (point.position - around) / 500.0;
+      EXPECT_LT(glm::distance(point.position, around), 0.5 * 4.0 * std::sqrt(1.09) + 1e-6);
+      int seeing = 0;
+      for (const scene::Camera& camera : cameras) {
+        const DVec2 pixel = camera.pixel_from_cam(camera.cam_from_world(point.position));
+        seeing += pixel.x >= 0 && pixel.y >= 0 && pixel.x < 64 && pixel.y < 48;
+      }
+      EXPECT_GE(seeing, 3);
+    }
+    EXPECT_LT(glm::length(mean), 0.2) << "not to one side";
+  }
+}
+
+TEST(RandomPoints, AreThoseOfTheirSeed) {
+  const auto cameras = ring(5, 2.0, DVec3(1.0));
+  const auto one = random_points(cameras, 50, 1), same = random_points(cameras, 50, 1),
+             other = random_points(cameras, 50, 2);
+  ASSERT_TRUE(one && same && other);
+  for (std::size_t i = 0; i < 50; ++i) EXPECT_EQ((*one)[i].position, (*same)[i].position);
+  EXPECT_NE((*one)[0].position, (*other)[0].position);
+}
+
+TEST(RandomPoints, NeedCamerasThatLookAtOnePlace) {
+  const auto refused = [](std::span<const scene::Camera> cameras) {
+    const auto points = random_points(cameras, 10, 0);
+    return !points && points.error().code == ErrorCode::unprocessable && points.error().where == "cameras";
+  };
+  auto cameras = ring(2, 4.0, DVec3(0.0));
+  EXPECT_TRUE(refused({}));
+  EXPECT_TRUE(refused(std::span(cameras).first(1)));
+  const DVec3 up(0, -1, 0);
+  cameras = {scene::look_at({0, 0, 0}, {0, 0, 5}, up, 0.8, 64, 48),
+             scene::look_at({1, 0, 0}, {1, 0, 5}, up, 0.8, 64, 48)};
+  EXPECT_TRUE(refused(cameras)) << "parallel";
+  cameras = {scene::look_at({2, 0, 0}, {4, 0, 0}, up, 0.8, 64, 48),
+             scene::look_at({0, 0, 2}, {0, 0, 4}, up, 0.8, 64, 48)};
+  EXPECT_TRUE(refused(cameras)) << "their axes meet behind them";
 }
 
 }  // namespace

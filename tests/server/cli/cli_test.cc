@@ -171,10 +171,34 @@ TEST_F(Cli, FitDoesNotEndBecauseACheckpointCannotBeWritten) {
   EXPECT_TRUE(io::read_scene(at("fit/scene.ply")));
 }
 
+TEST_F(Cli, FitStartsFromRandomPointsWhereThereAreNone) {
+  fs::remove(at("demo/sparse/0/points3D.txt"));
+  const std::string fit = "fit --iterations 150 --max-gaussians 3000 --dataset " + at("demo") + " --out ";
+  const Finished run = splatdrag(fit + at("fit"));
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_NE(run.err.find("no sparse points; starting from random ones"), std::string::npos) << run.err;
+  const json said = report("fit");
+  EXPECT_EQ(said["start_gaussians"], 3000);
+  EXPECT_GT(said["training"]["psnr_db"], said["curve"][0]["psnr_db"].get<double>() + 5) << said;
+  const Finished asked = splatdrag(fit + at("asked") + " --init random");
+  ASSERT_EQ(asked.status, 0) << asked.err;
+  EXPECT_EQ(asked.err.find("warning"), std::string::npos) << asked.err;
+  EXPECT_EQ(support::read_file(at("asked/scene.ply")), support::read_file(at("fit/scene.ply")));
+}
+
+TEST_F(Cli, FitIsToldOneStartOnly) {
+  const std::string fit = "fit --iterations 3 --dataset " + at("demo") + " --out " + at("fit") + " --init ";
+  for (const std::string& start : {std::string("scene"), "random --scene " + demo("scene.ply")}) {
+    const Finished run = splatdrag(fit + start);
+    EXPECT_EQ(run.status, 2) << run.err;
+    EXPECT_NE(run.err.find("--init"), std::string::npos) << run.err;
+  }
+}
+
 TEST_F(Cli, FitNeedsPointsOrASceneToStartFrom) {
   fs::remove(at("demo/sparse/0/points3D.txt"));
   const std::string fit = "fit --iterations 3 --out " + at("fit") + " --dataset " + at("demo");
-  const Finished without = splatdrag(fit);
+  const Finished without = splatdrag(fit + " --init points");
   EXPECT_EQ(without.status, 6);
   EXPECT_NE(without.err.find("--scene"), std::string::npos) << without.err;
   const Finished with = splatdrag(fit + " --scene " + demo("scene.ply"));
@@ -278,6 +302,52 @@ TEST_F(Cli, EditWritesSceneReportAndPictures) {
       EXPECT_EQ(picture->width, 160);
     }
   EXPECT_EQ(files_in("out/deep"), 2u + 9u) << "and nothing else";
+}
+
+TEST_F(Cli, EditWritesTheFormatThatTheNameOfItsOutputSays) {
+  const std::string edit = "edit --pictures 0 --scene " + demo("scene.ply") + " --request " + quick("ball") + " --out ";
+  ASSERT_EQ(splatdrag(edit + at("folder")).status, 0);
+  const auto edited = io::read_scene(at("folder/scene.ply"));
+  ASSERT_TRUE(edited) << edited.error().message;
+  for (const auto& [name, format] : {std::pair{"files/ball.ply", io::SceneFormat::ply},
+                                     {"files/ball.compressed.ply", io::SceneFormat::compressed_ply},
+                                     {"files/ball.spz", io::SceneFormat::spz},
+                                     {"files/ball.sog", io::SceneFormat::sog},
+                                     {"files/ball.glb", io::SceneFormat::glb},
+                                     {"files/ball.SPLAT", io::SceneFormat::splat}}) {
+    SCOPED_TRACE(name);
+    const Finished run = splatdrag(edit + at(name));
+    ASSERT_EQ(run.status, 0) << run.err;
+    EXPECT_NE(run.out.find(name), std::string::npos) << run.out;
+    const auto found = io::detect_format(at(name));
+    ASSERT_TRUE(found) << found.error().message;
+    EXPECT_EQ(*found, format);
+    const auto scene = io::read_scene(at(name));
+    ASSERT_TRUE(scene) << scene.error().message;
+    EXPECT_EQ(scene->cloud.size(), edited->cloud.size());
+    const bool rounds =
+        format == io::SceneFormat::compressed_ply || format == io::SceneFormat::spz || format == io::SceneFormat::sog;
+    EXPECT_EQ(run.err.find(" rounds positions") != std::string::npos, rounds) << run.err;
+  }
+  EXPECT_EQ(support::read_file(at("files/ball.ply")), support::read_file(at("folder/scene.ply")));
+  EXPECT_EQ(report("files")["gaussians"]["output"], edited->cloud.size()) << "the report lies beside the scene";
+  fs::create_directories(at("named.spz"));
+  ASSERT_EQ(splatdrag(edit + at("named.spz")).status, 0);
+  EXPECT_TRUE(fs::exists(at("named.spz/scene.ply"))) << "a folder stays one, however it is called";
+}
+
+TEST_F(Cli, EditComesBackInTheFormatItCameInAndNeverOverItself) {
+  ASSERT_EQ(splatdrag("convert --in " + demo("scene.ply") + " --out " + at("in.spz")).status, 0);
+  const std::string before = support::read_file(at("in.spz"));
+  const std::string edit = "edit --pictures 0 --scene " + at("in.spz") + " --request " + quick("ball") + " --out ";
+  EXPECT_EQ(splatdrag(edit + at("in.spz")).status, 9);
+  EXPECT_EQ(support::read_file(at("in.spz")), before);
+  const Finished run = splatdrag(edit + at("edited.spz"));
+  ASSERT_EQ(run.status, 0) << run.err;
+  const auto was = io::read_scene(at("in.spz")), is = io::read_scene(at("edited.spz"));
+  ASSERT_TRUE(was && is);
+  EXPECT_EQ(is->cloud.size(), report(".")["gaussians"]["output"]);
+  EXPECT_EQ(is->cloud.sh_degree, was->cloud.sh_degree);
 }
 
 TEST_F(Cli, EditWithoutAPresetOptimisesAndCorrects) {
