@@ -47,6 +47,9 @@ Region read_region(const JsonField& field, std::string_view size_name) {
   return region;
 }
 
+constexpr auto request_fields = {"scene",     "version", "mode",   "preset", "prompt", "handles",
+                                 "selection", "heal",    "attach", "crumbs", "region", "params"};
+
 EditRequest read_edit_request(const JsonField& field) {
   const Members members(field, {"scene", "version", "mode", "preset", "prompt", "handles", "selection", "heal",
                                 "attach", "crumbs", "region", "params"});
@@ -117,6 +120,12 @@ bool is_released_config(const json& document) {
 
 bool is_edit_request(const json& document) { return document.contains("handles") || document.contains("selection"); }
 
+/// Whether it has a field of an edit request, without what makes it one: a word is misspelt, most likely.
+bool is_nearly_an_edit_request(const json& document) {
+  return std::any_of(request_fields.begin(), request_fields.end(),
+                     [&](const char* field) { return document.contains(field); });
+}
+
 Result<RequestFile> decode_either(const json& document, const std::string& name) {
   const auto in_file = [&](Result<EditRequest> request, bool released) -> Result<RequestFile> {
     if (!request) return propagate(request);
@@ -124,11 +133,15 @@ Result<RequestFile> decode_either(const json& document, const std::string& name)
   };
   if (is_edit_request(document)) return in_file(decode(document, name, read_edit_request), false);
   if (is_released_config(document)) return in_file(decode(document, name, read_released_config), true);
+  if (is_nearly_an_edit_request(document)) return in_file(decode(document, name, read_edit_request), false);
+  std::string where = name;
+  if (document.is_object() && !document.empty())
+    where += (name.empty() ? "" : ".") + printable(document.begin().key());  // nothing else says what was meant
   return fail(ErrorCode::invalid_argument,
               "expected an edit request (with handles, or a selection to remove) or a 3DGS-Drag configuration (with "
               "start, direction and "
               "voxel_size)",
-              name);
+              where);
 }
 
 /// The requests of a file of several, by name; none if the document is something else.
@@ -191,6 +204,23 @@ Result<RequestFile> parse_request_file(std::string_view text, std::string_view n
   if (std::find(names.begin(), names.end(), chosen) == names.end())
     return fail(ErrorCode::not_found, "there is no request \"" + printable(chosen) + "\"; there are: " + listed(names));
   return decode_either((*document)[chosen], printable(chosen));
+}
+
+Result<Selection> parse_selection_file(std::string_view text, const JsonLimits& limits) {
+  const auto document = parse_document(text, limits);
+  if (!document) return propagate(document);
+  if (document->is_array()) {
+    std::optional<Error> error;
+    Selection operations = read_selection(JsonField(*document, "selection", error));
+    if (error) return tl::make_unexpected(std::move(*error));
+    return operations;
+  }
+  const bool is_alone = document->size() == 1 && document->contains("selection");
+  if (is_alone || !is_nearly_an_edit_request(*document)) return parse_selection(text, limits);
+  auto request = decode(*document, "", read_edit_request);
+  if (!request) return propagate(request);
+  if (!request->selection) return fail(ErrorCode::invalid_argument, "the edit request selects nothing", "selection");
+  return *std::move(request->selection);
 }
 
 std::string RequestFile::address_of(std::string_view field) const {

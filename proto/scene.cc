@@ -127,6 +127,10 @@ std::string to_json(const std::vector<Scene>& scenes) {
   return pretty(out);
 }
 
+std::string to_json(const SceneVersion& version, const std::string& scene) {
+  return pretty(encode(version, "/v1/scenes/" + scene));
+}
+
 std::string to_json(const std::vector<View>& views, std::string_view kind) {
   ordered_json out{{"kind", kind}, {"views", ordered_json::array()}};
   for (const View& view : views) out["views"].push_back(encode(view));

@@ -48,6 +48,9 @@ struct Scene {
 
 [[nodiscard]] std::string to_json(const Scene& scene);
 [[nodiscard]] std::string to_json(const std::vector<Scene>& scenes);  ///< {"scenes": [...]}
+/// As among the versions of its scene.
+///   scene  its id
+[[nodiscard]] std::string to_json(const SceneVersion& version, const std::string& scene);
 
 /// A view of a scene.
 struct View {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "engine/io/quantised.h"
@@ -11,18 +12,42 @@
 namespace engine::io {
 namespace {
 
-/// Largest and mean of values that come one by one.
-struct Tally {
-  double largest = 0, sum = 0;
-  std::size_t count = 0;
+/// What a format has room for; what lies beyond comes to the nearer end.
+struct Range {
+  double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
+  [[nodiscard]] bool holds(double value) const { return value >= low && value <= high; }
+};
 
-  void add(double value) {
-    largest = std::max(largest, value);
-    sum += value;
+/// Of colours, as displayed. A byte of .splat is from black to white; .spz spreads its own 1 / 0.15 of the coefficient.
+Range colours_of(SceneFormat format) {
+  constexpr double spz_reach = 0.5 / 0.15 * sh_c0;
+  if (format == SceneFormat::splat) return {0, 1};
+  if (format == SceneFormat::spz) return {0.5 - spz_reach, 0.5 + spz_reach};
+  return {};
+}
+
+/// Of log scales: in sixteenths from -10 on in .spz.
+Range log_scales_of(SceneFormat format) { return format == SceneFormat::spz ? Range{-10, -10 + 255.0 / 16} : Range{}; }
+
+/// Largest and mean of differences that come one by one, and of those that are none of rounding.
+struct Tally {
+  double largest = 0, sum = 0, most_clipped = 0;
+  std::size_t count = 0, clipped = 0;
+
+  void add(double difference) {
+    largest = std::max(largest, difference);
+    sum += difference;
     ++count;
   }
+  void add(double difference, bool held) {
+    if (held) return add(difference);
+    most_clipped = std::max(most_clipped, difference);
+    ++clipped;
+  }
   [[nodiscard]] AttributeLoss as(const char* attribute, const char* unit) const {
-    return {attribute, unit, largest, count == 0 ? 0 : sum / double(count)};
+    const double all = double(count + clipped);
+    return {attribute,   unit, largest, count == 0 ? 0 : sum / double(count), all == 0 ? 0 : double(clipped) / all,
+            most_clipped};
   }
 };
 
@@ -52,15 +77,20 @@ std::vector<AttributeLoss> scene_loss(const SceneFile& before, const SceneFile& 
   assert(a.size() == b.size());
   const auto order = written_order(before, format);
   const std::size_t in = scene::sh_coefficients(a.sh_degree), out = scene::sh_coefficients(b.sh_degree);
+  const Range colours = colours_of(format), log_scales = log_scales_of(format);
   Tally mean, scale, rotation, alpha, colour, sh;
   for (std::size_t j = 0; j < order.size(); ++j) {
     const std::size_t i = order[j];
     mean.add(glm::length(DVec3(a.mean.get(i)) - DVec3(b.mean.get(j))));
-    for (int c = 0; c < 3; ++c) scale.add(std::abs(double(a.log_scale.get(i)[c]) - double(b.log_scale.get(j)[c])));
+    for (int c = 0; c < 3; ++c) {
+      const auto before_it = double(a.log_scale.get(i)[c]);
+      scale.add(std::abs(before_it - double(b.log_scale.get(j)[c])), log_scales.holds(before_it));
+    }
     rotation.add(degrees_between(a.rotation.get(i), b.rotation.get(j)));
     alpha.add(std::abs(opacity(a.opacity_logit[i]) - opacity(b.opacity_logit[j])));
     for (std::size_t c = 0; c < 3; ++c) {
-      colour.add(sh_c0 * std::abs(double(a.sh_row(i)[c * in]) - double(b.sh_row(j)[c * out])));
+      const auto dc = double(a.sh_row(i)[c * in]);
+      colour.add(sh_c0 * std::abs(dc - double(b.sh_row(j)[c * out])), colours.holds(0.5 + sh_c0 * dc));
       for (std::size_t k = 1; k < std::min(in, out); ++k)
         sh.add(std::abs(double(a.sh_row(i)[c * in + k]) - double(b.sh_row(j)[c * out + k])));
     }

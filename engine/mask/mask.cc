@@ -13,19 +13,24 @@ namespace {
 
 constexpr int far_away = 1 << 20;  // more than any distance inside a picture (16384 px a side); its square fits 64 bits
 
-/// Vertical distance from each pixel of a column to the nearest set pixel of that column; far_away if there is none.
-void column_distances(const scene::Mask& mask, int x, std::vector<int>& distance) {
-  int since = far_away;
-  for (int y = 0; y < mask.height; ++y) {
-    since = mask.at(x, y) ? 0 : std::min(since + 1, far_away);
-    distance[std::size_t(y) * std::size_t(mask.width) + std::size_t(x)] = since;
-  }
-  since = far_away;
-  for (int y = mask.height; y-- > 0;) {
-    since = mask.at(x, y) ? 0 : std::min(since + 1, far_away);
-    int& here = distance[std::size_t(y) * std::size_t(mask.width) + std::size_t(x)];
-    here = std::min(here, since);
-  }
+/// Vertical distance from each pixel of the columns [first, end) to the nearest set pixel of its column; far_away if
+/// there is none. Row by row, as pictures lie in memory: down a column each step would wait for another cache line.
+void column_distances(const scene::Mask& mask, std::size_t first, std::size_t end, std::vector<int>& distance) {
+  const auto width = std::size_t(mask.width), height = std::size_t(mask.height);
+  std::vector<int> since(end - first, far_away);
+  for (std::size_t y = 0; y < height; ++y)
+    for (std::size_t x = first; x < end; ++x) {
+      int& so_far = since[x - first];
+      so_far = mask.data[y * width + x] != 0 ? 0 : std::min(so_far + 1, far_away);
+      distance[y * width + x] = so_far;
+    }
+  std::fill(since.begin(), since.end(), far_away);
+  for (std::size_t y = height; y-- > 0;)
+    for (std::size_t x = first; x < end; ++x) {
+      int &so_far = since[x - first], &here = distance[y * width + x];
+      so_far = mask.data[y * width + x] != 0 ? 0 : std::min(so_far + 1, far_away);
+      here = std::min(here, so_far);
+    }
 }
 
 /// One row of the dilation. A pixel with a set one at vertical distance g <= r lights the row within
@@ -70,9 +75,8 @@ scene::Mask dilate(const scene::Mask& mask, int radius_px) {
   }
   constexpr std::size_t grain = 64;  // rows or columns: enough work for a thread, enough chunks for many
   std::vector<int> distance(mask.data.size());
-  parallel_for(std::size_t(mask.width), grain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t x = begin; x < end; ++x) column_distances(mask, int(x), distance);
-  });
+  parallel_for(std::size_t(mask.width), grain,
+               [&](std::size_t begin, std::size_t end) { column_distances(mask, begin, end, distance); });
   scene::Mask wide(mask.width, mask.height);
   parallel_for(std::size_t(mask.height), grain, [&](std::size_t begin, std::size_t end) {
     std::vector<int> steps(std::size_t(mask.width) + 1);

@@ -38,8 +38,11 @@ ordered_json quantiles_of(std::vector<double> values) {
   return out;
 }
 
-std::vector<std::string> extra_properties(const io::PlyLayout& layout) {
+/// What rows hold beside the Gaussian; the other formats have no room for it, and a layout only for when they become a
+/// .ply file.
+std::vector<std::string> extra_properties(const io::PlyLayout& layout, io::SceneFormat format) {
   std::vector<std::string> names;
+  if (format != io::SceneFormat::ply) return names;
   for (const io::PlyProperty& property : layout.vertex().properties)
     if (!io::field_named(property.name)) names.push_back(property.name);
   return names;
@@ -88,7 +91,7 @@ ordered_json describe(const io::SceneFile& file) {
       {"quantiles", quantiles},
       {"opacity", quantiles_of(std::move(opacity))},
       {"sigma", quantiles_of(std::move(sigma))},
-      {"extra_properties", extra_properties(file.layout)},
+      {"extra_properties", extra_properties(file.layout, file.origin.format)},
       {"antialiased", file.origin.antialiased},
       {"spz_extensions", extension_types(file.origin)},
       {"left_out", file.origin.left_out}};

@@ -1,5 +1,7 @@
 // splatdrag render: pictures of a scene through a dataset's cameras or one of your own.
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <iomanip>
@@ -120,11 +122,23 @@ struct Destination {
   [[nodiscard]] path of(const RenderTask& task) const { return file ? *file : folder / (task.picture + extension); }
 };
 
+/// Whether a name is that of a picture in a format that is not written: a folder of that name is not what is meant.
+bool is_other_picture(const path& out) {
+  constexpr std::array others{".gif", ".bmp", ".tif",  ".tiff", ".webp", ".tga",
+                              ".ppm", ".hdr", ".avif", ".heic", ".jxl"};
+  std::string extension = out.extension().string();
+  for (char& c : extension) c = char(std::tolower(static_cast<unsigned char>(c)));
+  return std::find(others.begin(), others.end(), extension) != others.end();
+}
+
 Result<Destination> destination(const RenderOptions& options, std::size_t pictures) {
   Destination to{options.out, std::nullopt, "." + options.format};
   const path out = options.out;
   std::error_code unreachable;  // then it is no folder
-  if (io::format_of(out) && !std::filesystem::is_directory(out, unreachable)) {
+  const bool is_folder = std::filesystem::is_directory(out, unreachable);
+  const auto format = io::format_of(out);
+  if (!format && !is_folder && is_other_picture(out)) return propagate(format);
+  if (format && !is_folder) {
     if (pictures > 1)
       return fail(ErrorCode::invalid_argument, "several pictures need a folder, not a file name", "--out");
     to.file = out;

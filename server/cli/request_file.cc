@@ -29,7 +29,7 @@ engine::Result<proto::RequestFile> read_request(const std::filesystem::path& pat
 }
 
 engine::Result<proto::Selection> read_selection(const std::filesystem::path& path) {
-  return read_file(path, proto::parse_selection);
+  return read_file(path, proto::parse_selection_file);
 }
 
 }  // namespace server::cli

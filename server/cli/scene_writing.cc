@@ -34,6 +34,14 @@ std::vector<std::string> unsaid(const io::SceneOrigin& origin, io::SceneFormat f
   return lost;
 }
 
+/// Of values beyond what the format has room for.
+std::string clipped_in_numbers(const io::AttributeLoss& loss) {
+  std::array<char, 64> text{};
+  std::snprintf(text.data(), text.size(), "%.2g %% of them, by %.3g at most", 100 * loss.clipped_part,
+                loss.most_clipped);
+  return text.data();
+}
+
 std::string in_numbers(const io::AttributeLoss& loss) {
   std::array<char, 64> text{};
   std::snprintf(text.data(), text.size(), "%.3g at most, %.2g on average", loss.largest, loss.mean);
@@ -52,10 +60,13 @@ engine::Result<void> write_and_tell(const std::filesystem::path& file, const io:
     // What was written is read again: no formula, but what a reader will find.
     const auto back = io::read_scene(file);
     if (!back) return propagate(back);
-    for (const io::AttributeLoss& loss : io::scene_loss(scene, *back, format))
+    const std::string extension = "." + std::string(io::extension_of(format));
+    for (const io::AttributeLoss& loss : io::scene_loss(scene, *back, format)) {
+      if (loss.clipped_part > 0)
+        warn(extension + " clips " + loss.attribute + ": " + clipped_in_numbers(loss) + " (" + loss.unit + ")");
       if (loss.largest > 0)
-        warn("." + std::string(io::extension_of(format)) + " rounds " + loss.attribute + ": " + in_numbers(loss) +
-             " (" + loss.unit + ")");
+        warn(extension + " rounds " + loss.attribute + ": " + in_numbers(loss) + " (" + loss.unit + ")");
+    }
   }
   return {};
 }

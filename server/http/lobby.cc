@@ -135,7 +135,6 @@ void Lobby::run() {
       cut_ = false;
       guests.swap(guests_);
       by_due_.clear();
-      unsent_bytes_ = 0;
     }
     if (ended_) {
       handed_in.swap(handed_in_);
@@ -230,16 +229,18 @@ bool Lobby::make_room(const std::string& network) {
 }
 
 /// Has those go whose clients take the least, where too much waits for too many: first whoever has taken nothing for
-/// longest. One answer is always held, however large.
+/// longest. What waits in line for a worker stays, for it is not the lobby's: where that alone is too much, whoever has
+/// just come goes. One answer is always held, however large.
 ///   newest  socket of the guest that has just come
 void Lobby::bound_unsent_bytes(int newest) {
-  while (unsent_bytes_ > options_.max_unsent_bytes) {
+  while (unsent_bytes_.total() > options_.max_unsent_bytes) {
     auto longest = guests_.end();
     for (auto guest = guests_.begin(); guest != guests_.end(); ++guest) {
-      if (guest->first == newest || guest->second.visit->connection.bytes_unsent() == 0) continue;
+      if (guest->first == newest || guest->second.visit->unsent.bytes() == 0) continue;
       if (longest == guests_.end() || guest->second.since < longest->second.since) longest = guest;
     }
-    if (longest == guests_.end()) return;
+    if (longest == guests_.end()) longest = guests_.find(newest);
+    if (longest == guests_.end() || longest->second.visit->unsent.bytes() == unsent_bytes_.total()) return;
     cut_off(longest);
   }
 }
@@ -264,6 +265,7 @@ void Lobby::go_on_with(std::unique_ptr<Visit> visit, const HeadText& text) {
 
 void Lobby::let_in(std::unique_ptr<Visit> visit) {
   Connection& connection = visit->connection;
+  visit->unsent.set(unsent_bytes_, connection.bytes_unsent());
   switch (visit->next) {
     case Next::say_goodbye:
       connection.end_sending();
@@ -303,7 +305,6 @@ void Lobby::seat(std::unique_ptr<Visit> visit, unsigned events, Clock::time_poin
     guests_.erase(guest);  // nobody would ever look after it
     throw;
   }
-  unsent_bytes_ += guest->second.visit->connection.bytes_unsent();
   if (!watch(socket, events)) const auto ended = unseat(guest);
 }
 
@@ -317,7 +318,6 @@ std::unique_ptr<Visit> Lobby::unseat(Guests::iterator guest) {
   watch_no_more(guest->first);
   by_due_.erase({guest->second.due, guest->first});
   auto visit = std::move(guest->second.visit);
-  unsent_bytes_ -= visit->connection.bytes_unsent();  // which nobody has changed since
   guests_.erase(guest);
   return visit;
 }

@@ -19,14 +19,16 @@
 #include "engine/core/file_descriptor.h"
 #include "engine/core/result.h"
 #include "server/http/places.h"
+#include "server/http/unsent_bytes.h"
 #include "server/http/visit.h"
 
 namespace server::http {
 
 struct LobbyOptions {
-  std::size_t max_connections = 1024;                         ///< Open at a time, with those of the workers.
-  std::size_t max_connections_per_client = 256;               ///< Of one network; 0: no limit but the other one.
-  std::uint64_t max_unsent_bytes = std::uint64_t{512} << 20;  ///< Of answers in memory that clients are slow to take.
+  std::size_t max_connections = 1024;            ///< Open at a time, with those of the workers.
+  std::size_t max_connections_per_client = 256;  ///< Of one network; 0: no limit but the other one.
+  /// Of answers in memory that clients are slow to take, wherever those wait.
+  std::uint64_t max_unsent_bytes = std::uint64_t{512} << 20;
   ConnectionLimits connection = {};
 };
 
@@ -115,7 +117,8 @@ class Lobby {
   engine::FileDescriptor epoll_, wake_;
   Guests guests_;
   std::set<std::pair<Clock::time_point, int>> by_due_;
-  std::uint64_t unsent_bytes_ = 0;                             ///< Of the guests' answers.
+  /// Of the answers of guests, and of those that were: what waits in line for a worker is held as well.
+  UnsentBytes unsent_bytes_;
   Clock::time_point accept_again_ = Clock::time_point::max();  ///< Nobody is let in until then.
   bool doors_closed_ = false;
 

@@ -12,6 +12,7 @@
 #include "server/http/network.h"
 #include "server/http/places.h"
 #include "server/http/request_head.h"
+#include "server/http/unsent_bytes.h"
 
 namespace server::http {
 
@@ -56,6 +57,7 @@ struct Visit {
   bool stepped_aside = false;   ///< Its worker does not count among the workers any more.
   Answer answer;
   std::shared_ptr<const void> under_way;  ///< Counted as long as this lives.
+  UnsentBytes::Share unsent;  ///< What it held of its answer when the lobby saw it last; a worker only sends of it.
 };
 
 }  // namespace server::http

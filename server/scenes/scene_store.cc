@@ -168,6 +168,10 @@ Result<int> SceneStore::add_version(const std::string& id, int parent, const std
   return impl_->with(id, [&](const Snapshot& at) { return impl_->versions.add(at, parent, edit, overlay); });
 }
 
+Result<VersionInfo> SceneStore::find_version(const std::string& id, const std::string& version) const {
+  return impl_->with(id, [&](const Snapshot& at) { return Versions::find(at, version); });
+}
+
 Result<void> SceneStore::remove_version(const std::string& id, const std::string& version) {
   auto removed = impl_->with(id, [&](const Snapshot& at) { return impl_->versions.remove(at, version); });
   if (removed) impl_->files.forget(id + "/" + version + ".");

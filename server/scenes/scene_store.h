@@ -93,6 +93,9 @@ class SceneStore {
   ///   overlay  over the parent
   [[nodiscard]] Result<int> add_version(const std::string& id, int parent, const std::string& edit,
                                         const engine::scene::Overlay& overlay);
+  /// What is known of a version, as find() has it among all of its scene. A preview is none.
+  ///   errors  not_found
+  [[nodiscard]] Result<VersionInfo> find_version(const std::string& id, const std::string& version) const;
   /// Deletes a version for good, durable when this returns; its number is not used again. Those that were made from it
   /// are said to have been made from its parent, and stay as they are. Whoever holds it keeps it in memory.
   ///   errors  not_found; conflict: version 0, which all others lie over

@@ -4,28 +4,33 @@ namespace server::service {
 
 engine::Result<FairSemaphore::Slot> FairSemaphore::acquire() {
   std::unique_lock lock(mutex_);
-  const bool must_wait = taken_ == slots_ || now_serving_ != next_ticket_;
-  if (must_wait && next_ticket_ - now_serving_ >= max_waiting_)
+  if (taken_ < slots_) {  // nobody waits: slots are handed on to those who do
+    ++taken_;
+    return Slot(*this);
+  }
+  if (line_.size() >= max_waiting_)
     return engine::fail(engine::ErrorCode::busy, "too many pictures are asked for at once: try again in a second");
-  const std::uint64_t ticket = next_ticket_++;
-  changed_.wait(lock, [&] { return taken_ < slots_ && now_serving_ == ticket; });
-  ++now_serving_;
-  ++taken_;
-  changed_.notify_all();  // there may be a slot for the next one, too
+  Waiter waiter;
+  line_.push_back(&waiter);
+  waiter.served.wait(lock, [&] { return waiter.has_slot; });
   return Slot(*this);
 }
 
 void FairSemaphore::release() {
-  {
-    const std::lock_guard lock(mutex_);
+  const std::lock_guard lock(mutex_);
+  if (line_.empty()) {
     --taken_;
+    return;
   }
-  changed_.notify_all();
+  Waiter& next = *line_.front();
+  line_.pop_front();
+  next.has_slot = true;
+  next.served.notify_one();  // under the lock: the waiter, and its condition, may be gone right after it
 }
 
 std::size_t FairSemaphore::waiting() const {
   const std::lock_guard lock(mutex_);
-  return std::size_t(next_ticket_ - now_serving_);
+  return line_.size();
 }
 
 }  // namespace server::service

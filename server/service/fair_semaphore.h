@@ -3,7 +3,7 @@
 
 #include <condition_variable>
 #include <cstddef>
-#include <cstdint>
+#include <deque>
 #include <mutex>
 #include <utility>
 
@@ -39,14 +39,19 @@ class FairSemaphore {
   [[nodiscard]] std::size_t waiting() const;
 
  private:
+  /// One who waits. Each has a condition of its own: woken together, dozens would run for every slot that one gets.
+  struct Waiter {
+    std::condition_variable served;
+    bool has_slot = false;
+  };
+
   void release();
 
   const int slots_;
   const std::size_t max_waiting_;
-  mutable std::mutex mutex_;
-  std::condition_variable changed_;
-  int taken_ = 0;
-  std::uint64_t next_ticket_ = 0, now_serving_ = 0;  ///< Tickets between the two wait.
+  mutable std::mutex mutex_;  ///< Guards what follows, and what waiters have.
+  int taken_ = 0;             ///< Slots that are held, or have been handed to one who waits.
+  std::deque<Waiter*> line_;  ///< The first comes next.
 };
 
 }  // namespace server::service

@@ -85,6 +85,41 @@ TEST(RequestFile, SaysWhatItExpectsOfAnythingElse) {
   }
 }
 
+TEST(RequestFile, NamesAFieldThatIsMisspelt) {
+  const auto where = [](const char* text, const char* name) {
+    const auto request = parse_request_file(text, name);
+    return request ? "no error" : request.error().where;
+  };
+  EXPECT_EQ(where(R"({"mode": "move", "handels": [{"source": [0, 0, 0], "radius": 1}]})", ""), "handels");
+  EXPECT_EQ(where(R"({"handels": [{"source": [0, 0, 0], "radius": 1}]})", ""), "handels");
+  EXPECT_EQ(where(R"({"up": {"preset": "draft", "handels": []}, "down": {}})", "up"), "up.handels");
+  EXPECT_EQ(where(R"({"mode": "move"})", ""), "handles");
+}
+
+TEST(SelectionFile, IsASelectionAListOrAWholeRequest) {
+  const auto expected = parse_selection(R"({"selection": [{"rows": [[0, 3]]}, {"op": "subtract", "rows": [[1, 2]]}]})");
+  ASSERT_TRUE(expected) << expected.error().message;
+  for (const char* text : {R"([{"rows": [[0, 3]]}, {"op": "subtract", "rows": [[1, 2]]}])",
+                           R"({"selection": [{"rows": [[0, 3]]}, {"op": "subtract", "rows": [[1, 2]]}]})",
+                           R"({"mode": "remove", "params": {"views": 9},
+                               "selection": [{"rows": [[0, 3]]}, {"op": "subtract", "rows": [[1, 2]]}]})"}) {
+    const auto selection = parse_selection_file(text);
+    ASSERT_TRUE(selection) << text << ": " << selection.error().message << " " << selection.error().where;
+    EXPECT_EQ(*selection, *expected) << text;
+  }
+}
+
+TEST(SelectionFile, SaysWhereItIsWrong) {
+  const auto where = [](const char* text) {
+    const auto selection = parse_selection_file(text);
+    return selection ? "no error" : selection.error().where;
+  };
+  EXPECT_EQ(where(R"([{"rows": [[0, -3]]}])"), "selection[0].rows[0][1]");
+  EXPECT_EQ(where(R"({"selektion": []})"), "selektion");
+  EXPECT_EQ(where(R"({"mode": "move", "handles": [{"source": [0, 0, 0], "radius": 1}]})"), "selection");
+  EXPECT_EQ(where(R"({"mode": "remove", "selection": [{"rows": [[0, 3]]}], "parms": {}})"), "parms");
+}
+
 TEST(RequestFile, RefusesAMixtureOfBothForms) {
   const auto request =
       parse_request_file(R"({"handles": [{"source": [0, 0, 0], "radius": 1}], "start": [[0, 0, 0]]})", "");

@@ -384,11 +384,19 @@ describe('an edit', () => {
     await client.get(`/v1/scenes/${scene.id}/versions/1/file`);
   });
 
+  test('links to what is known of its version', async () => {
+    const { versions } = (await client.get(first.links.scene)).json(), result = await client.get(first.links.result);
+    assert.deepEqual(result.json(), versions.find(({ version }) => version === first.result_version));
+    assert.equal(result.json().edit, first.id);
+    await client.get(first.links.result, { headers: { 'if-none-match': result.headers.etag }, expect: 304 });
+  });
+
   test('leaves the other versions when its own is deleted', async () => {
     const { result_version } = await client.succeeded((await client.submit({ scene: scene.id, ...demo.leaf })).id);
     const url = `/v1/scenes/${scene.id}/versions/${result_version}`, before = await client.file(scene.id, 1);
     await client.delete(url);
     await client.delete(url, { expect: 404 });
+    await client.get(url, { expect: 404 });
     await client.get(`${url}/file`, { expect: 404 });
     await client.delete(`/v1/scenes/${scene.id}/versions/0`, { expect: 409 });
     assert.deepEqual(await client.file(scene.id, 1), before);

@@ -148,6 +148,12 @@ Result<std::shared_ptr<const Overlay>> Versions::overlay(const Snapshot& at, int
   return held;
 }
 
+Result<VersionInfo> Versions::find(const Snapshot& at, const std::string& version) {
+  const auto number = known_version(at, version);
+  if (!number) return propagate(number);
+  return at.manifest->scene.versions[place_of(*at.manifest, *number).value()];
+}
+
 Result<LoadedVersion> Versions::load(const Snapshot& at, const std::string& version) {
   if (is_preview(version)) return load_preview(at, version);
   const auto number = known_version(at, version);

@@ -43,6 +43,9 @@ class Versions {
   ///   errors   those of load() and write_manifest()
   [[nodiscard]] Result<int> add(const Snapshot& at, int parent, const std::string& edit,
                                 const engine::scene::Overlay& overlay);
+  /// What is known of a version. A preview is none.
+  ///   errors  not_found
+  [[nodiscard]] static Result<VersionInfo> find(const Snapshot& at, const std::string& version);
   /// Deletes a version for good: its number is not used again, and those that were made from it are said to have been
   /// made from its parent. Each is an overlay over version 0, so none needs another one's file. Whoever holds it keeps
   /// it in memory.

@@ -180,6 +180,13 @@ Result<Reply> get_views(const Call& call, SceneViews& views) {
   return Reply::json(proto::to_json(out, (*set)->is_virtual ? "virtual" : "dataset"));
 }
 
+Result<Reply> get_version(const Call& call, SceneStore& store) {
+  const std::string& id = call.path("id");
+  const auto version = store.find_version(id, call.path("v"));
+  if (!version) return propagate(version);
+  return Reply::json(proto::to_json(to_proto(*version), id));
+}
+
 /// The format asked for; "original" is that of the file the scene came in.
 Result<FileFormat> file_format(const Call& call, SceneStore& store) {
   const std::string format = call.query("format").value_or("ply");
@@ -261,6 +268,10 @@ void add_scene_routes(http::Router& router, const SceneRouteDependencies& depend
   router.add({.method = "GET",
               .path = "/v1/scenes/{id}/views",
               .handler = [&views](const Call& call) { return get_views(call, views); },
+              .queries = {}});
+  router.add({.method = "GET",
+              .path = "/v1/scenes/{id}/versions/{v}",
+              .handler = [&store](const Call& call) { return get_version(call, store); },
               .queries = {}});
   router.add({.method = "DELETE",
               .path = "/v1/scenes/{id}/versions/{v}",

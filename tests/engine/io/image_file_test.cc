@@ -121,6 +121,21 @@ TEST(EncodeImage, RoundsToTheNearestStepAndClamps) {
   for (int x = 0; x < 6; ++x) EXPECT_EQ(std::lround(255 * back.at(x, 0)), std::lround(expected[x])) << x;
 }
 
+TEST(EncodeImage, RoundsHalvesUpwardsToTheLastBit) {
+  Image image(3 * 255, 1, 1);
+  std::vector<long> expected;
+  for (int step = 0; step < 255; ++step) {
+    const float half = (float(step) + 0.5f) / 255;
+    const float around[] = {std::nextafter(half, 0.0f), half, std::nextafter(half, 1.0f)};
+    for (int i = 0; i < 3; ++i) {
+      image.data[std::size_t(3 * step + i)] = around[i];
+      expected.push_back(std::lround(255 * around[i]));
+    }
+  }
+  const Image back = decoded(*encode_image(image, ImageFormat::png));
+  for (int x = 0; x < image.width; ++x) EXPECT_EQ(std::lround(255 * back.at(x, 0)), expected[std::size_t(x)]) << x;
+}
+
 TEST(EncodeImage, JpegIsCloseAndQualityCosts) {
   const Image image = ramp(64, 48);
   const auto fine = encode_image(image, ImageFormat::jpeg, {.jpeg_quality = 97});

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "engine/io/quantised.h"
 #include "tests/engine/io/samples.h"
 #include "tests/support/data.h"
 
@@ -36,6 +37,31 @@ TEST(SceneLoss, HasTheLargestAndTheMeanOfEachAttribute) {
   EXPECT_NEAR(losses[2].largest, 0.1 * 180 / 3.14159265, 1e-4);
   EXPECT_NEAR(losses[5].largest, 0.125, 1e-6);
   EXPECT_NEAR(losses[5].mean, 0.125 / 36, 1e-6);
+}
+
+TEST(SceneLoss, TellsWhatIsClippedFromWhatIsRounded) {
+  SceneFile before = file_of(random_cloud(100, 0, 64));
+  for (std::size_t i = 0; i < before.cloud.size(); ++i)
+    for (std::size_t c = 0; c < 3; ++c) before.cloud.sh_row(i)[c] = float(double(i) / 100 - 0.5);  // within 0..1
+  before.cloud.sh_row(7)[1] = float(0.75 / sh_c0);                                                 // displayed as 1.25
+  before.cloud.log_scale.x[3] = -12.5f;
+  const support::TempDir folder;
+  const auto losses_of = [&](SceneFormat format) {
+    const auto path = folder.path() / "scene";
+    EXPECT_TRUE(write_scene(path, before, format));
+    const auto after = read_scene(path);
+    EXPECT_TRUE(after);
+    return scene_loss(before, *after, format);
+  };
+  const auto splat = losses_of(SceneFormat::splat), spz = losses_of(SceneFormat::spz);
+  EXPECT_NEAR(splat[4].clipped_part, 1.0 / 300, 1e-9);
+  EXPECT_NEAR(splat[4].most_clipped, 0.25, 1e-6);
+  EXPECT_LT(splat[4].largest, 0.51 / 255) << "half a step of rounding is all that is left";
+  EXPECT_EQ(splat[1].clipped_part, 0) << "its scales are floats";
+  EXPECT_EQ(spz[4].clipped_part, 0) << "it has room for that colour";
+  EXPECT_NEAR(spz[1].clipped_part, 1.0 / 300, 1e-9);
+  EXPECT_NEAR(spz[1].most_clipped, 2.5, 1e-6);
+  EXPECT_LE(spz[1].largest, 1.0 / 32 + 1e-6);
 }
 
 TEST(SceneLoss, FollowsTheOrderInWhichRowsWereWritten) {

@@ -520,6 +520,14 @@ TEST_F(Cli, RenderComparesWithPhotos) {
   EXPECT_GT(std::stod(run.out.substr(mean + 6)), 54.1) << run.out;
 }
 
+TEST_F(Cli, RenderRefusesPicturesInFormatsThatItDoesNotWrite) {
+  const Finished run = splatdrag("render --scene " + demo("scene.ply") +
+                                 " --eye 0,-1,-4.5 --target 0,-0.5,0 --size 96x64 --out " + at("q.GIF"));
+  EXPECT_NE(run.status, 0);
+  EXPECT_NE(run.err.find(".png, .jpg or .exr"), std::string::npos) << run.err;
+  EXPECT_FALSE(std::filesystem::exists(at("q.GIF")));
+}
+
 TEST_F(Cli, RenderWritesDepthAndAlpha) {
   const std::string camera =
       "render --scene " + demo("scene.ply") + " --eye 0,-1,-4.5 --target 0,-0.5,0 --size 96x64 --out ";
@@ -548,6 +556,9 @@ TEST_F(Cli, InfoSaysWhatThereIs) {
   EXPECT_EQ(info["scene"]["opacity"].size(), info["scene"]["quantiles"].size());
   EXPECT_LE(info["scene"]["opacity"][0], info["scene"]["opacity"][6]);
   EXPECT_EQ(info["dataset"]["views"].size(), 6u);
+  ASSERT_EQ(splatdrag("convert --in " + demo("scene.ply") + " --out " + at("bare.spz")).status, 0);
+  const json bare = json::parse(splatdrag("info --json --scene " + at("bare.spz")).out);
+  EXPECT_EQ(bare["scene"]["extra_properties"], json::array()) << "it has no room for any";
   const Finished text = splatdrag("info --scene " + demo("scene.ply"));
   EXPECT_NE(text.out.find("SH degree    1"), std::string::npos) << text.out;
 }

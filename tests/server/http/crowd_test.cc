@@ -292,6 +292,33 @@ TEST_F(Crowd, AnswersThatNobodyTakesAreBoundedInMemory) {
   EXPECT_EQ(second.answer().value_or(RawAnswer{}).body.size(), large_bytes);
 }
 
+TEST_F(Crowd, AnswersThatWaitForAThreadToGoOnCountInThatBound) {
+  ServerOptions options;
+  options.workers.threads = 1;
+  options.lobby.max_unsent_bytes = large_bytes + large_bytes / 2;
+  start(options);
+  const std::string ask_for_much = request(port(), "GET", "/large");
+  RawClient first(port()), busy(port()), second(port()), busy_after_it(port());
+  first.send(ask_for_much);
+  ASSERT_TRUE(says("splatdrag_http_requests_in_flight 1"));
+  busy.send(gate_request());
+  ASSERT_TRUE(gate.has_seen(1));
+  second.send(ask_for_much);
+  ASSERT_TRUE(says("splatdrag_http_requests_waiting 1"));
+  busy_after_it.send(gate_request());
+  ASSERT_TRUE(says("splatdrag_http_requests_waiting 2"));
+  std::size_t taken = 0;
+  std::jthread reader([&] { taken = first.answer().value_or(RawAnswer{}).body.size(); });
+  ASSERT_TRUE(says("splatdrag_http_requests_waiting 3")) << "the first can go on, once there is a thread";
+  gate.open(1);
+  ASSERT_TRUE(gate.has_seen(2));
+  ASSERT_TRUE(says("splatdrag_http_connections_cut_total 1")) << "what the second holds is too much beside the first";
+  EXPECT_FALSE(second.answer()) << "it broke off";
+  gate.open(1);
+  reader.join();
+  EXPECT_EQ(taken, large_bytes);
+}
+
 TEST_F(Crowd, StreamsOfEventsHaveThreadsOfTheirOwn) {
   ServerOptions options;
   options.workers.threads = 1;

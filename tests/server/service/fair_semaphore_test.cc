@@ -1,6 +1,7 @@
 #include "server/service/fair_semaphore.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <atomic>
 #include <chrono>
@@ -50,6 +51,35 @@ TEST(FairSemaphore, ServesThoseWhoWaitInTheirOrder) {
   }
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(order, (std::vector<int>{0, 1, 2, 3, 4}));
+}
+
+/// How often this thread has gone to sleep so far.
+long sleeps_of_this_thread() {
+  rusage usage{};
+  getrusage(RUSAGE_THREAD, &usage);
+  return usage.ru_nvcsw;
+}
+
+TEST(FairSemaphore, WakesOnlyTheOneWhoseTurnItIs) {
+  constexpr int clients = 32;
+  FairSemaphore semaphore(1, clients);
+  std::atomic<long> sleeps{0};
+  std::vector<std::thread> threads;
+  {
+    const auto slot = semaphore.acquire();
+    ASSERT_TRUE(slot);
+    for (int t = 0; t < clients; ++t)
+      threads.emplace_back([&] {
+        const long before = sleeps_of_this_thread();
+        const auto mine = semaphore.acquire();
+        sleeps += sleeps_of_this_thread() - before;
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));  // for whoever was woken to fall asleep again
+      });
+    await_waiting(semaphore, clients);
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_LE(sleeps, 4 * clients)
+      << "each waits once, and perhaps for a lock; all of them at each turn makes 500 or more";
 }
 
 TEST(FairSemaphore, TurnsAwayWhomItCannotSeat) {

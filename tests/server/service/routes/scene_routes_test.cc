@@ -82,6 +82,28 @@ TEST_F(SceneRoutes, ChangeAndRemoveAScene) {
   EXPECT_EQ(call("GET", "/v1/scenes/{id}", about(id)).error().where, "scene");
 }
 
+TEST_F(SceneRoutes, TellOfAVersionWhatItsSceneTellsOfIt) {
+  const std::string id = add_wall();
+  engine::scene::Overlay removal;
+  removal.removed = {3, 5};
+  ASSERT_TRUE(store->add_version(id, 0, "e000001", removal));
+  const json scene = json::parse(call("GET", "/v1/scenes/{id}", about(id))->body);
+  FakeCall request = about(id);
+  for (const char* version : {"0", "1"}) {
+    request.in_path["v"] = version;
+    const auto reply = call("GET", "/v1/scenes/{id}/versions/{v}", request);
+    ASSERT_TRUE(reply) << reply.error().message;
+    EXPECT_EQ(json::parse(reply->body), scene["versions"][std::stoul(version)]);
+  }
+  for (const char* none : {"2", "01", "-1", "p000001", "latest"}) {
+    request.in_path["v"] = none;
+    const auto reply = call("GET", "/v1/scenes/{id}/versions/{v}", request);
+    ASSERT_FALSE(reply) << none;
+    EXPECT_EQ(reply.error().code, ErrorCode::not_found);
+    EXPECT_EQ(reply.error().where, "version");
+  }
+}
+
 TEST_F(SceneRoutes, LeaveASceneToTheEditThatNeedsIt) {
   const std::string id = add_wall();
   http::Router guarded;
