@@ -49,7 +49,12 @@ export class Client {
         answer.on('error', failed);
       });
       request.on('timeout', () => request.destroy(new Error(`${method} ${target.pathname}: no answer in ${timeout} ms`)));
-      request.on('error', failed);
+      request.on('error', (error) => {
+        // The service may end a connection that waits, to make room, just when it is used again.
+        const isCut = method === 'GET' && request.reusedSocket && error.code === 'ECONNRESET';
+        if (isCut) this.#exchange(method, target, headers, bytes, timeout).then(done, failed);
+        else failed(error);
+      });
       request.end(bytes);
     });
   }
