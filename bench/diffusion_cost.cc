@@ -1,7 +1,8 @@
 // What Stable Diffusion costs at the size of 1.5: seconds and memory of each network's call, and of a step of training.
 //
-//   build/release/bench/diffusion_cost [side]     512 pixels unless told otherwise; OMP_NUM_THREADS says how many
-//   threads
+//   build/release/bench/diffusion_cost [side]     512 pixels unless told otherwise
+//
+// OMP_NUM_THREADS says how many threads.
 //
 // No weights are needed: the checkpoint is a hole in a file, as long as the real one, and its tensors are zeros. It is
 // made in the folder for temporary files and removed at the end.
@@ -128,6 +129,6 @@ int main(int argc, char** argv) {
   diffusion::AdamW optimiser(trained, {});
   const Tensor noise = at::randn(latents.sizes()), at_times = times(1), prompt = context.narrow(0, 0, 1);
   measure("training step, batch 1, rank 8", [&] {
-    (void)or_exit(diffusion::training_step(unet, configs, {latents, noise, at_times, prompt}, optimiser));
+    (void)or_exit(diffusion::training_step(unet, configs, {&latents, &noise, &at_times, &prompt}, optimiser));
   });
 }

@@ -34,12 +34,15 @@ pkg_check_modules(libwebp REQUIRED IMPORTED_TARGET libwebp>=1.2)  # SOG's pictur
 # Checksums of stored files. XXH3's output is fixed since 0.8.0.
 pkg_check_modules(libxxhash REQUIRED IMPORTED_TARGET libxxhash>=0.8)
 # Networks, for correction by a diffusion model (engine/diffusion): where both are found. Debian's libtorch, or another
-# build of it that CMAKE_PREFIX_PATH leads to; and of Unicode what a prompt needs.
-find_package(Torch 1.13 QUIET)
-pkg_check_modules(libutf8proc QUIET IMPORTED_TARGET libutf8proc>=2.6)  # what 2.8's file says it is
-set(SPLATDRAG_DIFFUSION OFF)
-if(Torch_FOUND AND libutf8proc_FOUND)
-  set(SPLATDRAG_DIFFUSION ON)
+# build of it that CMAKE_PREFIX_PATH leads to; and of Unicode what a prompt needs. Off, nobody looks for them: the package of
+# a libtorch whose own libraries are missing (one for CUDA without its toolkit) ends CMake, and QUIET does not keep it from that.
+option(SPLATDRAG_DIFFUSION "Diffusion models, where libtorch and utf8proc are found" ON)
+if(SPLATDRAG_DIFFUSION)
+  find_package(Torch 1.13 QUIET)
+  pkg_check_modules(libutf8proc QUIET IMPORTED_TARGET libutf8proc>=2.6)  # what 2.8's file says it is
+  if(NOT Torch_FOUND OR NOT libutf8proc_FOUND)
+    set(SPLATDRAG_DIFFUSION OFF)
+  endif()
 endif()
 message(STATUS "Diffusion models (libtorch-dev, libutf8proc-dev): ${SPLATDRAG_DIFFUSION}")
 if(SPLATDRAG_TESTS)

@@ -44,12 +44,21 @@ function(splatdrag_tests target label folder library)
     target_compile_options(${target} PRIVATE -fno-sanitize=null,alignment,object-size,vptr)
     # To start a program under a sanitizer takes longer than most tests do: one process for all of a program's.
     add_test(NAME ${folder}/${label} COMMAND ${target})
-    set_tests_properties(${folder}/${label} PROPERTIES LABELS ${label} TIMEOUT 1800
-                         ENVIRONMENT "${ROOM_TEST_ENVIRONMENT}")
+    set_tests_properties(${folder}/${label} PROPERTIES LABELS ${label} TIMEOUT 1800)
+    if(ROOM_TEST_ENVIRONMENT)
+      set_tests_properties(${folder}/${label} PROPERTIES ENVIRONMENT "${ROOM_TEST_ENVIRONMENT}")
+    endif()
   else()
     include(GoogleTest)
+    # An empty value would be dropped on its way to the tests, and its name with the next value taken for a pair. Of several
+    # variables the semicolons must get through: the list is taken apart once more where tests are discovered.
+    set(environment "")
+    if(ROOM_TEST_ENVIRONMENT)
+      string(REPLACE ";" "\\;" environment "${ROOM_TEST_ENVIRONMENT}")
+      set(environment ENVIRONMENT "${environment}")
+    endif()
     gtest_discover_tests(${target} TEST_PREFIX ${folder}/ DISCOVERY_TIMEOUT 60
-                         PROPERTIES LABELS ${label} TIMEOUT 900 ENVIRONMENT "${ROOM_TEST_ENVIRONMENT}")
+                         PROPERTIES LABELS ${label} TIMEOUT 900 ${environment})
   endif()
 endfunction()
 

@@ -22,7 +22,7 @@ packages=(
 )
 if [[ "${1:-}" == tests ]]; then
   packages+=(chromium webp)  # webp: the README's animation
-  packages+=(libtorch-dev libopenblas0-pthread libutf8proc-dev)  # diffusion models; without OpenBLAS, ten times slower
+  packages+=(libtorch-dev libopenblas0-pthread libutf8proc-dev)  # diffusion models; without OpenBLAS, training takes five times as long
   # A newer Node.js from elsewhere will do.
   if ! command -v node >/dev/null || ! command -v npm >/dev/null; then
     packages+=(nodejs npm)

@@ -11,7 +11,7 @@
 namespace engine::diffusion {
 
 /// work(), which returns a Result, with whatever libtorch throws turned into an error. Each function of this room that
-/// others call goes through it.
+/// others call and that returns a Result goes through it where it computes with tensors.
 ///   where  of the error
 ///   errors too_large: there was no memory for a tensor; internal: anything else, which is a mistake in this room
 template <class Work>

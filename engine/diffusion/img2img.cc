@@ -5,8 +5,10 @@
 #include <ATen/ops/cat.h>
 #include <ATen/ops/full.h>
 
+#include <string>
 #include <vector>
 
+#include "engine/core/finite.h"
 #include "engine/diffusion/unet.h"
 
 namespace engine::diffusion {
@@ -30,6 +32,9 @@ Result<void> denoise(const Model& unet, const weights::UNetConfig& config, Sched
     const Tensor predicted = guided_noise(unet, config, latents, timestep, contexts, guidance).contiguous();
     if (!fresh.empty()) noise(fresh);
     scheduler.step({latents.data_ptr<float>(), count}, {predicted.data_ptr<float>(), count}, fresh);
+    if (first_not_finite({latents.data_ptr<float>(), count}))
+      return fail(ErrorCode::internal,
+                  "what the networks see at time step " + std::to_string(timestep) + " is not finite", "latents");
   }
   return {};
 }

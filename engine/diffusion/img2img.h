@@ -14,8 +14,8 @@
 
 namespace engine::diffusion {
 
-/// The noise that is seen with the prompt, and `guidance` times as far from what is seen without it: e_u + g (e_t -
-/// e_u).
+/// The noise that is seen with the prompt, and `guidance` times as far from what is seen without it:
+/// e_u + g (e_t - e_u).
 ///   latents   [1, 4, h, w]
 ///   contexts  [2, 77, width]: of the negative prompt, then of the prompt. With guidance 1 the first is not looked at
 [[nodiscard]] Tensor guided_noise(const Model& unet, const weights::UNetConfig& config, const Tensor& latents,
@@ -28,7 +28,9 @@ using NoiseSource = std::function<void(std::span<float>)>;
 ///   latents  [1, 4, h, w], float32 and contiguous; changed in place
 ///   noise    asked if the scheduler takes noise
 ///   stop     asked before each call
-///   errors   cancelled
+///   errors   cancelled; internal: latents are no longer finite, which a checkpoint's or an adapter's great numbers
+///   bring
+///            about
 [[nodiscard]] Result<void> denoise(const Model& unet, const weights::UNetConfig& config, Scheduler& scheduler,
                                    Tensor& latents, const Tensor& contexts, double guidance, const NoiseSource& noise,
                                    const std::stop_token& stop);

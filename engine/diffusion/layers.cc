@@ -20,7 +20,7 @@
 namespace engine::diffusion {
 namespace {
 
-constexpr std::int64_t max_products = std::int64_t{1} << 26;  // floats: 256 MB
+constexpr std::int64_t max_products = std::int64_t{1} << 25;  // floats: 128 MB, and as much for their softmax
 
 /// [B, n, heads d] to [B heads, n, d].
 Tensor by_heads(const Tensor& x, int heads) {

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <string>
+#include <utility>
 
 #include "engine/diffusion/adapter.h"
 #include "engine/diffusion/parameters.h"
@@ -54,7 +55,7 @@ class Layer {
 [[nodiscard]] Tensor layer_norm(const Layer& layer, const Tensor& x, double eps);              ///< x is [..., C].
 
 /// softmax(q k^T / sqrt(d)) v for each of `heads` parts of width d, in slices of queries so that no more than a quarter
-/// of a gigabyte of products is held.
+/// of a gigabyte of products is held: those of one slice, and their softmax. With gradients all slices are kept.
 ///   q, k, v  [B, n, heads d], [B, m, heads d] twice
 ///   mask     [n, m], added to the products; an undefined tensor is none
 [[nodiscard]] Tensor attention(const Tensor& q, const Tensor& k, const Tensor& v, int heads, const Tensor& mask);

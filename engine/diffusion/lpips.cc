@@ -10,10 +10,12 @@
 #include <ATen/ops/replication_pad2d.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "engine/core/finite.h"
 #include "engine/diffusion/guard.h"
 #include "engine/diffusion/tensor.h"
 
@@ -178,6 +180,10 @@ Result<double> Lpips::evaluate_signed(const scene::Image& rendered, const scene:
       for (float& value : v_rendered.plane(c)) value = *from++ / divisor[std::size_t(c)];
     double value = 0;
     for (const double share : shares_) value += share;
+    // A poisoned gradient must not reach the scene.
+    if (!std::isfinite(value) || first_not_finite(v_rendered.data))
+      return fail(ErrorCode::internal, "the perceptual distance of two pictures, or its gradient, is not finite",
+                  "lpips");
     return value;
   });
 }

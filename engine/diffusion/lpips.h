@@ -29,7 +29,8 @@ class Lpips final : public optim::PerceptualLoss {
                                                              const weights::TensorFile& linear);
   ~Lpips() override;
 
-  /// errors  invalid_argument: the pictures are not of one size and three channels; too_large
+  /// errors  invalid_argument: the pictures are not of one size and three channels; internal: the distance, or its
+  ///         gradient, is not finite; too_large
   [[nodiscard]] Result<double> evaluate(const scene::Image& rendered, const scene::Image& target,
                                         scene::Image& v_rendered) override;
 

@@ -14,14 +14,13 @@ using weights::NoiseConfig;
 /// To the nearest whole number, halves to the even one, as the field's tables were made.
 int rounded(double value) { return int(std::nearbyint(value)); }
 
-/// `steps` time steps, the noisiest first. leading: equidistant from 0 on, moved by the offset; trailing: to the last
-/// one.
+/// `steps` time steps, the noisiest first. leading: equidistant from 0 on, moved by the offset; trailing: to the last.
 std::vector<int> spread(const NoiseConfig& noise, Spacing spacing, int steps) {
   const int all = noise.training_steps;
   std::vector<int> timesteps;
   for (int i = steps - 1; i >= 0; --i) switch (spacing) {
       case Spacing::leading:
-        timesteps.push_back(std::min(all - 1, i * (all / steps) + noise.steps_offset));
+        timesteps.push_back(i * (all / steps) + noise.steps_offset);
         break;
       case Spacing::linspace:
         timesteps.push_back(steps == 1 ? 0 : rounded(double(all - 1) * i / (steps - 1)));
@@ -75,6 +74,8 @@ class Pndm final : public Scheduler {
     // The second call is the first step again, with the mean of both predictions. It is so, too, where strength left
     // out the beginning of the list, in which the step stands twice: the published way, whose results are compared
     // with.
+    // One stride back from it is a time step of training: the list of the call before, with or without its beginning,
+    // has every time step but its first at least a stride below the last of training.
     const bool again = call_ == 1;
     std::vector<double> mixed(predicted.begin(), predicted.end());
     if (again) {
@@ -133,7 +134,7 @@ class DpmSolver final : public Scheduler {
     std::vector<int> timesteps;
     for (int i = steps; i >= 1; --i) switch (options.spacing) {
         case Spacing::leading:
-          timesteps.push_back(std::min(all - 1, i * (all / (steps + 1)) + noise.steps_offset));
+          timesteps.push_back(i * (all / (steps + 1)) + noise.steps_offset);
           break;
         case Spacing::linspace:
           timesteps.push_back(rounded(double(all - 1) * i / steps));
@@ -231,6 +232,21 @@ class Consistency final : public Scheduler {
   }
 };
 
+/// The first time step of leading spacing, where the sampler has one.
+int first_of_leading(const SamplerOptions& options, const NoiseConfig& noise) {
+  const int all = noise.training_steps, steps = options.steps;
+  switch (options.sampler) {
+    case Sampler::ddim:
+    case Sampler::pndm:
+      return (steps - 1) * (all / steps) + noise.steps_offset;
+    case Sampler::dpmpp2m:
+      return options.karras_sigmas ? 0 : steps * (all / (steps + 1)) + noise.steps_offset;
+    case Sampler::lcm:
+      break;
+  }
+  return 0;
+}
+
 }  // namespace
 
 Result<void> validate(const SamplerOptions& options, const NoiseConfig& noise) {
@@ -244,6 +260,12 @@ Result<void> validate(const SamplerOptions& options, const NoiseConfig& noise) {
   if (!(options.eta >= 0 && options.eta <= 1)) return refused("eta", "0 to 1");
   if (options.distilled_steps < 1 || options.distilled_steps > noise.training_steps)
     return refused("distilled_steps", "1 to " + std::to_string(noise.training_steps));
+  // Beyond the last step of training there is no level of noise. Cut off there, time steps would stand twice in the
+  // list.
+  if (const int first = first_of_leading(options, noise);
+      options.spacing == Spacing::leading && (noise.steps_offset < 0 || first >= noise.training_steps))
+    return refused("steps_offset", "that " + std::to_string(options.steps) + " steps begin below time step " +
+                                       std::to_string(noise.training_steps) + ", and not at " + std::to_string(first));
   return {};
 }
 
@@ -258,7 +280,15 @@ std::vector<double> alphas_cumprod(const NoiseConfig& noise) {
   return alphas;
 }
 
-Scheduler::Scheduler(const NoiseConfig& noise, const SamplerOptions& options) : alphas_(alphas_cumprod(noise)) {
+double Scheduler::alpha(int timestep) const {
+  assert(timestep < int(alphas_.size()));
+  if (timestep < 0) return last_alpha_;
+  // A list that goes too far is a mistake of this file, and must not become a picture of what lies behind an array.
+  return alphas_[std::min(std::size_t(timestep), alphas_.size() - 1)];
+}
+
+Scheduler::Scheduler(const NoiseConfig& noise, const SamplerOptions& options)
+    : alphas_(alphas_cumprod(noise)), last_alpha_(noise.ends_without_noise ? 1 : alphas_.front()) {
   assert(validate(options, noise));
   (void)options;
 }

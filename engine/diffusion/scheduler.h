@@ -41,7 +41,9 @@ struct SamplerOptions {
   double eta = 0;              ///< ddim: 0 to 1, how much noise is made anew at each step.
   int distilled_steps = 50;    ///< lcm: steps that the network was distilled to skip among.
 };
-/// errors  invalid_argument; `where` names the option
+/// errors  invalid_argument; `where` names the option, or "steps_offset": with the checkpoint's, leading spacing would
+/// begin
+///         beyond the last step of training
 [[nodiscard]] Result<void> validate(const SamplerOptions& options, const weights::NoiseConfig& noise);
 
 /// How much of the picture is left after t steps of noise: the product of 1 - beta, for each of the steps of training.
@@ -73,10 +75,11 @@ class Scheduler {
   virtual void advance(std::span<float> latents, std::span<const float> predicted, std::span<const float> noise) = 0;
   /// Keeps of a list of `steps` time steps those that the strength leaves.
   void keep(std::vector<int> all, const SamplerOptions& options);
-  /// alpha at a time step; before the first one, that of the first.
-  [[nodiscard]] double alpha(int timestep) const { return alphas_[std::size_t(timestep < 0 ? 0 : timestep)]; }
+  /// alpha at a time step of training; before the first one, that of the first, or 1 if the checkpoint says so.
+  [[nodiscard]] double alpha(int timestep) const;
 
   std::vector<double> alphas_;
+  double last_alpha_;
   std::vector<int> timesteps_;
   std::size_t skipped_ = 0;  ///< Time steps of the whole list before the first that is kept.
   std::size_t call_ = 0;

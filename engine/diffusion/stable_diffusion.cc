@@ -7,9 +7,11 @@
 #include <ATen/ops/empty.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <utility>
 
+#include "engine/core/finite.h"
 #include "engine/core/rng.h"
 #include "engine/diffusion/autoencoder.h"
 #include "engine/diffusion/guard.h"
@@ -37,10 +39,14 @@ Tensor as_tensor(const scene::Image& picture) {
   return tensor;
 }
 
-scene::Image as_picture(const Tensor& tensor) {
-  const Tensor flat = (tensor * 0.5 + 0.5).clamp(0, 1).contiguous();
+Result<scene::Image> as_picture(const Tensor& tensor) {
+  const Tensor flat = (tensor * 0.5 + 0.5).contiguous();
   scene::Image picture(int(flat.size(3)), int(flat.size(2)), int(flat.size(1)));
   std::copy_n(flat.data_ptr<float>(), picture.data.size(), picture.data.begin());
+  // Asked before clamping, which makes an infinity look like a colour, and lets NaN through.
+  if (first_not_finite(picture.data))
+    return fail(ErrorCode::internal, "what the autoencoder makes of the latents is not finite", "autoencoder");
+  for (float& value : picture.data) value = std::clamp(value, 0.0f, 1.0f);
   return picture;
 }
 
@@ -52,9 +58,10 @@ struct StableDiffusion::Networks {
   Parameters unet, autoencoder, text_encoder;
 
   /// [1, 77, width]
-  [[nodiscard]] Result<Tensor> context_of(const std::string& prompt, const Adapter* adapter) const {
-    const auto pieces = tokenizer.encode(prompt, std::size_t(configs.text_encoder.positions));
-    if (!pieces) return propagate(pieces);
+  ///   name  of the option that the prompt is, for errors
+  [[nodiscard]] Result<Tensor> context_of(const std::string& prompt, const char* name, const Adapter* adapter) const {
+    auto pieces = tokenizer.encode(prompt, std::size_t(configs.text_encoder.positions));
+    if (!pieces) return fail(pieces.error().code, std::move(pieces.error().message), name);
     Tensor numbers = at::empty({1, std::int64_t(pieces->size())}, at::kLong);
     std::ranges::copy(*pieces, numbers.data_ptr<std::int64_t>());
     return encode_text({text_encoder, adapter}, configs.text_encoder, numbers);
@@ -90,11 +97,16 @@ Result<StableDiffusion> StableDiffusion::open(const std::filesystem::path& path)
   return opened;
 }
 
-void StableDiffusion::adapt(const weights::AdapterWeights& weights, double factor) {
-  auto adapters = std::make_shared<Adapters>();
-  if (!weights.unet.empty()) adapters->unet.emplace(weights.unet).scale_by(factor);
-  if (!weights.text_encoder.empty()) adapters->text_encoder.emplace(weights.text_encoder).scale_by(factor);
-  adapters_ = std::move(adapters);
+Result<void> StableDiffusion::adapt(const weights::AdapterWeights& weights, double factor) {
+  if (!std::isfinite(factor)) return fail(ErrorCode::invalid_argument, "expected a finite number", "factor");
+  if (const auto checked = weights::check_adapter(weights, networks_->configs); !checked) return propagate(checked);
+  return guarded("adapter", [&]() -> Result<void> {
+    auto adapters = std::make_shared<Adapters>();
+    if (!weights.unet.empty()) adapters->unet.emplace(weights.unet).scale_by(factor);
+    if (!weights.text_encoder.empty()) adapters->text_encoder.emplace(weights.text_encoder).scale_by(factor);
+    adapters_ = std::move(adapters);
+    return {};
+  });
 }
 
 int StableDiffusion::side_multiple() const {
@@ -103,6 +115,12 @@ int StableDiffusion::side_multiple() const {
 }
 
 const weights::Configs& StableDiffusion::configs() const { return networks_->configs; }
+
+Result<void> validate(const RepaintOptions& options, const weights::NoiseConfig& noise) {
+  if (!(options.guidance >= 1 && options.guidance <= 100))
+    return fail(ErrorCode::invalid_argument, "expected 1 to 100", "guidance");
+  return validate(options.sampling, noise);
+}
 
 Result<scene::Image> StableDiffusion::repaint(const scene::Image& picture, const RepaintOptions& options,
                                               const std::stop_token& stop) const {
@@ -113,18 +131,23 @@ Result<scene::Image> StableDiffusion::repaint(const scene::Image& picture, const
     return fail(ErrorCode::invalid_argument,
                 "expected a picture of three channels with sides that are multiples of " + std::to_string(multiple),
                 "picture");
-  if (!(options.guidance >= 1 && options.guidance <= 100))
-    return fail(ErrorCode::invalid_argument, "expected 1 to 100", "guidance");
-  if (const auto valid = validate(options.sampling, all.noise); !valid) return propagate(valid);
+  if (std::int64_t{picture.width} * picture.height > max_repaint_pixels)
+    return fail(ErrorCode::too_large,
+                "a picture of " + std::to_string(picture.width) + " x " + std::to_string(picture.height) +
+                    " pixels; at most " + std::to_string(max_repaint_pixels) + " are repainted",
+                "picture");
+  if (const auto at = first_not_finite(picture.data))
+    return fail(ErrorCode::invalid_argument, "not a finite number", "picture[" + std::to_string(*at) + "]");
+  if (const auto valid = validate(options, all.noise); !valid) return propagate(valid);
 
   return guarded("repaint", [&]() -> Result<scene::Image> {
     const at::NoGradGuard no_gradients;
     const auto scheduler = make_scheduler(all.noise, options.sampling);
     if (scheduler->timesteps().empty()) return picture;
     const Adapter* text_adapter = Adapters::pointer(adapters_->text_encoder);
-    const auto negative = networks_->context_of(options.negative_prompt, text_adapter);
+    const auto negative = networks_->context_of(options.negative_prompt, "negative_prompt", text_adapter);
     if (!negative) return propagate(negative);
-    const auto positive = networks_->context_of(options.prompt, text_adapter);
+    const auto positive = networks_->context_of(options.prompt, "prompt", text_adapter);
     if (!positive) return propagate(positive);
 
     const Model autoencoder{networks_->autoencoder}, unet{networks_->unet, Adapters::pointer(adapters_->unet)};

@@ -14,13 +14,20 @@
 
 namespace engine::diffusion {
 
+/// Pixels of the largest picture that is repainted: 1024 x 1024, or as many. The autoencoder holds several tensors of
+/// 128 channels at that size, each of half a gigabyte.
+constexpr std::int64_t max_repaint_pixels = std::int64_t{1} << 20;
+
 /// How a picture is repainted.
 struct RepaintOptions {
   std::string prompt = {}, negative_prompt = {};
-  double guidance = 7.5;  ///< 1 or more: how much more the prompt counts than the lack of it; 1 halves the time.
+  double guidance = 7.5;  ///< 1 to 100: how much more the prompt counts than the lack of it; 1 halves the time.
   SamplerOptions sampling = {};
   std::uint64_t seed = 0;  ///< Same seed, same picture, at a fixed number of libtorch's threads.
 };
+/// Prompts are checked where they are taken to pieces.
+///   errors  invalid_argument; `where` names the option
+[[nodiscard]] Result<void> validate(const RepaintOptions& options, const weights::NoiseConfig& noise);
 
 /// The networks of a checkpoint, with their tokenizer. Its tensors are shared by all copies, and never change; a thread
 /// of its own may use each copy.
@@ -31,8 +38,9 @@ class StableDiffusion {
   [[nodiscard]] static Result<StableDiffusion> open(const std::filesystem::path& path);
 
   /// Puts an adapter on the networks, or takes it off (no layers).
-  ///   factor  multiplies its scales
-  void adapt(const weights::AdapterWeights& weights, double factor = 1);
+  ///   factor  multiplies its scales; finite
+  ///   errors  those of weights::check_adapter(); invalid_argument ("factor"); too_large. The adapter of before stays
+  [[nodiscard]] Result<void> adapt(const weights::AdapterWeights& weights, double factor = 1);
 
   /// Sides of pictures are multiples of this: 64 for Stable Diffusion 1.x and 2.x.
   [[nodiscard]] int side_multiple() const;
@@ -43,7 +51,10 @@ class StableDiffusion {
   ///   picture  [3], 0 to 1, sides multiples of side_multiple()
   ///   stop     asked before each call of the UNet
   ///   returns  of the same size, within 0 to 1
-  ///   errors   invalid_argument (`where`: picture, prompt, or the name of an option); cancelled; too_large
+  ///   errors   invalid_argument (`where`: picture, a place in it that is not finite, or the name of an option);
+  ///   cancelled;
+  ///            too_large (more than max_repaint_pixels, which is said before anything is allocated; a prompt; memory);
+  ///            internal: what the networks make of it is not finite
   [[nodiscard]] Result<scene::Image> repaint(const scene::Image& picture, const RepaintOptions& options,
                                              const std::stop_token& stop = {}) const;
 

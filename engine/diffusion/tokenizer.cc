@@ -4,9 +4,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cstdlib>
+#include <functional>
 #include <memory>
 #include <optional>
+#include <queue>
+#include <utility>
 
 namespace engine::diffusion {
 namespace {
@@ -63,6 +67,8 @@ std::optional<std::string> normalised(std::string_view text) {
   return lower;
 }
 
+std::uint64_t pair_of(std::uint32_t left, std::uint32_t right) { return std::uint64_t{left} << 32 | right; }
+
 /// Length of the ending of an English word that stands here ("'s"), 0 if none does.
 std::size_t contraction(std::string_view text) {
   for (const std::string_view ending : {"'s", "'t", "'re", "'ve", "'m", "'ll", "'d"})
@@ -72,37 +78,89 @@ std::size_t contraction(std::string_view text) {
 
 }  // namespace
 
-Tokenizer::Tokenizer(weights::Vocabulary vocabulary) : vocabulary_(std::move(vocabulary)) {
-  for (std::size_t i = 0; i < vocabulary_.merges.size(); ++i)
-    ranks_.emplace(vocabulary_.merges[i].first + " " + vocabulary_.merges[i].second, i);
-}
-
-void Tokenizer::encode_word(std::string_view word, std::vector<std::int64_t>& out) const {
-  std::vector<std::string> pieces;
-  for (const char c : word) pieces.push_back(weights::byte_characters()[std::uint8_t(c)]);
-  pieces.back() += "</w>";
-  while (pieces.size() > 1) {
-    std::size_t best = ranks_.size();
-    for (std::size_t i = 0; i + 1 < pieces.size(); ++i)
-      if (const auto found = ranks_.find(pieces[i] + " " + pieces[i + 1]); found != ranks_.end())
-        best = std::min(best, found->second);
-    if (best == ranks_.size()) break;
-    const auto& [left, right] = vocabulary_.merges[best];
-    std::vector<std::string> merged;
-    for (std::size_t i = 0; i < pieces.size(); ++i) {
-      const bool merges = i + 1 < pieces.size() && pieces[i] == left && pieces[i + 1] == right;
-      merged.push_back(merges ? left + right : pieces[i]);
-      i += merges ? 1 : 0;
+Tokenizer::Tokenizer(weights::Vocabulary vocabulary)
+    : begin_(vocabulary.begin), end_(vocabulary.end), filler_(vocabulary.filler) {
+  std::unordered_map<std::string, std::uint32_t> pieces;
+  const auto piece_of = [&](const std::string& text) {
+    const auto [found, is_new] = pieces.emplace(text, std::uint32_t(pieces.size()));
+    if (is_new) {
+      const auto number = vocabulary.numbers.find(text);
+      numbers_.push_back(number != vocabulary.numbers.end() ? number->second : vocabulary.end);
     }
-    pieces = std::move(merged);
+    return found->second;
+  };
+  for (const std::string& character : weights::byte_characters()) {
+    of_byte_.push_back(piece_of(character));
+    of_last_byte_.push_back(piece_of(character + "</w>"));
   }
-  for (const std::string& piece : pieces) {
-    const auto found = vocabulary_.numbers.find(piece);
-    out.push_back(found != vocabulary_.numbers.end() ? found->second : vocabulary_.end);
-  }
+  std::uint32_t rank = 0;
+  for (const auto& [left, right] : vocabulary.merges)  // a pair that is listed twice is of its first rank
+    merges_.emplace(pair_of(piece_of(left), piece_of(right)), Merge{rank++, piece_of(left + right)});
 }
 
-void Tokenizer::encode_text(std::string_view text, std::vector<std::int64_t>& out) const {
+const Tokenizer::Merge* Tokenizer::merge_of(std::uint32_t left, std::uint32_t right) const {
+  const auto found = merges_.find(pair_of(left, right));
+  return found == merges_.end() ? nullptr : &found->second;
+}
+
+/// Round by round the merge of least rank, wherever it stands, from left to right. Places that may merge wait in a
+/// heap: a long word takes n log n, where looking through all of it in each round would take the square.
+void Tokenizer::encode_word(std::string_view word, std::vector<std::int64_t>& out) const {
+  constexpr std::size_t none = std::size_t(-1);
+  struct Place {
+    std::uint32_t piece;
+    std::size_t before, after;  ///< Neighbours; none at the ends.
+    bool merged = false;        ///< Into the place before it.
+  };
+  std::vector<Place> places;
+  for (std::size_t i = 0; i < word.size(); ++i) {
+    const bool last = i + 1 == word.size();
+    places.push_back(
+        {(last ? of_last_byte_ : of_byte_)[std::uint8_t(word[i])], i == 0 ? none : i - 1, last ? none : i + 1});
+  }
+  /// What may merge at a place, as it was when it was noted.
+  struct Candidate {
+    std::uint32_t rank;
+    std::size_t at;
+    std::uint32_t left, right, piece;
+    bool operator>(const Candidate& other) const { return std::pair(rank, at) > std::pair(other.rank, other.at); }
+  };
+  std::priority_queue<Candidate, std::vector<Candidate>, std::greater<>> waiting;
+  const auto note = [&](std::size_t at) {
+    if (at == none || places[at].after == none) return;
+    const std::uint32_t left = places[at].piece, right = places[places[at].after].piece;
+    if (const Merge* const merge = merge_of(left, right)) waiting.push({merge->rank, at, left, right, merge->piece});
+  };
+  for (std::size_t i = 0; i < places.size(); ++i) note(i);
+  std::vector<std::size_t> merged;
+  while (!waiting.empty()) {
+    const std::uint32_t rank = waiting.top().rank;
+    merged.clear();
+    for (; !waiting.empty() && waiting.top().rank == rank; waiting.pop()) {
+      const Candidate next = waiting.top();
+      Place& place = places[next.at];
+      if (place.merged || place.piece != next.left || place.after == none || places[place.after].piece != next.right)
+        continue;  // one of the two has merged otherwise since
+      Place& right = places[place.after];
+      place.piece = next.piece;
+      right.merged = true;
+      place.after = right.after;
+      if (place.after != none) places[place.after].before = next.at;
+      merged.push_back(next.at);
+    }
+    // What the merged ones may merge with counts from the next round on.
+    for (const std::size_t at : merged) {
+      if (places[at].merged) continue;
+      note(places[at].before);
+      note(at);
+    }
+  }
+  for (const Place& place : places)
+    if (!place.merged) out.push_back(numbers_[place.piece]);
+}
+
+/// Ends when `out` has `most` numbers.
+void Tokenizer::encode_text(std::string_view text, std::size_t most, std::vector<std::int64_t>& out) const {
   struct Character {
     Kind kind;
     std::size_t size;
@@ -113,7 +171,7 @@ void Tokenizer::encode_text(std::string_view text, std::vector<std::int64_t>& ou
         utf8proc_iterate(reinterpret_cast<const utf8proc_uint8_t*>(rest.data()), utf8proc_ssize_t(rest.size()), &code);
     return Character{kind_of(code), std::size_t(size)};
   };
-  while (!text.empty()) {
+  while (!text.empty() && out.size() < most) {
     std::size_t size = contraction(text);
     if (size == 0) {
       const Character character = first(text);
@@ -134,23 +192,24 @@ void Tokenizer::encode_text(std::string_view text, std::vector<std::int64_t>& ou
 }
 
 Result<std::vector<std::int64_t>> Tokenizer::encode(std::string_view prompt, std::size_t positions) const {
+  assert(positions >= 1);
   if (prompt.size() > max_prompt_bytes)
     return fail(ErrorCode::too_large, "a prompt has at most " + std::to_string(max_prompt_bytes) + " bytes", "prompt");
-  std::vector<std::int64_t> numbers{vocabulary_.begin};
+  std::vector<std::int64_t> numbers{begin_};
   while (!prompt.empty()) {
     const std::size_t mark = std::min({prompt.find(begin_mark), prompt.find(end_mark), prompt.size()});
     const auto text = normalised(prompt.substr(0, mark));
     if (!text) return fail(ErrorCode::invalid_argument, "the prompt is no UTF-8", "prompt");
-    encode_text(*text, numbers);
+    encode_text(*text, positions - 1, numbers);
     prompt.remove_prefix(mark);
     if (prompt.empty()) break;
     const bool begins = prompt.starts_with(begin_mark);
-    numbers.push_back(begins ? vocabulary_.begin : vocabulary_.end);
+    numbers.push_back(begins ? begin_ : end_);
     prompt.remove_prefix(begins ? begin_mark.size() : end_mark.size());
   }
   numbers.resize(std::min(numbers.size(), positions - 1));
-  numbers.push_back(vocabulary_.end);
-  numbers.resize(positions, vocabulary_.filler);
+  numbers.push_back(end_);
+  numbers.resize(positions, filler_);
   return numbers;
 }
 

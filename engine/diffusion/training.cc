@@ -19,21 +19,23 @@ namespace engine::diffusion {
 
 Tensor noisy_latents(const weights::NoiseConfig& noise, const NoisyBatch& batch) {
   const std::vector<double> alphas = alphas_cumprod(noise);
-  const std::int64_t count = batch.timesteps.size(0);
+  const std::int64_t count = batch.timesteps->size(0);
   Tensor of_picture = at::empty({count, 1, 1, 1}, at::kFloat), of_noise = at::empty({count, 1, 1, 1}, at::kFloat);
-  const Tensor timesteps = batch.timesteps.contiguous();
+  const Tensor timesteps = batch.timesteps->contiguous();
   for (std::int64_t i = 0; i < count; ++i) {
-    const double alpha = alphas.at(std::size_t(timesteps.data_ptr<std::int64_t>()[i]));
+    const std::int64_t timestep = timesteps.data_ptr<std::int64_t>()[i];
+    assert(timestep >= 0 && timestep < std::int64_t(alphas.size()));
+    const double alpha = alphas.at(std::size_t(timestep));
     of_picture.data_ptr<float>()[i] = float(std::sqrt(alpha));
     of_noise.data_ptr<float>()[i] = float(std::sqrt(1 - alpha));
   }
-  return batch.latents * of_picture + batch.noise * of_noise;
+  return *batch.latents * of_picture + *batch.noise * of_noise;
 }
 
 Tensor denoising_loss(const Model& unet, const weights::Configs& configs, const NoisyBatch& batch) {
   const Tensor predicted =
-      predict_noise(unet, configs.unet, noisy_latents(configs.noise, batch), batch.timesteps, batch.context);
-  return at::mse_loss(predicted, batch.noise);
+      predict_noise(unet, configs.unet, noisy_latents(configs.noise, batch), *batch.timesteps, *batch.context);
+  return at::mse_loss(predicted, *batch.noise);
 }
 
 Result<void> validate(const AdamWOptions& options) {

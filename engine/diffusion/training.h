@@ -13,18 +13,19 @@
 
 namespace engine::diffusion {
 
-/// What a step learns from.
+/// What a step learns from. Of tensors that live as long as it is used; none is null.
 struct NoisyBatch {
-  const Tensor& latents;    ///< [B, 4, h, w], scaled, without noise.
-  const Tensor& noise;      ///< As large, normal.
-  const Tensor& timesteps;  ///< [B] int64: how much of it.
-  const Tensor& context;    ///< [B, 77, width] of the prompt.
+  const Tensor* latents;    ///< [B, 4, h, w], scaled, without noise.
+  const Tensor* noise;      ///< As large, normal.
+  const Tensor* timesteps;  ///< [B] int64, 0 to below the steps of training: how much of it.
+  const Tensor* context;    ///< [B, 77, width] of the prompt.
 };
 
 /// sqrt(alpha) latents + sqrt(1 - alpha) noise, each picture at its own time step.
 [[nodiscard]] Tensor noisy_latents(const weights::NoiseConfig& noise, const NoisyBatch& batch);
 
 /// The mean squared difference between the noise and what the network takes for it; a single number, with a gradient.
+/// Throws what libtorch throws: training_step() turns it into an error.
 [[nodiscard]] Tensor denoising_loss(const Model& unet, const weights::Configs& configs, const NoisyBatch& batch);
 
 struct AdamWOptions {

@@ -30,6 +30,9 @@ class JsonFields {
 
   [[nodiscard]] bool has_value(const char* key) const { return has(key) && !(*value_)[key].is_null(); }
   [[nodiscard]] bool is_array() const { return value_->is_array(); }
+  [[nodiscard]] bool is_boolean() const { return value_->is_boolean(); }
+  [[nodiscard]] bool is_number() const { return value_->is_number(); }
+  [[nodiscard]] bool is_string() const { return value_->is_string(); }
 
   [[nodiscard]] JsonFields at(const char* key) const {
     if (!value_->is_object()) note("an object");

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <system_error>
 #include <utility>
 
+#include "engine/core/finite.h"
 #include "engine/io/json_fields.h"
 #include "engine/io/read_bytes.h"
 
@@ -16,7 +19,10 @@ namespace {
 
 enum class Piece { down, up, alpha };
 
-/// The layers of a network that an adapter may be for, by name, with the shapes of their weights.
+constexpr std::string_view peft_beginning = "base_model.model.";
+
+/// The layers of a network that an adapter may be for, by name, with the shapes of their weights. Tables of a text
+/// encoder's pieces and positions are no layers: nothing is multiplied by them.
 struct Layers {
   std::map<std::string, Shape, std::less<>> shapes;
   std::map<std::string, std::string, std::less<>> by_flat_name;  ///< kohya's: every dot is an underscore.
@@ -24,7 +30,8 @@ struct Layers {
   explicit Layers(const std::vector<TensorSpec>& specs) {
     constexpr std::string_view ending = ".weight";
     for (const TensorSpec& spec : specs) {
-      if (!spec.name.ends_with(ending) || spec.shape.size() < 2) continue;
+      if (!spec.name.ends_with(ending) || spec.shape.size() < 2 || spec.name.starts_with("text_model.embeddings."))
+        continue;
       std::string layer = spec.name.substr(0, spec.name.size() - ending.size());
       std::string flat = layer;
       std::ranges::replace(flat, '.', '_');
@@ -97,7 +104,7 @@ class AdapterReader {
     }
     if (take_beginning(name, "text_encoder."))
       address.of_text_encoder = true;
-    else if (take_beginning(name, "base_model.model.") || !take_beginning(name, "unet."))
+    else if (take_beginning(name, peft_beginning) || !take_beginning(name, "unet."))
       address.of_text_encoder = name.starts_with("text_model.");
     address.layer = name;
     // Attention processors: "attn1.processor.to_q" is for attn1.to_q, "attn1.processor.to_out" for attn1.to_out.0.
@@ -117,19 +124,23 @@ class AdapterReader {
 /// A pair while its pieces come in.
 struct Pair {
   const StoredTensor *down = nullptr, *up = nullptr;
-  std::string down_name, up_name;
+  std::string down_name, up_name, alpha_name;
   double alpha = 0;
 };
 
-std::int64_t side_product(const Shape& shape, std::size_t from) {
-  std::int64_t product = 1;
-  for (std::size_t i = from; i < shape.size(); ++i) product *= shape[i];
+/// Of a tensor of a file, whose elements can be counted.
+std::uint64_t side_product(const Shape& shape, std::size_t from) {
+  std::uint64_t product = 1;
+  for (std::size_t i = from; i < shape.size(); ++i) product *= std::uint64_t(shape[i]);
   return product;
 }
 
-/// Do the shapes of a pair fit its layer's? Both may have sides of length 1 more, or fewer, than a matrix has.
+/// Do the shapes of a pair fit its layer's? Both may have sides of length 1 more, or fewer, than a matrix has. A rank
+/// of more than both widths is taken for damage; one above the lesser is of no use, but small layers of real adapters
+/// have it.
 bool fits(const Shape& down, const Shape& up, const Shape& layer) {
   if (down.size() < 2 || up.size() < 2 || down[0] < 1 || up[1] != down[0]) return false;
+  if (down[0] > std::max(layer[0], layer[1])) return false;
   return up[0] == layer[0] && side_product(up, 2) == 1 && down[1] == layer[1] &&
          side_product(down, 2) == side_product(layer, 2) && (layer.size() == 2 || down.size() == 2 || down.size() == 4);
 }
@@ -140,16 +151,26 @@ Result<FloatTensor> read_piece(const StoredTensor& tensor, const Shape& shape, c
   return read;
 }
 
-Result<LowRank> low_rank(const Pair& pair, const Shape& layer, const std::string& file, double alpha) {
+Result<LowRank> low_rank(const Pair& pair, const Shape& layer, const std::string& file,
+                         const AdapterSettings& settings) {
   if (pair.down == nullptr || pair.up == nullptr)
     return fail(ErrorCode::corrupt_data, "the other half of this pair is missing",
                 file + ":" + (pair.down != nullptr ? pair.down_name : pair.up_name));
+  // Of other types the file says nothing that can be held against their shape: nothing is allocated for them.
+  for (const auto& [tensor, name] : {std::pair(pair.down, &pair.down_name), std::pair(pair.up, &pair.up_name)})
+    if (!tensor->has_floats())
+      return fail(ErrorCode::unsupported, "its numbers are " + tensor->dtype + "; F16, BF16 and F32 are read",
+                  file + ":" + *name);
   if (!fits(pair.down->shape, pair.up->shape, layer))
     return fail(ErrorCode::corrupt_data,
                 "its shape " + text_of(pair.down->shape) + " and its other half's " + text_of(pair.up->shape) +
                     " do not fit a layer of " + text_of(layer),
                 file + ":" + pair.down_name);
   const std::int64_t rank = pair.down->shape[0];
+  if (settings.rank != 0 && rank != settings.rank)
+    return fail(ErrorCode::corrupt_data,
+                "its rank is " + std::to_string(rank) + ", but r is " + std::to_string(settings.rank),
+                file + ":" + pair.down_name);
   // Kept in the layer's own form: of a matrix as matrices, of a convolution as convolutions.
   Shape down{rank, layer[1]}, up{layer[0], rank};
   if (layer.size() == 4) down.insert(down.end(), {layer[2], layer[3]}), up.insert(up.end(), {1, 1});
@@ -159,42 +180,91 @@ Result<LowRank> low_rank(const Pair& pair, const Shape& layer, const std::string
   auto read_up = read_piece(*pair.up, up, file + ":" + pair.up_name);
   if (!read_up) return propagate(read_up);
   result.down = std::move(*read_down), result.up = std::move(*read_up);
-  const double own = pair.alpha != 0 ? pair.alpha : alpha;
+  const double own = pair.alpha != 0 ? pair.alpha : settings.alpha;
   result.scale = own != 0 ? own / double(rank) : 1;
   return result;
 }
 
-/// lora_alpha of the adapter_config.json beside a file of peft; 0 if there is none.
-Result<double> alpha_beside(const std::filesystem::path& path) {
+/// peft's configuration, whose fields' names begin with `prefix`.
+///   where  of the document
+Result<AdapterSettings> settings_of(const nlohmann::json& document, const std::string& prefix,
+                                    const std::string& where) {
+  std::optional<Error> error;
+  const io::JsonFields fields(document, where + ":", error);
+  if (!document.is_object()) return fail(ErrorCode::corrupt_data, "expected an object", where);
+  for (const char* name : {"use_rslora", "use_dora", "alpha_pattern", "rank_pattern"}) {
+    const auto field = document.find(prefix + name);
+    if (field == document.end() || field->is_null() || *field == false || (field->is_object() && field->empty()))
+      continue;
+    return fail(ErrorCode::unsupported, "an adapter whose layers are scaled in a way that is not read",
+                where + ":" + prefix + name);
+  }
+  const io::JsonFields rank = fields.at((prefix + "r").c_str()), alpha = fields.at((prefix + "lora_alpha").c_str());
+  const AdapterSettings settings{alpha.number(), std::int64_t(std::clamp(rank.number(), 0.0, 1e6))};
+  if (!(settings.alpha > 0 && settings.alpha < 1e6)) alpha.fail_here("expected a number above 0");
+  if (settings.rank < 1 || double(settings.rank) != rank.number()) rank.fail_here("expected a whole number above 0");
+  if (error) return tl::make_unexpected(std::move(*error));
+  return settings;
+}
+
+/// Those of the adapter_config.json beside a file of peft; nothing if there is none.
+Result<std::optional<AdapterSettings>> settings_beside(const std::filesystem::path& path) {
   const auto config = path.parent_path() / "adapter_config.json";
   std::error_code ignored;
-  if (!std::filesystem::is_regular_file(config, ignored)) return 0.0;
+  if (!std::filesystem::is_regular_file(config, ignored)) return std::nullopt;
   const auto bytes = io::read_bytes(config, 1 << 20);
   if (!bytes) return propagate(bytes);
   const auto document = io::parse_json(*bytes, "adapter_config.json");
   if (!document) return propagate(document);
-  std::optional<Error> error;
-  const double alpha = io::JsonFields(*document, "adapter_config.json:", error).at("lora_alpha").number();
-  if (error) return tl::make_unexpected(std::move(*error));
-  return alpha;
+  const auto settings = settings_of(*document, "", "adapter_config.json");
+  if (!settings) return propagate(settings);
+  return std::optional(*settings);
+}
+
+/// Those that diffusers writes among a file's texts since it keeps alphas: fields of both networks in one object, by
+/// their names ("unet.lora_alpha"), or of one network without. Nothing if there are none for a network.
+Result<std::optional<AdapterSettings>> settings_within(const TensorFile& file, bool of_text_encoder) {
+  const auto text = file.metadata().find("lora_adapter_metadata");
+  if (text == file.metadata().end()) return std::nullopt;
+  const std::string where = file.name() + ":lora_adapter_metadata";
+  const auto document = io::parse_json(std::as_bytes(std::span(text->second)), where);
+  if (!document) return propagate(document);
+  std::string prefix = of_text_encoder ? "text_encoder." : "unet.";
+  if (document->is_object() && !document->contains(prefix + "lora_alpha")) {
+    if (!document->contains("lora_alpha")) return std::nullopt;
+    prefix.clear();
+  }
+  const auto settings = settings_of(*document, prefix, where);
+  if (!settings) return propagate(settings);
+  return std::optional(*settings);
 }
 
 }  // namespace
 
-Result<AdapterWeights> decode_adapter(const TensorFile& file, const Configs& configs, double alpha) {
+Result<AdapterWeights> decode_adapter(const TensorFile& file, const Configs& configs,
+                                      const std::optional<AdapterSettings>& settings) {
   const AdapterReader reader(configs);
   std::map<std::string, Pair> unet, text_encoder;
   for (const auto& [name, tensor] : file.tensors()) {
     const auto address = reader.address_of(name);
     if (!address)
       return fail(ErrorCode::unsupported, "no tensor of a LoRA for these networks", file.name() + ":" + name);
+    if (name.starts_with(peft_beginning) && !settings)
+      return fail(ErrorCode::not_found, "the scale of peft's adapters is in adapter_config.json, which is not there",
+                  file.name() + ":" + name);
     Pair& pair = (address->of_text_encoder ? text_encoder : unet)[address->layer];
+    std::string& own_name = address->piece == Piece::down ? pair.down_name
+                            : address->piece == Piece::up ? pair.up_name
+                                                          : pair.alpha_name;
+    if (!own_name.empty())
+      return fail(ErrorCode::corrupt_data, "its layer has " + own_name + " already", file.name() + ":" + name);
+    own_name = name;
     switch (address->piece) {
       case Piece::down:
-        pair.down = &tensor, pair.down_name = name;
+        pair.down = &tensor;
         break;
       case Piece::up:
-        pair.up = &tensor, pair.up_name = name;
+        pair.up = &tensor;
         break;
       case Piece::alpha: {
         float value = 0;
@@ -207,14 +277,19 @@ Result<AdapterWeights> decode_adapter(const TensorFile& file, const Configs& con
     }
   }
   AdapterWeights weights;
-  for (const bool of_text_encoder : {false, true})
+  for (const bool of_text_encoder : {false, true}) {
+    const auto within = settings_within(file, of_text_encoder);
+    if (!within) return propagate(within);
+    const AdapterSettings own = *within ? **within : settings.value_or(AdapterSettings{});
     for (const auto& [layer, pair] : of_text_encoder ? text_encoder : unet) {
       if (pair.down == nullptr && pair.up == nullptr)
-        return fail(ErrorCode::corrupt_data, "an alpha without the layer that it is for", file.name() + ":" + layer);
-      auto read = low_rank(pair, reader.layers(of_text_encoder).shapes.find(layer)->second, file.name(), alpha);
+        return fail(ErrorCode::corrupt_data, "an alpha without the layer that it is for",
+                    file.name() + ":" + pair.alpha_name);
+      auto read = low_rank(pair, reader.layers(of_text_encoder).shapes.find(layer)->second, file.name(), own);
       if (!read) return propagate(read);
       (of_text_encoder ? weights.text_encoder : weights.unet).emplace(layer, std::move(*read));
     }
+  }
   if (weights.unet.empty() && weights.text_encoder.empty())
     return fail(ErrorCode::corrupt_data, "there is no tensor in it", file.name());
   return weights;
@@ -224,10 +299,31 @@ Result<AdapterWeights> read_adapter(const std::filesystem::path& path, const Con
   const auto file = TensorFile::open(path);
   if (!file) return propagate(file);
   // The configuration beside a file is of peft's alone: other layouts share folders with it.
-  const bool of_peft = !file->tensors().empty() && file->tensors().begin()->first.starts_with("base_model.model.");
-  const auto alpha = of_peft ? alpha_beside(path) : Result<double>(0.0);
-  if (!alpha) return propagate(alpha);
-  return decode_adapter(*file, configs, *alpha);
+  const bool of_peft = !file->tensors().empty() && file->tensors().begin()->first.starts_with(peft_beginning);
+  if (!of_peft) return decode_adapter(*file, configs);
+  const auto settings = settings_beside(path);
+  if (!settings) return propagate(settings);
+  return decode_adapter(*file, configs, *settings);
+}
+
+Result<void> check_adapter(const AdapterWeights& weights, const Configs& configs) {
+  const auto count = [](const Shape& shape) { return side_product(shape, 0); };
+  for (const bool of_text_encoder : {false, true}) {
+    const Layers layers(of_text_encoder ? tensors_of(configs.text_encoder) : tensors_of(configs.unet));
+    for (const auto& [layer, pair] : of_text_encoder ? weights.text_encoder : weights.unet) {
+      const auto found = layers.shapes.find(layer);
+      if (found == layers.shapes.end())
+        return fail(ErrorCode::invalid_argument, "the networks have no such layer", layer);
+      const Shape &down = pair.down.shape, &up = pair.up.shape, &shape = found->second;
+      if (down.size() != shape.size() || up.size() != shape.size() || !fits(down, up, shape) ||
+          pair.down.values.size() != count(down) || pair.up.values.size() != count(up))
+        return fail(ErrorCode::invalid_argument,
+                    text_of(down) + " and " + text_of(up) + " do not fit a layer of " + text_of(shape), layer);
+      if (!std::isfinite(pair.scale) || first_not_finite(pair.down.values) || first_not_finite(pair.up.values))
+        return fail(ErrorCode::invalid_argument, "a number is not finite", layer);
+    }
+  }
+  return {};
 }
 
 std::string encode_adapter(const AdapterWeights& weights) {

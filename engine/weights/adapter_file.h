@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "engine/core/result.h"
@@ -26,18 +27,33 @@ struct AdapterWeights {
   std::map<std::string, LowRank> unet, text_encoder;
 };
 
+/// What peft's configuration says of an adapter's layers.
+struct AdapterSettings {
+  double alpha = 0;       ///< Of layers without one of their own; 0: their rank.
+  std::int64_t rank = 0;  ///< r, which every layer must have; 0: not said.
+};
+
 /// Reads an adapter, in the layouts of diffusers (".lora.down.weight", ".lora_A.weight", attention processors as before
-/// 0.22), peft (with adapter_config.json beside it, of which r and lora_alpha are read) and kohya's scripts
+/// 0.22; r and lora_alpha from the text "lora_adapter_metadata" among the file's, where there is one), of peft
+/// ("base_model.model...", with adapter_config.json beside it, for r and lora_alpha) and of kohya's scripts
 /// ("lora_unet_..." with alphas). Without an alpha the scale is 1.
 ///   configs  of the checkpoint that it is for
-///   errors   those of TensorFile::open(); corrupt_data: half of a pair is missing, or their shapes do not fit each
-///   other
-///            or their layer; unsupported: a tensor that is no part of such an adapter, or for a layer that the
-///            networks do not have. `where` names the tensor
+///   errors   those of TensorFile::open(); corrupt_data: half of a pair is missing or there twice, or shapes do not fit
+///            each other, their layer or r; not_found: peft's configuration; unsupported: a tensor that is no part of
+///            such an adapter, of another type than F16, BF16 and F32, or for a layer that the networks do not have; a
+///            field that scales layers otherwise (use_rslora, use_dora, alpha_pattern, rank_pattern). `where` names the
+///            tensor or the field
 [[nodiscard]] Result<AdapterWeights> read_adapter(const std::filesystem::path& path, const Configs& configs);
 /// The same of a file that is open.
-///   alpha  of layers without one of their own; 0: their rank
-[[nodiscard]] Result<AdapterWeights> decode_adapter(const TensorFile& file, const Configs& configs, double alpha = 0);
+///   settings  of peft's configuration; those in the file's own texts count more
+[[nodiscard]] Result<AdapterWeights> decode_adapter(const TensorFile& file, const Configs& configs,
+                                                    const std::optional<AdapterSettings>& settings = std::nullopt);
+
+/// May these layers be put on the networks? What decode_adapter() gives may.
+///   errors  invalid_argument: a layer that the networks do not have, shapes that do not fit it, or a number that is
+///   not
+///           finite; `where` names the layer
+[[nodiscard]] Result<void> check_adapter(const AdapterWeights& weights, const Configs& configs);
 
 /// The file that diffusers' training scripts write today ("unet.LAYER.lora.down.weight"). It has no place for a scale:
 /// one other than 1 is multiplied into B.

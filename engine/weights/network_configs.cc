@@ -52,20 +52,26 @@ std::vector<int> channels_of(const JsonFields& fields) {
   return channels;
 }
 
-/// Collects the first thing that makes a network one of another kind.
+/// Collects the first thing that makes a network one of another kind, if no error was met before it. Networks of other
+/// kinds may have lists where ours have numbers (SDXL's transformer_layers_per_block), so a value of another type is
+/// one of another kind, too.
 class Kind {
  public:
-  explicit Kind(const JsonFields& fields) : fields_(fields) {}
+  Kind(const JsonFields& fields, const std::optional<Error>& error) : fields_(fields), error_(error) {}
 
   /// A field that must be absent, null, or this.
   void must_be(const char* key, const char* value) {
     if (fields_.has_value(key)) check(fields_.at(key), value);
   }
   void must_be(const char* key, bool value) {
-    if (fields_.has_value(key) && fields_.at(key).boolean() != value) refuse(fields_.at(key), value ? "true" : "false");
+    if (!fields_.has_value(key)) return;
+    const JsonFields field = fields_.at(key);
+    if (!field.is_boolean() || field.boolean() != value) refuse(field, value ? "true" : "false");
   }
   void must_be(const char* key, int value) {
-    if (fields_.has_value(key) && !(fields_.at(key).number() == value)) refuse(fields_.at(key), std::to_string(value));
+    if (!fields_.has_value(key)) return;
+    const JsonFields field = fields_.at(key);
+    if (!field.is_number() || field.number() != value) refuse(field, std::to_string(value));
   }
   void must_be_absent(const char* key) {
     if (fields_.has_value(key)) refuse(fields_.at(key), "nothing");
@@ -82,19 +88,20 @@ class Kind {
     return found;
   }
   void check(const JsonFields& value, const std::string& expected) {
-    if (value.string() != expected) refuse(value, expected);
+    if (!value.is_string() || value.string() != expected) refuse(value, expected);
   }
 
   [[nodiscard]] const std::optional<Error>& other() const { return other_; }
 
  private:
   void refuse(const JsonFields& value, const std::string& expected) {
-    if (other_) return;
+    if (other_ || error_) return;
     other_ = Error{ErrorCode::unsupported,
                    "a network of another kind than Stable Diffusion 1.x and 2.x-base, which have " + expected + " here",
                    value.where()};
   }
   const JsonFields& fields_;
+  const std::optional<Error>& error_;
   std::optional<Error> other_;
 };
 
@@ -105,7 +112,8 @@ void check_divisible(const JsonFields& fields, const char* key, const std::vecto
       fields.at(key).fail_here(std::to_string(channels[i]) + " channels do not part into " + std::to_string(parts[i]));
 }
 
-/// Reads a document by `read(fields, kind)`; an error that was met is the result.
+/// Reads a document by `read(fields, kind)`. An error that was met is the result; what makes it one of another kind,
+/// and was met before it, goes first: what is asked of the fields of one kind says nothing of another's.
 template <class Config, class Read>
 Result<Config> parse(std::span<const std::byte> json, const std::string& file, Read&& read) {
   const auto document = io::parse_json(json, file);
@@ -113,12 +121,26 @@ Result<Config> parse(std::span<const std::byte> json, const std::string& file, R
   std::optional<Error> error;
   const JsonFields fields(*document, file + ":", error);
   if (!document->is_object()) return fail(ErrorCode::corrupt_data, "expected an object", file);
-  Kind kind(fields);
+  Kind kind(fields, error);
   Config config;
   read(fields, kind, config);
-  if (error) return tl::make_unexpected(std::move(*error));
   if (kind.other()) return tl::make_unexpected(*kind.other());
+  if (error) return tl::make_unexpected(std::move(*error));
   return config;
+}
+
+/// Samplers divide by the picture that is left and by the noise that is there, and take logarithms of both.
+void check_noise(const JsonFields& fields, const NoiseConfig& config) {
+  constexpr double least = 1e-9;
+  if (!(config.beta_start > least && config.beta_start <= config.beta_end && config.beta_end < 1))
+    return fields.fail_here("expected 1e-9 < beta_start <= beta_end < 1");
+  const double first = std::sqrt(config.beta_start), last = std::sqrt(config.beta_end);
+  double left = 1;
+  for (int t = 0; t < config.training_steps; ++t) {
+    const double root = first + (last - first) * t / (config.training_steps - 1);
+    left *= 1 - root * root;
+  }
+  if (!(left > least)) fields.fail_here("with these betas nothing is left of a picture at the last step of training");
 }
 
 /// All that diffusers' UNet2DConditionModel can be and Stable Diffusion 1.x and 2.x-base are not.
@@ -212,16 +234,22 @@ Result<TextEncoderConfig> parse_text_encoder_config(std::span<const std::byte> j
 
 Result<NoiseConfig> parse_noise_config(std::span<const std::byte> json, const std::string& file) {
   return parse<NoiseConfig>(json, file, [](const JsonFields& fields, Kind& kind, NoiseConfig& config) {
-    kind.must_be("beta_schedule", "scaled_linear");
     kind.must_be("prediction_type", "epsilon");  // 2.x at 768 pixels predicts velocities
     kind.must_be_absent("trained_betas");
     kind.must_be("rescale_betas_zero_snr", false);
+    if (fields.has_value("beta_schedule"))
+      kind.must_be("beta_schedule", "scaled_linear");
+    else
+      (void)fields.at("beta_schedule").string();  // says that it is missing
     config.training_steps = whole(fields, "num_train_timesteps", 2, 1 << 16, config.training_steps);
-    config.beta_start = positive(fields, "beta_start", config.beta_start);
-    config.beta_end = positive(fields, "beta_end", config.beta_end);
-    if (!(config.beta_start <= config.beta_end && config.beta_end < 1))
-      fields.fail_here("expected beta_start <= beta_end < 1");
+    config.beta_start = fields.at("beta_start").number();
+    config.beta_end = fields.at("beta_end").number();
+    check_noise(fields, config);
     config.steps_offset = whole(fields, "steps_offset", 0, config.training_steps - 1, 0);
+    // The libraries' DDIM and LCM end without noise unless they are told otherwise, PNDM does not.
+    const std::string sampler = fields.has_value("_class_name") ? fields.at("_class_name").string() : "";
+    config.ends_without_noise = sampler == "DDIMScheduler" || sampler == "LCMScheduler";
+    if (fields.has_value("set_alpha_to_one")) config.ends_without_noise = fields.at("set_alpha_to_one").boolean();
   });
 }
 

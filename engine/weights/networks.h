@@ -56,11 +56,13 @@ struct TextEncoderConfig {
   Activation activation = Activation::quick_gelu;
 };
 
-/// scheduler/scheduler_config.json: how noise was added in training.
+/// scheduler/scheduler_config.json: how noise was added in training. Between the first step and the last, a billionth
+/// of the noise, and of the picture, is left at least.
 struct NoiseConfig {
   int training_steps = 1000;
   double beta_start = 0.00085, beta_end = 0.012;  ///< Square roots of betas are equidistant ("scaled_linear").
   int steps_offset = 1;
+  bool ends_without_noise = false;  ///< Do DDIM and PNDM end at no noise ("set_alpha_to_one"), or at the first step's?
 };
 
 struct Configs {
@@ -74,7 +76,8 @@ struct Configs {
 [[nodiscard]] Configs stable_diffusion_1();
 [[nodiscard]] Configs stable_diffusion_2_base();
 
-/// From the text of a config.json. What is absent is as the field's libraries have it.
+/// From the text of a config.json. What is absent is as the field's libraries have it, but for beta_schedule,
+/// beta_start and beta_end, which must be there: what the libraries would take for them is no Stable Diffusion.
 ///   file    for errors: "unet/config.json"
 ///   errors  corrupt_data: no JSON, a field of the wrong type or size; unsupported: a network of another kind (`where`
 ///           names the field that makes it one, such as SDXL's addition_embed_type)

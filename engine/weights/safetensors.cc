@@ -27,6 +27,7 @@ struct Entry {
   std::string dtype;
   Shape shape;
   std::vector<std::uint64_t> offsets;
+  bool has_dtype = false, has_shape = false, has_offsets = false;
 };
 
 /// Reads the header as it comes, without a tree of it: {"NAME": {"dtype": "F32", "shape": [2, 3], "data_offsets":
@@ -55,6 +56,9 @@ class HeaderReader final : public nlohmann::json_sax<nlohmann::json> {
       return true;
     }
     field_ = text;
+    if (name_ != "__metadata__") return begin_field(entries[name_]);
+    if (metadata.size() == max_metadata)
+      return stop(ErrorCode::too_large, "more than " + std::to_string(max_metadata) + " texts");
     return true;
   }
   bool string(std::string& text) override {
@@ -92,6 +96,16 @@ class HeaderReader final : public nlohmann::json_sax<nlohmann::json> {
   }
 
  private:
+  /// Each field once: the arrays of two would become one.
+  bool begin_field(Entry& entry) {
+    bool* const has = field_ == "dtype"          ? &entry.has_dtype
+                      : field_ == "shape"        ? &entry.has_shape
+                      : field_ == "data_offsets" ? &entry.has_offsets
+                                                 : nullptr;
+    if (has == nullptr) return unexpected("another field");
+    if (std::exchange(*has, true)) return stop(ErrorCode::corrupt_data, "its " + field_ + " stands there twice");
+    return true;
+  }
   bool stop(ErrorCode code, std::string message) {
     error = Error{code, std::move(message), file_ + ":" + (name_.empty() ? "header" : name_)};
     return false;
@@ -113,16 +127,17 @@ std::uint64_t bytes_of(std::string_view dtype) {
   return 0;
 }
 
-/// Bytes that type and shape ask for; nothing if that is more than can be counted.
+/// Bytes that type and shape ask for, of an unknown type those of one byte's; nothing if that is more than can be
+/// counted.
 std::optional<std::uint64_t> expected_bytes(const Entry& entry) {
-  std::uint64_t bytes = bytes_of(entry.dtype);
+  std::uint64_t bytes = std::max<std::uint64_t>(1, bytes_of(entry.dtype));
   for (const std::int64_t size : entry.shape)
     if (__builtin_mul_overflow(bytes, std::uint64_t(size), &bytes)) return std::nullopt;
   return bytes;
 }
 
 Result<void> check_entry(const Entry& entry, std::uint64_t data_bytes, const std::string& where) {
-  if (entry.dtype.empty() || entry.offsets.size() != 2)
+  if (entry.dtype.empty() || !entry.has_shape || entry.offsets.size() != 2)
     return fail(ErrorCode::corrupt_data, "expected dtype, shape and two data_offsets", where);
   const std::uint64_t begin = entry.offsets[0], end = entry.offsets[1];
   if (end < begin) return fail(ErrorCode::corrupt_data, "its bytes end before they begin", where);
@@ -132,7 +147,7 @@ Result<void> check_entry(const Entry& entry, std::uint64_t data_bytes, const std
                     ": the file is incomplete, copy or download it again",
                 where);
   const auto expected = expected_bytes(entry);
-  if (bytes_of(entry.dtype) != 0 && (!expected || *expected != end - begin))
+  if (!expected || (bytes_of(entry.dtype) != 0 && *expected != end - begin))
     return fail(
         ErrorCode::corrupt_data,
         entry.dtype + " of shape " + text_of(entry.shape) + " does not have " + std::to_string(end - begin) + " bytes",
@@ -164,16 +179,20 @@ Result<void> check_cover(const std::map<std::string, Entry>& entries, std::uint6
   return {};
 }
 
-/// A pickle by its name or by its first bytes: a zip archive (torch.save since 1.6) or a pickle of protocol 2 and
-/// later.
+/// A pickle by its name or by its first bytes: a zip archive (torch.save since 1.6) or a pickle of protocols 2 to 5.
 bool is_pickle(std::string_view name, std::span<const std::byte> bytes) {
   for (const char* ending : {".ckpt", ".pt", ".pth", ".bin", ".pkl"})
     if (name.ends_with(ending)) return true;
   const auto begins_with = [&](std::string_view magic) {
     return bytes.size() >= magic.size() && std::memcmp(bytes.data(), magic.data(), magic.size()) == 0;
   };
-  // 0x80 0x02 may also begin the length of a header, whose highest byte is then zero; a pickle's eighth byte is not.
-  return begins_with("PK\x03\x04") || (begins_with("\x80\x02") && bytes.size() >= 8 && bytes[7] != std::byte{0});
+  if (begins_with("PK\x03\x04")) return true;
+  // 0x80 0x02 may also begin the length of a header that is not too long. What follows in a pickle makes a longer one
+  // of it.
+  std::uint64_t header_bytes = 0;
+  if (bytes.size() < sizeof header_bytes) return false;
+  std::memcpy(&header_bytes, bytes.data(), sizeof header_bytes);
+  return begins_with("\x80") && bytes[1] >= std::byte{2} && bytes[1] <= std::byte{5} && header_bytes > max_header_bytes;
 }
 
 class Mapping {
@@ -228,6 +247,8 @@ std::uint64_t StoredTensor::elements() const {
   for (const std::int64_t size : shape) count *= std::uint64_t(size);
   return count;
 }
+
+bool StoredTensor::has_floats() const { return dtype == "F32" || dtype == "F16" || dtype == "BF16"; }
 
 Result<TensorFile> TensorFile::read(std::span<const std::byte> bytes, std::string name,
                                     std::shared_ptr<const void> owner) {
@@ -305,15 +326,18 @@ Result<std::span<const float>> floats_in_place(const StoredTensor& tensor, const
 
 Result<void> read_floats(const StoredTensor& tensor, const std::string& where, std::span<float> into) {
   assert(into.size() == tensor.elements());
+  if (!tensor.has_floats())
+    return fail(ErrorCode::unsupported, "its numbers are " + tensor.dtype + "; F16, BF16 and F32 are read", where);
+  // Read from a file they agree; whoever makes a tensor otherwise must not read beyond its bytes.
+  if (tensor.bytes.size() != into.size() * bytes_of(tensor.dtype))
+    return fail(ErrorCode::corrupt_data, "its shape does not have as many bytes", where);
   if (into.empty()) return {};
   if (tensor.dtype == "F32")
     std::memcpy(into.data(), tensor.bytes.data(), tensor.bytes.size());
   else if (tensor.dtype == "F16")
     widen(tensor.bytes, into, from_half);
-  else if (tensor.dtype == "BF16")
-    widen(tensor.bytes, into, from_bfloat);
   else
-    return fail(ErrorCode::unsupported, "its numbers are " + tensor.dtype + "; F16, BF16 and F32 are read", where);
+    widen(tensor.bytes, into, from_bfloat);
   return check_finite(into, where);
 }
 

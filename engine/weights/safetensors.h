@@ -29,12 +29,16 @@ struct StoredTensor {
   Shape shape;        ///< Outermost first; empty for a single number.
   std::span<const std::byte> bytes;
 
-  [[nodiscard]] std::uint64_t elements() const;
+  [[nodiscard]] std::uint64_t elements() const;  ///< Of a file's tensors it never overflows.
+  /// Are its numbers of a type that read_floats() reads? Then elements() is no more than there are bytes: only such a
+  /// tensor may be given memory for its numbers.
+  [[nodiscard]] bool has_floats() const;
 };
 
 /// What a header may ask for. The largest that is known, of Stable Diffusion in one file, has 1,131 tensors in 150 KB.
 constexpr std::uint64_t max_header_bytes = std::uint64_t{16} << 20;
 constexpr std::size_t max_tensors = 1 << 16;
+constexpr std::size_t max_metadata = 1 << 12;  // trainers write some dozens of texts
 constexpr std::size_t max_dimensions = 8;
 
 /// A safetensors file. Nothing of it is believed before it was checked: that each tensor has the bytes its type and
@@ -46,8 +50,7 @@ class TensorFile {
   /// Mapped into memory, read only: several jobs and processes share one copy, and what nobody asks for is never read.
   /// A file that is cut short while it is in use ends the process (SIGBUS): models are installed, never uploaded.
   ///   errors  not_found, invalid_argument (no regular file); unsupported: a pickle (.ckpt, .pt, .bin), by its name or
-  ///   its
-  ///           first bytes; corrupt_data, too_large (header): `where` is "FILE:header" or "FILE:TENSOR"
+  ///           its first bytes; corrupt_data, too_large (header): `where` is "FILE:header" or "FILE:TENSOR"
   [[nodiscard]] static Result<TensorFile> open(const std::filesystem::path& path);
   /// The same of a file in memory.
   ///   name  of the file, for errors
@@ -71,7 +74,7 @@ class TensorFile {
 /// The numbers of a tensor, widened to float.
 ///   where   address of the tensor, for errors: "unet.safetensors:conv_in.weight"
 ///   into    as many as the tensor has elements
-///   errors  unsupported: neither F16, BF16 nor F32; corrupt_data: NaN or infinity, `where` with its index
+///   errors  unsupported: not has_floats(); corrupt_data: NaN or infinity, `where` with its index
 [[nodiscard]] Result<void> read_floats(const StoredTensor& tensor, const std::string& where, std::span<float> into);
 
 /// The numbers of an F32 tensor where they lie, which costs nothing; empty for other types, and where the address is

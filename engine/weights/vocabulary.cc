@@ -1,5 +1,6 @@
 #include "engine/weights/vocabulary.h"
 
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <string_view>

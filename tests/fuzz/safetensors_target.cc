@@ -22,6 +22,10 @@ void read_configs(std::span<const std::byte> bytes) {
   (void)parse_noise_config(bytes, "config.json");
 }
 
+std::string file_text(const std::vector<std::byte>& bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
 }  // namespace
 
 void fuzz::run(std::span<const std::byte> bytes) {
@@ -29,13 +33,15 @@ void fuzz::run(std::span<const std::byte> bytes) {
   auto file = TensorFile::parse({bytes.begin(), bytes.end()}, "a.safetensors");
   if (!file) return;
   for (const auto& [name, tensor] : file->tensors()) {
-    if (tensor.bytes.size() / 2 < tensor.elements()) continue;  // a type that is not read
+    if (!tensor.has_floats()) continue;
     std::vector<float> values(tensor.elements());
     (void)read_floats(tensor, name, values);
   }
-  if (const auto adapter = decode_adapter(*file, tiny_configs()))
+  if (const auto adapter = decode_adapter(*file, tiny_configs(), AdapterSettings{}); adapter) {
+    demand(check_adapter(*adapter, tiny_configs()).has_value(), "an adapter that is accepted fits");
     demand(TensorFile::parse(bytes_of(encode_adapter(*adapter)), "a.safetensors").has_value(),
            "an adapter that is accepted can be written");
+  }
   if (const auto checkpoint = Checkpoint::of_file(std::move(*file), tiny_configs())) (void)checkpoint->check();
 }
 
@@ -43,6 +49,11 @@ std::vector<std::string> fuzz::seeds() {
   const std::string layer = "unet.mid_block.attentions.0.transformer_blocks.0.attn1.to_q.lora.";
   const std::string text = "cond_stage_model.transformer.text_model.embeddings.token_embedding.weight";
   return {
+      file_text(hostile_adapter(R"("Q","shape":[8000000000000,8])")),
+      file_text(hostile_adapter(R"("F32","shape":[2305843009213693952,8])")),
+      encode_tensors({{layer + "down.weight", {{1, 8}, std::vector<float>(8, 1.0f)}},
+                      {layer + "up.weight", {{8, 1}, std::vector<float>(8, 1.0f)}}},
+                     {{"lora_adapter_metadata", R"({"unet.r":1,"unet.lora_alpha":2,"unet.use_dora":false})"}}),
       encode_tensors({{"x", {{2, 2}, {1, 2, 3, 4}}}, {"y", {{}, {1}}}}, {{"format", "pt"}}),
       encode_tensors({{layer + "down.weight", {{1, 8}, std::vector<float>(8, 1.0f)}},
                       {layer + "up.weight", {{8, 1}, std::vector<float>(8, 1.0f)}}}),

@@ -113,7 +113,7 @@ void train(TinyModels& models, const support::TensorFile& file, const std::strin
   };
   for (std::int64_t step = 0; step < 20; ++step) {
     const Tensor noise_now = noise.select(0, step), times_now = timesteps.select(0, step);
-    const NoisyBatch batch{latents, noise_now, times_now, context};
+    const NoisyBatch batch{&latents, &noise_now, &times_now, &context};
     if (step == 0) {
       const Tensor noisy = noisy_latents(models.configs().noise, batch);
       EXPECT_TRUE(near(noisy, as_tensor(file.at(start + ".step0.noisy")), 1e-5));
@@ -173,7 +173,7 @@ TEST_F(AdapterGolden, OnTheTextEncoderWithGradientsThroughBothNetworks) {
   const Tensor noise = as_tensor(train_file.at("noise")).select(0, 0);
   const Tensor latents = as_tensor(train_file.at("latents"));
   const Tensor timesteps = as_tensor(train_file.at("timesteps")).select(0, 0), context = encoded();
-  const Tensor loss = denoising_loss(models->unet, models->configs(), {latents, noise, timesteps, context});
+  const Tensor loss = denoising_loss(models->unet, models->configs(), {&latents, &noise, &timesteps, &context});
   const double expected = file.at("unet_loss").values[0];
   EXPECT_NEAR(loss.item<double>(), expected, 1e-5 * expected);
   loss.backward();

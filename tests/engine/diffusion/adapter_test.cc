@@ -104,7 +104,7 @@ TEST(Training, LowersTheLossOnWhatItLearnsFromAndRefusesPoison) {
   std::vector<Tensor> trained;
   adapter.collect(trained);
   AdamW optimiser(trained, {.learning_rate = 1e-2});
-  const NoisyBatch batch{latents, noise, timesteps, context};
+  const NoisyBatch batch{&latents, &noise, &timesteps, &context};
   double first = 0, last = 0;
   for (int step = 0; step < 60; ++step) {
     const auto loss = training_step(unet, configs, batch, optimiser);
@@ -116,7 +116,7 @@ TEST(Training, LowersTheLossOnWhatItLearnsFromAndRefusesPoison) {
   const auto before = adapter.layers();
   Tensor poisoned = noise.clone();
   poisoned.data_ptr<float>()[3] = std::numeric_limits<float>::infinity();
-  const auto refused = training_step(unet, configs, {latents, poisoned, timesteps, context}, optimiser);
+  const auto refused = training_step(unet, configs, {&latents, &poisoned, &timesteps, &context}, optimiser);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::internal);
   for (const auto& [layer, pair] : adapter.layers()) EXPECT_EQ(pair.down.values, before.at(layer).down.values);

@@ -54,6 +54,67 @@ TEST(Scheduler, TimestepsFallAndStayWithinTraining) {
       }
 }
 
+TEST(Scheduler, StepsThatBeginBeyondTrainingAreRefusedAndAllOthersStayFinite) {
+  for (const int offset : {0, 1, 2, 20, 999})
+    for (const Sampler sampler : all_samplers)
+      for (const Spacing spacing : {Spacing::leading, Spacing::linspace, Spacing::trailing})
+        for (const int steps : {1, 2, 49, 50, 499, 500})
+          for (const double strength : {0.5, 0.98, 1.0})
+            for (const bool karras : {false, true}) {
+              const weights::NoiseConfig config{.steps_offset = offset};
+              const SamplerOptions options{.sampler = sampler,
+                                           .steps = steps,
+                                           .strength = strength,
+                                           .spacing = spacing,
+                                           .karras_sigmas = karras,
+                                           .eta = 0.5};
+              const auto valid = validate(options, config);
+              if (!valid) {
+                EXPECT_EQ(valid.error().where, "steps_offset");
+                EXPECT_EQ(spacing, Spacing::leading);
+                EXPECT_GT(offset, 1) << "what checkpoints have";
+                continue;
+              }
+              const auto scheduler = make_scheduler(config, options);
+              std::array<float, 4> x = picture;
+              for (std::size_t call = 0; call < scheduler->timesteps().size(); ++call) {
+                ASSERT_LT(scheduler->timesteps()[call], 1000);
+                scheduler->step(x, noise, noise);
+              }
+              for (const float value : x)
+                ASSERT_TRUE(std::isfinite(value)) << name_of(sampler) << " offset " << offset << " steps " << steps;
+            }
+}
+
+TEST(Scheduler, AnOffsetIsRefusedFromTheStepThatNoNoiseIsKnownFor) {
+  const auto accepted = [](Sampler sampler, int steps, int offset) {
+    return validate({.sampler = sampler, .steps = steps}, {.steps_offset = offset}).has_value();
+  };
+  for (const Sampler sampler : {Sampler::ddim, Sampler::pndm}) {
+    EXPECT_TRUE(accepted(sampler, 50, 19)) << "49 * 20 + 19 is the last";
+    EXPECT_FALSE(accepted(sampler, 50, 20));
+    EXPECT_FALSE(accepted(sampler, 500, 2));
+    EXPECT_TRUE(accepted(sampler, 1, 999));
+  }
+  EXPECT_TRUE(accepted(Sampler::dpmpp2m, 50, 49)) << "50 * 19 + 49";
+  EXPECT_FALSE(accepted(Sampler::dpmpp2m, 50, 50));
+  EXPECT_TRUE(accepted(Sampler::lcm, 4, 999)) << "it takes its own";
+}
+
+TEST(Scheduler, EndsWithoutNoiseWhereTheCheckpointSaysSo) {
+  // The last call of one step, from time step 0: to the picture itself, or back to where it was.
+  const std::array<float, 1> seen = {0.5f}, none = {};
+  const double alpha = alphas_cumprod({})[0];
+  for (const Sampler sampler : {Sampler::ddim, Sampler::pndm})
+    for (const bool without : {false, true}) {
+      const auto scheduler =
+          make_scheduler({.steps_offset = 0, .ends_without_noise = without}, {.sampler = sampler, .steps = 1});
+      std::array<float, 1> x = {0.7f};
+      scheduler->step(x, seen, none);
+      EXPECT_NEAR(double(x[0]), without ? (0.7 - std::sqrt(1 - alpha) * 0.5) / std::sqrt(alpha) : 0.7, 1e-6);
+    }
+}
+
 TEST(Scheduler, ConsistencyTakesItsStepsAmongThoseItWasDistilledTo) {
   EXPECT_EQ(make_scheduler({}, {.sampler = Sampler::lcm, .steps = 4})->timesteps(),
             (std::vector<int>{999, 759, 499, 259}));

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
+#include "engine/core/rng.h"
 #include "engine/weights/vocabulary.h"
 #include "tests/engine/weights/samples.h"
 #include "tests/support/data.h"
@@ -120,11 +122,40 @@ TEST(StableDiffusion, AnAdapterIsPutOnAndTakenOff) {
   weights::AdapterWeights weights;
   weights.unet["mid_block.attentions.0.transformer_blocks.0.attn1.to_q"] = {
       {{1, 8}, std::vector<float>(8, 1.0f)}, {{8, 1}, {1, -1, 2, -2, 3, -3, 4, -4}}, 1.0};
-  sd->adapt(weights);
+  ASSERT_TRUE(sd->adapt(weights));
   const scene::Image without = plain.repaint(picture(), few_steps).value();
   EXPECT_NE(sd->repaint(picture(), few_steps).value(), without);
-  sd->adapt({});
+  // What cannot be put on leaves the one that is there.
+  const scene::Image with = sd->repaint(picture(), few_steps).value();
+  weights::AdapterWeights other = weights;
+  other.unet["nowhere"] = weights.unet.begin()->second;
+  EXPECT_EQ(sd->adapt(other).error().where, "nowhere");
+  other = weights;
+  other.unet.begin()->second.up.values.pop_back();
+  EXPECT_EQ(sd->adapt(other).error().where, weights.unet.begin()->first);
+  EXPECT_EQ(sd->adapt(weights, std::nan("")).error().where, "factor");
+  EXPECT_EQ(sd->repaint(picture(), few_steps).value(), with);
+  ASSERT_TRUE(sd->adapt({}));
   EXPECT_EQ(sd->repaint(picture(), few_steps).value(), without);
+}
+
+TEST(StableDiffusion, WhatIsNotFiniteNeverBecomesAPicture) {
+  const TinyFolder folder;
+  const auto error = [&] {
+    const auto sd = StableDiffusion::open(folder.path());
+    const auto repainted = sd.value().repaint(picture(), few_steps);
+    return repainted ? Error{ErrorCode::internal, "accepted", {}} : repainted.error();
+  };
+  const auto with_great = [&](Network network, const std::string& name, const std::string& file) {
+    auto tensors = weights::random_tensors(weights::tiny_configs(), network, 3);
+    for (float& value : tensors.at(name).values) value = 3e38f;
+    folder.write(file, weights::encode_tensors(tensors));
+  };
+  with_great(Network::autoencoder, "decoder.conv_out.weight", "vae/diffusion_pytorch_model.safetensors");
+  EXPECT_EQ(error().where, "autoencoder");
+  EXPECT_EQ(error().code, ErrorCode::internal);
+  with_great(Network::unet, "conv_out.weight", "unet/diffusion_pytorch_model.safetensors");
+  EXPECT_EQ(error().where, "latents");
 }
 
 TEST(StableDiffusion, IsCancelledBetweenCalls) {
@@ -151,7 +182,26 @@ TEST(StableDiffusion, WhatCannotBeRepaintedIsNamed) {
   EXPECT_EQ(where({}, few_steps), "picture");
   EXPECT_EQ(where(picture(), {.guidance = 0.5}), "guidance");
   EXPECT_EQ(where(picture(), {.sampling = {.steps = 0}}), "steps");
+  EXPECT_EQ(where(picture(), {.guidance = 101}), "guidance");
   EXPECT_EQ(where(picture(), {.prompt = "\xff"}), "prompt");
+  EXPECT_EQ(where(picture(), {.negative_prompt = "\xff"}), "negative_prompt");
+  scene::Image poisoned = picture();
+  poisoned.data[7] = std::nanf("");
+  EXPECT_EQ(where(poisoned, few_steps), "picture[7]");
+  const auto large = sd->repaint(scene::Image(1024, 1032, 3), few_steps);
+  ASSERT_FALSE(large);
+  EXPECT_EQ(large.error().code, ErrorCode::too_large);
+}
+
+TEST(StableDiffusion, ACheckpointWhoseStepsBeginBeyondTrainingIsNamed) {
+  const TinyFolder folder;
+  folder.write("scheduler/scheduler_config.json",
+               R"({"beta_schedule":"scaled_linear","beta_start":0.00085,"beta_end":0.012,"steps_offset":999})");
+  const auto sd = StableDiffusion::open(folder.path());
+  ASSERT_TRUE(sd);
+  const auto repainted = sd->repaint(picture(), few_steps);
+  ASSERT_FALSE(repainted);
+  EXPECT_EQ(repainted.error().where, "steps_offset");
 }
 
 TEST(StableDiffusion, ADamagedCheckpointIsNamed) {

@@ -46,10 +46,64 @@ TEST(NetworkConfigs, AnotherKindOfNetworkIsNamedByItsField) {
   EXPECT_EQ(refused(with(unet, "\"class_embed_type\":null", "\"in_channels\":9")).where,
             "unet/config.json:in_channels");
   EXPECT_EQ(refused(with(unet, "\"DownBlock2D\"", "\"KDownBlock2D\"")).where, "unet/config.json:down_block_types[1]");
-  const std::string velocities = R"({"prediction_type":"v_prediction"})";
-  const auto noise = parse_noise_config(bytes_of(velocities), "scheduler/scheduler_config.json");
-  ASSERT_FALSE(noise);
-  EXPECT_EQ(noise.error().code, ErrorCode::unsupported);
+  EXPECT_EQ(refused(with(unet, "\"DownBlock2D\"", "7")).code, ErrorCode::corrupt_data);
+  EXPECT_EQ(refused(with(unet, "\"class_embed_type\":null", "\"only_cross_attention\":[true,false]")).code,
+            ErrorCode::unsupported);
+}
+
+TEST(NetworkConfigs, TheUNetOfSdxlIsSaidToBeAnotherKind) {
+  const Error xl = refused(R"({"_class_name":"UNet2DConditionModel","act_fn":"silu","addition_embed_type":"text_time",
+    "addition_embed_type_num_heads":64,"addition_time_embed_dim":256,"attention_head_dim":[5,10,20],
+    "block_out_channels":[320,640,1280],"center_input_sample":false,"class_embed_type":null,"conv_in_kernel":3,
+    "conv_out_kernel":3,"cross_attention_dim":2048,"cross_attention_norm":null,
+    "down_block_types":["DownBlock2D","CrossAttnDownBlock2D","CrossAttnDownBlock2D"],"downsample_padding":1,
+    "flip_sin_to_cos":true,"freq_shift":0,"in_channels":4,"layers_per_block":2,"mid_block_scale_factor":1,
+    "mid_block_type":"UNetMidBlock2DCrossAttn","norm_eps":1e-05,"norm_num_groups":32,"num_attention_heads":null,
+    "out_channels":4,"projection_class_embeddings_input_dim":2816,"resnet_out_scale_factor":1.0,
+    "transformer_layers_per_block":[1,2,10],"up_block_types":["CrossAttnUpBlock2D","CrossAttnUpBlock2D","UpBlock2D"],
+    "use_linear_projection":true})");
+  EXPECT_EQ(xl.code, ErrorCode::unsupported);
+  EXPECT_EQ(xl.where, "unet/config.json:addition_embed_type");
+  const Error layers = refused(with(unet, "\"class_embed_type\":null", "\"transformer_layers_per_block\":[1,2]"));
+  EXPECT_EQ(layers.code, ErrorCode::unsupported);
+  EXPECT_EQ(layers.where, "unet/config.json:transformer_layers_per_block");
+}
+
+const std::string scheduler =
+    R"({"beta_schedule":"scaled_linear","beta_start":0.00085,"beta_end":0.012,"prediction_type":"epsilon"})";
+
+Result<NoiseConfig> noise_of(const std::string& json) { return parse_noise_config(bytes_of(json), "scheduler.json"); }
+
+TEST(NetworkConfigs, ASchedulerIsReadFieldByField) {
+  const auto config = noise_of(scheduler);
+  ASSERT_TRUE(config) << config.error().message;
+  EXPECT_EQ(config->training_steps, 1000);
+  EXPECT_EQ(config->beta_end, 0.012);
+  EXPECT_EQ(config->steps_offset, 0);
+  EXPECT_FALSE(config->ends_without_noise);
+  const std::string& last = "\"epsilon\"";
+  EXPECT_TRUE(noise_of(with(scheduler, last, "\"epsilon\",\"set_alpha_to_one\":true"))->ends_without_noise);
+  EXPECT_TRUE(noise_of(with(scheduler, last, "\"epsilon\",\"_class_name\":\"DDIMScheduler\""))->ends_without_noise)
+      << "its default";
+  EXPECT_FALSE(noise_of(with(scheduler, last, "\"epsilon\",\"_class_name\":\"PNDMScheduler\""))->ends_without_noise);
+}
+
+TEST(NetworkConfigs, NoiseThatNobodyCanComputeWithIsRefused) {
+  const auto refused_at = [](const std::string& from, const std::string& to) {
+    const auto config = noise_of(with(scheduler, from, to));
+    return config ? "accepted" : config.error().where;
+  };
+  EXPECT_EQ(noise_of(with(scheduler, "epsilon", "v_prediction")).error().code, ErrorCode::unsupported);
+  EXPECT_EQ(noise_of(with(scheduler, "scaled_linear", "linear")).error().code, ErrorCode::unsupported);
+  EXPECT_EQ(refused_at("\"beta_schedule\":\"scaled_linear\",", ""), "scheduler.json:beta_schedule");
+  EXPECT_EQ(refused_at("\"scaled_linear\"", "null"), "scheduler.json:beta_schedule");
+  EXPECT_EQ(refused_at("\"scaled_linear\"", "7"), "scheduler.json:beta_schedule");
+  EXPECT_EQ(refused_at("\"beta_start\":0.00085,", ""), "scheduler.json:beta_start");
+  EXPECT_EQ(refused_at("\"beta_end\":0.012,", ""), "scheduler.json:beta_end");
+  EXPECT_EQ(refused_at("0.00085", "1e-300"), "scheduler.json:") << "its first level has no noise at all";
+  EXPECT_EQ(refused_at("0.012", "0.999999"), "scheduler.json:") << "its last ones have no picture";
+  EXPECT_EQ(refused_at("0.012", "0.0001"), "scheduler.json:") << "less at the end than at the beginning";
+  EXPECT_EQ(refused_at("0.012", "1.5"), "scheduler.json:");
 }
 
 TEST(NetworkConfigs, SizesThatCannotBeAreNamed) {

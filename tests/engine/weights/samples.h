@@ -81,4 +81,12 @@ inline std::vector<std::byte> file_of(const std::string& header, const std::stri
   return bytes_of(bytes + header + data);
 }
 
+/// An adapter of a few hundred bytes whose first half claims a type and shape ("DTYPE","shape":[...]) for no bytes.
+inline std::vector<std::byte> hostile_adapter(const std::string& claim) {
+  const std::string layer = "unet.mid_block.attentions.0.transformer_blocks.0.attn1.to_q.lora.";
+  return file_of("{\"" + layer + "down.weight\":{\"dtype\":" + claim + ",\"data_offsets\":[0,0]},\"" + layer +
+                     "up.weight\":{\"dtype\":\"F32\",\"shape\":[8,1],\"data_offsets\":[0,32]}}",
+                 std::string(32, '\0'));
+}
+
 }  // namespace engine::weights
