@@ -87,6 +87,17 @@ test("undo and redo walk through what was there", () => {
   assert.equal(history.canRedo, false, "a new change forgets what was undone");
 });
 
+test("what cannot be gone back to is forgotten, and leaves nothing to do again", () => {
+  const history = new History();
+  history.note("gone");
+  const isUsable = (value) => value !== "gone";
+  assert.equal(history.undo("here", isUsable), undefined);
+  assert.deepEqual([history.canUndo, history.canRedo], [false, false]);
+  for (const value of ["first", "gone"]) history.note(value);
+  assert.equal(history.undo("here", isUsable), "first");
+  assert.equal(history.redo("first", isUsable), "here");
+});
+
 test("history forgets what is too long ago", () => {
   const history = new History(2);
   for (const value of [1, 2, 3]) history.note(value);
