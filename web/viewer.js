@@ -35,6 +35,7 @@ const THING_PX = 14; // A thing is taken hold of within this of its middle, howe
 const SKETCH_PX = 2; // A line that is drawn has a corner this often at most.
 const MAX_CACHED_PICTURES = 6; // Enough to go back and forth between two versions and three layers.
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }; // Right, down.
+const CONTROLS = "button, a, input, select"; // What lies on the picture and is no part of it.
 const THUMBNAIL = { width: 320, height: 200 };
 
 /** How much a turn of the wheel multiplies by. */
@@ -338,11 +339,16 @@ export class Viewer {
     on("contextmenu", (event) => event.preventDefault());
     on("wheel", (event) => this.#wheel(event), { passive: false });
     on("dblclick", (event) => {
-      if (event.target.closest("button, a, input, select")) return;
+      if (event.target.closest(CONTROLS)) return;
       this.#pointerAt = this.#place(event);
       this.focusHere();
     });
     on("keydown", (event) => this.#key(event));
+    // A key or a button between two clicks makes the second one a click of its own, however quick the hand is.
+    const between = ({ type, target }) => {
+      if (type === "keydown" || target.closest?.(CONTROLS)) this.#clicked.at = -Infinity;
+    };
+    for (const name of ["keydown", "pointerdown"]) document.addEventListener(name, between, true);
   }
 
   #place(event) {
@@ -351,7 +357,7 @@ export class Viewer {
   }
 
   #down(event) {
-    if (event.target.closest("button, a, input, select") || !this.camera) return;
+    if (event.target.closest(CONTROLS) || !this.camera) return;
     this.#view.focus({ preventScroll: true });
     this.#view.classList.remove("by-keyboard");
     this.#pointers.set(event.pointerId, this.#place(event));
