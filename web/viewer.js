@@ -177,6 +177,7 @@ export class Viewer {
 
   async #load(job, signal) {
     const requestedAt = performance.now();
+    const before = this.#queue.underWay;
     const { blob, timing } = await api.render(
       job.scene,
       job.version,
@@ -189,8 +190,10 @@ export class Viewer {
       },
       signal,
     );
+    // As many as shared the service with this one, on the way from its first moment to its last.
+    const atOnce = (before + this.#queue.underWay) / 2;
     const picture = await createImageBitmap(blob);
-    if (!job.large) this.#adaptive.record(serverTime(timing) ?? performance.now() - requestedAt);
+    if (!job.large) this.#adaptive.record(serverTime(timing) ?? performance.now() - requestedAt, atOnce);
     return { picture, ms: performance.now() - requestedAt };
   }
 
