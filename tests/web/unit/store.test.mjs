@@ -114,6 +114,9 @@ test("single letters are keys until they are turned off, which outlives a reload
   assert.equal(new SceneMemory(storage).letterKeys, false);
   memory.letterKeys = true;
   assert.equal(new SceneMemory(storage).letterKeys, true);
+  const forgetful = new SceneMemory({ getItem: () => null, setItem: () => {} });
+  forgetful.letterKeys = false;
+  assert.equal(forgetful.letterKeys, false, "as long as the page is open, where nothing may be stored");
 });
 
 test("what was uploaded has the name that the user knows", () => {
