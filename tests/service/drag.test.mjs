@@ -182,13 +182,30 @@ describe('a thing of a small scene', () => {
     await page.mouse.click(...at);
     await hand.count();
     await id('thing-hold').click();
-    await id('handle-0-target').focus();
+    await page.waitForFunction(() => document.activeElement.dataset.testid === 'handle-0-target');
     for (let i = 0; i < 5; ++i) await page.keyboard.press('ArrowLeft');
     await hand.state('moved');
     await page.waitForFunction(() => /^p\d/.test(document.querySelector('[data-testid=view]').dataset.version));
     await id('thing-drop').click();
     await hand.shown(0);
     assert.deepEqual(complaints, []);
+    await page.context().close();
+  });
+
+  test('is left as it was let go, unrepaired, for who wants it so', async () => {
+    const { page, id, hand } = await opened();
+    await id('auto-repair').uncheck();
+    const at = await hand.onScreen(mug);
+    await page.mouse.click(...at);
+    await hand.count();
+    await hand.drag(at, [at[0] - 60, at[1]]);
+    await hand.state('moved');
+    await id('thing-repair').waitFor();
+    await page.waitForFunction(() => /^p\d/.test(document.querySelector('[data-testid=view]').dataset.version));
+    assert.deepEqual((await service.client.get('/v1/edits')).json().edits, [], 'nobody has asked for an edit');
+    await page.waitForTimeout(600);  // it saves a little later
+    await page.reload();
+    assert.equal(await id('auto-repair').isChecked(), false, 'after a reload, too');
     await page.context().close();
   });
 
