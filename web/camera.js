@@ -99,8 +99,8 @@ export function onLine(camera, x, y, through, axis) {
 }
 
 /** The point under a pixel position on the plane through `through` at right angles to the unit vector `normal`. Towards
- *  the horizon, where the plane runs away from under the hand, and beyond, no farther from the camera than FARTHEST. A plane
- *  that is seen nearly edge-on says nothing about a pixel: the point under it on the plane that faces the camera, moved
+ *  the horizon, where the plane runs away from under the hand, and beyond, no farther from the camera than FARTHEST. Of a
+ *  plane that is seen nearly edge-on a pixel says nothing: the point under it on the plane that faces the camera, moved
  *  along `normal` into the plane. Which of the two depends on camera and plane alone: no drag jumps between them. */
 export function onPlane(camera, x, y, through, normal) {
   const { origin, direction } = rayThrough(camera, x, y);

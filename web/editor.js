@@ -596,8 +596,8 @@ export class Editor {
     this.store.set({ submitting: false });
   }
 
-  /** Posts an edit. One whose answer was lost goes under the same key when it is posted again: it is answered, not queued
-   *  twice. Only then: one that is given up on its way and asked for anew is another one. */
+  /** Posts an edit. One whose answer was lost goes under the same key when it is posted again: it is answered, not
+   *  queued twice. Only then: one that is given up on its way and asked for anew is another one. */
   async #submit(request) {
     const body = JSON.stringify(request);
     const key = this.#lost?.body === body ? this.#lost.key : freshKey();
@@ -664,7 +664,7 @@ export class Editor {
     api.cancelEdit(id).catch(() => {});
   }
 
-  /** What a draft was made of has been changed, or undone: its result would throw that away, and is no longer wanted. */
+  /** What a draft was made of has been changed, or undone: its result would throw that away. */
   #draftOutdated() {
     const { draft, drafted, version } = this.state;
     if (draft && JSON.stringify(this.#draftRequest()) !== draft.body) this.#giveUpDraft();

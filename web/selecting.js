@@ -145,8 +145,8 @@ export class Selecting {
     return present?.id === scene.id && shown === version ? picked : null;
   }
 
-  /** A click that takes the whole thing under it, in place of one that was; where nothing is, lets go. What somebody has
-   *  made by hand is not lost to a click that went astray: it stays, and that is said. */
+  /** A click that takes the whole thing under it, in place of one that was; where nothing is, lets go. What somebody
+   *  has made by hand is not lost to a click that went astray: it stays, and that is said. */
   async propose(camera, x, y) {
     this.#proposing?.abort();
     const abort = (this.#proposing = new AbortController());
@@ -154,8 +154,10 @@ export class Selecting {
     const { thingMode, selectMode, dragging, selection, handles } = this.#state;
     // Somebody who has taken something in hand meanwhile has it there.
     if (!picked || !thingMode || selectMode || dragging) return;
-    const own = proposalOf(selection) ? handles.length > 1 || handles.some(({ target }) => !target) : selection.length + handles.length > 0;
-    if (own)
+    // Of a thing that one click took, the one handle came with dragging it.
+    const came = proposalOf(selection) && handles.every(({ target }) => target) ? 1 : 0;
+    const clicked = came || selection.length === 0;
+    if (!clicked || handles.length > came)
       return this.say("What you have placed stays.", {
         seconds: 6,
         action: { label: "Let go of it", run: () => this.place([], { handles: [] }) },

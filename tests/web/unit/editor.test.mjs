@@ -351,7 +351,8 @@ test("a draft that is given up while its scene is on its way does not take the s
   arrive();
   await settle();
   assert.deepEqual([editor.state.version, editor.state.drafted], [0, null]);
-  assert.deepEqual([editor.state.handles.length, editor.state.selection.length], [1, 1], "nothing is taken from the hand");
+  const { handles, selection } = editor.state;
+  assert.deepEqual([handles.length, selection.length], [1, 1], "nothing is taken from the hand");
   assert.deepEqual(cancelled, ["e000001"]);
   drag.giveUp();
 });

@@ -248,7 +248,7 @@ test("of two clicks on things the later one counts, in whatever order the servic
   editor.selecting.use("brush");
   answers[2]();
   await third;
-  assert.deepEqual(editor.state.selection[0].grow.inside, [[3, 4, 0]], "who took the brush meanwhile keeps what is there");
+  assert.deepEqual(editor.state.selection[0].grow.inside, [[3, 4, 0]], "who took the brush keeps what is there");
   assert.deepEqual(said, []);
 });
 
