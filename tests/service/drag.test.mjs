@@ -207,6 +207,11 @@ describe('a thing of a small scene', () => {
     await id('hint').waitFor();
     await page.mouse.click(...at);
     await hand.count();
+    // Within the time of a double click, but with a key in between: each click is one of its own.
+    await page.mouse.click(...at);
+    await page.keyboard.press('Escape');
+    await page.mouse.click(...at);
+    await hand.count();
     await id('thing-hold').click();
     await page.waitForFunction(() => document.activeElement.dataset.testid === 'handle-0-target');
     for (let i = 0; i < 5; ++i) await page.keyboard.press('ArrowLeft');
