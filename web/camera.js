@@ -11,9 +11,9 @@ const DEFAULT_FOV = 50;
 
 // An orbit stops this far from looking straight along the up axis, where left and right have no meaning.
 const POLE_MARGIN = (3 * Math.PI) / 180;
-// A plane whose angle to a ray has less than this sine is seen edge-on; choices, as the next two.
-const EDGE_ON = 0.05;
-const FARTHEST = 4; // Times the distance at which a drag began.
+// A plane whose angle to the ray to its middle has less than this sine is seen edge-on; choices, as the next two.
+const EDGE_ON = 0.1;
+const FARTHEST = 3; // Times the distance at which a drag began.
 const FACES_CAMERA = 0.97; // Cosine of the angle between an axis and the way to the camera: 14 degrees.
 // Nothing nearer than this fraction of the distance to the pivot is drawn over the picture.
 const NEAR = 1e-4;
@@ -98,17 +98,25 @@ export function onLine(camera, x, y, through, axis) {
   return addScaled(through, axis, along);
 }
 
-/** The point under a pixel position on the plane through `through` at right angles to the unit vector `normal`. Where
- *  the plane is seen nearly edge-on, or only its horizon is there, the point under it on the plane that faces the
- *  camera, moved along `normal` into the plane: still somewhere that a hand can follow. */
+/** The point under a pixel position on the plane through `through` at right angles to the unit vector `normal`. Towards
+ *  the horizon, where the plane runs away from under the hand, and beyond, no farther from the camera than FARTHEST. Of a
+ *  plane that is seen nearly edge-on a pixel says nothing: the point under it on the plane that faces the camera, moved
+ *  along `normal` into the plane. Which of the two depends on camera and plane alone: no drag jumps between them. */
 export function onPlane(camera, x, y, through, normal) {
   const { origin, direction } = rayThrough(camera, x, y);
+  const away = distance(through, origin);
+  const height = dot(sub(through, origin), normal);
+  if (Math.abs(height) < EDGE_ON * away) {
+    const point = onViewPlane(camera, x, y, through);
+    return addScaled(point, normal, height - dot(sub(point, origin), normal));
+  }
   const facing = dot(direction, normal);
-  const away = Math.abs(facing) < EDGE_ON ? Infinity : dot(sub(through, origin), normal) / facing;
-  // Towards the horizon the plane runs away from under the hand.
-  if (away > 0 && away < FARTHEST * distance(through, origin)) return addScaled(origin, direction, away);
-  const point = onViewPlane(camera, x, y, through);
-  return addScaled(point, normal, -dot(sub(point, through), normal));
+  const along = height / facing;
+  const farthest = FARTHEST * away;
+  if (along > 0 && along < farthest) return addScaled(origin, direction, along);
+  // As far out as that in the ray's bearing: where the ray meets the plane so far away, this is the same point.
+  const bearing = unit(addScaled(direction, normal, -facing));
+  return addScaled(addScaled(origin, normal, height), bearing, Math.sqrt(farthest ** 2 - height ** 2));
 }
 
 /** Where a dragged point goes.

@@ -56,7 +56,7 @@ export const NOTHING_OPEN = {
   estimate: null, // {key, ...}: what the service expects of a run.
   submitting: false,
   draftOnRelease: true, // A thing that was dragged is repaired as a draft as soon as it is let go.
-  draft: null, // {id} of the draft that is under way; id null until the service has it.
+  draft: null, // {id, body} of the draft that is under way: id null until the service has it, and what it was made of.
   drafted: null, // {version, base, request}: what the last draft made, of which version, of which request.
   edits: [],
   tab: "drag",
@@ -64,7 +64,7 @@ export const NOTHING_OPEN = {
 
 /** What undo brings back, all at once: a drag is meant on a version, in a mode, with settings. */
 const PLACED_KEYS = [
-  ...["version", "handles", "selection", "region", "mode", "preset", "params", "heal", "attach", "crumbs"],
+  ...["version", "handles", "selection", "region", "mode", "preset", "prompt", "params", "heal", "attach", "crumbs"],
 ];
 /** What goes from the screen when another version comes. */
 const OF_THE_VERSION = { comparing: false, compareWith: null, preview: null, problem: null, estimate: null };
@@ -106,7 +106,7 @@ export class Editor {
   #previewing = null;
   #placing = null;
   #nextId = 1;
-  #pending = null; // {body, key} of a submission whose answer never came.
+  #lost = null; // {body, key} of a submission whose answer never came.
   #abandoned = new Set(); // Ids of edits that were begun and that nobody wants to hear of.
   #opened = 0;
   #lastView = null;
@@ -139,7 +139,7 @@ export class Editor {
       ],
       () => this.#requestChanged(),
     );
-    store.watch(["handles", "selection", "version", "mode"], () => this.#draftOutdated());
+    store.watch([...PLACED_KEYS], () => this.#draftOutdated());
     store.watch(STORED_KEYS, () => this.#saveSoon());
   }
 
@@ -184,7 +184,7 @@ export class Editor {
     this.#following.clear();
     for (const abort of [this.#counting, this.#previewing, this.#placing]) abort?.abort();
     this.#previewing = null;
-    this.#pending = null;
+    this.#lost = null;
     this.#abandoned.clear();
     this.#history.clear();
     if (this.state.scene) this.#save();
@@ -318,22 +318,19 @@ export class Editor {
   }
 
   undo() {
-    this.#step((present) => this.#history.undo(present));
+    this.#step(this.#history.undo(this.#present(), this.#isThere));
   }
 
   redo() {
-    this.#step((present) => this.#history.redo(present));
+    this.#step(this.#history.redo(this.#present(), this.#isThere));
   }
 
-  /** What was placed on a version that has been deleted since is passed over. */
-  #step(next) {
-    for (;;) {
-      const placed = next(this.#present());
-      if (!placed) return;
-      if (this.state.scene && !this.state.scene.versions.some((v) => v.version === placed.version)) continue;
-      return this.#place(placed, false);
-    }
+  #step(placed) {
+    if (placed) this.#place(placed, false);
   }
+
+  /** Is what was placed on a version that has not been deleted since? */
+  #isThere = ({ version }) => !this.state.scene || this.state.scene.versions.some((v) => v.version === version);
 
   get canUndo() {
     return this.#history.canUndo;
@@ -599,34 +596,48 @@ export class Editor {
     this.store.set({ submitting: false });
   }
 
+  /** Posts an edit. One whose answer was lost goes under the same key when it is posted again: it is answered, not
+   *  queued twice. Only then: one that is given up on its way and asked for anew is another one. */
+  async #submit(request) {
+    const body = JSON.stringify(request);
+    const key = this.#lost?.body === body ? this.#lost.key : freshKey();
+    this.#lost = null;
+    try {
+      return await api.createEdit(request, key);
+    } catch (error) {
+      if (!(error.status > 0)) this.#lost = { body, key };
+      throw error;
+    }
+  }
+
   async run() {
     const request = this.request();
-    const body = JSON.stringify(request);
-    // If the answer to a submission was lost, the same one again under the same key is answered, not queued twice.
-    if (this.#pending?.body !== body) this.#pending = { body, key: freshKey() };
     this.store.set({ submitting: true });
     try {
-      const edit = await api.createEdit(request, this.#pending.key);
-      this.#pending = null;
+      const edit = await this.#submit(request);
       this.store.set({ edits: merged(this.state.edits, edit), tab: "edits", problem: null });
       this.#followAll();
     } catch (error) {
-      if (error.status > 0) this.#pending = null;
-      this.store.set({ problem: { error, key: body, from: "run" } });
+      this.store.set({ problem: { error, key: JSON.stringify(request), from: "run" } });
     }
     this.store.set({ submitting: false });
+  }
+
+  /** What a draft of the screen would be asked for with. */
+  #draftRequest() {
+    return requestOf({ ...this.state, scene: this.state.scene.id, preset: "draft" });
   }
 
   /** Repairs what is on the screen as a draft. Its result is shown when it is there. */
   async runDraft() {
     this.#giveUpDraft();
-    const draft = { id: null };
+    const request = this.#draftRequest();
+    const draft = { id: null, body: JSON.stringify(request) };
     this.store.set({ draft, drafted: null });
-    const request = { ...this.request(), preset: "draft" };
     try {
-      const edit = await api.createEdit(request, freshKey());
+      const edit = await this.#submit(request);
       if (this.state.draft !== draft) return this.#abandon(edit.id);
-      this.store.set({ draft: { id: edit.id }, edits: merged(this.state.edits, edit) });
+      this.store.set({ draft: { ...draft, id: edit.id }, edits: merged(this.state.edits, edit) });
       this.#followAll();
     } catch (error) {
       if (this.state.draft !== draft) return;
@@ -653,10 +664,10 @@ export class Editor {
     api.cancelEdit(id).catch(() => {});
   }
 
-  /** What a draft was to repair has been changed, or undone: it is no longer wanted. */
+  /** What a draft was made of has been changed, or undone: its result would throw that away. */
   #draftOutdated() {
     const { draft, drafted, version } = this.state;
-    if (draft && !changesScene(this.state)) this.#giveUpDraft();
+    if (draft && JSON.stringify(this.#draftRequest()) !== draft.body) this.#giveUpDraft();
     if (drafted && version !== drafted.version) this.store.set({ drafted: null });
   }
 
@@ -665,11 +676,14 @@ export class Editor {
     const { drafted } = this.state;
     if (!drafted) return;
     const { request, base } = drafted;
-    const { preset: _, ...rest } = request;
+    const opening = this.#opened;
     this.store.set({ submitting: true });
     try {
-      const edit = await api.createEdit({ ...rest, scene: this.state.scene.id, version: base, preset: "standard" }, freshKey());
-      this.store.set({ drafted: { ...drafted, better: edit.id }, edits: merged(this.state.edits, edit) });
+      const edit = await this.#submit({ ...request, scene: this.state.scene.id, version: base, preset: "standard" });
+      if (opening !== this.#opened) return;
+      // Undone meanwhile, it is an edit like any other.
+      if (this.state.drafted === drafted) this.store.set({ drafted: { ...drafted, better: edit.id } });
+      this.store.set({ edits: merged(this.state.edits, edit) });
       this.#followAll();
     } catch (error) {
       this.say(`It could not be run: ${error.detail ?? error.message}`, { kind: "bad" });
@@ -699,16 +713,11 @@ export class Editor {
       heal: request.heal ?? [],
       mode: request.mode ?? "move",
       preset: request.preset ?? "",
+      prompt: request.prompt ?? null,
       region: request.region ?? null,
       params: request.params ?? {},
     });
-    this.store.set({
-      selectMode: false,
-      selected: null,
-      prompt: request.prompt ?? null,
-      problem: null,
-      tab: "drag",
-    });
+    this.store.set({ selectMode: false, selected: null, problem: null, tab: "drag" });
   }
 
   // --- edits -----------------------------------------------------------------------------------------------------
@@ -769,7 +778,7 @@ export class Editor {
   }
 
   async #editEnded(edit) {
-    const { draft, drafted } = this.state;
+    const { draft } = this.state;
     const isDraft = draft?.id === edit.id;
     if (isDraft && (edit.state !== "succeeded" || edit.result_version === null)) this.store.set({ draft: null });
     if (edit.state === "failed") {
@@ -781,20 +790,24 @@ export class Editor {
     try {
       await this.reloadScene();
     } catch (error) {
+      if (isDraft && this.state.draft?.id === edit.id) this.store.set({ draft: null });
       return this.say(`The result is version ${edit.result_version}, but: ${error.message}`, { kind: "bad" });
     }
     if (opening !== this.#opened) return;
     const say = (text, action) => this.say(text, { kind: "good", seconds: 10, action });
     if (isDraft) {
+      // Given up while the scene was on its way, it does not take the screen from what is done there now.
+      if (this.state.draft?.id !== edit.id) return;
       this.#finish(edit);
       const done = { version: edit.result_version, base: edit.version, request: edit.request, edit: edit.id };
       return this.store.set({ draft: null, drafted: done });
     }
-    if (drafted?.better === edit.id && this.state.version === drafted.version) {
+    const { drafted, version, dragging } = this.state;
+    if (drafted?.better === edit.id && version === drafted.version) {
       this.showVersion(edit.result_version);
       return say(`Version ${edit.result_version} is what the draft was for. ${HOLD} to compare.`);
     }
-    if (this.state.version !== edit.version)
+    if (version !== edit.version || dragging)
       return say(`Version ${edit.result_version} is ready.`, {
         label: "Show",
         run: () => this.showVersion(edit.result_version),

@@ -15,8 +15,10 @@ export class AdaptiveSide {
     return Math.round(this.#side / 16) * 16;
   }
 
-  /** A picture of the present size took the service `ms`. */
-  record(ms) {
+  /** A picture of the present size took the service so many ms.
+   *    atOnce  of so many at a time: they share its cores, so that one comes this much more often than each takes */
+  record(took, atOnce = 1) {
+    const ms = took / Math.max(1, atOnce);
     const { min, max, goal } = this.limits;
     // Cost grows with the area, in part: half of the correction, and no more than a third at once, so that one slow
     // answer (a scene just being loaded) does not spoil the rest.
@@ -32,7 +34,8 @@ export function serverTime(header) {
 }
 
 /** Requests pictures, a few at a time; of the requests made meanwhile, only the latest is carried out next. An answer
- *  that comes after that of a later request is dropped: an older picture never replaces a newer one.
+ *  that comes after that of a later request is dropped: an older picture never replaces a newer one. A failure is told
+ *  only of the latest request; pictures of earlier ones are shown still.
  *    load(job, signal)        returns the picture
  *    onPicture(picture, job)  is called when it has arrived
  *    onError(error, job)      is called when loading failed, but not for a picture that was given up
@@ -43,7 +46,7 @@ export class FrameQueue {
   #running = []; // In the order in which they were requested.
   #next = null;
   #count = 0;
-  #latest = 0; // Number of the latest request that was answered.
+  #latest = 0; // Number of the latest request whose picture was shown.
 
   constructor({ load, onPicture, onError, atOnce = 1 }) {
     Object.assign(this, { load, onPicture, onError, atOnce });
@@ -51,6 +54,11 @@ export class FrameQueue {
 
   get busy() {
     return this.#running.length > 0;
+  }
+
+  /** How many are under way; for load(), this one among them. */
+  get underWay() {
+    return this.#running.length;
   }
 
   request(job) {
@@ -78,17 +86,20 @@ export class FrameQueue {
   async #start(job) {
     const one = { job, abort: new AbortController(), number: ++this.#count };
     this.#running.push(one);
-    let outcome;
+    let picture = null;
+    let failure = null;
     try {
-      const picture = await this.load(job, one.abort.signal);
-      outcome = () => this.onPicture(picture, job);
+      picture = await this.load(job, one.abort.signal);
     } catch (error) {
-      outcome = () => this.onError(error, job);
+      failure = { error };
     }
     this.#running = this.#running.filter((other) => other !== one);
-    if (!one.abort.signal.aborted && one.number > this.#latest) {
+    const outdated = one.abort.signal.aborted || one.number < this.#latest;
+    if (!outdated && !failure) {
       this.#latest = one.number;
-      outcome();
+      this.onPicture(picture, job);
+    } else if (!outdated && !this.#running.some(({ number }) => number > one.number)) {
+      this.onError(failure.error, job);
     }
     // The call may itself have led to a new request, which is then under way.
     const next = this.#next;

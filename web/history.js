@@ -17,17 +17,14 @@ export class History {
     this.#future = [];
   }
 
-  /** The value before `present`; undefined if there is none. */
-  undo(present) {
-    if (this.#past.length === 0) return undefined;
-    this.#future.push(present);
-    return this.#past.pop();
+  /** The value before `present`; undefined if there is none.
+   *    isUsable  whether a value can still be gone back to; those that cannot are forgotten */
+  undo(present, isUsable = () => true) {
+    return step(this.#past, this.#future, present, isUsable);
   }
 
-  redo(present) {
-    if (this.#future.length === 0) return undefined;
-    this.#past.push(present);
-    return this.#future.pop();
+  redo(present, isUsable = () => true) {
+    return step(this.#future, this.#past, present, isUsable);
   }
 
   clear() {
@@ -42,4 +39,15 @@ export class History {
   get canRedo() {
     return this.#future.length > 0;
   }
+}
+
+/** The latest usable value of a list, for which `present` goes to the other one. */
+function step(from, to, present, isUsable) {
+  while (from.length > 0) {
+    const value = from.pop();
+    if (!isUsable(value)) continue;
+    to.push(present);
+    return value;
+  }
+  return undefined;
 }

@@ -140,6 +140,12 @@ export function buildRequestPanel(editor) {
     title: "Preview again whenever a handle has been moved",
     changed: (on) => store.set({ autoPreview: on }),
   });
+  const repair = toggle({
+    label: "Repair by itself",
+    testid: "auto-repair",
+    title: "A thing that was dragged is repaired as a draft as soon as it is let go; each draft is a version",
+    changed: (on) => store.set({ draftOnRelease: on }),
+  });
   const preview = h(
     "button",
     { type: "button", testid: "preview", title: "Preview (P)", onclick: () => editor.preview() },
@@ -163,7 +169,7 @@ export function buildRequestPanel(editor) {
     h("div", { class: "field" }, h("span", { class: "name" }, "Mode"), mode.element),
     settings,
     paramProblem,
-    h("div", { class: "row between" }, files, auto.element),
+    h("div", { class: "row between" }, files, h("div", {}, auto.element, repair.element)),
     importProblem,
   );
   const footer = h(
@@ -184,6 +190,7 @@ export function buildRequestPanel(editor) {
       "selection",
       "params",
       "autoPreview",
+      "draftOnRelease",
       "info",
       "handles",
       "scene",
@@ -204,6 +211,7 @@ export function buildRequestPanel(editor) {
       crumbs.update(state.crumbs === "move" ? "" : (state.crumbs ?? ""));
       params.update(state.info, state.params, state.preset);
       auto.update(state.autoPreview);
+      repair.update(state.draftOnRelease);
       const others = Object.keys(state.params).filter((name) => !params.shows(name));
       if (state.prompt) others.push(`prompt “${state.prompt}”`);
       also.hidden = others.length === 0;

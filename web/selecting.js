@@ -38,6 +38,7 @@ const PASSING = [0, 429, 503]; // The service is full, restarting, or loads the 
 export class Selecting {
   #queue;
   #again = null;
+  #proposing = null; // Ends the wait for where a thing was clicked.
   #lost = null; // Id of a selection that had to be posted again, until it has been seen.
 
   /**   place(selection, more)  puts a selection on the screen, and more of what is placed; can be undone
@@ -130,23 +131,37 @@ export class Selecting {
 
   /** What the version shows there, as the service picks it; null where it does not say, or nobody wants to know any
    *  more. */
-  async #pick(camera, x, y) {
+  async #pick(camera, x, y, signal = undefined) {
     const { scene, version } = this.#state;
     let picked;
     try {
-      picked = await api.pick(scene.id, version, { camera: onTheWire(camera), x, y });
+      picked = await api.pick(scene.id, version, { camera: onTheWire(camera), x, y }, signal);
     } catch (error) {
-      this.say(`Nothing could be selected: ${error.message}`, { kind: "bad" });
+      if (!api.wasGivenUp(error)) this.say(`Nothing could be selected: ${error.message}`, { kind: "bad" });
       return null;
     }
     const { scene: present, version: shown } = this.#state;
+    if (signal?.aborted) return null;
     return present?.id === scene.id && shown === version ? picked : null;
   }
 
-  /** A click that takes the whole thing under it, in place of what was selected; where nothing is, lets go. */
+  /** A click that takes the whole thing under it, in place of one that was; where nothing is, lets go. What somebody
+   *  has made by hand is not lost to a click that went astray: it stays, and that is said. */
   async propose(camera, x, y) {
-    const picked = await this.#pick(camera, x, y);
-    if (!picked) return;
+    this.#proposing?.abort();
+    const abort = (this.#proposing = new AbortController());
+    const picked = await this.#pick(camera, x, y, abort.signal);
+    const { thingMode, selectMode, dragging, selection, handles } = this.#state;
+    // Somebody who has taken something in hand meanwhile has it there.
+    if (!picked || !thingMode || selectMode || dragging) return;
+    // Of a thing that one click took, the one handle came with dragging it.
+    const came = proposalOf(selection) && handles.every(({ target }) => target) ? 1 : 0;
+    const clicked = came || selection.length === 0;
+    if (!clicked || handles.length > came)
+      return this.say("What you have placed stays.", {
+        seconds: 6,
+        action: { label: "Let go of it", run: () => this.place([], { handles: [] }) },
+      });
     this.store.set({ tab: "drag", nextThing: false });
     this.place(picked.hit ? thingAt(picked.point) : [], { handles: [] });
   }

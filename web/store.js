@@ -47,12 +47,15 @@ const LETTER_KEYS = "splatdrag.letter_keys";
 /** What is kept for each scene in the browser's storage, by id. A record of another scene that had the same id (of
  *  another service at this address) is not used: `created` tells them apart. */
 export class SceneMemory {
+  #letterKeys = null; // As set on this page: where storage is forbidden, all that is known.
+
   constructor(storage) {
     this.storage = storage;
   }
 
   /** Whether single letters are keys for commands. */
   get letterKeys() {
+    if (this.#letterKeys !== null) return this.#letterKeys;
     try {
       return this.storage.getItem(LETTER_KEYS) !== "off";
     } catch {
@@ -61,6 +64,7 @@ export class SceneMemory {
   }
 
   set letterKeys(on) {
+    this.#letterKeys = on;
     try {
       this.storage.setItem(LETTER_KEYS, on ? "on" : "off");
     } catch {

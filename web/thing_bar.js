@@ -16,7 +16,9 @@ export function buildThingBar(editor) {
   const more = button("+ More", "thing-more", "Up to the next border beyond (.)", () => selecting.widen(1));
   const hold = button("By keys", "thing-hold", "A handle to move by arrow keys, or by numbers in the panel", () => {
     editor.holdThing();
-    requestAnimationFrame(() => document.querySelector("[data-testid=handle-0-target]")?.focus());
+    const { handles, selected } = store.state;
+    const index = handles.findIndex((handle) => handle.id === selected);
+    requestAnimationFrame(() => document.querySelector(`[data-testid=handle-${index}-target]`)?.focus());
   });
   const remove = button("Remove", "thing-remove", "Take it away for good, and complete what it hid", () =>
     editor.removeThing(),
@@ -24,7 +26,7 @@ export function buildThingBar(editor) {
   const repair = button("Repair", "thing-repair", "Run it as a draft", () => editor.runDraft(), {
     class: "small primary",
   });
-  const drop = button("Let go", "thing-drop", "Nothing is taken any more (Esc)", () => editor.letGo());
+  const drop = button("Let go", "thing-drop", "", () => editor.letGo());
   const cancel = button("Stop", "thing-cancel", "Give up the repair; it stays where you dragged it", () =>
     editor.cancelDraft(),
   );
@@ -64,6 +66,9 @@ export function buildThingBar(editor) {
       ])
         element.hidden = !shows;
       less.disabled = selectionWaits || !borders.less;
+      remove.disabled = selectionWaits || !(answer?.count > 0);
+      // With a handle, Esc leaves the handle only.
+      attrs(drop, { title: `Nothing is taken any more${state.handles.length ? "" : " (Esc)"}` });
       more.disabled = selectionWaits || !borders.more;
       better.disabled = state.submitting;
       text(line, lineOf(state));
@@ -86,7 +91,7 @@ function lineOf({ selection, selectionAnswer: answer, selectionWaits, draft, dra
   if (selection.length === 0) {
     if (!drafted) return "";
     const better = edits.find((e) => e.id === drafted.better);
-    if (better) return better.state === "succeeded" ? "Done well." : `Running it well: ${statusLine(better)}`;
+    if (better) return `Running it well: ${statusLine(better)}`;
     const edit = edits.find((e) => e.id === drafted.edit);
     const seconds = edit?.started && edit?.ended ? (new Date(edit.ended) - new Date(edit.started)) / 1000 : null;
     return `Done, as a draft${seconds === null ? "" : ` in ${duration(seconds)}`}.`;

@@ -35,6 +35,7 @@ const THING_PX = 14; // A thing is taken hold of within this of its middle, howe
 const SKETCH_PX = 2; // A line that is drawn has a corner this often at most.
 const MAX_CACHED_PICTURES = 6; // Enough to go back and forth between two versions and three layers.
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }; // Right, down.
+const CONTROLS = "button, a, input, select"; // What lies on the picture and is no part of it.
 const THUMBNAIL = { width: 320, height: 200 };
 
 /** How much a turn of the wheel multiplies by. */
@@ -176,6 +177,7 @@ export class Viewer {
 
   async #load(job, signal) {
     const requestedAt = performance.now();
+    const before = this.#queue.underWay;
     const { blob, timing } = await api.render(
       job.scene,
       job.version,
@@ -188,8 +190,10 @@ export class Viewer {
       },
       signal,
     );
+    // As many as shared the service with this one, on the way from its first moment to its last.
+    const atOnce = (before + this.#queue.underWay) / 2;
     const picture = await createImageBitmap(blob);
-    if (!job.large) this.#adaptive.record(serverTime(timing) ?? performance.now() - requestedAt);
+    if (!job.large) this.#adaptive.record(serverTime(timing) ?? performance.now() - requestedAt, atOnce);
     return { picture, ms: performance.now() - requestedAt };
   }
 
@@ -338,11 +342,16 @@ export class Viewer {
     on("contextmenu", (event) => event.preventDefault());
     on("wheel", (event) => this.#wheel(event), { passive: false });
     on("dblclick", (event) => {
-      if (event.target.closest("button, a, input, select")) return;
+      if (event.target.closest(CONTROLS)) return;
       this.#pointerAt = this.#place(event);
       this.focusHere();
     });
     on("keydown", (event) => this.#key(event));
+    // A key or a button between two clicks makes the second one a click of its own, however quick the hand is.
+    const between = ({ type, target }) => {
+      if (type === "keydown" || target.closest?.(CONTROLS)) this.#clicked.at = -Infinity;
+    };
+    for (const name of ["keydown", "pointerdown"]) document.addEventListener(name, between, true);
   }
 
   #place(event) {
@@ -351,7 +360,7 @@ export class Viewer {
   }
 
   #down(event) {
-    if (event.target.closest("button, a, input, select") || !this.camera) return;
+    if (event.target.closest(CONTROLS) || !this.camera) return;
     this.#view.focus({ preventScroll: true });
     this.#view.classList.remove("by-keyboard");
     this.#pointers.set(event.pointerId, this.#place(event));

@@ -180,6 +180,27 @@ test("a level drag stays at its height, follows the pointer, and does not run aw
   }
 });
 
+test("a level drag never jumps and never turns back, from the lowest row of the picture to the highest", () => {
+  const up = [0, -1, 0];
+  const from = [0, 0, 0];
+  for (const height of [0, 0.05, 0.29, 0.31, 0.6, 1.5, 4]) {
+    const above = { ...camera, eye: [0, -height, -3], target: from, up, width: 600, height: 400 };
+    let last = null;
+    for (let y = 399.5; y > 0; --y) {
+      const moved = dragged(above, from, 300, y, "level", { up });
+      near(moved[1], 0, 1e-9);
+      const { eye } = above;
+      assert.ok(distance(moved, eye) < 3.0001 * distance(from, eye), `${moved} at ${y}, ${height} above`);
+      if (last) {
+        assert.ok(moved[2] >= last[2] - 1e-9, `back to ${moved} from ${last} at ${y}, ${height} above`);
+        const most = 0.25 * distance(from, eye);
+        assert.ok(distance(moved, last) < most, `a step to ${moved} from ${last} at ${y}, ${height} above`);
+      }
+      last = moved;
+    }
+  }
+});
+
 test("zooming keeps what is under the pointer where it is", () => {
   const under = onViewPlane(camera, 500, 90, camera.target);
   const nearer = zoomedAt(camera, 500, 90, 0.4, 1e-3);

@@ -219,6 +219,14 @@ test("undo passes over what was placed on a version that is gone", async () => {
   editor.undo();
   assert.equal(editor.state.version, 0);
   assert.equal(editor.canUndo, false);
+  assert.equal(editor.canRedo, false, "there is nothing to do again either");
+});
+
+test("undo takes the prompt of an imported request back with the request", () => {
+  editor.load({ handles: [{ source: [0, 0, 0] }], prompt: "a red ball" });
+  assert.equal(editor.request().prompt, "a red ball");
+  editor.undo();
+  assert.equal(editor.request().prompt, undefined);
 });
 
 test("undo covers mode, preset and parameters as it covers handles", () => {
@@ -315,6 +323,107 @@ test("a draft whose request is still on its way when it is given up is cancelled
   await settle();
   assert.equal(cancelled.length, 1);
   assert.deepEqual([editor.state.draft, editor.state.edits], [null, []]);
+});
+
+/** From now on edits can be cancelled. Returns the ids of those that were. */
+function cancels(...ids) {
+  const cancelled = [];
+  for (const id of ids)
+    service[`POST /v1/edits/${id}/cancel`] = () => (cancelled.push(id), edit({ id, state: "cancel_requested" }));
+  return cancelled;
+}
+
+test("a draft that is given up while its scene is on its way does not take the screen", async () => {
+  const cancelled = cancels("e000001");
+  service["POST /v1/edits"] = () => edit();
+  await take();
+  dragBy(30);
+  await settle();
+  versionComes();
+  const fresh = service["GET /v1/scenes/s000001"];
+  let arrive;
+  service["GET /v1/scenes/s000001"] = () => new Promise((resolve) => (arrive = () => resolve(fresh())));
+  streams[0].send(edit({ state: "succeeded", progress: 1, result_version: 1 }));
+  await settle();
+  const drag = editor.dragThing(CAMERA, { x: 260, y: 150 });
+  drag.move(290, 150);
+  await settle();
+  arrive();
+  await settle();
+  assert.deepEqual([editor.state.version, editor.state.drafted], [0, null]);
+  const { handles, selection } = editor.state;
+  assert.deepEqual([handles.length, selection.length], [1, 1], "nothing is taken from the hand");
+  assert.deepEqual(cancelled, ["e000001"]);
+  drag.giveUp();
+});
+
+for (const [what, change] of [
+  ["a brush stroke", () => editor.selecting.draw("brush", CAMERA, [[1, 1]])],
+  ["a number in the panel", () => editor.change(editor.state.handles[0].id, { target: [2, 0, 0] })],
+  ["a parameter", () => editor.settle({ params: { views: 4 } })],
+  ["a box", () => editor.settle({ region: { center: [0, 0, 0], size: [1, 1, 1] } })],
+  ["another version", () => editor.showVersion(1)],
+])
+  test(`a draft is given up for ${what}: its result would throw that away`, async () => {
+    const cancelled = cancels("e000001");
+    service["POST /v1/edits"] = () => edit();
+    await take();
+    versionComes();
+    await editor.reloadScene();
+    dragBy(30);
+    await settle();
+    change();
+    await settle();
+    assert.deepEqual([editor.state.draft, cancelled], [null, ["e000001"]]);
+  });
+
+test("a draft goes on whatever is the preset: it has its own", async () => {
+  service["POST /v1/edits"] = () => edit();
+  await take();
+  dragBy(30);
+  await settle();
+  editor.settle({ preset: "standard" });
+  await settle();
+  assert.equal(editor.state.draft.id, "e000001");
+});
+
+test("a draft whose answer was lost is asked for again under its key", async () => {
+  const keys = [];
+  service["POST /v1/edits"] = (body, headers) => (
+    keys.push(headers["Idempotency-Key"]), keys.length === 1 ? new TypeError("lost") : edit()
+  );
+  await take();
+  dragBy(30);
+  await settle();
+  assert.deepEqual([editor.state.draft, editor.state.problem.error.code], [null, "unreachable"]);
+  await editor.runDraft();
+  assert.equal(editor.state.draft.id, "e000001");
+  assert.equal(keys[0], keys[1]);
+  await editor.runDraft();
+  assert.notEqual(keys[1], keys[2]);
+});
+
+test("a result that is undone while it is asked to be run well stays undone", async () => {
+  let answer;
+  service["POST /v1/edits"] = () => edit();
+  await take();
+  dragBy(30);
+  await settle();
+  versionComes();
+  streams[0].send(edit({ state: "succeeded", progress: 1, result_version: 1 }));
+  await settle();
+  service["POST /v1/edits"] = () => new Promise((resolve) => (answer = () => resolve(edit({ id: "e000002" }))));
+  const asked = editor.runBetter();
+  await settle();
+  editor.undo();
+  await settle();
+  answer();
+  await asked;
+  assert.equal(editor.state.drafted, null);
+  assert.deepEqual(
+    editor.state.edits.map((e) => e.id),
+    ["e000002", "e000001"],
+  );
 });
 
 test("a thing is removed by one press, and what is taken next is to be moved again", async () => {

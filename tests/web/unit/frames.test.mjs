@@ -113,6 +113,28 @@ test("several are on their way at once, and an older one never replaces a newer 
   assert.equal(queue.busy, false);
 });
 
+test("a failed request drops no picture of an earlier one, and is told of only if it is the latest", async () => {
+  const { queue, loads, shown, failed } = byHand(3);
+  for (const key of ["a", "b", "c"]) queue.request({ key });
+  assert.equal(queue.underWay, 3);
+  loads[1].reject(new Error("no"));
+  await settle();
+  assert.deepEqual(failed, [], "a later one is under way");
+  loads[0].resolve("A");
+  await settle();
+  assert.deepEqual(shown, [["A", "a"]]);
+  loads[2].reject(new Error("never"));
+  await settle();
+  assert.deepEqual(failed, [["never", "c"]]);
+  for (const key of ["d", "e"]) queue.request({ key });
+  loads[4].resolve("E");
+  await settle();
+  loads[3].reject(new Error("late"));
+  await settle();
+  assert.equal(failed.length, 1, "a newer one is shown");
+  assert.equal(queue.underWay, 0);
+});
+
 test("a large picture goes alone", async () => {
   const { queue, loads } = byHand(3);
   queue.request({ key: "a" });
@@ -142,6 +164,13 @@ test("slow answers make moving pictures smaller, quick ones larger, within limit
   assert.equal(side.side, 160);
   for (let i = 0; i < 50; ++i) side.record(1);
   assert.equal(side.side, 960);
+});
+
+test("pictures that share the service may each take as much longer", () => {
+  const [alone, shared] = [0, 1].map(() => new AdaptiveSide({ start: 400, min: 160, max: 960, goal: 90 }));
+  alone.record(90);
+  shared.record(270, 3);
+  assert.deepEqual([alone.side, shared.side], [400, 400]);
 });
 
 test("the size settles where pictures take as long as they may", () => {

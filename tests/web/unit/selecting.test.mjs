@@ -232,3 +232,44 @@ test("while selecting, the version itself is on the screen, and no preview is ma
   editor.selecting.toggle();
   assert.equal(editor.state.selectMode, false);
 });
+
+test("of two clicks on things the later one counts, in whatever order the service answers", async () => {
+  const answers = [];
+  service["POST /v1/scenes/s000001/versions/0/pick"] = (body) =>
+    new Promise((resolve) => answers.push(() => resolve({ hit: true, point: [body.x, body.y, 0] })));
+  const first = editor.selecting.propose(CAMERA, 1, 2);
+  const second = editor.selecting.propose(CAMERA, 3, 4);
+  answers[1]();
+  await second;
+  answers[0]();
+  await first;
+  assert.deepEqual(editor.state.selection, [{ grow: { inside: [[3, 4, 0]], whole: true } }]);
+  const third = editor.selecting.propose(CAMERA, 5, 6);
+  editor.selecting.use("brush");
+  answers[2]();
+  await third;
+  assert.deepEqual(editor.state.selection[0].grow.inside, [[3, 4, 0]], "who took the brush keeps what is there");
+  assert.deepEqual(said, []);
+});
+
+test("a click that went astray takes nothing that was placed by hand", async () => {
+  const [miss, hit] = [() => ({ hit: false, point: null }), service["POST /v1/scenes/s000001/versions/0/pick"]];
+  const clickAt = (answers) => {
+    service["POST /v1/scenes/s000001/versions/0/pick"] = answers;
+    return editor.selecting.propose(CAMERA, 7, 8);
+  };
+  await clickAt(hit);
+  draw("brush", [[1, 1]]);
+  for (const answers of [miss, hit]) await clickAt(answers);
+  assert.equal(editor.state.selection.length, 2);
+  assert.equal(said.length, 2);
+  editor.selecting.clear();
+  await editor.place(CAMERA, 200, 150);
+  await clickAt(miss);
+  assert.equal(editor.state.handles.length, 1);
+  editor.letGo();
+  await clickAt(hit);
+  await clickAt(miss);
+  assert.deepEqual(editor.state.selection, [], "what one click took, another lets go");
+  assert.equal(said.length, 3);
+});

@@ -87,6 +87,17 @@ test("undo and redo walk through what was there", () => {
   assert.equal(history.canRedo, false, "a new change forgets what was undone");
 });
 
+test("what cannot be gone back to is forgotten, and leaves nothing to do again", () => {
+  const history = new History();
+  history.note("gone");
+  const isUsable = (value) => value !== "gone";
+  assert.equal(history.undo("here", isUsable), undefined);
+  assert.deepEqual([history.canUndo, history.canRedo], [false, false]);
+  for (const value of ["first", "gone"]) history.note(value);
+  assert.equal(history.undo("here", isUsable), "first");
+  assert.equal(history.redo("first", isUsable), "here");
+});
+
 test("history forgets what is too long ago", () => {
   const history = new History(2);
   for (const value of [1, 2, 3]) history.note(value);
@@ -103,6 +114,9 @@ test("single letters are keys until they are turned off, which outlives a reload
   assert.equal(new SceneMemory(storage).letterKeys, false);
   memory.letterKeys = true;
   assert.equal(new SceneMemory(storage).letterKeys, true);
+  const forgetful = new SceneMemory({ getItem: () => null, setItem: () => {} });
+  forgetful.letterKeys = false;
+  assert.equal(forgetful.letterKeys, false, "as long as the page is open, where nothing may be stored");
 });
 
 test("what was uploaded has the name that the user knows", () => {
