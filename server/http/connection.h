@@ -73,8 +73,8 @@ class Connection {
 
   /// An answer begins: its rate is measured from here.
   void begin_answer();
-  /// The client takes it too slowly: nothing more is sent.
-  void give_answer_up() { broken_ = true; }
+  /// The client takes it too slowly: nothing more is sent, and what was posted is held no longer.
+  void give_answer_up();
   /// Bytes that follow those before. They are sent as far as the client takes them at once; the rest waits for
   /// send_now() or write().
   ///   returns  false: the client has gone

@@ -400,6 +400,7 @@ void Lobby::end_wait(Guests::iterator guest) {
       return hooks_.ready(std::move(visit));
     case Next::send_on:
       visit->connection.give_answer_up();
+      visit->unsent.set(unsent_bytes_, 0);  // it waits for a thread with nothing: nobody is cut for it
       return hooks_.ready(std::move(visit));
     default:
       return;
