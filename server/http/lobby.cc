@@ -265,7 +265,7 @@ void Lobby::go_on_with(std::unique_ptr<Visit> visit, const HeadText& text) {
 
 void Lobby::let_in(std::unique_ptr<Visit> visit) {
   Connection& connection = visit->connection;
-  visit->unsent.set(unsent_bytes_, connection.bytes_unsent());
+  visit->unsent.set(unsent_bytes_, connection.bytes_held());
   switch (visit->next) {
     case Next::say_goodbye:
       connection.end_sending();
