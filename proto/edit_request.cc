@@ -1,6 +1,9 @@
 #include "proto/edit_request.h"
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -47,12 +50,20 @@ Region read_region(const JsonField& field, std::string_view size_name) {
   return region;
 }
 
-constexpr auto request_fields = {"scene",     "version", "mode",   "preset", "prompt", "handles",
-                                 "selection", "heal",    "attach", "crumbs", "region", "params"};
+constexpr std::array<std::string_view, 12> request_fields{"scene",  "version", "mode",      "preset",
+                                                          "prompt", "handles", "selection", "heal",
+                                                          "attach", "crumbs",  "region",    "params"};
+constexpr std::array<std::string_view, 6> config_fields{"start",   "direction",  "voxel_size",
+                                                        "cluster", "local_mask", "mode"};
 
-EditRequest read_edit_request(const JsonField& field) {
-  const Members members(field, {"scene", "version", "mode", "preset", "prompt", "handles", "selection", "heal",
-                                "attach", "crumbs", "region", "params"});
+/// What a request is read for.
+enum class Wanted {
+  edit,      ///< It says what moves, or removes what it selects.
+  selection  ///< That alone: nothing has to move.
+};
+
+EditRequest read_request(const JsonField& field, Wanted wanted) {
+  const Members members(field, request_fields);
   EditRequest request;
   if (const auto f = members.optional("scene")) request.scene = f->text();
   if (const auto f = members.optional("version")) request.version = f->whole(0, no_limit);
@@ -61,7 +72,7 @@ EditRequest read_edit_request(const JsonField& field) {
   if (const auto f = members.optional("prompt"); f && !f->is_null()) request.prompt = f->text();
   const auto selection = members.optional("selection");
   // What is selected can be removed without a word on where it is.
-  const bool may_lack_handles = request.mode == Mode::remove && selection.has_value();
+  const bool may_lack_handles = wanted == Wanted::selection || (request.mode == Mode::remove && selection.has_value());
   if (const auto handles = may_lack_handles ? members.optional("handles") : members.required("handles"))
     for (const JsonField& handle : handles->elements(may_lack_handles ? 0 : 1, max_handles, "handles"))
       request.handles.push_back(read_handle(handle, selection.has_value()));
@@ -74,13 +85,15 @@ EditRequest read_edit_request(const JsonField& field) {
   return request;
 }
 
+EditRequest read_edit_request(const JsonField& field) { return read_request(field, Wanted::edit); }
+
 /// One element per handle, or a refusal that says how many there are.
 std::vector<JsonField> per_handle(const JsonField& field, std::size_t handles, const std::string& things) {
   return field.elements(handles, handles, things + ", as many as start has");
 }
 
 EditRequest read_released_config(const JsonField& field) {
-  const Members members(field, {"start", "direction", "voxel_size", "cluster", "local_mask", "mode"});
+  const Members members(field, config_fields);
   EditRequest request;
   if (const auto start = members.required("start"))
     for (const JsonField& source : start->elements(1, max_handles, "points"))
@@ -120,10 +133,73 @@ bool is_released_config(const json& document) {
 
 bool is_edit_request(const json& document) { return document.contains("handles") || document.contains("selection"); }
 
-/// Whether it has a field of an edit request, without what makes it one: a word is misspelt, most likely.
-bool is_nearly_an_edit_request(const json& document) {
-  return std::any_of(request_fields.begin(), request_fields.end(),
-                     [&](const char* field) { return document.contains(field); });
+template <std::size_t N>
+bool is_one_of(std::string_view name, const std::array<std::string_view, N>& names) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+template <std::size_t N>
+std::ptrdiff_t fields_in_common(const json& document, const std::array<std::string_view, N>& names) {
+  return std::count_if(names.begin(), names.end(), [&](std::string_view name) { return document.contains(name); });
+}
+
+/// Letters to put in, leave out or exchange that make one of the other (Levenshtein 1966). Names beyond any field's
+/// length are not looked at: they are nothing misspelt, and a file may have a million letters.
+std::size_t letters_between(std::string_view a, std::string_view b) {
+  constexpr std::size_t longest = 32;
+  if (a.size() > longest || b.size() > longest) return std::max(a.size(), b.size());
+  std::array<std::size_t, longest + 1> row{};
+  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = std::exchange(row[0], i);
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t exchanged = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = std::exchange(row[j], std::min({exchanged, row[j] + 1, row[j - 1] + 1}));
+    }
+  }
+  return row[b.size()];
+}
+
+template <std::size_t N>
+std::size_t letters_to_nearest(std::string_view name, const std::array<std::string_view, N>& names) {
+  std::size_t least = std::numeric_limits<std::size_t>::max();
+  for (const std::string_view known : names) least = std::min(least, letters_between(name, known));
+  return least;
+}
+
+template <std::size_t N>
+std::string joined(const std::array<std::string_view, N>& names) {
+  std::string text;
+  for (const std::string_view name : names) text += (text.empty() ? "" : ", ") + std::string(name);
+  return text;
+}
+
+/// What a document is most likely meant to be that has nothing by which forms are told apart.
+struct Guess {
+  std::optional<std::string> misspelt;  ///< The field of neither form that is nearest to one.
+  bool is_request = false, is_released = false;
+};
+
+Guess guess_at(const json& document) {
+  Guess guess;
+  if (!document.is_object()) return guess;
+  const auto of_request = fields_in_common(document, request_fields),
+             of_config = fields_in_common(document, config_fields);
+  std::size_t least = std::numeric_limits<std::size_t>::max();
+  bool is_nearer_to_config = false;
+  for (const auto& member : document.items()) {
+    if (is_one_of(member.key(), request_fields) || is_one_of(member.key(), config_fields)) continue;
+    const std::size_t to_request = letters_to_nearest(member.key(), request_fields),
+                      to_config = letters_to_nearest(member.key(), config_fields);
+    if (guess.misspelt && std::min(to_request, to_config) >= least) continue;
+    guess.misspelt = member.key();
+    least = std::min(to_request, to_config);
+    is_nearer_to_config = to_config < to_request;
+  }
+  if (of_request == 0 && of_config == 0) return guess;
+  guess.is_released = of_config > of_request || (of_config == of_request && is_nearer_to_config);
+  guess.is_request = !guess.is_released;
+  return guess;
 }
 
 Result<RequestFile> decode_either(const json& document, const std::string& name) {
@@ -133,21 +209,38 @@ Result<RequestFile> decode_either(const json& document, const std::string& name)
   };
   if (is_edit_request(document)) return in_file(decode(document, name, read_edit_request), false);
   if (is_released_config(document)) return in_file(decode(document, name, read_released_config), true);
-  if (is_nearly_an_edit_request(document)) return in_file(decode(document, name, read_edit_request), false);
-  std::string where = name;
-  if (document.is_object() && !document.empty())
-    where += (name.empty() ? "" : ".") + printable(document.begin().key());  // nothing else says what was meant
+  const Guess guess = guess_at(document);
+  const std::string where =
+      guess.misspelt ? name + (name.empty() ? "" : ".") + printable(*guess.misspelt) : name;  // says what was meant
+  if (guess.misspelt && (guess.is_request || guess.is_released))
+    return fail(ErrorCode::invalid_argument,
+                "unknown field; there are " + (guess.is_released ? joined(config_fields) : joined(request_fields)),
+                where);
+  // All its fields are known: what is missing is said.
+  if (guess.is_request) return in_file(decode(document, name, read_edit_request), false);
+  if (guess.is_released) return in_file(decode(document, name, read_released_config), true);
   return fail(ErrorCode::invalid_argument,
               "expected an edit request (with handles, or a selection to remove) or a 3DGS-Drag configuration (with "
-              "start, direction and "
-              "voxel_size)",
+              "start, direction and voxel_size)",
               where);
+}
+
+bool is_request(const json& document) { return is_edit_request(document) || is_released_config(document); }
+
+/// Whether the document is a request, if a wrong one, though members of it are objects: it has a word that one field
+/// says, and no member is a request itself, beside which such a word would be a comment.
+bool is_one_that_lacks_something(const json& document) {
+  constexpr std::array words{"mode", "preset", "attach", "crumbs", "version"};
+  if (!document.is_object()) return false;
+  return std::any_of(words.begin(), words.end(),
+                     [&](const char* word) { return document.contains(word) && !document[word].is_object(); }) &&
+         std::none_of(document.begin(), document.end(), is_request);
 }
 
 /// The requests of a file of several, by name; none if the document is something else.
 std::vector<std::string> request_names(const json& document) {
   std::vector<std::string> names;
-  if (!document.is_object()) return names;
+  if (!document.is_object() || is_request(document) || is_one_that_lacks_something(document)) return names;
   for (const auto& member : document.items()) {
     if (member.value().is_object())
       names.push_back(member.key());
@@ -163,6 +256,26 @@ std::string listed(const std::vector<std::string>& names) {
   for (std::size_t i = 0; i < std::min(names.size(), max_listed); ++i)
     text += (i == 0 ? "" : ", ") + printable(names[i]);
   return names.size() > max_listed ? text + ", ..." : text;
+}
+
+/// Of a file, the request that is meant.
+struct Chosen {
+  const json* request;
+  std::string name;  ///< Among several; empty if the file is one.
+};
+
+Result<Chosen> choose(const json& document, std::string_view name) {
+  const auto names = request_names(document);
+  if (names.empty()) {
+    if (name.empty() || !is_request(document)) return Chosen{&document, ""};
+    return fail(ErrorCode::invalid_argument, "the file holds one request, which has no name: leave the name out");
+  }
+  if (name.empty() && names.size() > 1)
+    return fail(ErrorCode::invalid_argument, "the file holds several requests; choose one by name: " + listed(names));
+  const std::string chosen(name.empty() ? names.front() : name);
+  if (std::find(names.begin(), names.end(), chosen) == names.end())
+    return fail(ErrorCode::not_found, "there is no request \"" + printable(chosen) + "\"; there are: " + listed(names));
+  return Chosen{&document[chosen], printable(chosen)};
 }
 
 ordered_json encode(const Handle& handle) {
@@ -192,35 +305,34 @@ Result<EditRequest> parse_released_config(std::string_view text, const JsonLimit
 Result<RequestFile> parse_request_file(std::string_view text, std::string_view name, const JsonLimits& limits) {
   const auto document = parse_document(text, limits);
   if (!document) return propagate(document);
-  if (is_edit_request(*document) || is_released_config(*document)) {
-    if (name.empty()) return decode_either(*document, "");
-    return fail(ErrorCode::invalid_argument, "the file holds one request, which has no name: leave the name out");
-  }
-  const auto names = request_names(*document);
-  if (names.empty()) return decode_either(*document, "");
-  if (name.empty() && names.size() > 1)
-    return fail(ErrorCode::invalid_argument, "the file holds several requests; choose one by name: " + listed(names));
-  const std::string chosen(name.empty() ? names.front() : name);
-  if (std::find(names.begin(), names.end(), chosen) == names.end())
-    return fail(ErrorCode::not_found, "there is no request \"" + printable(chosen) + "\"; there are: " + listed(names));
-  return decode_either((*document)[chosen], printable(chosen));
+  const auto chosen = choose(*document, name);
+  if (!chosen) return propagate(chosen);
+  return decode_either(*chosen->request, chosen->name);
 }
 
-Result<Selection> parse_selection_file(std::string_view text, const JsonLimits& limits) {
+Result<Selection> parse_selection_file(std::string_view text, std::string_view name, const JsonLimits& limits) {
   const auto document = parse_document(text, limits);
   if (!document) return propagate(document);
   if (document->is_array()) {
+    if (!name.empty())
+      return fail(ErrorCode::invalid_argument,
+                  "the file is a list of operations, which has no name: leave the name out");
     std::optional<Error> error;
     Selection operations = read_selection(JsonField(*document, "selection", error));
     if (error) return tl::make_unexpected(std::move(*error));
     return operations;
   }
-  const bool is_alone = document->size() == 1 && document->contains("selection");
-  if (is_alone || !is_nearly_an_edit_request(*document)) return parse_selection(text, limits);
-  auto request = decode(*document, "", read_edit_request);
-  if (!request) return propagate(request);
-  if (!request->selection) return fail(ErrorCode::invalid_argument, "the edit request selects nothing", "selection");
-  return *std::move(request->selection);
+  const auto chosen = choose(*document, name);
+  if (!chosen) return propagate(chosen);
+  const json& request = *chosen->request;
+  const std::string where = (chosen->name.empty() ? "" : chosen->name + ".") + "selection";
+  const auto selects_nothing = [&] { return fail(ErrorCode::invalid_argument, "the request selects nothing", where); };
+  if (is_released_config(request) && !is_edit_request(request)) return selects_nothing();  // none of its fields could
+  auto read =
+      decode(request, chosen->name, [](const JsonField& field) { return read_request(field, Wanted::selection); });
+  if (!read) return propagate(read);
+  if (!read->selection) return selects_nothing();
+  return *std::move(read->selection);
 }
 
 std::string RequestFile::address_of(std::string_view field) const {

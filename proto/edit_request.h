@@ -104,10 +104,12 @@ struct RequestFile {
 [[nodiscard]] Result<RequestFile> parse_request_file(std::string_view text, std::string_view name,
                                                      const JsonLimits& limits = {});
 
-/// Decodes what a person has at hand of a selection: {"selection": [...]}, the list alone, or a whole edit request, of
-/// which all is checked and the selection is taken.
-///   errors  as parse_selection(), also of a list ("selection[2]..."); invalid_argument: a request that selects nothing
-[[nodiscard]] Result<Selection> parse_selection_file(std::string_view text, const JsonLimits& limits = {});
+/// Decodes what a person has at hand of a selection: {"selection": [...]}, the list alone, or an edit request, of which
+/// all is checked and the selection is taken; nothing has to move in it. Also of several by name, as above.
+///   errors  as parse_selection(), also of a list ("selection[2]..."), and those of a name; invalid_argument: a request
+///           that selects nothing, a name and a list
+[[nodiscard]] Result<Selection> parse_selection_file(std::string_view text, std::string_view name = {},
+                                                     const JsonLimits& limits = {});
 
 /// The request as indented JSON that parse_edit_request() reads back; what is not given is left out.
 [[nodiscard]] std::string to_json(const EditRequest& request);

@@ -81,9 +81,9 @@ Quat unpack_rotation(std::uint32_t word) {
 
 /// The middle of the bin that the writer, which truncates, put the value in; the ends are what it saturated to.
 float unpack_sh(std::uint8_t u) {
-  if (u == 0) return -4.0f;
-  if (u == 255) return 4.0f;
-  return ((float(u) + 0.5f) / 256.0f - 0.5f) * 8.0f;
+  if (u == 0) return float(compressed_ply_sh.low);
+  if (u == 255) return float(compressed_ply_sh.high);
+  return float(((u + 0.5) / compressed_ply_sh_bins - 0.5) * (2 * compressed_ply_most_sh));
 }
 
 class CompressedPly {
@@ -221,8 +221,6 @@ class CompressedPly {
   std::array<std::size_t, 4> word_offsets_{};
 };
 
-constexpr float most_log_scale = 20.0f;  // as PlayCanvas' writer: beyond it, the engine saturates
-
 std::uint32_t pack_unorm(double value, double low, double high, int bits) {
   const double most = double((1u << bits) - 1u);
   if (!(high > low)) return 0;
@@ -317,8 +315,8 @@ std::vector<std::byte> encode_compressed_ply(const scene::GaussianCloud& cloud, 
         std::memcpy(bytes.data() + first_word + (first + k) * word_bytes, words.data(), word_bytes);
         for (std::size_t j = 0; j < rest; ++j) {
           const double value = double(sh[j / (coefficients - 1) * coefficients + j % (coefficients - 1) + 1]);
-          bytes[first_sh + (first + k) * rest + j] =
-              std::byte(std::uint8_t(std::clamp(std::trunc((value / 8 + 0.5) * 256), 0.0, 255.0)));
+          bytes[first_sh + (first + k) * rest + j] = std::byte(std::uint8_t(std::clamp(
+              std::trunc((value / (2 * compressed_ply_most_sh) + 0.5) * compressed_ply_sh_bins), 0.0, 255.0)));
         }
       }
     }

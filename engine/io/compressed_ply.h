@@ -10,10 +10,16 @@
 #include "engine/core/result.h"
 #include "engine/io/input_file.h"
 #include "engine/io/ply_header.h"
+#include "engine/io/quantised.h"
 #include "engine/io/read_options.h"
 #include "engine/scene/gaussian_cloud.h"
 
 namespace engine::io {
+
+/// SH beyond DC: 256 bins from -4 to 4. What is read is a bin's middle, of the first and the last the ends.
+constexpr double compressed_ply_most_sh = 4, compressed_ply_sh_bins = 256;
+constexpr StoredRange compressed_ply_sh{-compressed_ply_most_sh, compressed_ply_most_sh,
+                                        2 * compressed_ply_most_sh / compressed_ply_sh_bins};
 
 /// Is this the header of a compressed file?
 [[nodiscard]] bool is_compressed_ply(const PlyHeader& header);

@@ -590,7 +590,8 @@ class Glb {
         cloud.mean.set(to, vector(position));
         Vec3 size = vector(scale);
         if (!logarithmic_)
-          for (int c = 0; c < 3; ++c) size[c] = size[c] == 0 ? -20.0f : float(std::log(double(size[c])));  // NaN stays
+          for (int c = 0; c < 3; ++c)
+            size[c] = size[c] == 0 ? -most_log_scale : float(std::log(double(size[c])));  // NaN stays
         cloud.log_scale.set(to, size);
         const Quat q(rotation.at(i, 3), rotation.at(i, 0), rotation.at(i, 1), rotation.at(i, 2));
         cloud.rotation.set(to, glm::dot(q, q) == 0 ? Quat(1, 0, 0, 0) : q);
@@ -749,7 +750,8 @@ Result<std::vector<std::byte>> encode_glb(const scene::GaussianCloud& cloud, con
       for (std::size_t c = 0; c < 3; ++c) {
         put(attributes[0], i, c, turned.mean.get(k)[int(c)]);
         // Saturated where the renderer saturates, so that no scale is infinite.
-        put(attributes[3], i, c, float(std::exp(double(std::clamp(turned.log_scale.get(k)[int(c)], -20.f, 20.f)))));
+        put(attributes[3], i, c,
+            float(std::exp(double(std::clamp(turned.log_scale.get(k)[int(c)], -most_log_scale, most_log_scale)))));
         for (std::size_t j = 0; j < coefficients; ++j) put(attributes[5 + j], i, c, sh[c * coefficients + j]);
         binary[attributes[1].offset + 4 * i + c] =
             std::byte(nearest_byte(255 * (0.5 + sh_c0 * double(sh[c * coefficients]))));

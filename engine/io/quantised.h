@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <numbers>
 
 #include "engine/core/vec.h"
@@ -15,6 +16,22 @@
 namespace engine::io {
 
 using scene::sh_c0;
+
+/// Log scales are written within this, either way: beyond it the engine saturates, and exp() would be infinite some
+/// day.
+constexpr float most_log_scale = 20.0f;
+
+/// What a format has room for: `low` and `high` are the least and the greatest value that a file can say.
+struct StoredRange {
+  double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
+  double step = 0;  ///< Between values next to each other; 0: floats.
+  /// Whether the value is but rounded to what a file can say. Half a step beyond the ends is: so far apart are values
+  /// and what becomes of them in between, too.
+  [[nodiscard]] constexpr bool holds(double value) const { return value >= low - step / 2 && value <= high + step / 2; }
+};
+
+/// Of log scales that are floats, or between ends that are.
+constexpr StoredRange saturated_log_scales{-double(most_log_scale), double(most_log_scale), 0};
 
 /// Nearest byte, saturating.
 inline std::uint8_t nearest_byte(double value) { return std::uint8_t(std::clamp(std::round(value), 0.0, 255.0)); }

@@ -4,30 +4,37 @@
 #include <array>
 #include <cassert>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
+#include "engine/io/compressed_ply.h"
 #include "engine/io/quantised.h"
+#include "engine/io/splat.h"
+#include "engine/io/spz.h"
 
 namespace engine::io {
 namespace {
 
-/// What a format has room for; what lies beyond comes to the nearer end.
-struct Range {
-  double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
-  [[nodiscard]] bool holds(double value) const { return value >= low && value <= high; }
+/// What a format has room for, where that is not everything.
+struct Room {
+  StoredRange f_dc = {}, log_scales = {}, sh = {};
 };
 
-/// Of colours, as displayed. A byte of .splat is from black to white; .spz spreads its own 1 / 0.15 of the coefficient.
-Range colours_of(SceneFormat format) {
-  constexpr double spz_reach = 0.5 / 0.15 * sh_c0;
-  if (format == SceneFormat::splat) return {0, 1};
-  if (format == SceneFormat::spz) return {0.5 - spz_reach, 0.5 + spz_reach};
+Room room_in(SceneFormat format) {
+  switch (format) {
+    case SceneFormat::splat:
+      return {.f_dc = splat_f_dc, .log_scales = saturated_log_scales};
+    case SceneFormat::spz:
+      return {.f_dc = spz_f_dc, .log_scales = spz_log_scales, .sh = spz_sh};
+    case SceneFormat::glb:
+      return {.log_scales = saturated_log_scales};
+    case SceneFormat::compressed_ply:
+      return {.log_scales = saturated_log_scales, .sh = compressed_ply_sh};
+    case SceneFormat::sog:  // its codebooks have the scene's own ends
+    case SceneFormat::ply:
+      break;
+  }
   return {};
 }
-
-/// Of log scales: in sixteenths from -10 on in .spz.
-Range log_scales_of(SceneFormat format) { return format == SceneFormat::spz ? Range{-10, -10 + 255.0 / 16} : Range{}; }
 
 /// Largest and mean of differences that come one by one, and of those that are none of rounding.
 struct Tally {
@@ -77,22 +84,24 @@ std::vector<AttributeLoss> scene_loss(const SceneFile& before, const SceneFile& 
   assert(a.size() == b.size());
   const auto order = written_order(before, format);
   const std::size_t in = scene::sh_coefficients(a.sh_degree), out = scene::sh_coefficients(b.sh_degree);
-  const Range colours = colours_of(format), log_scales = log_scales_of(format);
+  const Room room = room_in(format);
   Tally mean, scale, rotation, alpha, colour, sh;
   for (std::size_t j = 0; j < order.size(); ++j) {
     const std::size_t i = order[j];
     mean.add(glm::length(DVec3(a.mean.get(i)) - DVec3(b.mean.get(j))));
     for (int c = 0; c < 3; ++c) {
       const auto before_it = double(a.log_scale.get(i)[c]);
-      scale.add(std::abs(before_it - double(b.log_scale.get(j)[c])), log_scales.holds(before_it));
+      scale.add(std::abs(before_it - double(b.log_scale.get(j)[c])), room.log_scales.holds(before_it));
     }
     rotation.add(degrees_between(a.rotation.get(i), b.rotation.get(j)));
     alpha.add(std::abs(opacity(a.opacity_logit[i]) - opacity(b.opacity_logit[j])));
     for (std::size_t c = 0; c < 3; ++c) {
       const auto dc = double(a.sh_row(i)[c * in]);
-      colour.add(sh_c0 * std::abs(dc - double(b.sh_row(j)[c * out])), colours.holds(0.5 + sh_c0 * dc));
-      for (std::size_t k = 1; k < std::min(in, out); ++k)
-        sh.add(std::abs(double(a.sh_row(i)[c * in + k]) - double(b.sh_row(j)[c * out + k])));
+      colour.add(sh_c0 * std::abs(dc - double(b.sh_row(j)[c * out])), room.f_dc.holds(dc));
+      for (std::size_t k = 1; k < std::min(in, out); ++k) {
+        const auto before_it = double(a.sh_row(i)[c * in + k]);
+        sh.add(std::abs(before_it - double(b.sh_row(j)[c * out + k])), room.sh.holds(before_it));
+      }
     }
   }
   return {mean.as("positions", "world units"), scale.as("log scales", "natural logarithm"),

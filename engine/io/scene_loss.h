@@ -13,8 +13,8 @@ struct AttributeLoss {
   std::string attribute;         ///< "positions", "log scales", "rotations", "opacities", "colours", "SH"
   std::string unit;              ///< "world units", "degrees", ...
   double largest = 0, mean = 0;  ///< Of values that the format has room for: they are rounded.
-  double clipped_part = 0;       ///< Of the values, 0 to 1, that lie beyond what it has room for: colours, log scales.
-  double most_clipped = 0;       ///< How far the farthest of them came.
+  double clipped_part = 0;  ///< Of the values, 0 to 1, that lie beyond what it has room for: colours, log scales, SH.
+  double most_clipped = 0;  ///< How far the farthest of them came.
 };
 
 /// Compares a scene with what read_scene() finds in the file that write_scene() has made of it.

@@ -27,7 +27,7 @@ Record record_at(std::span<const std::byte> bytes, std::size_t i) {
   return record;
 }
 
-float log_scale_of(float sigma) { return std::max(float(std::log(double(sigma))), -20.0f); }
+float log_scale_of(float sigma) { return std::max(float(std::log(double(sigma))), -most_log_scale); }
 
 Quat rotation_of(const std::array<std::uint8_t, 4>& bytes) {
   std::array<double, 4> q;
@@ -117,7 +117,7 @@ std::vector<std::byte> encode_splat(const scene::GaussianCloud& cloud) {
         record.position[std::size_t(axis)] = cloud.mean.get(i)[axis];
         // Saturated where the renderer saturates, so that no sigma is infinite.
         record.sigma[std::size_t(axis)] =
-            float(std::exp(double(std::clamp(cloud.log_scale.get(i)[axis], -20.f, 20.f))));
+            float(std::exp(double(std::clamp(cloud.log_scale.get(i)[axis], -most_log_scale, most_log_scale))));
       }
       for (std::size_t c = 0; c < 3; ++c)
         record.rgba[c] =

@@ -7,12 +7,15 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/io/quantised.h"
 #include "engine/io/read_options.h"
 #include "engine/scene/gaussian_cloud.h"
 
 namespace engine::io {
 
 constexpr std::size_t splat_record_bytes = 32;
+/// A byte of colour is from black to white.
+constexpr StoredRange splat_f_dc{-0.5 / sh_c0, 0.5 / sh_c0, 1 / (255 * sh_c0)};
 
 /// Could these bytes, the first of a file of `size` bytes, be a .splat file? There is no magic number: asks for whole
 /// records, and believable positions, sigmas and rotations in each record that lies in `bytes`.

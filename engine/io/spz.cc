@@ -31,7 +31,6 @@ constexpr std::size_t rows_per_task = 4096;  // of a parallel task: a choice
 constexpr std::size_t header_bytes = 16;
 constexpr std::size_t max_deflate_ratio = 1032;  // of deflate: 258 bytes for every 2 bits
 constexpr std::size_t max_zstd_ratio = 32768;    // of Zstandard: 128 KiB, a block's most, for 4 bytes
-constexpr double colour_scale = 0.15;            // of this format; wider than sh_c0 to keep colours beyond 0..1
 constexpr double farthest_fixed = 8388608;       // steps, of a position in 24 bits
 constexpr std::uint8_t flag_antialiased = 1, flag_extensions = 2;
 constexpr std::uint32_t v4_header_bytes = 32;
@@ -349,18 +348,19 @@ void pack_row(const scene::GaussianCloud& cloud, std::size_t i, const Header& he
     // 24 bits reach one step farther down than up; a turn may put what came from there at the other end.
     const auto fixed = std::uint32_t(std::int32_t(std::clamp(steps, -farthest_fixed, farthest_fixed - 1)));
     for (std::size_t b = 0; b < 3; ++b) out.positions[9 * at + 3 * axis + b] = std::byte(fixed >> 8 * b & 255u);
-    out.scales[3 * at + axis] = std::byte(nearest_byte((double(log_scale[int(axis)]) + 10.0) * 16.0));
+    out.scales[3 * at + axis] =
+        std::byte(nearest_byte((double(log_scale[int(axis)]) - spz_least_log_scale) * spz_log_scale_steps));
   }
   out.alphas[at] = std::byte(byte_of_logit(cloud.opacity_logit[i]));
   const std::uint32_t rotation = packed_rotation(cloud.rotation.get(i));
   std::memcpy(out.rotations.data() + 4 * at, &rotation, sizeof rotation);
   const auto sh = cloud.sh_row(i);
   for (std::size_t c = 0; c < 3; ++c) {
-    out.colors[3 * at + c] = std::byte(nearest_byte((double(sh[c * coefficients]) * colour_scale + 0.5) * 255.0));
+    out.colors[3 * at + c] = std::byte(nearest_byte((double(sh[c * coefficients]) * spz_colour_scale + 0.5) * 255.0));
     // All 8 bits of each coefficient: Niantic's writer keeps 4 or 5 to pack better, which costs quality.
     for (std::size_t k = 1; k < coefficients; ++k)
       out.sh[(at * (coefficients - 1) + k - 1) * 3 + c] =
-          std::byte(nearest_byte(double(sh[c * coefficients + k]) * 128.0 + 128.0));
+          std::byte(nearest_byte(double(sh[c * coefficients + k]) * spz_sh_steps + 128.0));
   }
 }
 
@@ -468,16 +468,18 @@ Result<DecodedScene> decode_spz(std::span<const std::byte> bytes, const std::str
     for (std::size_t i = begin; i < end; ++i) {
       cloud.mean.set(i, position_at(*header, in.positions, i));
       cloud.opacity_logit[i] = logit_of_byte(std::to_integer<std::uint8_t>(in.alphas[i]));
-      const auto log_scale = [&](std::size_t axis) { return float(byte_at(in.scales, 3 * i + axis)) / 16.0f - 10.0f; };
+      const auto log_scale = [&](std::size_t axis) {
+        return float(byte_at(in.scales, 3 * i + axis) / spz_log_scale_steps + spz_least_log_scale);
+      };
       cloud.log_scale.set(i, {log_scale(0), log_scale(1), log_scale(2)});
       cloud.rotation.set(i, header->version <= 2 ? rotation_first_three(in.rotations, i)
                                                  : rotation_smallest_three(word_at(in.rotations, i)));
       const auto sh = cloud.sh_row(i);
       for (std::size_t c = 0; c < 3; ++c) {
-        sh[c * coefficients] = float((byte_at(in.colors, 3 * i + c) / 255.0 - 0.5) / colour_scale);
+        sh[c * coefficients] = float((byte_at(in.colors, 3 * i + c) / 255.0 - 0.5) / spz_colour_scale);
         for (std::size_t k = 1; k < coefficients; ++k)
           sh[c * coefficients + k] =
-              (float(byte_at(in.sh, (i * (coefficients - 1) + k - 1) * 3 + c)) - 128.0f) / 128.0f;
+              float((byte_at(in.sh, (i * (coefficients - 1) + k - 1) * 3 + c) - 128.0) / spz_sh_steps);
       }
       to_rdf.apply(cloud, i);
     }

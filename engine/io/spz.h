@@ -8,11 +8,21 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/io/quantised.h"
 #include "engine/io/read_options.h"
 #include "engine/io/scene_origin.h"
 #include "engine/scene/gaussian_cloud.h"
 
 namespace engine::io {
+
+constexpr double spz_colour_scale = 0.15;  ///< Of this format; wider than sh_c0 to keep colours beyond 0..1.
+constexpr double spz_least_log_scale = -10, spz_log_scale_steps = 16;  ///< Steps in one.
+constexpr double spz_sh_steps = 128;                                   ///< In one; byte 128 is 0.
+
+constexpr StoredRange spz_f_dc{-0.5 / spz_colour_scale, 0.5 / spz_colour_scale, 1 / (255 * spz_colour_scale)};
+constexpr StoredRange spz_log_scales{spz_least_log_scale, spz_least_log_scale + 255 / spz_log_scale_steps,
+                                     1 / spz_log_scale_steps};
+constexpr StoredRange spz_sh{-128 / spz_sh_steps, 127 / spz_sh_steps, 1 / spz_sh_steps};
 
 /// Do these first bytes of a file say gzip (versions 1 to 3) or "NGSP" (version 4)?
 [[nodiscard]] bool looks_like_spz(std::span<const std::byte> bytes);

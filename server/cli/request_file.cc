@@ -28,8 +28,10 @@ engine::Result<proto::RequestFile> read_request(const std::filesystem::path& pat
   });
 }
 
-engine::Result<proto::Selection> read_selection(const std::filesystem::path& path) {
-  return read_file(path, proto::parse_selection_file);
+engine::Result<proto::Selection> read_selection(const std::filesystem::path& path, const std::string& name) {
+  return read_file(path, [&](std::string_view text, const proto::JsonLimits& limits) {
+    return proto::parse_selection_file(text, name, limits);
+  });
 }
 
 }  // namespace server::cli

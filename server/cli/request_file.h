@@ -17,7 +17,8 @@ namespace server::cli {
 [[nodiscard]] engine::Result<proto::RequestFile> read_request(const std::filesystem::path& path,
                                                               const std::string& name);
 
-/// Reads a selection: of any form that proto::parse_selection_file() knows. Errors as read_request().
-[[nodiscard]] engine::Result<proto::Selection> read_selection(const std::filesystem::path& path);
+/// Reads a selection: of any form that proto::parse_selection_file() knows. `name` and errors as read_request().
+[[nodiscard]] engine::Result<proto::Selection> read_selection(const std::filesystem::path& path,
+                                                              const std::string& name);
 
 }  // namespace server::cli

@@ -31,7 +31,7 @@ using std::filesystem::path;
 constexpr int virtual_side = 800;  // pixels of a picture where no camera says
 
 struct SelectOptions {
-  std::string scene, selection, dataset, out, pictures;
+  std::string scene, selection, name, dataset, out, pictures;
   int views = 6;
   ComputeOptions compute;
 };
@@ -39,7 +39,8 @@ struct SelectOptions {
 /// Errors of the engine name an operation; the user knows it by its place in the file.
 engine::Error in_file(engine::Error error, const SelectOptions& options) {
   if (error.where.starts_with("selection"))
-    error.where = path(options.selection).filename().string() + ":" + error.where;
+    error.where = path(options.selection).filename().string() + ":" + (options.name.empty() ? "" : options.name + ".") +
+                  error.where;
   return error;
 }
 
@@ -101,7 +102,7 @@ void print(const Selected& selected, std::size_t rows, Terminal& terminal) {
 }
 
 Result<void> run(const SelectOptions& options, Terminal& terminal) {
-  const auto asked = read_selection(options.selection);
+  const auto asked = read_selection(options.selection, options.name);
   if (!asked) return propagate(asked);
   if (!options.out.empty())
     if (auto safe = keep_input_safe(options.scene, options.out); !safe) return safe;
@@ -142,9 +143,12 @@ void add_select_command(CLI::App& program, Action& action) {
       ->required()
       ->type_name("FILE");
   command
-      ->add_option("--selection", options->selection, "Operations, carried out in order: {\"selection\": [...]} (JSON)")
+      ->add_option(
+          "--selection", options->selection,
+          "Operations, carried out in order (JSON): a list of them, {\"selection\": [...]}, or an edit request")
       ->required()
       ->type_name("FILE");
+  command->add_option("--name", options->name, "Which request of a file of several")->type_name("NAME");
   command
       ->add_option("--dataset", options->dataset,
                    "Folder with the scene's cameras (COLMAP, transforms.json or an INRIA model): operations may name "

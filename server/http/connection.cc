@@ -258,6 +258,14 @@ void Connection::begin_answer() {
   written_ = 0;
 }
 
+void Connection::give_answer_up() {
+  broken_ = true;
+  std::string().swap(output_);  // whoever ends the visit may have to wait for a thread: not with all of it
+  sent_ = 0;
+  file_.reset();
+  file_left_ = 0;
+}
+
 Connection::Sending Connection::stopped_sending() {
   if (would_block()) return Sending::waiting;
   broken_ = true;

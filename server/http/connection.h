@@ -73,8 +73,8 @@ class Connection {
 
   /// An answer begins: its rate is measured from here.
   void begin_answer();
-  /// The client takes it too slowly: nothing more is sent.
-  void give_answer_up() { broken_ = true; }
+  /// The client takes it too slowly: nothing more is sent, and what was posted is held no longer.
+  void give_answer_up();
   /// Bytes that follow those before. They are sent as far as the client takes them at once; the rest waits for
   /// send_now() or write().
   ///   returns  false: the client has gone
@@ -87,8 +87,8 @@ class Connection {
   /// Sends all of the bytes, and what was posted before; waits for the client to take them.
   ///   returns  false: the client has gone or takes the answer too slowly
   [[nodiscard]] bool write(std::string_view bytes);
-  /// Bytes in memory that were posted and are not sent.
-  [[nodiscard]] std::size_t bytes_unsent() const { return output_.size(); }
+  /// Bytes in memory for what was posted: all of it until the last of it is sent.
+  [[nodiscard]] std::size_t bytes_held() const { return output_.size(); }
   [[nodiscard]] std::uint64_t bytes_written() const { return written_; }  ///< Since begin_answer().
 
   /// The client is waited for, without a thread: for more of a body, or until it takes more of an answer.

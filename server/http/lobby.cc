@@ -265,7 +265,7 @@ void Lobby::go_on_with(std::unique_ptr<Visit> visit, const HeadText& text) {
 
 void Lobby::let_in(std::unique_ptr<Visit> visit) {
   Connection& connection = visit->connection;
-  visit->unsent.set(unsent_bytes_, connection.bytes_unsent());
+  visit->unsent.set(unsent_bytes_, connection.bytes_held());
   switch (visit->next) {
     case Next::say_goodbye:
       connection.end_sending();
@@ -400,6 +400,7 @@ void Lobby::end_wait(Guests::iterator guest) {
       return hooks_.ready(std::move(visit));
     case Next::send_on:
       visit->connection.give_answer_up();
+      visit->unsent.set(unsent_bytes_, 0);  // it waits for a thread with nothing: nobody is cut for it
       return hooks_.ready(std::move(visit));
     default:
       return;

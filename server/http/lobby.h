@@ -27,7 +27,8 @@ namespace server::http {
 struct LobbyOptions {
   std::size_t max_connections = 1024;            ///< Open at a time, with those of the workers.
   std::size_t max_connections_per_client = 256;  ///< Of one network; 0: no limit but the other one.
-  /// Of answers in memory that clients are slow to take, wherever those wait.
+  /// Of answers in memory that clients are slow to take, with the lobby or in line for a worker. What workers' threads
+  /// hold comes on top: one answer each.
   std::uint64_t max_unsent_bytes = std::uint64_t{512} << 20;
   ConnectionLimits connection = {};
 };

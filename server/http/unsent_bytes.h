@@ -4,7 +4,6 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
-#include <utility>
 
 namespace server::http {
 
@@ -15,20 +14,22 @@ class UnsentBytes {
   class Share {
    public:
     Share() = default;
-    ~Share() { set(0); }
+    ~Share() { change_to(0); }
     Share(const Share&) = delete;
     Share& operator=(const Share&) = delete;
 
     /// Counted in `sum`, and only there, from now on.
-    void set(const UnsentBytes& sum, std::uint64_t bytes) {
-      set(0);
-      sum_ = sum.sum_;
-      set(bytes);
+    void set(UnsentBytes& sum, std::uint64_t bytes) {
+      if (sum_ != sum.sum_) {
+        change_to(0);
+        sum_ = sum.sum_;
+      }
+      change_to(bytes);  // in one step: nobody sees a total without it
     }
     [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
    private:
-    void set(std::uint64_t bytes) {
+    void change_to(std::uint64_t bytes) {
       if (sum_) *sum_ += bytes - bytes_;  // modulo 2^64: less, too
       bytes_ = bytes;
     }

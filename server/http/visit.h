@@ -57,7 +57,7 @@ struct Visit {
   bool stepped_aside = false;   ///< Its worker does not count among the workers any more.
   Answer answer;
   std::shared_ptr<const void> under_way;  ///< Counted as long as this lives.
-  UnsentBytes::Share unsent;  ///< What it held of its answer when the lobby saw it last; a worker only sends of it.
+  UnsentBytes::Share unsent;              ///< Its connection's bytes_held() when the lobby saw it last.
 };
 
 }  // namespace server::http

@@ -94,6 +94,30 @@ TEST(RequestFile, NamesAFieldThatIsMisspelt) {
   EXPECT_EQ(where(R"({"handels": [{"source": [0, 0, 0], "radius": 1}]})", ""), "handels");
   EXPECT_EQ(where(R"({"up": {"preset": "draft", "handels": []}, "down": {}})", "up"), "up.handels");
   EXPECT_EQ(where(R"({"mode": "move"})", ""), "handles");
+  EXPECT_EQ(where(R"({"description": "to the right", "handels": [{"source": [0, 0, 0], "radius": 1}]})", ""),
+            "handels");
+  EXPECT_EQ(where(R"({"strat": [[0, 0, 0]], "directions": [[0, 1, 0]], "cluster": [0]})", ""), "directions");
+  EXPECT_EQ(where(R"({"cluster": [0], "directon": [[0, 1, 0]], "mode": "move"})", ""), "directon");
+  EXPECT_EQ(where(R"({"cluster": [0], "mode": "move"})", ""), "start") << "it is missing";
+  EXPECT_EQ(where(R"({"preset": "draft", "params": {"views": 9}})", ""), "handles") << "it is missing";
+  EXPECT_EQ(where(R"({"handels": {"source": [0, 0, 0], "radius": 1}, "mode": "move"})", ""), "handels");
+  EXPECT_EQ(where(R"({"version": 2, "region": {"center": [0, 0, 0], "size": [1, 1, 1]}})", ""), "handles");
+}
+
+TEST(RequestFile, TakesWordsBesideSeveralRequestsAsComments) {
+  const std::string text = R"({"mode": "both move", "up": {"handles": [{"source": [0, 0, 0], "radius": 1}]},
+                               "down": {"handles": [{"source": [0, 0, 0], "radius": 2}]}})";
+  const auto down = parse_request_file(text, "down");
+  ASSERT_TRUE(down) << down.error().message;
+  EXPECT_EQ(down->request.handles[0].radius, 2);
+}
+
+TEST(RequestFile, SaysOfWhichFormTheMisspeltFieldIs) {
+  const auto message = [](const char* text) { return parse_request_file(text, "").error().message; };
+  EXPECT_NE(message(R"({"strat": [[0, 0, 0]], "mode": "move", "cluster": [0]})").find("voxel_size"), std::string::npos);
+  EXPECT_NE(message(R"({"strat": [[0, 0, 0]], "mode": "move"})").find("voxel_size"), std::string::npos)
+      << "both have a mode: the misspelt one decides";
+  EXPECT_NE(message(R"({"handels": [[0, 0, 0]], "mode": "move"})").find("selection"), std::string::npos);
 }
 
 TEST(SelectionFile, IsASelectionAListOrAWholeRequest) {
@@ -102,7 +126,11 @@ TEST(SelectionFile, IsASelectionAListOrAWholeRequest) {
   for (const char* text : {R"([{"rows": [[0, 3]]}, {"op": "subtract", "rows": [[1, 2]]}])",
                            R"({"selection": [{"rows": [[0, 3]]}, {"op": "subtract", "rows": [[1, 2]]}]})",
                            R"({"mode": "remove", "params": {"views": 9},
-                               "selection": [{"rows": [[0, 3]]}, {"op": "subtract", "rows": [[1, 2]]}]})"}) {
+                               "selection": [{"rows": [[0, 3]]}, {"op": "subtract", "rows": [[1, 2]]}]})",
+                           R"({"scene": "s1",
+                               "selection": [{"rows": [[0, 3]]}, {"op": "subtract", "rows": [[1, 2]]}]})",
+                           R"({"part": {"preset": "draft",
+                               "selection": [{"rows": [[0, 3]]}, {"op": "subtract", "rows": [[1, 2]]}]}})"}) {
     const auto selection = parse_selection_file(text);
     ASSERT_TRUE(selection) << text << ": " << selection.error().message << " " << selection.error().where;
     EXPECT_EQ(*selection, *expected) << text;
@@ -118,6 +146,22 @@ TEST(SelectionFile, SaysWhereItIsWrong) {
   EXPECT_EQ(where(R"({"selektion": []})"), "selektion");
   EXPECT_EQ(where(R"({"mode": "move", "handles": [{"source": [0, 0, 0], "radius": 1}]})"), "selection");
   EXPECT_EQ(where(R"({"mode": "remove", "selection": [{"rows": [[0, 3]]}], "parms": {}})"), "parms");
+  EXPECT_EQ(where(R"({"mode": "remove", "selektion": []})"), "selektion");
+  EXPECT_EQ(where(R"({"start": [[0, 0, 0]], "direction": [[0, 1, 0]], "voxel_size": 1})"), "selection");
+  EXPECT_EQ(where(R"({"part": {"selection": [{"rows": [[0, -3]]}]}})"), "part.selection[0].rows[0][1]");
+}
+
+TEST(SelectionFile, IsChosenByNameAmongSeveral) {
+  const std::string text =
+      R"({"ears": {"selection": [{"rows": [[0, 3]]}]}, "tail": {"selection": [{"rows": [[5, 9]]}]}})";
+  const auto tail = parse_selection_file(text, "tail");
+  ASSERT_TRUE(tail) << tail.error().message;
+  EXPECT_EQ(*tail, parse_selection(R"({"selection": [{"rows": [[5, 9]]}]})").value());
+  const auto none = parse_selection_file(text);
+  ASSERT_FALSE(none);
+  EXPECT_NE(none.error().message.find("ears, tail"), std::string::npos) << none.error().message;
+  EXPECT_EQ(parse_selection_file(text, "nose").error().code, ErrorCode::not_found);
+  EXPECT_EQ(parse_selection_file(R"([{"rows": [[0, 3]]}])", "ears").error().code, ErrorCode::invalid_argument);
 }
 
 TEST(RequestFile, RefusesAMixtureOfBothForms) {

@@ -43,12 +43,12 @@ TEST(SelectionFile, IsReadAndNamesItsFileInErrors) {
   const support::TempDir folder;
   const auto file = folder.path() / "part.json";
   support::write_file(file, R"({"selection": [{"rows": [[0, 3]]}]})");
-  const auto selection = read_selection(file);
+  const auto selection = read_selection(file, "");
   ASSERT_TRUE(selection) << selection.error().message;
   EXPECT_EQ(selection->size(), 1u);
   support::write_file(file, R"({"selection": [{"rows": [[0, -3]]}]})");
-  ASSERT_FALSE(read_selection(file));
-  EXPECT_EQ(read_selection(file).error().where, "part.json:selection[0].rows[0][1]");
+  ASSERT_FALSE(read_selection(file, ""));
+  EXPECT_EQ(read_selection(file, "").error().where, "part.json:selection[0].rows[0][1]");
 }
 
 }  // namespace

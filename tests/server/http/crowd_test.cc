@@ -319,6 +319,37 @@ TEST_F(Crowd, AnswersThatWaitForAThreadToGoOnCountInThatBound) {
   EXPECT_EQ(taken, large_bytes);
 }
 
+TEST_F(Crowd, AnAnswerThatIsGivenUpPushesNoOtherOut) {
+  ServerOptions options;
+  options.workers.threads = 1;
+  options.lobby.max_unsent_bytes = large_bytes + large_bytes / 2;
+  options.lobby.connection.stall_timeout = 1s;
+  start(options);
+  const std::string ask_for_much = request(port(), "GET", "/large");
+  RawClient busy(port()), dead(port()), busy_after_it(port()), live(port()), busy_to_the_end(port());
+  busy.send(gate_request());
+  ASSERT_TRUE(gate.has_seen(1));
+  dead.send(ask_for_much);
+  ASSERT_TRUE(says("splatdrag_http_requests_waiting 1"));
+  busy_after_it.send(gate_request());
+  ASSERT_TRUE(says("splatdrag_http_requests_waiting 2"));
+  gate.open(1);
+  ASSERT_TRUE(gate.has_seen(2));
+  live.send(ask_for_much);
+  ASSERT_TRUE(says("splatdrag_http_requests_waiting 1"));
+  busy_to_the_end.send(gate_request());
+  ASSERT_TRUE(says("splatdrag_http_requests_waiting 3")) << "the dead one's time is over: it is to be ended, too";
+  std::size_t taken = 0;
+  std::jthread reader([&] { taken = live.answer().value_or(RawAnswer{}).body.size(); });
+  gate.open(1);
+  ASSERT_TRUE(gate.has_seen(3)) << "by now both have been answered, and one was given up";
+  gate.open(1);
+  reader.join();
+  EXPECT_EQ(taken, large_bytes);
+  EXPECT_FALSE(dead.answer()) << "it broke off";
+  EXPECT_TRUE(says("splatdrag_http_connections_cut_total 0"));
+}
+
 TEST_F(Crowd, StreamsOfEventsHaveThreadsOfTheirOwn) {
   ServerOptions options;
   options.workers.threads = 1;
