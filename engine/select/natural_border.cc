@@ -176,20 +176,33 @@ NaturalBorder natural_border(const neighbours::NeighbourGraph& graph, std::span<
     const double cost = (inside[taken] + outside[n - taken]) * (1 + preference * squared_log_odds(0.5 * (last + next)));
     if (cost < infinity) levels.push_back({taken, cost});
   }
-  NaturalBorder out{std::vector<std::uint8_t>(n, 0), 0};
+  NaturalBorder out{std::vector<std::uint8_t>(n, 0)};
   if (levels.empty()) {  // all are equally far from everything given
     for (std::size_t node = 0; node < n; ++node) out.inside[node] = potential[node] > 0;
     return out;
   }
   std::size_t chosen = weakest(levels);
-  if (choice.whole || choice.wider != 0) {
-    const std::vector<std::size_t> borders = weaker_than_others(levels);
+  const std::vector<std::size_t> borders = weaker_than_others(levels);
+  if (choice.beyond) {
+    const double given_inside = double(std::count(given.begin(), given.end(), Given::inside));
+    const auto first = std::find_if(borders.begin(), borders.end(), [&](std::size_t level) {
+      return double(levels[level].taken) > apart * given_inside;
+    });
+    const std::ptrdiff_t known = borders.end() - first, wanted = std::min<std::ptrdiff_t>(choice.wider, known);
+    out.wider = int(wanted), out.more = wanted<known, out.less = wanted> 0;
+    if (wanted == 0) {
+      for (std::size_t node = 0; node < n; ++node) out.inside[node] = given[node] == Given::inside;
+      return out;
+    }
+    chosen = first[wanted - 1];
+  } else {
     std::size_t at = std::size_t(std::find(borders.begin(), borders.end(), chosen) - borders.begin());
     if (choice.whole)
       for (std::size_t i = at + 1; i < borders.size(); ++i)
         if (levels[borders[i]].cost <= nearly_as_weak * levels[chosen].cost) at = i;
     const auto wanted = std::clamp(std::ptrdiff_t(at) + choice.wider, std::ptrdiff_t{0}, std::ssize(borders) - 1);
     out.wider = int(wanted - std::ptrdiff_t(at));
+    out.more = wanted + 1 < std::ssize(borders), out.less = wanted > 0;
     chosen = borders[std::size_t(wanted)];
   }
   for (std::size_t i = 0; i < levels[chosen].taken; ++i) out.inside[order[i]] = 1;

@@ -21,12 +21,16 @@ struct BorderChoice {
   /// stripe ends as sharply as it does.
   bool whole = false;
   int wider = 0;  ///< So many borders farther out than that; below 0: farther in.
+  /// Counted from what is given for the inside, of which there is some: 0 is just that, and 1 the first border that
+  /// encloses somewhat more. `whole` has no meaning then, nor has `wider` below 0.
+  bool beyond = false;
 };
 
 /// A border, and what is within.
 struct NaturalBorder {
   std::vector<std::uint8_t> inside;  ///< [nodes] 1: inside.
   int wider = 0;                     ///< As chosen; nearer to 0 where there are fewer borders on that side.
+  bool more = false, less = false;   ///< Is there a border farther out than this one; farther in?
 };
 
 /// Divides the graph at a level of the potentials: nodes at or above it are inside. Of all levels the one where the

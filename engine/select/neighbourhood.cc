@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -71,7 +72,7 @@ Surroundings surroundings_of(const Array3& mean, const Grow& grow) {
   std::vector<double> squared = squared_distances(mean, middle);
   const auto half = squared.begin() + std::ptrdiff_t(squared.size() / 2);
   std::nth_element(squared.begin(), half, squared.end());
-  const double by_scene_share = grow.whole || grow.wider != 0 ? reach_of_whole : reach_by_scene;
+  const double by_scene_share = grow.whole ? reach_of_whole : reach_by_scene;
   const double half_of_scene = std::sqrt(*half), by_scene = by_scene_share * half_of_scene;
   // An outside point that is nowhere near the scene says nothing of the thing's size.
   if (nearest <= beside_scene * half_of_scene) farthest = std::max(farthest, nearest);
@@ -192,7 +193,17 @@ Result<Grown> Neighbourhood::grow(const scene::GaussianCloud& cloud, const Grow&
   const auto seeds = seeds_of(cloud, grow);
   if (!seeds) return propagate(seeds);
   const NaturalBorder border = grow.whole ? whole_border(*seeds, grow.wider) : border_of(*seeds, {false, grow.wider});
-  return Grown{rows_where_marked(border.inside), border.wider};
+  return Grown{rows_where_marked(border.inside), border.wider, border.more, border.less, is_cut_short_};
+}
+
+Result<Grown> Neighbourhood::grow_beyond(const scene::GaussianCloud& cloud, const Grow& grow,
+                                         std::span<const std::uint32_t> rows, int farther) const {
+  auto seeds = seeds_of(cloud, grow);
+  if (!seeds) return propagate(seeds);
+  for (std::size_t node = 0; node < rows_.size(); ++node)
+    if (std::binary_search(rows.begin(), rows.end(), rows_[node])) seeds->given[node] = Given::inside;
+  const NaturalBorder border = border_of(*seeds, {.wider = farther, .beyond = true});
+  return Grown{rows_where_marked(border.inside), border.wider, border.more, border.less, is_cut_short_};
 }
 
 NaturalBorder Neighbourhood::border_of(const Seeds& seeds, const BorderChoice& choice) const {
@@ -203,13 +214,15 @@ NaturalBorder Neighbourhood::border_of(const Seeds& seeds, const BorderChoice& c
 NaturalBorder Neighbourhood::whole_border(const Seeds& seeds, int wider) const {
   Seeds tried = seeds, best_seeds = seeds;
   NaturalBorder best = border_of(seeds, {true, 0});
-  std::vector<std::uint8_t> found = best.inside;
+  std::vector<std::uint32_t> found;
+  for (std::uint32_t node = 0; node < best.inside.size(); ++node)
+    if (best.inside[node] != 0) found.push_back(node);
+  FarEnds ends;
   const auto size = [](const NaturalBorder& border) {
     return double(std::count(border.inside.begin(), border.inside.end(), std::uint8_t{1}));
   };
   const double most = more_by_far_ends * size(best);
-  for (int i = 0; i < far_ends; ++i) {
-    click_far_end(found, tried);
+  for (int i = 0; i < far_ends && click_far_end(found, tried, ends); ++i) {
     NaturalBorder border = border_of(tried, {true, 0});
     if (size(border) > most || size(border) <= size(best)) continue;
     best = std::move(border), best_seeds = tried;
@@ -217,22 +230,29 @@ NaturalBorder Neighbourhood::whole_border(const Seeds& seeds, int wider) const {
   return wider == 0 ? best : border_of(best_seeds, {true, wider});
 }
 
-void Neighbourhood::click_far_end(std::span<const std::uint8_t> inside, Seeds& seeds) const {
+bool Neighbourhood::click_far_end(std::span<const std::uint32_t> inside, Seeds& seeds, FarEnds& ends) const {
   const auto place = [&](std::uint32_t node) {
     const float* at = points_.data() + std::size_t(3) * node;
     return DVec3(at[0], at[1], at[2]);
   };
-  std::uint32_t far_end = seeds.clicked.inside[0];
-  double farthest = 0;
-  for (std::uint32_t node = 0; node < inside.size(); ++node) {
-    if (inside[node] == 0) continue;
-    double nearest = std::numeric_limits<double>::infinity();
-    for (const std::uint32_t click : seeds.clicked.inside)
-      nearest = std::min(nearest, distance(place(node), place(click)));
-    if (nearest > farthest) farthest = nearest, far_end = node;
+  ends.squared.resize(inside.size(), std::numeric_limits<double>::infinity());
+  for (; ends.clicks < seeds.clicked.inside.size(); ++ends.clicks) {
+    const DVec3 click = place(seeds.clicked.inside[ends.clicks]);
+    for (std::size_t i = 0; i < inside.size(); ++i) {
+      const DVec3 offset = place(inside[i]) - click;
+      ends.squared[i] = std::min(ends.squared[i], glm::dot(offset, offset));
+    }
   }
-  seeds.given[far_end] = Given::inside;
-  seeds.clicked.inside.push_back(far_end);
+  std::vector<std::uint32_t> order(inside.size());
+  std::iota(order.begin(), order.end(), 0u);
+  const auto far_end = order.begin() + std::ptrdiff_t(most_of_rows * double(order.size() - 1));
+  std::nth_element(order.begin(), far_end, order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return ends.squared[a] != ends.squared[b] ? ends.squared[a] < ends.squared[b] : a < b;
+  });
+  if (!(ends.squared[*far_end] > 0)) return false;
+  seeds.given[inside[*far_end]] = Given::inside;
+  seeds.clicked.inside.push_back(inside[*far_end]);
+  return true;
 }
 
 std::vector<std::uint32_t> Neighbourhood::settle(std::span<const Given> given) const {

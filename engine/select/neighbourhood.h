@@ -30,13 +30,14 @@ struct Surroundings {
   bool operator==(const Surroundings&) const = default;
 };
 
-/// Rows: the nearest to the middle count. A first click then takes 1.2 s of one core, the next ones 0.35 s.
+/// Rows: the nearest to the middle count. A first click then takes 1.2 s of one core, the next ones 0.35 s; one that
+/// means the whole walks three times.
 constexpr std::size_t max_neighbourhood = 250'000;
 
 /// The surroundings of an operation. Without a reach: a quarter of the distance within which half of the scene's rows
 /// lie; or four times as far as the farthest inside point, or as the nearest outside one if that is farther, but not
-/// four times as far as half of the rows, rounded up to a power of the square root of 2. The farther of the two. Who
-/// asks for the whole, or for a border farther out, looks at four fifths of that distance.
+/// four times as far as half of the rows, rounded up to a power of the square root of 2. The farther of the two. For
+/// the whole, 0.8 of the distance within which half of the rows lie takes the place of a quarter of it.
 /// Precondition: validate() holds, and the scene has a row.
 [[nodiscard]] Surroundings surroundings_of(const Array3& mean, const Grow& grow);
 
@@ -49,6 +50,8 @@ constexpr std::size_t max_neighbourhood = 250'000;
 struct Grown {
   std::vector<std::uint32_t> rows;  ///< Of the cloud, ascending.
   int wider = 0;  ///< Grow::wider, or nearer to 0 where there are fewer borders: NaturalBorder::wider.
+  bool more = false, less = false;  ///< Is there a border farther out, or in, as far as was looked?
+  bool is_cut_short = false;        ///< Neighbourhood::is_cut_short().
 };
 
 /// The rows around a point, joined to their neighbours by edges that are the weaker the more likely a border runs
@@ -72,6 +75,12 @@ class Neighbourhood {
   ///            cover all rows around the inside points more
   [[nodiscard]] Result<Grown> grow(const scene::GaussianCloud& cloud, const Grow& grow) const;
 
+  /// The same, where rows are inside already: up to the border so many farther out than they end, counted from 1; for 0
+  /// just those. All of them stay.
+  ///   rows  [any] within reach, ascending, as grow() gave them for the same clicks
+  [[nodiscard]] Result<Grown> grow_beyond(const scene::GaussianCloud& cloud, const Grow& grow,
+                                          std::span<const std::uint32_t> rows, int farther) const;
+
   /// For each node that is not given, the side at which a random walk from it rather ends; where there is no way to
   /// either, the outside. The rows that are inside, given or not, ascending.
   ///   given  [rows().size()], by node
@@ -90,6 +99,10 @@ class Neighbourhood {
     std::vector<Given> given;  ///< [nodes]
     ClickedNodes clicked;      ///< The node that each point is on, where no point of the other side has it.
   };
+  struct FarEnds {
+    std::vector<double> squared;  ///< [n] Distance of each node from the nearest of so many clicks.
+    std::size_t clicks = 0;
+  };
   [[nodiscard]] Result<Seeds> seeds_of(const scene::GaussianCloud& cloud, const Grow& grow) const;
   /// Claims the nodes that a point lies on; returns the one that covers it most.
   std::uint32_t claim(const scene::GaussianCloud& cloud, DVec3 point, Given side,
@@ -99,8 +112,11 @@ class Neighbourhood {
   /// or behind, hangs together with those rather than with what was clicked on. The largest counts that has not taken
   /// another thing.
   [[nodiscard]] NaturalBorder whole_border(const Seeds& seeds, int wider) const;
-  /// Makes the node inside that is farthest from all inside clicks one more of them.
-  void click_far_end(std::span<const std::uint8_t> inside, Seeds& seeds) const;
+  /// Makes a node inside that is as far from all inside clicks as nearly all others one more of them: the very
+  /// farthest is, on a capture, a floater or where the border leaks. Does nothing and returns false if all are clicked.
+  ///   inside  [n] nodes, 1 or more
+  ///   ends    of the calls before with these nodes
+  bool click_far_end(std::span<const std::uint32_t> inside, Seeds& seeds, FarEnds& ends) const;
   /// The rows of marked nodes, ascending.
   [[nodiscard]] std::vector<std::uint32_t> rows_where_marked(std::span<const std::uint8_t> nodes) const;
   /// Gives what lies at the reach to the outside.

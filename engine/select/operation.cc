@@ -134,9 +134,12 @@ class Check {
     for (std::size_t i = 0; i < grow.outside.size(); ++i)
       if (std::find(grow.inside.begin(), grow.inside.end(), grow.outside[i]) != grow.inside.end())
         return bad(of(indexed("outside", i)), "the same point is among the inside ones");
-    if (std::abs(grow.wider) > max_wider)
+    if (grow.wider < -max_wider || grow.wider > max_wider)
       return bad(of("wider"), "expected a number of borders from -" + std::to_string(max_wider) + " to " +
                                   std::to_string(max_wider));
+    // Without `whole`, less of the scene is looked at, and has other borders: there is nothing to count from.
+    if (grow.wider != 0 && !grow.whole)
+      return bad(of("wider"), "expected `whole` with it: borders are counted from that of the whole");
     return grow.reach ? length("reach", *grow.reach, "world units") : Result<void>{};
   }
   Result<void> check(const Masks& masks) {

@@ -15,6 +15,10 @@ namespace {
 /// Kept between selections: of a list that grows several things, and no more than some 100 MB.
 constexpr std::size_t neighbourhoods_kept = 4;
 
+/// So often the reach of a whole is doubled in search of a border farther out: then it holds nearly all of a scene, or
+/// as much as is ever looked at.
+constexpr int farther_reaches = 2;
+
 /// What selecting reads of a scene has to be finite: a NaN would be on no side of anything.
 Result<void> check_finite(const scene::GaussianCloud& cloud) {
   const auto bad = scene::first_not_finite(cloud);
@@ -71,18 +75,36 @@ const Neighbourhood& Selector::neighbourhood(const Surroundings& surroundings) {
   return *neighbourhoods_.back();
 }
 
+Result<Grown> Selector::grown(const Grow& grow) {
+  Surroundings surroundings = surroundings_of(cloud_.mean, grow);
+  const Neighbourhood* around = &neighbourhood(surroundings);
+  auto out = around->grow(cloud_, grow);
+  if (!out) return out;
+  if (!grow.whole || grow.reach) return out;
+  for (int i = 0; i < farther_reaches && !out->more; ++i) {
+    if (around->is_cut_short() || around->rows().size() == cloud_.size()) break;  // there is no more to look at
+    surroundings.reach *= 2;
+    around = &neighbourhood(surroundings);
+    auto farther = around->grow_beyond(cloud_, grow, out->rows, std::max(0, grow.wider - out->wider));
+    if (!farther) return farther;
+    out->rows = std::move(farther->rows), out->wider += farther->wider, out->more = farther->more;
+    out->less = out->less || farther->less;
+  }
+  return out;
+}
+
 Result<RowSet> Selector::rows_of(const Grow& grow, const std::string& where, Selected& so_far) {
   RowSet named(cloud_.size(), 0);
   if (cloud_.size() == 0) return named;
-  const Neighbourhood& around = neighbourhood(surroundings_of(cloud_.mean, grow));
-  const auto grown = around.grow(cloud_, grow);
-  if (!grown) return fail(grown.error().code, grown.error().message, where + ".grow." + grown.error().where);
-  for (const std::uint32_t row : grown->rows) named[row] = 1;
-  if (grown->wider != grow.wider)
+  const auto found = grown(grow);
+  if (!found) return fail(found.error().code, found.error().message, where + ".grow." + found.error().where);
+  for (const std::uint32_t row : found->rows) named[row] = 1;
+  if (found->wider != grow.wider)
     so_far.warnings.push_back({"there is no border farther " + std::string(grow.wider > 0 ? "out" : "in") +
-                                   " than wider = " + std::to_string(grown->wider),
-                               where});
-  if (around.is_cut_short())
+                                   " than wider = " + std::to_string(found->wider),
+                               where + ".grow.wider"});
+  // A whole without a reach asks for no distance: that less was looked at is no failing of the request.
+  if (found->is_cut_short && !(grow.whole && !grow.reach))
     so_far.warnings.push_back({cut_short("to the first inside point: lower the reach, or grow larger things in several "
                                          "operations"),
                                where});

@@ -20,18 +20,19 @@ namespace engine::select {
 /// Something about a selection that a person should know.
 struct Warning {
   std::string message;  ///< One sentence.
-  std::string where;    ///< "selection[2]", or "selection" for all of it.
+  std::string where;    ///< "selection[2]", "selection[2].grow.wider", or "selection" for all of it.
   bool operator==(const Warning&) const = default;
 };
 
 /// The rows that are meant.
 struct Selected {
-  RowSet rows;                    ///< [N] 1: selected; as scene::select() takes it.
-  std::size_t count = 0;          ///< Selected rows.
-  scene::Bounds bounds;           ///< Of their means, world units; {0,0,0} twice where none is selected.
-  DVec3 centre{0.0};              ///< Mean of their means, world units; 0 where none is selected.
-  std::size_t undecided = 0;      ///< Rows that masks leave nearly even: MaskedRows::undecided, over all operations.
-  std::vector<Warning> warnings;  ///< Nothing is selected; an operation names no row; a reach was cut short.
+  RowSet rows;                ///< [N] 1: selected; as scene::select() takes it.
+  std::size_t count = 0;      ///< Selected rows.
+  scene::Bounds bounds;       ///< Of their means, world units; {0,0,0} twice where none is selected.
+  DVec3 centre{0.0};          ///< Mean of their means, world units; 0 where none is selected.
+  std::size_t undecided = 0;  ///< Rows that masks leave nearly even: MaskedRows::undecided, over all operations.
+  std::vector<Warning>
+      warnings;  ///< Nothing is selected; an operation names no row; a reach was cut short; there is no such border.
 };
 
 /// Selects in one scene, and keeps what the next selection there can use: a user clicks on, and each click asks for all
@@ -51,6 +52,9 @@ class Selector {
  private:
   [[nodiscard]] Result<void> carry_out(const Operation& operation, const std::string& where, Selected& so_far);
   [[nodiscard]] Result<RowSet> rows_of(const Grow& grow, const std::string& where, Selected& so_far);
+  /// Of a whole without a reach: where its surroundings have no border farther out, the next ones are looked for in
+  /// twice the reach, and again.
+  [[nodiscard]] Result<Grown> grown(const Grow& grow);
   [[nodiscard]] RowSet rows_of(const Masks& masks, const std::string& where, Selected& so_far);
   [[nodiscard]] const Neighbourhood& neighbourhood(const Surroundings& surroundings);
 

@@ -76,7 +76,7 @@ TEST(GrowOnTheDemoScene, TakesMoreOrLessOfAThingByBorders) {
   grow.wider = 64;
   const Selected all = selector.select({{Op::add, grow}}).value();
   ASSERT_EQ(all.warnings.size(), 1u);
-  EXPECT_EQ(all.warnings[0].where, "selection[0]");
+  EXPECT_EQ(all.warnings[0].where, "selection[0].grow.wider");
   EXPECT_EQ(all.warnings[0].message.find("there is no border farther out than wider = "), 0u);
 }
 

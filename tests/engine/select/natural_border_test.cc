@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <numeric>
 #include <vector>
 
@@ -110,6 +111,29 @@ TEST(NaturalBorder, SaysHowFarItWentWhereThereAreNoMore) {
   EXPECT_LE(wider, 0);
   EXPECT_GE(inmost.size(), 1u);
   EXPECT_LE(inmost.size(), 200u);
+}
+
+TEST(NaturalBorder, IsCountedFromWhatIsInsideAlreadyWhereThatIsAsked) {
+  const WeightedGraph strips = three_strips(0.05f, 0.4f);
+  std::vector<Given> given(strips.graph.size(), Given::no);
+  std::fill_n(given.begin(), 200, Given::inside);
+  given[1190] = Given::outside;
+  const std::vector<double> potential = random_walk(strips.graph, strips.weight, given);
+  const auto taken = [&](int wider) {
+    return natural_border(strips.graph, strips.weight, potential, given, {{10}, {1190}},
+                          {.wider = wider, .beyond = true});
+  };
+  const auto count = [](const NaturalBorder& border) {
+    return std::count(border.inside.begin(), border.inside.end(), 1);
+  };
+  EXPECT_EQ(count(taken(0)), 200);
+  EXPECT_TRUE(taken(0).more);
+  EXPECT_GT(count(taken(1)), 1.15 * 200);
+  EXPECT_EQ(taken(1).wider, 1);
+  const NaturalBorder last = taken(60);
+  EXPECT_LT(last.wider, 60);
+  EXPECT_FALSE(last.more);
+  EXPECT_TRUE(last.less);
 }
 
 TEST(NaturalBorder, TakesAllThatCanBeReachedWhereNothingIsOutside) {

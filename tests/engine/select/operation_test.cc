@@ -83,8 +83,9 @@ TEST(ValidateSelection, NamesWhatIsWrongWithPointsMasksAndRows) {
   EXPECT_EQ(refusal(Grow{{{0, 0, 0}, {0, 0, -inf}}, {}, {}}), "invalid selection[1].grow.inside[1]");
   EXPECT_EQ(refusal(Grow{{{0, 0, 0}}, {{1, 0, 0}, {0, 0, 0}}, {}}), "invalid selection[1].grow.outside[1]");
   EXPECT_EQ(refusal(Grow{{{0, 0, 0}}, {}, 0.0}), "invalid selection[1].grow.reach");
-  EXPECT_EQ(refusal(Grow{{{0, 0, 0}}, {}, {}, false, 65}), "invalid selection[1].grow.wider");
-  EXPECT_EQ(refusal(Grow{{{0, 0, 0}}, {}, {}, false, -65}), "invalid selection[1].grow.wider");
+  for (const int wider : {65, -65, std::numeric_limits<int>::min()})
+    EXPECT_EQ(refusal(Grow{{{0, 0, 0}}, {}, {}, true, wider}), "invalid selection[1].grow.wider") << wider;
+  EXPECT_EQ(refusal(Grow{{{0, 0, 0}}, {}, {}, false, 1}), "invalid selection[1].grow.wider") << "no whole";
   EXPECT_EQ(refusal(Masks{}), "invalid selection[1].masks");
   EXPECT_EQ(refusal(Masks{{{camera, scene::Mask(100, 100)}, {camera, scene::Mask(100, 99)}}}),
             "invalid selection[1].masks[1].image");
