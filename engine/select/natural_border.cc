@@ -188,8 +188,8 @@ NaturalBorder natural_border(const neighbours::NeighbourGraph& graph, std::span<
     const auto first = std::find_if(borders.begin(), borders.end(), [&](std::size_t level) {
       return double(levels[level].taken) > apart * given_inside;
     });
-    const std::ptrdiff_t known = borders.end() - first, wanted = std::min<std::ptrdiff_t>(choice.wider, known);
-    out.wider = int(wanted), out.more = wanted<known, out.less = wanted> 0;
+    const auto wanted = std::min<std::ptrdiff_t>(choice.wider, borders.end() - first);
+    out.wider = int(wanted);
     if (wanted == 0) {
       for (std::size_t node = 0; node < n; ++node) out.inside[node] = given[node] == Given::inside;
       return out;
@@ -202,7 +202,6 @@ NaturalBorder natural_border(const neighbours::NeighbourGraph& graph, std::span<
         if (levels[borders[i]].cost <= nearly_as_weak * levels[chosen].cost) at = i;
     const auto wanted = std::clamp(std::ptrdiff_t(at) + choice.wider, std::ptrdiff_t{0}, std::ssize(borders) - 1);
     out.wider = int(wanted - std::ptrdiff_t(at));
-    out.more = wanted + 1 < std::ssize(borders), out.less = wanted > 0;
     chosen = borders[std::size_t(wanted)];
   }
   for (std::size_t i = 0; i < levels[chosen].taken; ++i) out.inside[order[i]] = 1;

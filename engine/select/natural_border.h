@@ -30,7 +30,6 @@ struct BorderChoice {
 struct NaturalBorder {
   std::vector<std::uint8_t> inside;  ///< [nodes] 1: inside.
   int wider = 0;                     ///< As chosen; nearer to 0 where there are fewer borders on that side.
-  bool more = false, less = false;   ///< Is there a border farther out than this one; farther in?
 };
 
 /// Divides the graph at a level of the potentials: nodes at or above it are inside. Of all levels the one where the

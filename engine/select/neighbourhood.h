@@ -49,9 +49,8 @@ constexpr std::size_t max_neighbourhood = 250'000;
 /// What grows.
 struct Grown {
   std::vector<std::uint32_t> rows;  ///< Of the cloud, ascending.
-  int wider = 0;  ///< Grow::wider, or nearer to 0 where there are fewer borders: NaturalBorder::wider.
-  bool more = false, less = false;  ///< Is there a border farther out, or in, as far as was looked?
-  bool is_cut_short = false;        ///< Neighbourhood::is_cut_short().
+  int wider = 0;              ///< Grow::wider, or nearer to 0 where there are fewer borders: NaturalBorder::wider.
+  bool is_cut_short = false;  ///< Neighbourhood::is_cut_short().
 };
 
 /// The rows around a point, joined to their neighbours by edges that are the weaker the more likely a border runs

@@ -79,16 +79,14 @@ Result<Grown> Selector::grown(const Grow& grow) {
   Surroundings surroundings = surroundings_of(cloud_.mean, grow);
   const Neighbourhood* around = &neighbourhood(surroundings);
   auto out = around->grow(cloud_, grow);
-  if (!out) return out;
   if (!grow.whole || grow.reach) return out;
-  for (int i = 0; i < farther_reaches && !out->more; ++i) {
+  for (int i = 0; i < farther_reaches && out && out->wider < grow.wider; ++i) {
     if (around->is_cut_short() || around->rows().size() == cloud_.size()) break;  // there is no more to look at
     surroundings.reach *= 2;
     around = &neighbourhood(surroundings);
-    auto farther = around->grow_beyond(cloud_, grow, out->rows, std::max(0, grow.wider - out->wider));
-    if (!farther) return farther;
-    out->rows = std::move(farther->rows), out->wider += farther->wider, out->more = farther->more;
-    out->less = out->less || farther->less;
+    const int so_far = out->wider;
+    out = around->grow_beyond(cloud_, grow, out->rows, grow.wider - so_far);
+    if (out) out->wider += so_far;
   }
   return out;
 }
