@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -243,15 +242,11 @@ bool Neighbourhood::click_far_end(std::span<const std::uint32_t> inside, Seeds& 
       ends.squared[i] = std::min(ends.squared[i], glm::dot(offset, offset));
     }
   }
-  std::vector<std::uint32_t> order(inside.size());
-  std::iota(order.begin(), order.end(), 0u);
-  const auto far_end = order.begin() + std::ptrdiff_t(most_of_rows * double(order.size() - 1));
-  std::nth_element(order.begin(), far_end, order.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return ends.squared[a] != ends.squared[b] ? ends.squared[a] < ends.squared[b] : a < b;
-  });
-  if (!(ends.squared[*far_end] > 0)) return false;
-  seeds.given[inside[*far_end]] = Given::inside;
-  seeds.clicked.inside.push_back(inside[*far_end]);
+  const auto far_end = std::max_element(ends.squared.begin(), ends.squared.end());
+  if (far_end == ends.squared.end() || !(*far_end > 0)) return false;
+  const std::uint32_t node = inside[std::size_t(far_end - ends.squared.begin())];
+  seeds.given[node] = Given::inside;
+  seeds.clicked.inside.push_back(node);
   return true;
 }
 
