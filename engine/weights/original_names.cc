@@ -57,13 +57,16 @@ std::string of_resnet(const std::string& part) {
 std::string of_unet(const UNetConfig& config, const std::string& name) {
   Walk at(name);
   const int layers = config.layers_per_block;
+  const auto of_layer = [&](const std::string& blocks, int first) {
+    const bool is_resnet = at.take("resnets");
+    if (!is_resnet) at.take("attentions");
+    const std::string block = blocks + std::to_string(first + at.number());
+    return is_resnet ? block + ".0." + of_resnet(at.rest()) : block + ".1." + at.rest();
+  };
   if (at.take("down_blocks")) {
     const int first = 1 + at.number() * (layers + 1);
     if (at.take("downsamplers.0.conv")) return "input_blocks." + std::to_string(first + layers) + ".0.op." + at.rest();
-    const bool is_resnet = at.take("resnets");
-    if (!is_resnet) at.take("attentions");
-    const std::string block = "input_blocks." + std::to_string(first + at.number());
-    return is_resnet ? block + ".0." + of_resnet(at.rest()) : block + ".1." + at.rest();
+    return of_layer("input_blocks.", first);
   }
   if (at.take("mid_block")) {
     if (at.take("attentions.0")) return "middle_block.1." + at.rest();
@@ -78,10 +81,7 @@ std::string of_unet(const UNetConfig& config, const std::string& name) {
       const int place = config.up_attends[std::size_t(level)] ? 2 : 1;
       return "output_blocks." + std::to_string(first + layers) + "." + std::to_string(place) + ".conv." + at.rest();
     }
-    const bool is_resnet = at.take("resnets");
-    if (!is_resnet) at.take("attentions");
-    const std::string block = "output_blocks." + std::to_string(first + at.number());
-    return is_resnet ? block + ".0." + of_resnet(at.rest()) : block + ".1." + at.rest();
+    return of_layer("output_blocks.", first);
   }
   static constexpr std::array<Renamed, 5> pairs = {{{"conv_in.", "input_blocks.0.0."},
                                                     {"time_embedding.linear_1.", "time_embed.0."},

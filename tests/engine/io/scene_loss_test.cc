@@ -52,21 +52,23 @@ TEST(SceneLoss, HasTheLargestAndTheMeanOfEachAttribute) {
   EXPECT_NEAR(losses[5].mean, 0.125 / 36, 1e-6);
 }
 
+/// What a scene loses by being written and read again.
+auto losses_of(const SceneFile& before, SceneFormat format) {
+  const support::TempDir folder;
+  const auto path = folder.path() / "scene";
+  EXPECT_TRUE(write_scene(path, before, format));
+  const auto after = read_scene(path);
+  EXPECT_TRUE(after);
+  return scene_loss(before, *after, format);
+}
+
 TEST(SceneLoss, TellsWhatIsClippedFromWhatIsRounded) {
   SceneFile before = file_of(random_cloud(100, 0, 64));
   for (std::size_t i = 0; i < before.cloud.size(); ++i)
     for (std::size_t c = 0; c < 3; ++c) before.cloud.sh_row(i)[c] = float(double(i) / 100 - 0.5);  // within 0..1
   before.cloud.sh_row(7)[1] = float(0.75 / sh_c0);                                                 // displayed as 1.25
   before.cloud.log_scale.x[3] = -12.5f;
-  const support::TempDir folder;
-  const auto losses_of = [&](SceneFormat format) {
-    const auto path = folder.path() / "scene";
-    EXPECT_TRUE(write_scene(path, before, format));
-    const auto after = read_scene(path);
-    EXPECT_TRUE(after);
-    return scene_loss(before, *after, format);
-  };
-  const auto splat = losses_of(SceneFormat::splat), spz = losses_of(SceneFormat::spz);
+  const auto splat = losses_of(before, SceneFormat::splat), spz = losses_of(before, SceneFormat::spz);
   EXPECT_NEAR(splat[4].clipped_part, 1.0 / 300, 1e-9);
   EXPECT_NEAR(splat[4].most_clipped, 0.25, 1e-6);
   EXPECT_LT(splat[4].largest, 0.51 / 255) << "half a step of rounding is all that is left";
@@ -125,22 +127,14 @@ TEST(SceneLoss, TellsWhatIsClippedOfShAndOfLogScales) {
   SceneFile before = tame(random_cloud(100, 1, 67));
   before.cloud.sh_row(5)[3] = 6.5f;
   before.cloud.log_scale.y[8] = -25;
-  const support::TempDir folder;
-  const auto losses_of = [&](SceneFormat format) {
-    const auto path = folder.path() / "scene";
-    EXPECT_TRUE(write_scene(path, before, format));
-    const auto after = read_scene(path);
-    EXPECT_TRUE(after);
-    return scene_loss(before, *after, format);
-  };
-  const auto spz = losses_of(SceneFormat::spz), compressed = losses_of(SceneFormat::compressed_ply);
+  const auto spz = losses_of(before, SceneFormat::spz), compressed = losses_of(before, SceneFormat::compressed_ply);
   EXPECT_NEAR(spz[5].most_clipped, 6.5 - 127.0 / 128, 1e-6);
   EXPECT_LE(spz[5].largest, 0.5 / 128 + 1e-6);
   EXPECT_NEAR(compressed[5].most_clipped, 2.5, 1e-6);
   EXPECT_NEAR(compressed[5].clipped_part, 1.0 / 900, 1e-9);
   EXPECT_LE(compressed[5].largest, 1.0 / 32 + 1e-6);
   for (const SceneFormat format : {SceneFormat::splat, SceneFormat::glb, SceneFormat::compressed_ply}) {
-    const auto losses = losses_of(format);
+    const auto losses = losses_of(before, format);
     EXPECT_NEAR(losses[1].most_clipped, 5, 1e-5) << extension_of(format);
     EXPECT_NEAR(losses[1].clipped_part, 1.0 / 300, 1e-9) << extension_of(format);
     EXPECT_LT(losses[1].largest, 1) << extension_of(format) << ": what is left is rounded";
