@@ -80,7 +80,7 @@ TEST_F(ServiceTest, FillsInTheRequestFromTheStart) {
 }
 
 TEST_F(ServiceTest, FillsInTheDefaultPresetToo) {
-  submit(move_ball_slowly(scene));
+  submit(move_ball_for_long(scene));
   proto::EditRequest request = move_ball(scene);
   request.preset = std::nullopt;
   request.params = {};
@@ -225,7 +225,7 @@ TEST_F(ServiceTest, LeavesTheNumberOfIntervalsToWhatIsSelected) {
   request.handles[0].target = proto::Point{1, 0, 0};
   request.mode = proto::Mode::extend;
   request.params.interpolation = proto::Interpolation::rigid;
-  submit(move_ball_slowly(scene));
+  const auto before_it = submit(move_ball_for_long(scene));
   const auto waiting = value(service->submit(request, "")).status;
   EXPECT_EQ(waiting.request.params.intervals, std::nullopt) << "not known before it begins";
   EXPECT_EQ(waiting.intervals, 0);
@@ -233,6 +233,7 @@ TEST_F(ServiceTest, LeavesTheNumberOfIntervalsToWhatIsSelected) {
   EXPECT_EQ(estimate.intervals, 3);
   EXPECT_EQ(estimate.request.params.intervals, 3);
   EXPECT_EQ(estimate.request.selection, request.selection);
+  (void)value(service->cancel(before_it));
   EXPECT_EQ(wait_for_end(*service, waiting.id).intervals, 3);
 }
 
@@ -435,13 +436,17 @@ TEST_F(ServiceTest, SequenceOnOneSceneBuildsOnWhatCameBefore) {
 }
 
 TEST_F(ServiceTest, EditsWaitForEachOtherInTheirOrder) {
-  const auto first = submit(move_ball_slowly(scene));
   const std::string other = add_ball(*store, dir.path());
-  const auto second = submit(move_ball(other)), third = submit(move_ball(scene));
+  const auto first = submit(move_ball_for_long(scene));
+  const auto second = submit(move_ball_for_long(other, 2)), third = submit(move_ball_for_long(scene, 2));
   wait_for_interval(*service, first);
   EXPECT_EQ(value(service->find(second)).queue_position, 1);
   EXPECT_EQ(value(service->find(third)).queue_position, 2);
   EXPECT_EQ(value(service->find(first)).queue_position, std::nullopt);
+  for (const auto& id : {first, second, third}) {
+    wait_for_interval(*service, id);
+    (void)value(service->stop(id));
+  }
   EXPECT_EQ(wait_for_end(*service, third).result_version, 2) << "the first one's is 1";
   EXPECT_EQ(value(service->find(second)).result_version, 1) << "of its own scene";
 
@@ -459,9 +464,9 @@ TEST_F(ServiceTest, EditsWaitForEachOtherInTheirOrder) {
 
 TEST_F(ServiceTest, AFullQueueIsBusy) {
   reopen(1);
-  submit(move_ball_slowly(scene));
+  submit(move_ball_for_long(scene));
   wait_for(*service, "e000001", [](const auto& status) { return status.state == "running"; });
-  submit(move_ball(scene));
+  submit(move_ball_for_long(scene, 2));
   EXPECT_EQ(code_of(service->submit(move_ball(scene), "")), ErrorCode::busy);
 }
 
@@ -470,14 +475,14 @@ TEST_F(ServiceTest, LooksAtASceneWithinTheMemoryForWorkAndOnlyWhereThereIsRoomIn
   engine::MemoryBudget budget(1 << 30, "--work-memory", std::chrono::milliseconds(20));
   service = value(
       EditService::open(*store, {.folder = dir.path() / "edits", .max_queued = 1, .threads = 1, .memory = &budget}));
-  submit(move_ball_slowly(scene));
+  submit(move_ball_for_long(scene));
   wait_for(*service, "e000001", [](const auto& status) { return status.state == "running"; });
   {
     const auto others = value(budget.take(1 << 30, ""));
     EXPECT_EQ(code_of(service->submit(move_ball(scene), "")), ErrorCode::unavailable);
     EXPECT_EQ(code_of(service->estimate(move_ball(scene))), ErrorCode::unavailable);
   }
-  submit(move_ball(scene));
+  submit(move_ball_for_long(scene, 2));
   EXPECT_EQ(budget.lent(), 0u);
   const auto others = value(budget.take(1 << 30, ""));
   EXPECT_EQ(code_of(service->submit(move_ball(scene), "")), ErrorCode::busy) << "nothing is measured for it";
@@ -485,7 +490,7 @@ TEST_F(ServiceTest, LooksAtASceneWithinTheMemoryForWorkAndOnlyWhereThereIsRoomIn
 }
 
 TEST_F(ServiceTest, StopKeepsTheLastFinishedInterval) {
-  const auto id = submit(move_ball_slowly(scene));
+  const auto id = submit(move_ball_for_long(scene));
   wait_for_interval(*service, id, 2);
   const auto stopping = value(service->stop(id));
   EXPECT_EQ(stopping.state, "stop_requested");
@@ -502,8 +507,8 @@ TEST_F(ServiceTest, StopKeepsTheLastFinishedInterval) {
 }
 
 TEST_F(ServiceTest, StopNeedsSomethingToKeep) {
-  submit(move_ball_slowly(scene));
-  const auto waiting = submit(move_ball(scene));
+  submit(move_ball_for_long(scene));
+  const auto waiting = submit(move_ball_for_long(scene, 2));
   EXPECT_EQ(code_of(service->stop(waiting)), ErrorCode::conflict);
   EXPECT_EQ(code_of(service->stop("e000077")), ErrorCode::not_found);
 }
@@ -618,7 +623,7 @@ TEST_F(ServiceTest, ACancelledEditLeavesNothingAtWhateverMomentItComes) {
 }
 
 TEST_F(ServiceTest, ACancelledEditsFilesAreGone) {
-  const auto id = submit(move_ball_slowly(scene));
+  const auto id = submit(move_ball_for_long(scene));
   wait_for_interval(*service, id);
   EXPECT_TRUE(fs::exists(dir.path() / "edits/jobs" / id));
   value(service->cancel(id));
@@ -631,7 +636,7 @@ TEST_F(ServiceTest, ACancelledEditsFilesAreGone) {
 }
 
 TEST_F(ServiceTest, OnlyWhatHasEndedCanBeRemoved) {
-  const auto id = submit(move_ball_slowly(scene));
+  const auto id = submit(move_ball_for_long(scene));
   wait_for_interval(*service, id);
   EXPECT_EQ(code_of(service->remove(id)), ErrorCode::conflict);
   value(service->cancel(id));
@@ -651,7 +656,7 @@ TEST_F(ServiceTest, RemovingAnEditKeepsItsResult) {
 
 TEST_F(ServiceTest, AVersionIsKeptAsLongAsAnEditNeedsIt) {
   for (int i = 0; i < 2; ++i) wait_for_end(*service, submit(move_ball(scene)));
-  proto::EditRequest request = move_ball_slowly(scene);
+  proto::EditRequest request = move_ball_for_long(scene);
   request.version = 1;
   request.handles[0].source = {0.5, 0, 0}, request.handles[0].target = proto::Point{0, 0, 0};
   const auto id = submit(request);
@@ -670,7 +675,7 @@ TEST_F(ServiceTest, AVersionIsKeptAsLongAsAnEditNeedsIt) {
 }
 
 TEST_F(ServiceTest, ASceneIsKeptAsLongAsAnEditNeedsIt) {
-  const auto id = submit(move_ball_slowly(scene));
+  const auto id = submit(move_ball_for_long(scene));
   const auto refused = service->remove_scene(scene);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::conflict);
@@ -741,7 +746,7 @@ TEST_F(ServiceTest, ADamagedCheckpointCostsTimeOnly) {
 }
 
 TEST_F(ServiceTest, AStopThatARestartCameBetweenKeepsThePromisedInterval) {
-  const auto id = submit(move_ball_slowly(scene));
+  const auto id = submit(move_ball_for_long(scene));
   wait_for_interval(*service, id, 3);
   service->drain(0ms);
   const auto finished = value(service->find(id)).finished_intervals.size();
@@ -816,7 +821,7 @@ TEST_F(ServiceTest, ADamagedPictureIsNamedAndNotServed) {
 }
 
 TEST_F(ServiceTest, BetweenTwoNewsNotAByteChanges) {
-  const auto id = submit(move_ball_slowly(scene));
+  const auto id = submit(move_ball_for_long(scene));
   wait_for_interval(*service, id);
   int same = 0;
   for (int i = 0; i < 50; ++i) {
@@ -981,13 +986,15 @@ TEST_F(ServiceTest, CountsEditsByState) {
 }
 
 TEST_F(ServiceTest, DrainEndsAtTheNextIntervalAndLosesNothing) {
-  const auto id = submit(move_ball_slowly(scene));
+  const auto id = submit(move_ball_for_long(scene));
   wait_for_interval(*service, id, 1);
   service->drain(10s);
   const auto paused = value(service->find(id));
   EXPECT_EQ(paused.state, "running");
   EXPECT_LT(paused.finished_intervals.size(), 20u);
   reopen();
+  wait_for_interval(*service, id, paused.finished_intervals.size() + 1);
+  (void)value(service->stop(id));
   EXPECT_EQ(wait_for_end(*service, id).state, "succeeded");
 }
 

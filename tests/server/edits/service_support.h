@@ -86,6 +86,14 @@ inline proto::EditRequest move_ball_slowly(const std::string& scene) {
   return request;
 }
 
+/// The same with ten times as many pictures, for a test that ends the edit itself: however late the test comes to look
+/// on a busy machine, the edit is still at work. What is to wait behind it must take longer, or it goes first.
+inline proto::EditRequest move_ball_for_long(const std::string& scene, int longer = 1) {
+  proto::EditRequest request = move_ball_slowly(scene);
+  request.params.views = *request.params.views * 10 * longer;
+  return request;
+}
+
 /// The edit once `wanted(status)` holds; ends the test when patience does.
 template <class Wanted>
 proto::EditStatus wait_for(EditService& service, const std::string& id, Wanted wanted) {

@@ -96,6 +96,7 @@ class EditRoutesTest : public edits::ServiceTest {
   }
   Request edit_body() const { return with_body(proto::to_json(edits::move_ball(scene))); }
   std::string slow_edit() { return submit(edits::move_ball_slowly(scene)); }
+  std::string long_edit(int longer = 1) { return submit(edits::move_ball_for_long(scene, longer)); }
 
   http::Router router;
 };
@@ -254,7 +255,7 @@ TEST_F(EditRoutesTest, APreviewIsAnsweredAtOnce) {
 
 TEST_F(EditRoutesTest, AListIsFiltered) {
   edits::wait_for_end(*service, submit(edits::move_ball(scene)));
-  const auto running = slow_edit();
+  const auto running = long_edit();
   const auto listed = [&](std::map<std::string, std::string, std::less<>> query) {
     Request request;
     request.in_query = std::move(query);
@@ -323,14 +324,14 @@ TEST_F(EditRoutesTest, CorrectedPicturesAreListedAndServed) {
 }
 
 TEST_F(EditRoutesTest, StopCancelAndDeleteAnswerByTheState) {
-  const auto id = slow_edit();
+  const auto id = long_edit();
   edits::wait_for_interval(*service, id);
   EXPECT_EQ(code_of(call("DELETE", "/v1/edits/{id}", about(id))), ErrorCode::conflict);
   EXPECT_EQ(json::parse(value(call("POST", "/v1/edits/{id}/stop", about(id))).body).at("state"), "stop_requested");
   edits::wait_for_end(*service, id);
   EXPECT_EQ(code_of(call("POST", "/v1/edits/{id}/cancel", about(id))), ErrorCode::conflict);
 
-  const auto other = slow_edit();
+  const auto other = long_edit();
   const auto cancelled = value(call("POST", "/v1/edits/{id}/cancel", about(other)));
   EXPECT_EQ(cancelled.status, 200);
   edits::wait_for_end(*service, other);
@@ -366,7 +367,7 @@ TEST_F(EditRoutesTest, EventsTellEveryChangeOnceAndEndWithTheEdit) {
 }
 
 TEST_F(EditRoutesTest, NewsOfOtherEditsIsNoEvent) {
-  const auto running = slow_edit(), waiting = submit(edits::move_ball(scene));
+  const auto running = slow_edit(), waiting = long_edit();
   const auto reply = value(call("GET", "/v1/edits/{id}/events", about(waiting)));
   Listener listener;
   listener.listens = [&] { return !value(service->find(running)).ended; };
@@ -376,8 +377,8 @@ TEST_F(EditRoutesTest, NewsOfOtherEditsIsNoEvent) {
 }
 
 TEST_F(EditRoutesTest, AStreamEndsWhenItsListenerOrItsEditIsGone) {
-  const auto running = slow_edit();
-  (void)submit(edits::move_ball(scene));
+  const auto running = long_edit();
+  (void)long_edit(2);
   const auto reply = value(call("GET", "/v1/edits/{id}/events", about(running)));
   Listener gone;
   gone.listens = [] { return false; };
