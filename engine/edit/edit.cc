@@ -22,7 +22,7 @@ Result<void> correct_and_optimise(State& state, Edit& edit, int u) {
   const std::vector<scene::Mask> masks = masks_to_edit(state, edit);
   const int corrections = edit.params().annealing_steps;
   for (int a = 1; a <= corrections; ++a) {
-    const repair::Round round{u, a, strength_of(edit.params(), a)};
+    const repair::Round round{u, a, strength_of(edit.params(), a), u == state.report.resolved.intervals};
     auto corrected = correct(state, edit, masks, round);
     if (!corrected) return propagate(corrected);
     if (a == corrections && edit.corrector != nullptr)

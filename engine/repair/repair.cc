@@ -9,6 +9,7 @@
 
 #include "engine/core/parallel.h"
 #include "engine/core/rng.h"
+#include "engine/core/rows.h"
 #include "engine/mask/mask.h"
 #include "engine/render/forward.h"
 #include "engine/repair/chart.h"
@@ -17,6 +18,7 @@
 #include "engine/repair/survey.h"
 #include "engine/repair/trust.h"
 #include "engine/repair/vacated.h"
+#include "engine/repair/veils.h"
 #include "engine/repair/view_order.h"
 #include "engine/train/densify.h"
 #include "engine/working/footprint.h"
@@ -247,6 +249,13 @@ void Repair::clear_unseen(WorkingScene& working, Rows& rows, const scene::Camera
   std::sort(rows.dragged.begin(), rows.dragged.end());
 }
 
+void Repair::clear_veils(WorkingScene& working, Rows& rows) {
+  const std::vector<std::uint32_t> veils =
+      veils_before(working, original_, rows.vacating, rows.moved, views_, workspace_);
+  for (const std::uint32_t row : veils) working.give_up(row);
+  rows.gone = united(rows.gone, veils), rows.dragged = united(rows.dragged, veils);
+}
+
 Result<Repair::Telling> Repair::most_telling_view(const WorkingScene& working, const Rows& rows, const Round& round,
                                                   const std::function<Result<void>()>& looked) {
   Telling best;
@@ -347,7 +356,9 @@ Result<Repair::Background> Repair::complete_background(WorkingScene& working, Ro
   scene::Image surface = surfaces_behind(now, v, round).inverse_depth;
   const scene::Image closing = this->closing(working, rows, v, surface);
   Background background{{}, scene::Mask(view.width, view.height), 0, {}};
-  scene::Mask open(view.width, view.height);
+  scene::Mask empty(view.width, view.height), open(view.width, view.height);
+  for (std::size_t i = 0; i < empty.data.size(); ++i) empty.data[i] = now.inverse_depth.data[i] == 0;
+  const scene::Mask air = repair::air(empty, vacated_[v]);
   bool goes_on = false;
   for (std::size_t i = 0; i < surface.data.size(); ++i) {
     if (closing.data[i] > 0) surface.data[i] = closing.data[i];
@@ -360,7 +371,7 @@ Result<Repair::Background> Repair::complete_background(WorkingScene& working, Ro
       now.trust.data[i] = hint_of_closure;
     }
     background.filled.data[i] = vacated_[v].data[i] != 0 && now.trust.data[i] < correct::trusted;
-    open.data[i] = background.filled.data[i] != 0 && !(surface.data[i] > 0);
+    open.data[i] = background.filled.data[i] != 0 && air.data[i] == 0 && !(surface.data[i] > 0);
   }
   background.uncovered = {vacated_[v].area(), open.area(), scene::bounding_box(open)};
   auto picture = ask_corrector(std::move(now.color), vacated_[v], std::move(now.trust), v,
@@ -406,6 +417,7 @@ Result<Corrected> Repair::correct(WorkingScene& working, std::span<const scene::
   give_up_healed(working);
   Rows rows = rows_of(working);
   note_vacated(working, rows, masks);
+  if (round.arrives && round.correction == 1 && mode_ == Mode::move) clear_veils(working, rows);
   trust_ = trust_of_rows(working, observed_, mode_);
   const OpaqueTrail opaque(working, original_, mode_);
   const auto views = double(views_.size());

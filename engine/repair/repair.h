@@ -34,7 +34,7 @@ using working::WorkingScene;
 struct Uncovered {
   std::size_t pixels = 0;  ///< What the part covered there, and covers no more.
   /// Those of them that show what no camera has seen, and where no surface was found to go on: what is there was
-  /// painted in this view alone.
+  /// painted in this view alone. Mere air is none of them.
   std::size_t open = 0;
   scene::Rect open_box;  ///< Around them.
 };
@@ -52,6 +52,7 @@ struct Round {
   int interval = 1;     ///< u, from 1.
   int correction = 1;   ///< a, from 1.
   double strength = 0;  ///< S(a), 0 to 1.
+  bool arrives = true;  ///< The interval is the last one: what moved stays where it is now.
 };
 
 /// Corrects the views of one edit. What it knows of the unedited scene is made once; nothing else is carried from one
@@ -130,6 +131,8 @@ class Repair {
   /// Lays what goes on behind the dragged part into the working scene as seeds.
   [[nodiscard]] Result<Background> complete_background(WorkingScene& working, Rows& rows, std::size_t v,
                                                        const Round& round);
+  /// What hangs as a veil before the part where it arrives goes.
+  void clear_veils(WorkingScene& working, Rows& rows);
   /// Healed rows go, for good.
   void give_up_healed(WorkingScene& working) const;
   /// Takes the trust of what view v shows in vacated pixels and no camera has seen, and of what lay right under a

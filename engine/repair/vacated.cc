@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/mask/mask.h"
 #include "engine/neighbours/point_index.h"
 
 namespace engine::repair {
@@ -60,6 +61,34 @@ scene::Image far_side(const scene::GaussianCloud& cloud, std::span<const std::ui
         far.at(u, v) = std::max(far.at(u, v), float(p.z));
   }
   return far;
+}
+
+scene::Mask air(const scene::Mask& empty, const scene::Mask& vacated) {
+  const int width = empty.width, height = empty.height;
+  scene::Mask beside = empty;
+  for (std::size_t at = 0; at < beside.data.size(); ++at) beside.data[at] &= vacated.data[at] == 0;
+  // A pixel or two may show nothing for a fault of the scene.
+  beside = mask::opened(beside, mask::blur_radius(height));
+  scene::Mask reached(width, height);
+  std::vector<std::size_t> next;
+  const auto reach = [&](std::size_t at) {
+    if (empty.data[at] == 0 || reached.data[at] != 0) return;
+    reached.data[at] = 1;
+    next.push_back(at);
+  };
+  for (std::size_t at = 0; at < beside.data.size(); ++at)
+    if (beside.data[at] != 0) reach(at);
+  while (!next.empty()) {
+    const std::size_t at = next.back(), x = at % std::size_t(width), y = at / std::size_t(width);
+    next.pop_back();
+    if (x > 0) reach(at - 1);
+    if (x + 1 < std::size_t(width)) reach(at + 1);
+    if (y > 0) reach(at - std::size_t(width));
+    if (y + 1 < std::size_t(height)) reach(at + std::size_t(width));
+  }
+  for (std::size_t at = 0; at < reached.data.size(); ++at)
+    reached.data[at] = reached.data[at] != 0 && vacated.data[at] != 0;
+  return reached;
 }
 
 }  // namespace engine::repair

@@ -8,6 +8,7 @@
 #include <set>
 #include <utility>
 
+#include "engine/core/rng.h"
 #include "engine/edit/masks.h"
 #include "engine/render/forward.h"
 #include "tests/engine/edit/block.h"
@@ -335,26 +336,70 @@ BlockScene without_floor() {
   return block;
 }
 
+TEST(Repair, ClearsTheVeilBeforeThePartOnlyWhereItStays) {
+  BlockScene block;
+  const auto first = std::uint32_t(block.cloud.size());
+  for (int i = -2; i <= 2; ++i)
+    for (int k = -2; k <= 2; ++k)
+      add_gaussian(block.cloud, {0.9f + 0.06f * float(i), -0.6f, 0.06f * float(k)}, {0.05f, 0.02f, 0.05f}, -2,
+                   floor_color);
+  for (const bool arrives : {false, true}) {
+    SCOPED_TRACE(arrives);
+    Moved moved(block);
+    ASSERT_TRUE(moved.correct({1, 1, 0.5, arrives}));
+    for (std::uint32_t row = first; row < moved.working.input_rows(); ++row)
+      EXPECT_EQ(moved.working.role()[row], arrives ? Role::original : Role::frozen) << row;
+  }
+}
+
+/// The block before what lies far off at all depths, seen by one camera: nobody could tell what goes on behind it.
+BlockScene before_rubble() {
+  BlockScene block = without_floor();
+  block.cameras.resize(1);
+  const scene::Camera& camera = block.cameras[0];
+  Rng rng(0);
+  for (int i = -22; i <= 22; ++i)
+    for (int k = -22; k <= 22; ++k) {
+      const double z = double(rng.uniform(5, 9));
+      const DVec2 pixel = DVec2(32.0) + 2.0 * DVec2(i, k);
+      const DVec3 at =
+          camera.world_from_cam(z * DVec3((pixel.x - camera.cx) / camera.fx, (pixel.y - camera.cy) / camera.fy, 1));
+      if (!block.hides(at)) add_gaussian(block.cloud, Vec3(at), Vec3(0.02f * float(z)), 4, floor_color);
+    }
+  return block;
+}
+
 TEST(Repair, TellsWhatIsLeftOpenAndWhere) {
-  Moved on_floor, in_void(without_floor());
-  const auto completed = on_floor.correct(), open = in_void.correct();
+  Moved on_floor, before_all(before_rubble());
+  const auto completed = on_floor.correct(), open = before_all.correct();
   ASSERT_TRUE(completed && open);
   ASSERT_EQ(completed->uncovered.size(), on_floor.block.cameras.size());
   for (std::size_t v = 0; v < on_floor.block.cameras.size(); ++v) {
-    const Uncovered &there = completed->uncovered[v], &nowhere = open->uncovered[v];
-    EXPECT_NEAR(double(there.pixels), double(nowhere.pixels), 0.1 * double(nowhere.pixels))
-        << v << ": the same block has left, and its foot shines a little through a floor";
+    const Uncovered& there = completed->uncovered[v];
     EXPECT_LT(double(there.open), 0.1 * double(there.pixels)) << v << ": the floor goes on, but for rims";
-    EXPECT_GT(double(nowhere.open), 0.5 * double(nowhere.pixels)) << v;
-    const scene::Mask below = in_void.uncovered(v);
-    const scene::Rect hidden = scene::bounding_box(below), box = nowhere.open_box;
-    EXPECT_TRUE(box.x0 <= hidden.x0 && box.y0 <= hidden.y0 && box.x1 >= hidden.x1 && box.y1 >= hidden.y1) << v;
-    EXPECT_GE(std::size_t(box.width() * box.height()), nowhere.open) << v;
   }
+  const Uncovered &there = completed->uncovered[0], &nowhere = open->uncovered[0];
+  EXPECT_NEAR(double(there.pixels), double(nowhere.pixels), 0.1 * double(nowhere.pixels))
+      << "the same block has left, and its foot shines a little through a floor";
+  EXPECT_GT(double(nowhere.open), 0.5 * double(nowhere.pixels));
+  const scene::Mask below = before_all.uncovered(0);
+  const scene::Rect hidden = scene::bounding_box(below), box = nowhere.open_box;
+  EXPECT_TRUE(box.x0 <= hidden.x0 && box.y0 <= hidden.y0 && box.x1 >= hidden.x1 && box.y1 >= hidden.y1);
+  EXPECT_GE(std::size_t(box.width() * box.height()), nowhere.open);
   Moved drawn_out(0, Mode::extend);
   const auto extended = drawn_out.correct();
   ASSERT_TRUE(extended);
   EXPECT_TRUE(extended->uncovered.empty()) << "nothing has left its place";
+}
+
+TEST(Repair, LeavesNothingOpenWhereThereIsMereAir) {
+  Moved in_void(without_floor());
+  const auto corrected = in_void.correct();
+  ASSERT_TRUE(corrected);
+  for (const Uncovered& seen : corrected->uncovered) {
+    EXPECT_GT(seen.pixels, 0u);
+    EXPECT_EQ(seen.open, 0u);
+  }
 }
 
 TEST(Repair, KeepsInThePictureWhatWasFilledInWhereNoSurfaceGoesOn) {

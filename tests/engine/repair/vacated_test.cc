@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <numeric>
+#include <span>
+#include <string_view>
 
 #include "tests/engine/edit/block.h"
 
@@ -86,6 +89,53 @@ TEST(FarSide, IsNowhereForRowsBehindTheCameraOrFarBesideItsPicture) {
     edit::add_gaussian(cloud, mean, Vec3(0.01f), 4, edit::block_color);
   const std::vector<std::uint32_t> all{0, 1, 2, 3};
   EXPECT_EQ(far_side(cloud, all, camera), scene::Image(32, 32, 1));
+}
+
+/// A mask drawn by a character per pixel: '.' is not set.
+scene::Mask drawn(std::span<const std::string_view> rows) {
+  scene::Mask mask(int(rows[0].size()), int(rows.size()));
+  for (int y = 0; y < mask.height; ++y)
+    for (int x = 0; x < mask.width; ++x) mask.at(x, y) = rows[std::size_t(y)][std::size_t(x)] != '.';
+  return mask;
+}
+
+TEST(Air, IsWhereNothingIsAllTheWayFromBesideTheHole) {
+  constexpr std::array<std::string_view, 6> empty{"oooooooooooo",  //
+                                                  "oooooooooooo",  //
+                                                  "oooooo......",  //
+                                                  "oooooo.ooo..",  // a hole in what stands there
+                                                  "oooooo.ooo..",  //
+                                                  "oooooo......"};
+  constexpr std::array<std::string_view, 6> vacated{"............",  //
+                                                    "............",  //
+                                                    "...ooooooooo",  //
+                                                    "...ooooooooo",  //
+                                                    "...ooooooooo",  //
+                                                    "............"};
+  const scene::Mask found = air(drawn(empty), drawn(vacated));
+  for (int y = 0; y < 6; ++y)
+    for (int x = 0; x < 12; ++x)
+      EXPECT_EQ(found.at(x, y), vacated[std::size_t(y)][std::size_t(x)] == 'o' && x < 6) << x << " " << y;
+}
+
+TEST(Air, IsNotToldByASpeckBesideAHole) {
+  // 256 rows, so that what is blurred is a pixel wide: one alone beside the hole shows nothing.
+  scene::Mask empty(256, 256), vacated(256, 256);
+  for (int y = 100; y < 140; ++y)
+    for (int x = 100; x < 140; ++x) empty.at(x, y) = vacated.at(x, y) = 1;
+  empty.at(99, 120) = 1;
+  EXPECT_EQ(air(empty, vacated).area(), 0u);
+  for (int y = 0; y < 256; ++y)
+    for (int x = 0; x < 100; ++x) empty.at(x, y) = 1;
+  EXPECT_EQ(air(empty, vacated).area(), vacated.area()) << "nothing at all on one side of it";
+}
+
+TEST(Air, IsNoneWhereSomethingIsEverywhereOrNothingWasLeft) {
+  EXPECT_EQ(air(scene::Mask(8, 8), scene::Mask(8, 8)).area(), 0u);
+  scene::Mask all(8, 8);
+  for (std::uint8_t& pixel : all.data) pixel = 1;
+  EXPECT_EQ(air(scene::Mask(8, 8), all).area(), 0u);
+  EXPECT_EQ(air(all, scene::Mask(8, 8)).area(), 0u);
 }
 
 }  // namespace
