@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -25,6 +26,8 @@ constexpr double too_large = 1.25, off_centre = 1.2;
 // Factors that bare balls are tried with: finer steps than a person would take.
 constexpr double least_factor = 0.25, most_factor = 2.0;
 constexpr int factors = 25;
+
+constexpr int most_wider = 3;  // times that a person asks for more, or for less: a choice
 
 constexpr int too_wide_px = 5;  // beyond the true outline: what segmentation tools are off by at worst
 
@@ -81,6 +84,12 @@ Result<Grasp> grasp_by_selection(std::string by, select::Selection selection, co
   return grasp_of(std::move(by), std::move(request), scene);
 }
 
+/// The harmonic mean of recall and precision.
+double f1_of(const Match& match) {
+  const double sum = match.recall + match.precision;
+  return sum > 0 ? 2 * match.recall * match.precision / sum : 0;
+}
+
 /// The photos that were taken farthest to the left, in the middle and farthest to the right.
 std::vector<scene::Camera> three_photos(const CapturedCase& the_case) {
   const DVec3 right = right_of(the_case);
@@ -122,14 +131,28 @@ Result<Grasp> grasp_by_bare_balls(const CapturedCase& the_case, const scene::Gau
     const double factor = least_factor * std::pow(most_factor / least_factor, double(i) / (factors - 1));
     const auto tried = grasp(factor);
     if (!tried) continue;
-    const auto [recall, precision] = match(scene, tried->rows, the_case.moving, counts);
-    const double f1 = recall + precision > 0 ? 2 * recall * precision / (recall + precision) : 0;
+    const double f1 = f1_of(match(scene, tried->rows, the_case.moving, counts));
     if (f1 > best_f1) best = factor, best_f1 = f1;
   }
   auto out = grasp(best);
   if (!out || !the_case.careless) return out;
   for (edit::Handle& handle : out->request.handles) place_carelessly(the_case, handle);
   return grasp_of("bare", std::move(out->request), scene);
+}
+
+Result<Grasp> grasp_by_a_click(const CapturedCase& the_case, const scene::GaussianCloud& scene) {
+  if (the_case.clicks.inside.empty()) return fail(ErrorCode::invalid_argument, "there is none", "clicks.inside");
+  select::Grow click{{the_case.clicks.inside.front()}, {}, {}};
+  click.whole = true;
+  const std::vector<double> counts = opacities_times_area(scene);
+  std::optional<Result<Grasp>> best;
+  double best_f1 = -1;
+  for (click.wider = -most_wider; click.wider <= most_wider; ++click.wider) {
+    auto tried = grasp_by_selection("click", {{select::Op::add, click}}, the_case, scene);
+    const double f1 = tried ? f1_of(match(scene, tried->rows, the_case.moving, counts)) : -1;
+    if (!best || f1 > best_f1) best = std::move(tried), best_f1 = f1;
+  }
+  return *std::move(best);
 }
 
 Result<Grasp> grasp_by_clicks(const CapturedCase& the_case, const scene::GaussianCloud& scene) {
@@ -152,9 +175,10 @@ Result<Grasp> grasp_by_wide_masks(const CapturedCase& the_case, const scene::Gau
 }
 
 const std::vector<NamedGrasp>& known_grasps() {
-  static const std::vector<NamedGrasp> all{{"balls", grasp_by_balls},   {"bare", grasp_by_bare_balls},
-                                           {"clicks", grasp_by_clicks}, {"looking", grasp_by_looking},
-                                           {"masks", grasp_by_masks},   {"wide_masks", grasp_by_wide_masks}};
+  static const std::vector<NamedGrasp> all{{"balls", grasp_by_balls},          {"bare", grasp_by_bare_balls},
+                                           {"click", grasp_by_a_click},        {"clicks", grasp_by_clicks},
+                                           {"looking", grasp_by_looking},      {"masks", grasp_by_masks},
+                                           {"wide_masks", grasp_by_wide_masks}};
   return all;
 }
 

@@ -15,7 +15,7 @@ namespace engine::captures {
 
 /// What is asked for, and what that takes along.
 struct Grasp {
-  std::string by;         ///< How: "balls", "bare", "clicks", "looking", "masks", "wide_masks".
+  std::string by;         ///< How: "balls", "bare", "click", "clicks", "looking", "masks", "wide_masks".
   edit::Request request;  ///< Without parameters: those are a preset's.
   std::vector<std::uint32_t>
       rows;  ///< Of the trained scene: selected ones, or those in balls that have a target. Ascending.
@@ -35,6 +35,12 @@ using GraspBy = std::function<Result<Grasp>(const CapturedCase& the_case, const 
 /// precision). Carelessly: those balls, placed as above.
 ///   errors  those of deform::assign(), where no factor gives every handle a row
 [[nodiscard]] Result<Grasp> grasp_by_bare_balls(const CapturedCase& the_case, const scene::GaussianCloud& scene);
+
+/// By the first of the case's clicks alone, which means the whole (select::Grow::whole), and that many borders wider or
+/// narrower that a person who looks at the tint would ask for: of at most three more and three less the one whose rows
+/// match what moves best (F1). Carelessly: as clicks.
+///   errors  those of select::select() and edit::assign(); invalid_argument: the case has no click inside
+[[nodiscard]] Result<Grasp> grasp_by_a_click(const CapturedCase& the_case, const scene::GaussianCloud& scene);
 
 /// By a selection that grows from the clicks of the case; each of its rows goes with the nearest handle. Carelessly:
 /// the selection reaches beyond the thing by so many pixels of a photo, and ends at a plane upright to it through the

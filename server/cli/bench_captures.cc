@@ -119,8 +119,9 @@ CLI::Option* add_capture_options(CLI::App& command, CaptureOptions& options) {
       .add_option(
           "--by", options.by,
           "How a request of --captures says what moves: balls around its handles (within a box; or bare, of the "
-          "best size), a selection that grows from at most six clicks, or from as many of a person who looks "
-          "and corrects, or masks of three photos, true or five pixels too wide (default: all in turn)")
+          "best size), a selection that grows from one click, with more or less asked for, from at most "
+          "six, or from as many of a person who looks and corrects, or masks of three photos, true or five pixels too "
+          "wide (default: all in turn)")
       ->needs(on)
       ->check(CLI::IsMember(ways))
       ->type_name("WAY");

@@ -17,7 +17,7 @@ struct CaptureOptions {
   bool on = false;
   std::string cache;  ///< Folder of trained scenes; empty: default_capture_cache().
   std::string page;   ///< File; empty: none is written.
-  std::vector<std::string> by{"balls",   "bare",  "clicks",
+  std::vector<std::string> by{"balls",   "bare",  "click",     "clicks",
                               "looking", "masks", "wide_masks"};  ///< Names of captures::known_grasps().
   int fit_iterations = 1500;
 };

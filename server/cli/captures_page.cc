@@ -28,6 +28,8 @@ constexpr const char* how =
     "- **bare** balls, as 3DGS-Drag has them, of the size that matches the truth best: nobody could choose a better "
     "one;\n"
     "- a selection that grows from at most six **clicks** fixed beforehand;\n"
+    "- the same from the first of these clicks alone (**click**), as on the page: it means the whole, and up to three\n"
+    "  borders more or less are asked for, whichever matches the truth best;\n"
     "- the same from the clicks of a person who is **looking**: up to six, each goes to the largest patch that is\n"
     "  tinted wrongly in six photos' views, and is undone if it makes things worse;\n"
     "- **masks** of three photos, lifted: the true outline; **wide masks**: 5 pixels more all around.\n\n"

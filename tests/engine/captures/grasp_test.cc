@@ -130,6 +130,12 @@ CapturedCase with_clicks() {
   return out;
 }
 
+std::vector<std::uint32_t> rows_below(std::uint32_t end) {
+  std::vector<std::uint32_t> rows(end);
+  std::iota(rows.begin(), rows.end(), 0u);
+  return rows;
+}
+
 TEST(GraspByClicks, TakesTheThingThatWasClickedAtWhateverTheRadiusOfItsHandle) {
   const auto grasp = grasp_by_clicks(with_clicks(), two_balls());
   ASSERT_TRUE(grasp) << grasp.error().message;
@@ -160,6 +166,44 @@ TEST(GraspByClicks, ClicksThatSayNothingAreAnError) {
   CapturedCase the_case = with_clicks();
   the_case.clicks.inside.clear();
   EXPECT_FALSE(grasp_by_clicks(the_case, two_balls()));
+}
+
+TEST(GraspByAClick, TakesTheWholeOfWhatWasClickedAtAlone) {
+  CapturedCase the_case = with_clicks();
+  the_case.clicks.outside.clear();  // not needed
+  the_case.moving = MovingPart(two_balls(), rows_below(300));
+  const auto grasp = grasp_by_a_click(the_case, two_balls());
+  ASSERT_TRUE(grasp) << grasp.error().message;
+  EXPECT_EQ(grasp->by, "click");
+  EXPECT_EQ(grasp->rows, rows_below(300));
+}
+
+TEST(GraspByAClick, AsksForMoreOrLessUntilItIsWhatIsMeant) {
+  // A strip of three colours: what the click is on, or all of it.
+  scene::GaussianCloud strip;
+  strip.resize(1800);
+  for (std::size_t i = 0; i < strip.size(); ++i) {
+    strip.mean.set(i, 0.02f * Vec3(float(i / 15), float(i % 15), 0));
+    strip.rotation.set(i, {1, 0, 0, 0});
+    strip.log_scale.set(i, Vec3(-4.2f));
+    strip.opacity_logit[i] = 4;
+    strip.sh_row(i)[i / 600] = 1;
+  }
+  CapturedCase the_case = with_handles({{{0.1, 0.1, 0}, DVec3(0, 1, 0), 0.05, 0}});
+  the_case.clicks = {{{0.1, 0.1, 0}}, {}};
+  for (const std::uint32_t meant : {600u, 1800u}) {
+    SCOPED_TRACE(meant);
+    the_case.moving = MovingPart(strip, rows_below(meant));
+    const auto grasp = grasp_by_a_click(the_case, strip);
+    ASSERT_TRUE(grasp) << grasp.error().message;
+    EXPECT_NEAR(double(grasp->rows.size()), meant, 60) << "but for a column or two";
+  }
+}
+
+TEST(GraspByAClick, OneThatIsNotThereIsAnError) {
+  CapturedCase the_case = with_clicks();
+  the_case.clicks.inside.clear();
+  EXPECT_FALSE(grasp_by_a_click(the_case, two_balls()));
 }
 
 /// The first ball is what moves.
