@@ -41,6 +41,8 @@ constexpr float shows = 0.5f;
 // that tells most, at each view. From 6 to 14 and from 0.5 to 0.9 on the ball and the leaf of the demo scene, the ear
 // of a fox and a doll: progress and the time that is left go by it.
 constexpr double closure_views = 10, telling_views = 0.75;
+// Below this opacity of all that is there a pixel shows nothing. A choice: what is faint is no air.
+constexpr float nothing = 0.05f;
 // Share of seeds in a pixel from which on it shows what the repair has decided.
 constexpr float decided = 0.5f;
 // A stain goes so deep, in parts of its distance: the layers of a surface below the one that shows are stained as well.
@@ -109,6 +111,7 @@ struct Repair::ViewNow {
   scene::Image color;          ///< [3]
   scene::Image trust;          ///< [1]
   scene::Image inverse_depth;  ///< [1] Of the first half of the light; 0: nothing.
+  scene::Mask empty;           ///< Next to nothing shows.
   scene::Mask reliable;        ///< Trusted and opaque.
   scene::Mask within;          ///< Not seen by anyone, and within what has left.
 };
@@ -148,11 +151,16 @@ Repair::ViewNow Repair::look(const WorkingScene& working, std::span<const std::u
   options.depth = true;
   render::Rendering now;
   render::forward(layers, view, options, trust_, workspace_, now);
-  ViewNow seen{std::move(now.color), std::move(now.weight), std::move(now.median_depth),
-               scene::Mask(view.width, view.height), scene::Mask(view.width, view.height)};
+  ViewNow seen{std::move(now.color),
+               std::move(now.weight),
+               std::move(now.median_depth),
+               scene::Mask(view.width, view.height),
+               scene::Mask(view.width, view.height),
+               scene::Mask(view.width, view.height)};
   for (std::size_t i = 0; i < now.alpha.data.size(); ++i) {
     float& depth = seen.inverse_depth.data[i];
     depth = depth > 0 ? 1 / depth : 0;
+    seen.empty.data[i] = now.alpha.data[i] < nothing;
     seen.reliable.data[i] =
         depth > 0 && seen.trust.data[i] >= correct::trusted && now.alpha.data[i] >= correct::trusted;
   }
@@ -250,10 +258,9 @@ void Repair::clear_unseen(WorkingScene& working, Rows& rows, const scene::Camera
 }
 
 void Repair::clear_veils(WorkingScene& working, Rows& rows) {
-  const std::vector<std::uint32_t> veils =
-      veils_before(working, original_, rows.vacating, rows.moved, views_, workspace_);
-  for (const std::uint32_t row : veils) working.give_up(row);
-  rows.gone = united(rows.gone, veils), rows.dragged = united(rows.dragged, veils);
+  veils_ = veils_before(working, original_, rows.vacating, rows.moved, views_, workspace_);
+  for (const std::uint32_t row : veils_) working.give_up(row);
+  rows.gone = united(rows.gone, veils_), rows.dragged = united(rows.dragged, veils_);
 }
 
 Result<Repair::Telling> Repair::most_telling_view(const WorkingScene& working, const Rows& rows, const Round& round,
@@ -356,9 +363,8 @@ Result<Repair::Background> Repair::complete_background(WorkingScene& working, Ro
   scene::Image surface = surfaces_behind(now, v, round).inverse_depth;
   const scene::Image closing = this->closing(working, rows, v, surface);
   Background background{{}, scene::Mask(view.width, view.height), 0, {}};
-  scene::Mask empty(view.width, view.height), open(view.width, view.height);
-  for (std::size_t i = 0; i < empty.data.size(); ++i) empty.data[i] = now.inverse_depth.data[i] == 0;
-  const scene::Mask air = repair::air(empty, vacated_[v]);
+  scene::Mask open(view.width, view.height);
+  const scene::Mask mere_air = air(now.empty, vacated_[v]);
   bool goes_on = false;
   for (std::size_t i = 0; i < surface.data.size(); ++i) {
     if (closing.data[i] > 0) surface.data[i] = closing.data[i];
@@ -371,9 +377,9 @@ Result<Repair::Background> Repair::complete_background(WorkingScene& working, Ro
       now.trust.data[i] = hint_of_closure;
     }
     background.filled.data[i] = vacated_[v].data[i] != 0 && now.trust.data[i] < correct::trusted;
-    open.data[i] = background.filled.data[i] != 0 && air.data[i] == 0 && !(surface.data[i] > 0);
+    open.data[i] = background.filled.data[i] != 0 && mere_air.data[i] == 0 && !(surface.data[i] > 0);
   }
-  background.uncovered = {vacated_[v].area(), open.area(), scene::bounding_box(open)};
+  background.uncovered = {vacated_[v].area() - mere_air.area(), open.area(), scene::bounding_box(open)};
   auto picture = ask_corrector(std::move(now.color), vacated_[v], std::move(now.trust), v,
                                nearest_views(views_, v, most_examples), round, Purpose::background);
   if (!picture) return propagate(picture);
@@ -417,7 +423,7 @@ Result<Corrected> Repair::correct(WorkingScene& working, std::span<const scene::
   give_up_healed(working);
   Rows rows = rows_of(working);
   note_vacated(working, rows, masks);
-  if (round.arrives && round.correction == 1 && mode_ == Mode::move) clear_veils(working, rows);
+  if (round.arrives && round.correction == 1) clear_veils(working, rows);
   trust_ = trust_of_rows(working, observed_, mode_);
   const OpaqueTrail opaque(working, original_, mode_);
   const auto views = double(views_.size());
@@ -467,7 +473,7 @@ Repair::Rows Repair::rows_of(const WorkingScene& working) const {
     const bool is_gone = working::has_left(working.role()[i]) && mode_ == Mode::move;
     const bool is_moved = working::has_arrived(working.role()[i]);
     if (is_gone) rows.gone.push_back(i);
-    if (is_gone && i < working.input_rows()) rows.vacating.push_back(i);
+    if (is_gone && i < working.input_rows() && !std::ranges::binary_search(veils_, i)) rows.vacating.push_back(i);
     if (is_moved) rows.moved.push_back(i);
     if (is_gone || is_moved) rows.dragged.push_back(i);
   }

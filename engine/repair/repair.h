@@ -32,9 +32,9 @@ using working::WorkingScene;
 
 /// What one view shows of the place that the part has left.
 struct Uncovered {
-  std::size_t pixels = 0;  ///< What the part covered there, and covers no more.
+  std::size_t pixels = 0;  ///< What the part covered there, and covers no more, but for mere air.
   /// Those of them that show what no camera has seen, and where no surface was found to go on: what is there was
-  /// painted in this view alone. Mere air is none of them.
+  /// painted in this view alone.
   std::size_t open = 0;
   scene::Rect open_box;  ///< Around them.
 };
@@ -52,7 +52,7 @@ struct Round {
   int interval = 1;     ///< u, from 1.
   int correction = 1;   ///< a, from 1.
   double strength = 0;  ///< S(a), 0 to 1.
-  bool arrives = true;  ///< The interval is the last one: what moved stays where it is now.
+  bool arrives = false;  ///< The interval is the last one: what moved stays where it is now.
 };
 
 /// Corrects the views of one edit. What it knows of the unedited scene is made once; nothing else is carried from one
@@ -68,7 +68,8 @@ class Repair {
   Repair(scene::GaussianCloud original, std::span<const scene::Camera> observers, std::vector<scene::Camera> views,
          std::span<const std::uint32_t> healed, Mode mode, std::uint64_t seed, correct::Corrector& corrector);
 
-  /// One correction of all views. Appends seeds to the working scene.
+  /// One correction of all views. Appends seeds to the working scene, and gives up what hides what is completed, or the
+  /// part where it arrives.
   ///   masks    per view, dilated; views without a set pixel stay as they are
   ///   advance  called with the part that is done, after each view of either pass; its error ends the correction
   ///   errors   those of the corrector and of `advance`; internal: the corrector gave back something else than a
@@ -153,6 +154,7 @@ class Repair {
   Witnesses witnesses_;
   std::vector<std::uint32_t> healed_;  ///< Ascending.
   std::vector<scene::Mask> stained_;   ///< Per view: pixels that the healed rows made up.
+  std::vector<std::uint32_t> veils_;   ///< Rows of the input that were given up as veils, ascending.
   std::vector<std::uint32_t> unseen_;  ///< Rows of the input that no camera has seen, ascending.
   UneditedViews unedited_;
   std::vector<correct::Example> buffer_;

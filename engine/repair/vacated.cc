@@ -1,6 +1,7 @@
 #include "engine/repair/vacated.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include "engine/mask/mask.h"
@@ -64,15 +65,19 @@ scene::Image far_side(const scene::GaussianCloud& cloud, std::span<const std::ui
 }
 
 scene::Mask air(const scene::Mask& empty, const scene::Mask& vacated) {
+  assert(empty.data.size() == vacated.data.size());
   const int width = empty.width, height = empty.height;
+  // A pixel or two may show nothing for a fault of the scene, and through a crack a hole is no part of what is outside.
+  const int crack = mask::blur_radius(height);
   scene::Mask beside = empty;
   for (std::size_t at = 0; at < beside.data.size(); ++at) beside.data[at] &= vacated.data[at] == 0;
-  // A pixel or two may show nothing for a fault of the scene.
-  beside = mask::opened(beside, mask::blur_radius(height));
+  beside = mask::opened(beside, crack);
+  scene::Mask wide = mask::opened(empty, crack);
+  mask::unite(wide, beside);
   scene::Mask reached(width, height);
   std::vector<std::size_t> next;
   const auto reach = [&](std::size_t at) {
-    if (empty.data[at] == 0 || reached.data[at] != 0) return;
+    if (wide.data[at] == 0 || reached.data[at] != 0) return;
     reached.data[at] = 1;
     next.push_back(at);
   };

@@ -31,7 +31,7 @@ using working::WorkingScene;
                                     const scene::Camera& camera);
 
 /// Pixels that the part has left and that show mere air now: nothing is there, and nothing beside what was left either,
-/// all the way. There is nothing to complete.
+/// all the way, by no crack. There is nothing to complete.
 ///   empty    pixels that show nothing
 ///   vacated  pixels that the part has left, of the same size
 [[nodiscard]] scene::Mask air(const scene::Mask& empty, const scene::Mask& vacated);

@@ -17,13 +17,14 @@ namespace engine::repair {
 
 using working::WorkingScene;
 
-/// Frozen rows of the working scene that are a veil: most of their light falls on the part where everything else that
-/// stays is behind it, and did not where the part came from: there they are a layer of what the part grows out of.
-/// Ascending; none where they all take less of the part's light than anybody sees. Three forward passes for each of at
-/// most a dozen of the views, twice that where there is a veil.
-///   original  the scene as the edit found it, in the frame of the edit
-///   left      rows of it that have left their place
-///   arrived   rows of the working scene that they have become
+/// Frozen rows of the working scene that are a veil: most of their light falls on the part where what is solid of the
+/// rest is behind it, and did not where the part came from: there they are a layer of what the part grows out of.
+/// Ascending. None where they all take less of the part's light than anybody sees, nor where the scene without them
+/// looks otherwise: what shows there, such as a net or glass, is no veil. Three forward passes for each of at most a
+/// dozen of the views, and five more where there may be a veil.
+///   original  the scene as the edit found it, in the frame of the edit: input_rows() rows (asserted)
+///   left      rows of it that have left their place, ascending
+///   arrived   rows of the working scene where they have come to, ascending
 ///   views     in that frame
 [[nodiscard]] std::vector<std::uint32_t> veils_before(const WorkingScene& working, const scene::GaussianCloud& original,
                                                       std::span<const std::uint32_t> left,

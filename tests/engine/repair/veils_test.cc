@@ -10,11 +10,15 @@
 namespace engine::repair {
 namespace {
 
-constexpr float faint = -2;  // logit: of an eighth; where some overlap, of a third
+constexpr float faint = -3.2f;  // logit: of a twenty-fifth; where some overlap, of an eighth
+
+constexpr Vec3 shown_floor_color{0.26f, 0.43f, 0.6f};  // between its Gaussians shines the dark below
 
 /// Logit and height of what floats over an area, and its middle.
 struct Haze {
   float logit = faint, height = 0.6f, x = 0.9f;
+  Vec3 color = shown_floor_color;
+  float extent = 0.05f;
 };
 
 /// A block that has moved over a floor before which something floats.
@@ -29,7 +33,7 @@ struct Arrival {
     for (int i = -2; i <= 2; ++i)
       for (int k = -2; k <= 2; ++k)
         edit::add_gaussian(block.cloud, {haze.x + 0.06f * float(i), -haze.height, 0.06f * float(k)},
-                           {0.05f, 0.02f, 0.05f}, haze.logit, edit::floor_color);
+                           {haze.extent, 0.02f, haze.extent}, haze.logit, haze.color);
     floating.resize(block.cloud.size() - first);
     std::iota(floating.begin(), floating.end(), std::uint32_t(first));
     block.request.handles[0].target = block.middle + DVec3(way, 0, 0);
@@ -55,6 +59,14 @@ TEST(Veils, AreNoneThatNobodySees) { EXPECT_TRUE(Arrival(Haze{.logit = -5}).veil
 
 TEST(Veils, AreNotWhatHidesThePart) {
   EXPECT_TRUE(Arrival(Haze{.logit = 5}).veils().empty()) << "it is a thing, and stands before the part";
+}
+
+TEST(Veils, AreNotWhatIsSeenBeforeTheFloor) {
+  EXPECT_TRUE(Arrival(Haze{.color = {0.9f, 0.9f, 0.1f}}).veils().empty()) << "a net, say: people see it";
+}
+
+TEST(Veils, AreNotWhatMostlyHangsBesideThePart) {
+  EXPECT_TRUE(Arrival(Haze{.logit = -4, .extent = 0.6f}).veils().empty());
 }
 
 TEST(Veils, AreNotLayersOfWhatThePartGrowsOutOf) {
