@@ -182,37 +182,6 @@ std::optional<ChannelLayout> find_channels(const OIIO::ImageSpec& spec) {
   return std::nullopt;
 }
 
-/// The stored picture turned as its EXIF orientation (2 to 8) asks.
-Image turned(const Image& stored, int orientation) {
-  const bool swaps = orientation >= 5;
-  const int right = stored.width - 1, bottom = stored.height - 1;
-  Image out(swaps ? stored.height : stored.width, swaps ? stored.width : stored.height, stored.channels);
-  const auto source = [&](int x, int y) -> std::array<int, 2> {
-    switch (orientation) {
-      case 2:
-        return {right - x, y};
-      case 3:
-        return {right - x, bottom - y};
-      case 4:
-        return {x, bottom - y};
-      case 5:
-        return {y, x};
-      case 6:
-        return {y, bottom - x};
-      case 7:
-        return {right - y, bottom - x};
-      default:
-        return {right - y, x};
-    }
-  };
-  for (int y = 0; y < out.height; ++y)
-    for (int x = 0; x < out.width; ++x) {
-      const auto [from_x, from_y] = source(x, y);
-      for (int c = 0; c < out.channels; ++c) out.at(x, y, c) = stored.at(from_x, from_y, c);
-    }
-  return out;
-}
-
 Result<Image> decode(std::span<const std::byte> bytes, const std::string& name, const ImageOptions& options) {
   // Asked before the library sees a byte: at the end of a PNG it leaks memory, of a JPEG it sees nothing wrong.
   const auto format = sniff(bytes);
@@ -250,9 +219,6 @@ Result<Image> decode(std::span<const std::byte> bytes, const std::string& name, 
     return fail(ErrorCode::corrupt_data, "a pixel is NaN or infinite",
                 name + ":pixel[" + std::to_string(*bad % pixels % std::size_t(image.width)) + "," +
                     std::to_string(*bad % pixels / std::size_t(image.width)) + "]");
-  const int orientation = spec.get_int_attribute("Orientation", 1);
-  if (options.orientation == Orientation::upright && orientation >= 2 && orientation <= 8)
-    return turned(image, orientation);
   return image;
 }
 
