@@ -1,6 +1,7 @@
 #include "engine/edit/memory.h"
 
 #include <algorithm>
+#include <chrono>
 
 namespace engine::edit {
 namespace {
@@ -8,27 +9,30 @@ namespace {
 // Choices: the groups of a drag; and rows of what is kept besides what was asked for last, some 50 MB of bodies.
 constexpr std::size_t most_kept = 8, most_rows = 400'000;
 
+}  // namespace
+
 /// The one that fits, which then is the last one; else one that is made now, in place of those that were used longest
 /// ago.
 ///   rows_of  how many rows one of them is about
-template <class Kept, class Fits, class Make, class RowsOf>
-const Kept& find_or_make(std::list<Kept>& kept, Fits&& fits, Make&& make, RowsOf&& rows_of) {
-  const auto found = std::ranges::find_if(kept, fits);
-  if (found != kept.end()) {
-    kept.splice(kept.end(), kept, found);
-  } else {
-    kept.push_back(make());
-    std::size_t rows = 0;
-    for (const Kept& one : kept) rows += rows_of(one);
-    while (kept.size() > 1 && (kept.size() > most_kept || rows > most_rows)) {
-      rows -= rows_of(kept.front());
-      kept.pop_front();
-    }
+template <class T, class Fits, class Make, class RowsOf>
+const T& Memory::find_or_make(std::list<Noted<T>>& known, Fits&& fits, Make&& make, RowsOf&& rows_of) {
+  const auto noted = std::ranges::find_if(known, fits, &Noted<T>::found);
+  if (noted != known.end()) {
+    known.splice(known.end(), known, noted);
+    saved_seconds_ += known.back().seconds;
+    return known.back().found;
   }
-  return kept.back();
+  const auto begin = std::chrono::steady_clock::now();
+  known.push_back({make()});
+  known.back().seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  std::size_t rows = 0;
+  for (const Noted<T>& one : known) rows += rows_of(one.found);
+  while (known.size() > 1 && (known.size() > most_kept || rows > most_rows)) {
+    rows -= rows_of(known.front().found);
+    known.pop_front();
+  }
+  return known.back().found;
 }
-
-}  // namespace
 
 const std::vector<select::Touch>& Memory::contact_of(const scene::LayeredCloud& scene,
                                                      std::span<const std::uint32_t> part,

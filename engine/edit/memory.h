@@ -28,7 +28,16 @@ class Memory {
   [[nodiscard]] const deform::Body& body_of(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
                                             std::span<const deform::Drag> drags, std::span<const std::uint8_t> held);
 
+  /// Seconds that this memory has saved so far: what was answered from it had taken so long to find out.
+  [[nodiscard]] double saved_seconds() const { return saved_seconds_; }
+
  private:
+  /// What was found out, and how long that took.
+  template <class T>
+  struct Noted {
+    T found;
+    double seconds = 0;
+  };
   struct Contact {
     std::vector<std::uint32_t> part, selected;
     std::vector<select::Touch> touches;
@@ -36,9 +45,14 @@ class Memory {
   struct Crumbs {
     std::vector<std::uint32_t> selected, rows;
   };
-  std::list<Crumbs> crumbs_;        ///< The one used last is last.
-  std::list<Contact> contacts_;     ///< The same.
-  std::list<deform::Body> bodies_;  ///< The same.
+
+  template <class T, class Fits, class Make, class RowsOf>
+  const T& find_or_make(std::list<Noted<T>>& known, Fits&& fits, Make&& make, RowsOf&& rows_of);
+
+  std::list<Noted<Crumbs>> crumbs_;        ///< The one used last is last.
+  std::list<Noted<Contact>> contacts_;     ///< The same.
+  std::list<Noted<deform::Body>> bodies_;  ///< The same.
+  double saved_seconds_ = 0;
 };
 
 }  // namespace engine::edit

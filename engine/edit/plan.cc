@@ -25,7 +25,7 @@ constexpr double unite_pixel_seconds = 1e-9;   // to make a mask of it and unite
 constexpr double dilate_pixel_seconds = 4e-9;  // the box filter of a dilation
 constexpr double row_seconds = 2e-8;           // to copy one Gaussian, or look at it
 constexpr double dome_row_seconds = 4e-7;      // rays of virtual cameras through a scene
-constexpr double drag_row_seconds = 2e-7;      // to deform, paste or relocate one dragged Gaussian
+constexpr double drag_row_seconds = 2e-7;      // to deform, paste or relocate one dragged Gaussian; bodies take longer
 constexpr double observe_frames = 1.1;         // largest weights, or depth beside colour
 constexpr double look_frames = 1.3;            // depth and trust beside colour
 constexpr double surface_seconds = 8e-3;       // to find the surfaces that go on in a view
@@ -58,7 +58,7 @@ class Maker {
   }
 
   std::vector<PlannedStage> operator()() && {
-    add(Stage::assign, 0, slow(row_seconds * n_));
+    add(Stage::assign, 0, slow(row_seconds * n_) + work_.assign_seconds);
     add(Stage::views, 0, choice());
     for (int u = 1; u <= work_.intervals; ++u) add_interval(u);
     add(Stage::finish, 0, slow(row_seconds * n_ + dilate_pixel_seconds * views_ * pixels_));
@@ -76,11 +76,15 @@ class Maker {
            work_.frame.pixel * work_.covered * pixels + slow(unite_pixel_seconds * pixels);
   }
 
+  /// To find out where everything goes in one interval.
+  [[nodiscard]] double motion() const {
+    return work_.drag_seconds > 0 ? work_.drag_seconds / work_.intervals : slow(drag_row_seconds * p_h_);
+  }
   /// Virtual cameras, the dry run of the drag, and what all cameras see of its beginning and its end.
   [[nodiscard]] double choice() const {
     const double small = std::min(double(comparison_side * comparison_side), pixels_);
     const double dome = work_.virtual_views ? dome_row_seconds * n_ : 0;
-    return slow(dome + drag_row_seconds * p_h_ * work_.intervals) + 2 * double(work_.candidates) * footprint(small);
+    return slow(dome) + motion() * work_.intervals + 2 * double(work_.candidates) * footprint(small);
   }
 
   /// What a moment shows.
@@ -97,7 +101,7 @@ class Maker {
     const double masks = views_ * footprint(pixels_);
     const bool optimises = work_.iterations > 0;
     add_pictures(u, u == 1 ? Shows::rendered : Shows::as_before);
-    add(Stage::deform, u, slow(drag_row_seconds * p_h_));
+    add(Stage::deform, u, motion());
     // Without an optimisation, what leaves its place is what the interval before has put there, and was united then.
     add(Stage::mask, u, u == 1 || optimises ? masks : 0);
     add(Stage::deform, u, slow(drag_row_seconds * p_h_));

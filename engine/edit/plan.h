@@ -70,8 +70,11 @@ struct Workload {
   std::size_t pictured = 0;     ///< and pictures are made of so many views.
   bool kept = false;            ///< Checkpoints are handed out.
   FrameTime frame;              ///< Of this scene, on this machine as it is now; 0: not measured.
-  double slowness = 1;          ///< Of this machine as it is now: how many times longer work takes than where the
-                                ///< plan's figures were measured.
+  // What a preview of this drag took, on this machine as it is now (PreviewOutcome); 0: there was none.
+  double assign_seconds = 0;  ///< To find what is dragged, and what holds it.
+  double drag_seconds = 0;    ///< To take it through all intervals.
+  double slowness = 1;        ///< Of this machine as it is now: how many times longer work takes than where the plan's
+                              ///< figures were measured.
 };
 
 /// One stage of one interval.

@@ -2,6 +2,7 @@
 #include "engine/core/rows.h"
 
 #include <algorithm>
+#include <chrono>
 #include <utility>
 
 #include "engine/edit/drag.h"
@@ -10,6 +11,24 @@
 #include "engine/edit/publish.h"
 
 namespace engine::edit {
+namespace {
+
+/// How long work takes, or took when a memory found out what it now knows.
+class Stopwatch {
+ public:
+  explicit Stopwatch(const Memory& memory) : memory_(memory), saved_(memory.saved_seconds()) {}
+  [[nodiscard]] double seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count() +
+           (memory_.saved_seconds() - saved_);
+  }
+
+ private:
+  const Memory& memory_;
+  const double saved_;
+  const std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace
 
 Result<PreviewOutcome> preview(const scene::LayeredCloud& scene, const Request& request) {
   Memory memory;
@@ -19,6 +38,7 @@ Result<PreviewOutcome> preview(const scene::LayeredCloud& scene, const Request& 
 Result<PreviewOutcome> preview(const scene::LayeredCloud& scene, const Request& request, Memory& memory) {
   if (const auto valid = validate(request); !valid) return propagate(valid);
   PreviewOutcome outcome;
+  const Stopwatch assigning(memory);
   auto assignment = assign(scene, request, memory);
   if (!assignment) return propagate(assignment);
   outcome.counts = std::move(assignment->count);
@@ -27,12 +47,15 @@ Result<PreviewOutcome> preview(const scene::LayeredCloud& scene, const Request& 
 
   const Parts parts = parts_of(scene, assignment->handle, request, memory);
   outcome.parts = parts.attachments;
+  outcome.assign_seconds = assigning.seconds();
   std::vector<std::uint32_t> rows = rows_in_use(assignment->handle, parts);
   const std::vector<std::uint32_t>& given_up = assignment->given_up;
   rows = united(rows, given_up);
   const scene::GaussianCloud dragged = scene::gather(scene, rows);
+  const Stopwatch dragging(memory);
   DraggedAlone drag = drag_alone(std::move(rows), dragged, assignment->handle, request, parts, outcome.intervals,
                                  request.params.rotate_sh, memory);
+  outcome.drag_seconds = dragging.seconds();
   const bool moves = !drag.working.rows_that_left().empty();
   if (moves)
     for (std::uint32_t k = 0; k < drag.rows.size(); ++k)

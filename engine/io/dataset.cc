@@ -281,7 +281,7 @@ Result<scene::Image> load_photo(const View& view, MemoryBudget* memory) {
       take_from(memory, (unknown ? 0 : std::uint64_t{file_bytes}) + pixel_bytes * pixels, view.camera.name);
   if (!share) return propagate(share);
   // About the size that was counted, with up to 8 channels, or none: it may have been exchanged meanwhile.
-  auto photo = read_image(view.photo, {.orientation = Orientation::as_stored, .max_pixels = 2 * pixels});
+  auto photo = read_image(view.photo, {.max_pixels = 2 * pixels});
   if (!photo && photo.error().code != ErrorCode::too_large) return photo;
   const int width = view.lens ? view.lens->width : view.camera.width;
   const int height = view.lens ? view.lens->height : view.camera.height;

@@ -6,11 +6,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cctype>
 #include <cmath>
 #include <cstring>
 #include <exception>
 #include <initializer_list>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <new>
@@ -182,37 +184,6 @@ std::optional<ChannelLayout> find_channels(const OIIO::ImageSpec& spec) {
   return std::nullopt;
 }
 
-/// The stored picture turned as its EXIF orientation (2 to 8) asks.
-Image turned(const Image& stored, int orientation) {
-  const bool swaps = orientation >= 5;
-  const int right = stored.width - 1, bottom = stored.height - 1;
-  Image out(swaps ? stored.height : stored.width, swaps ? stored.width : stored.height, stored.channels);
-  const auto source = [&](int x, int y) -> std::array<int, 2> {
-    switch (orientation) {
-      case 2:
-        return {right - x, y};
-      case 3:
-        return {right - x, bottom - y};
-      case 4:
-        return {x, bottom - y};
-      case 5:
-        return {y, x};
-      case 6:
-        return {y, bottom - x};
-      case 7:
-        return {right - y, bottom - x};
-      default:
-        return {right - y, x};
-    }
-  };
-  for (int y = 0; y < out.height; ++y)
-    for (int x = 0; x < out.width; ++x) {
-      const auto [from_x, from_y] = source(x, y);
-      for (int c = 0; c < out.channels; ++c) out.at(x, y, c) = stored.at(from_x, from_y, c);
-    }
-  return out;
-}
-
 Result<Image> decode(std::span<const std::byte> bytes, const std::string& name, const ImageOptions& options) {
   // Asked before the library sees a byte: at the end of a PNG it leaks memory, of a JPEG it sees nothing wrong.
   const auto format = sniff(bytes);
@@ -250,34 +221,51 @@ Result<Image> decode(std::span<const std::byte> bytes, const std::string& name, 
     return fail(ErrorCode::corrupt_data, "a pixel is NaN or infinite",
                 name + ":pixel[" + std::to_string(*bad % pixels % std::size_t(image.width)) + "," +
                     std::to_string(*bad % pixels / std::size_t(image.width)) + "]");
-  const int orientation = spec.get_int_attribute("Orientation", 1);
-  if (options.orientation == Orientation::upright && orientation >= 2 && orientation <= 8)
-    return turned(image, orientation);
   return image;
 }
 
 tl::unexpected<Error> refused(std::string message) { return fail(ErrorCode::invalid_argument, std::move(message)); }
 
-/// round(max * clamp(value, 0, 1)), halves upwards; 0 of NaN, of which no comparison is true. Without a call, for that
-/// cost people who wait for a JPEG four times what libjpeg does; the difference to the whole number below is exact.
+/// round(max * clamp(value, 0, 1)), halves upwards; 0 of NaN, of which no comparison is true. Without a call or a
+/// branch: people wait for JPEGs, and so compilers take vectors of values, as this file is told to trap nothing
+/// (CMakeLists.txt).
 template <class T>
 T nearest(float value) {
   constexpr float top = std::numeric_limits<T>::max();
-  const float scaled = top * (value > 0.0f ? (value < 1.0f ? value : 1.0f) : 0.0f);
+  const float positive = value > 0.0f ? value : 0.0f;
+  const float scaled = top * (positive < 1.0f ? positive : 1.0f);
   const int below = int(scaled);
-  return T(below + int(scaled - float(below) >= 0.5f));
+  const float rest = scaled - float(below);  // exact, and so is twice of it
+  return T(below + int(rest + rest));
 }
 
-/// Interleaved values of T's full range, as PNG and JPEG hold them.
-template <class T>
-std::vector<T> quantised(const Image& image) {
-  const auto channels = std::size_t(image.channels);
-  std::vector<T> out(image.data.size());
-  for (std::size_t c = 0; c < channels; ++c) {
-    const auto plane = image.plane(int(c));
-    for (std::size_t i = 0; i < plane.size(); ++i) out[i * channels + c] = nearest<T>(plane[i]);
+/// Interleaved values of T's full range, as PNG and JPEG hold them, of a picture with so many channels.
+template <class T, std::size_t kChannels>
+std::vector<T> interleaved_steps(const Image& image) {
+  const std::size_t pixels = image.pixels();
+  std::vector<T> out(kChannels * pixels);
+  // Rounded plane by plane, some pixels at a time, which vectors can do, and then dealt out.
+  T steps[kChannels][256];
+  for (std::size_t first = 0; first < pixels; first += std::size(steps[0])) {
+    const std::size_t count = std::min(std::size(steps[0]), pixels - first);
+    for (std::size_t c = 0; c < kChannels; ++c) {
+      const float* const values = image.plane(int(c)).data() + first;
+      for (std::size_t i = 0; i < count; ++i) steps[c][i] = nearest<T>(values[i]);
+    }
+    T* to = out.data() + kChannels * first;
+    for (std::size_t i = 0; i < count; ++i)
+      for (std::size_t c = 0; c < kChannels; ++c) *to++ = steps[c][i];
   }
   return out;
+}
+
+///   image  of 1, 3 or 4 channels
+template <class T>
+std::vector<T> quantised(const Image& image) {
+  assert(image.channels == 1 || image.channels == 3 || image.channels == 4);
+  return image.channels == 1   ? interleaved_steps<T, 1>(image)
+         : image.channels == 3 ? interleaved_steps<T, 3>(image)
+                               : interleaved_steps<T, 4>(image);
 }
 
 /// `pixels` holds interleaved values of spec.format.

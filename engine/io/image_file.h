@@ -14,11 +14,6 @@
 
 namespace engine::io {
 
-/// The order of rows and columns of a photo that is read.
-enum class Orientation {
-  upright,   ///< Rows as a viewer shows them: the EXIF orientation is applied.
-  as_stored  ///< Rows as in the file. Cameras are calibrated on these by COLMAP and its kin, which ignore EXIF.
-};
 /// What becomes of the alpha of a picture that is read.
 enum class Alpha {
   on_black,  ///< Colour times alpha, 3 channels: the picture in front of black, as 3DGS trains on it.
@@ -27,7 +22,6 @@ enum class Alpha {
 
 /// How a picture is read, and the limits, which hold before memory is allocated. The limits are choices.
 struct ImageOptions {
-  Orientation orientation = Orientation::upright;
   Alpha alpha = Alpha::on_black;
   int max_side = 16384;                                   ///< Pixels; larger pictures are refused (too_large).
   std::uint64_t max_pixels = std::uint64_t{1} << 27;      ///< Pixels of 4 channels; more is refused (too_large).
@@ -41,7 +35,9 @@ struct PictureSize {
 };
 
 /// 3 channels (grey is repeated), or 4 (see Alpha). Integers of 8 or 16 bits become 0 to 1; floats stay as they are
-/// and are taken to be display-referred. Limits hold before memory is allocated.
+/// and are taken to be display-referred. Limits hold before memory is allocated. Rows are those of the file, whatever
+/// its EXIF data say of how it is to be turned: COLMAP and its kin calibrate cameras on these, and what the library
+/// finds in damaged EXIF data is decided by memory that nobody wrote.
 ///   name    for error addresses
 ///   errors  unsupported: not one of the formats, or no R, G, B among the channels;
 ///           corrupt_data: damaged, cut short, NaN or infinity, or a header that promises more than 16 MiB and 2048

@@ -142,7 +142,7 @@ void summarise(std::ostream& out, const Destination& to, const EditReport& repor
       << " new ones\n";
   for (std::size_t i = 0; i < edit.handles.size(); ++i)
     out << "handle " << i + 1 << ": " << edit.handles[i].gaussians << " Gaussians\n";
-  // With what is removed they go away: it takes them along to nowhere.
+  // In mode `remove` those that go along with the part are removed with it.
   const bool removed = report.request.crumbs == proto::Crumbs::remove || report.request.mode == proto::Mode::remove;
   if (edit.crumbs > 0)
     out << "crumbs that the selection had left out, and that went " << (removed ? "away: " : "along: ") << edit.crumbs

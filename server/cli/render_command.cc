@@ -122,13 +122,10 @@ struct Destination {
   [[nodiscard]] path of(const RenderTask& task) const { return file ? *file : folder / (task.picture + extension); }
 };
 
-/// Whether a name is that of a picture in a format that is not written: a folder of that name is not what is meant.
-bool is_other_picture(const path& out) {
-  constexpr std::array others{".gif", ".bmp", ".tif",  ".tiff", ".webp", ".tga",
-                              ".ppm", ".hdr", ".avif", ".heic", ".jxl"};
-  std::string extension = out.extension().string();
-  for (char& c : extension) c = char(std::tolower(static_cast<unsigned char>(c)));
-  return std::find(others.begin(), others.end(), extension) != others.end();
+/// Whether a name reads as a file's: it ends in an extension that begins with a letter. "v1.2" and "q.old/" do not.
+bool is_file_name(const path& out) {
+  const std::string extension = out.extension().string();
+  return extension.size() > 1 && std::isalpha(static_cast<unsigned char>(extension[1])) != 0;
 }
 
 Result<Destination> destination(const RenderOptions& options, std::size_t pictures) {
@@ -137,7 +134,9 @@ Result<Destination> destination(const RenderOptions& options, std::size_t pictur
   std::error_code unreachable;  // then it is no folder
   const bool is_folder = std::filesystem::is_directory(out, unreachable);
   const auto format = io::format_of(out);
-  if (!format && !is_folder && is_other_picture(out)) return propagate(format);
+  // Whoever asks for one picture in q.mp4 does not mean a folder of that name.
+  if (!format && !is_folder && pictures == 1 && is_file_name(out))
+    return fail(ErrorCode::unsupported, format.error().message + "; a folder's name may end in /", "--out");
   if (format && !is_folder) {
     if (pictures > 1)
       return fail(ErrorCode::invalid_argument, "several pictures need a folder, not a file name", "--out");

@@ -75,10 +75,8 @@ std::string size_text(int width, int height) { return std::to_string(width) + " 
 Result<scene::Mask> decode(const std::string& file, const scene::Camera& camera, const std::string& where) {
   const std::size_t pixels = std::size_t(camera.width) * std::size_t(camera.height);
   const std::string expected = "expected a mask of the camera's " + size_text(camera.width, camera.height) + " pixels";
-  const auto image = engine::io::decode_image(std::as_bytes(std::span(file)), where,
-                                              {.orientation = engine::io::Orientation::as_stored,
-                                               .max_side = std::max(camera.width, camera.height),
-                                               .max_pixels = pixels});
+  const auto image = engine::io::decode_image(
+      std::as_bytes(std::span(file)), where, {.max_side = std::max(camera.width, camera.height), .max_pixels = pixels});
   if (!image && image.error().code == ErrorCode::too_large)
     return fail(ErrorCode::invalid_argument, expected + ", found a larger one", where);
   if (!image) return fail(image.error().code, "the mask cannot be read: " + image.error().message, where);

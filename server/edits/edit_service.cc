@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "engine/core/fair_semaphore.h"
 #include "engine/edit/handles.h"
 #include "engine/edit/preview.h"
 #include "engine/edit/workload.h"
@@ -21,7 +22,6 @@
 #include "server/edits/records.h"
 #include "server/edits/speed_log.h"
 #include "server/edits/status.h"
-#include "server/edits/turnstile.h"
 #include "server/scenes/disk/public_errors.h"
 
 namespace server::edits {
@@ -189,7 +189,7 @@ struct EditService::Impl {
     if (info->up) request_there.up = *info->up;
     {
       // One at a time: they would slow each other down. And counted, for nobody else counts what this thread renders.
-      const auto alone = measuring.enter();
+      const auto alone = measuring.acquire();
       if (!alone) return propagate(alone);
       const auto share = engine::take_from(options.memory, measuring_bytes(out.work), "scene");
       if (!share) return propagate(share);
@@ -230,9 +230,9 @@ struct EditService::Impl {
   Selections own_selections;
   Selections& selections;
   engine::WorkArena arena;
-  NamedLocks scenes_in_use;              ///< By scene: shared while an edit of it is accepted, alone in while_idle().
-  NamedLocks results;                    ///< By edit; see Workshop.
-  Turnstile measuring{measured_within};  ///< Of whoever uses `speeds`.
+  NamedLocks scenes_in_use;  ///< By scene: shared while an edit of it is accepted, alone in while_idle().
+  NamedLocks results;        ///< By edit; see Workshop.
+  engine::FairSemaphore measuring{{.patience = measured_within}, "edits"};  ///< Of whoever uses `speeds`.
   SpeedLog speeds;
   std::unique_ptr<jobs::Store> records;
   std::unique_ptr<jobs::Queue> queue;

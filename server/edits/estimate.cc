@@ -89,6 +89,10 @@ JobWorkload workload_of(const scene::LayeredCloud& version, const edit::Request&
   const MachineSpeed speed = log.speed_of(picture, [&] { return edit::measured_frames(cloud, cameras, side); });
   work.edit.frame = speed.frame;
   work.edit.slowness = speed.slowness;
+  // The preview has been a trial of the drag, whose time no count of rows tells: bodies are solved for.
+  const double as_usual = speed.slowness / speed.now;
+  work.edit.assign_seconds = preview.assign_seconds * as_usual;
+  work.edit.drag_seconds = preview.drag_seconds * as_usual;
   return work;
 }
 

@@ -52,10 +52,11 @@ MachineSpeed SpeedLog::speed_of(const std::string& picture, const std::function<
     slownesses.push_back(slowness_());
   }
 
+  const double now = known ? slownesses.back() : (slownesses[slownesses.size() - 2] + slownesses.back()) / 2;
+
   const std::lock_guard lock(mutex_);
   for (const double slowness : slownesses) note_slowness(slowness);
   if (!known) {
-    const double now = (slownesses[slownesses.size() - 2] + slownesses.back()) / 2;
     Frames& measured = frames_[picture];
     measured.last_use = ++uses_;
     measured.gaussians.push_back(frame.gaussians / now);
@@ -65,7 +66,7 @@ MachineSpeed SpeedLog::speed_of(const std::string& picture, const std::function<
       frames_.erase(std::ranges::min_element(frames_, {}, [](const auto& entry) { return entry.second.last_use; }));
   }
   const double usual = median_of(slownesses_);
-  return {{known->gaussians * usual, known->pixel * usual}, usual};
+  return {{known->gaussians * usual, known->pixel * usual}, usual, now};
 }
 
 }  // namespace server::edits

@@ -17,6 +17,7 @@ namespace server::edits {
 struct MachineSpeed {
   engine::edit::FrameTime frame = {};  ///< Of one scene.
   double slowness = 1;                 ///< As of engine::edit::Workload.
+  double now = 1;                      ///< The same at this moment, whatever else goes on.
 };
 
 /// Remembers what was measured, and answers with the medians: what was measured while renders and edits were at work

@@ -70,7 +70,7 @@ std::vector<std::uint8_t> on_layers(const render::Layers& layers, std::span<cons
 RenderService::RenderService(const RenderServiceOptions& options)
     : options_(options),
       arena_(options.threads, engine::Priority::high),
-      slots_(arena_.threads(), options.max_waiting) {
+      slots_({.slots = arena_.threads(), .waiting = options.max_waiting}, "pictures") {
   arena_.start_threads();
 }
 

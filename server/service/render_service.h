@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/core/fair_semaphore.h"
 #include "engine/core/memory_budget.h"
 #include "engine/core/parallel.h"
 #include "engine/core/result.h"
@@ -20,7 +21,6 @@
 #include "server/edits/selections.h"
 #include "server/pictures/picture_content.h"
 #include "server/scenes/scene_store.h"
-#include "server/service/fair_semaphore.h"
 
 namespace server::service {
 
@@ -98,7 +98,7 @@ class RenderService {
 
   const RenderServiceOptions options_;
   engine::WorkArena arena_;
-  FairSemaphore slots_;
+  engine::FairSemaphore slots_;
   std::mutex mutex_;  ///< Guards canvases_.
   /// Not one per thread: while a thread waits within a rendering, oneTBB may have it begin another one.
   std::vector<std::unique_ptr<Canvas>> canvases_;

@@ -34,7 +34,7 @@ std::vector<DVec3> around(DVec3 centre, double radius) {
 
 SceneViews::SceneViews(scenes::SceneStore& store)
     : store_(store),
-      turns_(/*slots=*/1, max_waiting),
+      turns_({.waiting = max_waiting}, "views"),
       virtual_(virtual_memory_bytes, "the cache of virtual views", scenes::WhenFull::exceed) {}
 
 Result<std::shared_ptr<const ViewSet>> SceneViews::find_virtual_views(const scenes::SceneInfo& scene,

@@ -6,12 +6,12 @@
 #include <string>
 #include <vector>
 
+#include "engine/core/fair_semaphore.h"
 #include "engine/core/result.h"
 #include "engine/scene/camera.h"
 #include "proto/camera.h"
 #include "server/scenes/disk/bounded_cache.h"
 #include "server/scenes/scene_store.h"
-#include "server/service/fair_semaphore.h"
 
 namespace server::service {
 
@@ -65,7 +65,7 @@ class SceneViews {
   Result<std::shared_ptr<const ViewSet>> find_virtual_views(const scenes::SceneInfo& scene, const Gone& gone);
 
   scenes::SceneStore& store_;
-  FairSemaphore turns_;
+  engine::FairSemaphore turns_;
   scenes::BoundedCache virtual_;
 };
 

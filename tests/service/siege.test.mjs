@@ -60,21 +60,20 @@ test('sixteen hostile uploads at once leave the service alive, and a running edi
   const before = resident();
 
   const { id } = await client.submit(request);
+  await client.until(id, (edit) => edit.state === 'running');
   const seen = new Map(attacks.map(({ name }) => [name, new Map()]));
   let slowest = { seconds: 0 };
-  let next = 0, under = 0, most = 0;
+  let next = 0, beside = 0, isOver = false;
   const ended = async () => finalStates.includes((await client.edit(id)).state);
   const deadline = Date.now() + 10_000;
   const attacker = async () => {
     do {
       const { name, send, taken = false } = attacks[next++ % attacks.length];
-      most = Math.max(most, ++under);
       const start = Date.now();
       const { status, json } = await send().catch((error) => {
         const { exitCode, signalCode } = service.process;
         throw new Error(`${name}: ${error.message}; the service ended: ${exitCode ?? signalCode}\n${service.log.slice(-2000)}`);
       });
-      --under;
       const seconds = (Date.now() - start) / 1000;
       if (seconds > slowest.seconds) slowest = { name, seconds };
       const answer = json();
@@ -82,16 +81,18 @@ test('sixteen hostile uploads at once leave the service alive, and a running edi
       assert.ok([400, 413, 422, 429, 503].includes(status) || (taken && status === 200), `${name}: ${status} ${answer.detail}`);
       const told = status === 200 ? `200 ${answer.dataset.warnings[0] ?? ''}` : `${status} ${answer.code}`;
       seen.get(name).set(told, (seen.get(name).get(told) ?? 0) + 1);
-    } while (Date.now() < deadline && (next < 2 * attacks.length || !(await ended())));
+      isOver = await ended();
+      if (!isOver) ++beside;
+    } while (Date.now() < deadline && (next < 2 * attacks.length || !isOver));
   };
   await Promise.all(Array.from({ length: 16 }, attacker));
   const edit = await client.succeeded(id);
   assert.deepEqual(await client.file(scene.id, edit.version), expected);
   await service.alive();
-  assert.equal(most, 16);
+  assert.ok(beside > 0, 'the edit was over before a hostile request was answered');
   assert.doesNotMatch(service.log, /"bug|terminate called|bad_alloc/i);
   for (const { name, bytes } of attacks)
     console.log(`${name} (${bytes} bytes): ${[...seen.get(name)].map(([told, times]) => `${times} x ${told}`).join(', ')}`);
-  console.log(`${next} hostile requests, 16 at once, within ${limit.kind} of ${mib(2 * gibibyte)}; the slowest took ${slowest.seconds} s (${slowest.name}). ` +
+  console.log(`${next} hostile requests, 16 at once, ${beside} answered beside the edit, within ${limit.kind} of ${mib(2 * gibibyte)}; the slowest took ${slowest.seconds} s (${slowest.name}). ` +
     `Resident at most: ${mib(resident())}, ${mib(before)} before${Number.isNaN(limit.peak()) ? '' : `; the group's peak: ${mib(limit.peak())}`}`);
 });

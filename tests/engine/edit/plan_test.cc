@@ -267,5 +267,22 @@ TEST(Plan, CostsNoLessThanNothingAndMoreTheMoreThereIsToDo) {
   }
 }
 
+// No count of rows tells how long an elastic body is solved for.
+TEST(Plan, HasWhatAPreviewOfTheDragTookWhereTheEditDragsAndAssigns) {
+  Workload work = cases[1].workload();
+  ASSERT_EQ(work.intervals, 3);
+  work.dragged = 0;  // of which the plan's own figures would be
+  const auto before = plan_of(work);
+  work.assign_seconds = 5, work.drag_seconds = 30;
+  const auto after = plan_of(work);
+  ASSERT_EQ(after.size(), before.size());
+  std::map<Stage, double> more;
+  for (std::size_t k = 0; k < after.size(); ++k) more[after[k].stage] += after[k].seconds - before[k].seconds;
+  EXPECT_NEAR(more[Stage::assign], 5, 1e-9);
+  EXPECT_NEAR(more[Stage::views], 30, 1e-9) << "the drag is tried once before views are chosen";
+  EXPECT_NEAR(more[Stage::deform], 30, 1e-9) << "a third of it in each interval";
+  EXPECT_NEAR(more[Stage::mask], 0, 1e-9);
+}
+
 }  // namespace
 }  // namespace engine::edit

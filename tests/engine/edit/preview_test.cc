@@ -155,6 +155,25 @@ TEST(Preview, WithAMemoryIsTheSame) {
         }
 }
 
+// Plans are made with it: an edit has no memory, and finds all out once more.
+TEST(Preview, TellsWhatItTookAsIfItHadNoMemory) {
+  const auto scene = plain(ball_before_wall(400));
+  Memory memory;
+  Request request = four_handles(Mode::move);
+  request.params.interpolation = Interpolation::arap;
+  request.selected = in_spheres(*scene.base, request);
+  const auto first = preview(scene, request, memory);
+  ASSERT_TRUE(first);
+  EXPECT_GT(first->assign_seconds, 0);
+  EXPECT_GT(first->drag_seconds, 0);
+  const double saved_before = memory.saved_seconds();  // by the preview itself, of several intervals
+  const auto again = preview(scene, request, memory);
+  ASSERT_TRUE(again);
+  const double saved = memory.saved_seconds() - saved_before;
+  EXPECT_GT(saved, 0) << "the body, at least, is known";
+  EXPECT_GE(again->assign_seconds + again->drag_seconds, saved);
+}
+
 TEST(Preview, WithASelectionIsWhatTheEditWillBe) {
   const scene::GaussianCloud cloud = ball_before_wall(200, Vec3(0), 3);
   Request request = four_handles(Mode::move);

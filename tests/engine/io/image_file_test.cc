@@ -11,6 +11,7 @@
 #include <string>
 #include <string_view>
 
+#include "engine/core/byte_writer.h"
 #include "engine/core/rng.h"
 #include "engine/io/read_bytes.h"
 #include "tests/support/data.h"
@@ -108,32 +109,41 @@ TEST(EncodeImage, PngComesBackAsItWas) {
   EXPECT_LT(max_difference(decoded(*encode_image(fine, ImageFormat::png, {.png_bits = 16})), fine), 1e-7f);
 }
 
+/// The steps of a PNG of so many bits that these values are written as.
+std::vector<long> written_steps(const std::vector<float>& values, int bits) {
+  Image image(int(values.size()), 1, 1);
+  image.data = values;
+  const Image back = decoded(*encode_image(image, ImageFormat::png, {.png_bits = bits}));
+  std::vector<long> steps;
+  for (int x = 0; x < image.width; ++x) steps.push_back(std::lround(float((1 << bits) - 1) * back.at(x, 0)));
+  return steps;
+}
+
 TEST(EncodeImage, RoundsToTheNearestStepAndClamps) {
-  Image image(6, 1, 1);
-  image.data = {-3.0f,
-                0.5f / 255 - 1e-6f,
-                0.5f / 255 + 1e-6f,
-                1.7f,
-                std::numeric_limits<float>::quiet_NaN(),
-                std::numeric_limits<float>::infinity()};
-  const Image back = decoded(*encode_image(image, ImageFormat::png));
-  const float expected[] = {0, 0, 1, 255, 0, 255};
-  for (int x = 0; x < 6; ++x) EXPECT_EQ(std::lround(255 * back.at(x, 0)), std::lround(expected[x])) << x;
+  constexpr float infinity = std::numeric_limits<float>::infinity(), nan = std::numeric_limits<float>::quiet_NaN();
+  for (const int bits : {8, 16}) {
+    SCOPED_TRACE(bits);
+    const long top = (1 << bits) - 1;
+    EXPECT_EQ(written_steps({-3.0f, -0.0f, 0.4f / float(top), 0.6f / float(top), 1.7f, nan, infinity, -infinity}, bits),
+              (std::vector<long>{0, 0, 0, 1, top, 0, top, 0}));
+  }
 }
 
 TEST(EncodeImage, RoundsHalvesUpwardsToTheLastBit) {
-  Image image(3 * 255, 1, 1);
-  std::vector<long> expected;
-  for (int step = 0; step < 255; ++step) {
-    const float half = (float(step) + 0.5f) / 255;
-    const float around[] = {std::nextafter(half, 0.0f), half, std::nextafter(half, 1.0f)};
-    for (int i = 0; i < 3; ++i) {
-      image.data[std::size_t(3 * step + i)] = around[i];
-      expected.push_back(std::lround(255 * around[i]));
+  for (const int bits : {8, 16}) {
+    SCOPED_TRACE(bits);
+    const long top = (1 << bits) - 1, stride = bits == 8 ? 1 : 13;  // of 65535 steps every so many
+    std::vector<float> values;
+    std::vector<long> expected;
+    for (long step = 0; step < top; step += stride) {
+      const float half = (float(step) + 0.5f) / float(top);
+      for (const float value : {std::nextafter(half, 0.0f), half, std::nextafter(half, 1.0f)}) {
+        values.push_back(value);
+        expected.push_back(std::lround(float(top) * value));  // halves away from zero, of the same product
+      }
     }
+    EXPECT_EQ(written_steps(values, bits), expected);
   }
-  const Image back = decoded(*encode_image(image, ImageFormat::png));
-  for (int x = 0; x < image.width; ++x) EXPECT_EQ(std::lround(255 * back.at(x, 0)), expected[std::size_t(x)]) << x;
 }
 
 TEST(EncodeImage, JpegIsCloseAndQualityCosts) {
@@ -270,39 +280,56 @@ TEST(ReadImage, PutsTransparentPicturesInFrontOfBlack) {
   EXPECT_NEAR(kept.at(1, 0, 3), 0.2f, 1e-6f);
 }
 
-TEST(ReadImage, TurnsAPhotoUprightUnlessToldNotTo) {
-  const TempDir dir;
-  // What the eye should see: 3 x 2, one bright corner at the upper left, a half-bright one at the upper right.
-  const int w = 3, h = 2;
-  const auto upright = [&](int x, int y) { return y > 0 ? 0.0f : x == 0 ? 1.0f : x == w - 1 ? 0.5f : 0.0f; };
-  for (int orientation = 1; orientation <= 8; ++orientation) {
-    SCOPED_TRACE(orientation);
-    const bool swapped = orientation >= 5;
-    const int sw = swapped ? h : w, sh = swapped ? w : h;
-    // EXIF 2.3, 4.6.4: where row 0 and column 0 of the stored picture are in the upright one.
-    const bool row0_bottom = orientation == 3 || orientation == 4, column0_right = orientation == 2 || orientation == 3;
-    const bool row0_right = orientation == 6 || orientation == 7, column0_bottom = orientation == 7 || orientation == 8;
-    std::vector<float> stored;
-    for (int row = 0; row < sh; ++row)
-      for (int column = 0; column < sw; ++column) {
-        const int x = swapped ? (row0_right ? w - 1 - row : row) : (column0_right ? w - 1 - column : column);
-        const int y = swapped ? (column0_bottom ? h - 1 - column : column) : (row0_bottom ? h - 1 - row : row);
-        stored.push_back(upright(x, y));
-      }
-    OIIO::ImageSpec spec(sw, sh, 1, OIIO::TypeDesc::UINT8);
-    spec.attribute("Orientation", orientation);
-    write_with_library(dir.path() / "photo.tif", spec, stored);
-    const auto turned = read_image(dir.path() / "photo.tif");
-    ASSERT_TRUE(turned);
-    ASSERT_EQ(turned->width, w);
-    ASSERT_EQ(turned->height, h);
-    for (int y = 0; y < h; ++y)
-      for (int x = 0; x < w; ++x) EXPECT_NEAR(turned->at(x, y, 2), upright(x, y), 0.01f) << x << "," << y;
-    const auto as_stored = read_image(dir.path() / "photo.tif", {.orientation = Orientation::as_stored});
-    ASSERT_TRUE(as_stored);
-    EXPECT_EQ(as_stored->width, sw);
-    EXPECT_NEAR(as_stored->data[0], stored[0], 0.01f);
-  }
+/// EXIF data, little-endian: a directory that asks for a picture to be turned, and that leads to another one.
+std::string exif_of(std::uint32_t orientation) {
+  ByteWriter tiff;
+  tiff.write_all(std::span("II*", 4));
+  tiff.write(std::uint32_t{8});  // where the directory begins
+  tiff.write(std::uint16_t{2});  // its entries: tag, type, count, and the value or where it is
+  const auto entry = [&](std::uint16_t tag, std::uint16_t type, std::uint32_t value) {
+    tiff.write(tag), tiff.write(type), tiff.write(std::uint32_t{1}), tiff.write(value);
+  };
+  entry(0x0112, 3, orientation);
+  entry(0x8769, 4, 38);          // the camera's directory
+  tiff.write(std::uint32_t{0});  // none follows
+  tiff.write(std::uint16_t{1});  // the camera's: one entry
+  entry(0xa001, 3, 1);           // sRGB
+  return std::string("Exif\0\0", 6) + std::move(tiff).take();
+}
+
+/// The JPEG with these EXIF data.
+std::vector<std::byte> with_exif(const std::vector<std::byte>& jpeg, const std::string& exif) {
+  const std::size_t length = exif.size() + 2;
+  const std::string segment = std::string("\xff\xe1") + char(length >> 8) + char(length & 0xff) + exif;
+  const auto bytes = std::as_bytes(std::span(segment));
+  std::vector<std::byte> out = jpeg;
+  out.insert(out.begin() + 2, bytes.begin(), bytes.end());
+  return out;
+}
+
+TEST(DecodeImage, RowsAreThoseOfTheFileWhateverItsExifDataAskFor) {
+  const auto jpeg = encode_image(ramp(24, 16), ImageFormat::jpeg);
+  ASSERT_TRUE(jpeg);
+  const Image stored = decoded(*jpeg);
+  for (std::uint32_t orientation = 0; orientation <= 9; ++orientation)
+    EXPECT_EQ(max_difference(decoded(with_exif(*jpeg, exif_of(orientation))), stored), 0) << orientation;
+}
+
+// The library reads tags of damaged EXIF data that are not there: whether a photo was turned was up to what was last in
+// that memory.
+TEST(DecodeImage, OfDamagedExifDataIsTheSamePictureEachTime) {
+  const auto jpeg = encode_image(ramp(24, 16), ImageFormat::jpeg);
+  ASSERT_TRUE(jpeg);
+  const Image stored = decoded(*jpeg);
+  const std::string exif = exif_of(6);
+  for (std::size_t size = 0; size < exif.size(); ++size)
+    EXPECT_EQ(max_difference(decoded(with_exif(*jpeg, exif.substr(0, size))), stored), 0) << "cut to " << size;
+  for (std::size_t at = 6; at < exif.size(); ++at)  // behind the name
+    for (const int value : {0x00, 0x06, 0x12, 0x7f, 0xff}) {
+      std::string damaged = exif;
+      damaged[at] = char(value);
+      EXPECT_EQ(max_difference(decoded(with_exif(*jpeg, damaged)), stored), 0) << "byte " << at << " is " << value;
+    }
 }
 
 TEST(ReadImage, NamesTheLimitBeforeItAllocates) {

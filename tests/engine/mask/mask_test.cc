@@ -59,6 +59,19 @@ TEST(Dilate, IsTheDiscOfItsDefinition) {
   }
 }
 
+TEST(Dilate, IsTheSameDiscWhereColumnsAreSharedOut) {
+  // Columns are worked on 64 at a time: one such share, one and a bit, two, and several with a last one that is cut.
+  for (const int width : {64, 65, 128, 300}) {
+    SCOPED_TRACE(width);
+    const Mask mask = random_mask(width, 19, 0.02f, std::uint64_t(width));
+    ASSERT_GT(mask.area(), 0u);
+    for (const int radius : {1, 4, 11}) {
+      SCOPED_TRACE(radius);
+      EXPECT_EQ(dilate(mask, radius), dilate_by_definition(mask, radius));
+    }
+  }
+}
+
 TEST(Dilate, LeavesAnEmptyMaskEmptyAndAFullOneFull) {
   const Mask empty(9, 4);
   EXPECT_EQ(dilate(empty, 3), empty);

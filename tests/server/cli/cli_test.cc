@@ -521,11 +521,20 @@ TEST_F(Cli, RenderComparesWithPhotos) {
 }
 
 TEST_F(Cli, RenderRefusesPicturesInFormatsThatItDoesNotWrite) {
-  const Finished run = splatdrag("render --scene " + demo("scene.ply") +
-                                 " --eye 0,-1,-4.5 --target 0,-0.5,0 --size 96x64 --out " + at("q.GIF"));
-  EXPECT_NE(run.status, 0);
-  EXPECT_NE(run.err.find(".png, .jpg or .exr"), std::string::npos) << run.err;
-  EXPECT_FALSE(std::filesystem::exists(at("q.GIF")));
+  const std::string camera =
+      "render --scene " + demo("scene.ply") + " --eye 0,-1,-4.5 --target 0,-0.5,0 --size 96x64 --out ";
+  for (const char* name : {"q.GIF", "q.mp4", "q.jp2", "q.pfm"}) {
+    const Finished run = splatdrag(camera + at(name));
+    EXPECT_NE(run.status, 0) << name;
+    EXPECT_NE(run.err.find(".png, .jpg or .exr"), std::string::npos) << run.err;
+    EXPECT_NE(run.err.find("--out"), std::string::npos) << run.err;
+    EXPECT_FALSE(fs::exists(at(name)));
+  }
+  fs::create_directory(at("there.old"));
+  for (const char* name : {"v1.2", "there.old", "new.old/"}) {
+    EXPECT_EQ(splatdrag(camera + at(name)).status, 0) << name;
+    EXPECT_TRUE(fs::exists(at(name) + "/render.png")) << name;
+  }
 }
 
 TEST_F(Cli, RenderWritesDepthAndAlpha) {

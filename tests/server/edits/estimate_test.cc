@@ -3,11 +3,17 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <memory>
 #include <string>
+#include <utility>
 #include <vector>
+
+#include "tests/engine/edit/samples.h"
 
 namespace server::edits {
 namespace {
+
+using engine::DVec3;
 
 JobWorkload typical() {
   JobWorkload work;
@@ -64,6 +70,27 @@ TEST(Estimate, TheTimeOfAJobIsThatOfTheEditAndWhatComesBeforeAndAfter) {
   EXPECT_DOUBLE_EQ(estimated_seconds(work), seconds_to_load(150'000, false) + of_edit + seconds_to_publish(150'000));
   work.layered = true;
   EXPECT_GT(estimated_seconds(work), seconds_to_load(150'000, false) + of_edit + seconds_to_publish(150'000));
+}
+
+TEST(Estimate, TakesThePreviewForATrialOfTheDragWhateverElseGoesOn) {
+  namespace edit = engine::edit;
+  const engine::scene::LayeredCloud version{
+      std::make_shared<const engine::scene::GaussianCloud>(edit::ball_before_wall(200)), nullptr};
+  edit::Request request;
+  request.handles = {{DVec3(0), DVec3(0.5, 0, 0), 0.3, 0}};
+  request.params.views = 2, request.params.max_image_side = 48;
+  auto preview = edit::preview(version, request);
+  ASSERT_TRUE(preview);
+  preview->assign_seconds = 4, preview->drag_seconds = 8;
+  double slowness = 1;
+  SpeedLog log([&] { return slowness; });
+  const auto seconds = [&] {
+    const edit::Workload work = workload_of(version, request, *preview, {}, false, 0, "scene", log).edit;
+    return std::pair(work.assign_seconds, work.drag_seconds);
+  };
+  EXPECT_EQ(seconds(), std::pair(4.0, 8.0));
+  slowness = 4;
+  EXPECT_EQ(seconds(), std::pair(1.0, 2.0)) << "it was slowed down as the yardstick is";
 }
 
 TEST(Estimate, MemoryHoldsTheWorkingCopyAndAPicturesScene) {

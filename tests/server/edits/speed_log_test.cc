@@ -36,6 +36,7 @@ TEST_F(SpeedLogTest, OneMeasurementUnderLoadDoesNotCount) {
   load = 4;
   const MachineSpeed known = measure(), another = measure("another scene");
   EXPECT_DOUBLE_EQ(known.slowness, 1.5);
+  EXPECT_DOUBLE_EQ(known.now, 1.5 * 4) << "what else was timed now is to be divided by it";
   EXPECT_DOUBLE_EQ(known.frame.gaussians, 2e-3);
   EXPECT_DOUBLE_EQ(another.frame.gaussians, 2e-3) << "the yardstick was slowed down alike";
   EXPECT_DOUBLE_EQ(another.frame.pixel, 1e-8);

@@ -54,7 +54,7 @@ export class Service {
     this.log = '';
     this.exited = new Promise((done) => child.on('exit', (code, signal) => done({ code, signal })));
     const url = await new Promise((done, failed) => {
-      const timer = setTimeout(() => failed(new Error(`the service did not start in 30 s:\n${this.log}`)), 30_000);
+      const timer = setTimeout(() => failed(new Error(`the service did not start in two minutes:\n${this.log}`)), 120_000);
       const listen = (chunk) => {
         this.log = (this.log + chunk).slice(-1_000_000);
         const match = /listening on (http:\/\/[^\s"]+)/.exec(this.log);
