@@ -248,6 +248,7 @@ async function take() {
     bounds: { low: [0, 0, 0], high: [1, 1, 1] },
     centre: [0.5, 0.5, 0.5],
     undecided: 0,
+    border: null,
     warnings: [],
   });
   service["POST /v1/previews"] = () => ({ version: "p000001", handles: [{ gaussians: 7 }], gaussians: { crumbs: 0 } });
