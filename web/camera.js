@@ -237,6 +237,23 @@ export const levelled = (pose, worldUp) => ({ ...pose, up: worldUp });
 /** The camera's own up direction: what the person in front of the screen calls up. */
 export const upOf = (pose) => scale(axes(pose).down, -1);
 
+/** How the cameras of a dataset were held, on the whole. */
+export function upOfViews(views) {
+  const sum = views.reduce((up, view) => sub(up, view.cam_from_world[1]), [0, 0, 0]);
+  // Held every way, they say nothing.
+  return length(sum) > 0.3 * views.length ? unit(sum) : DEFAULT_UP;
+}
+
+/** The pose that looks at the same from another direction, of length 1: from where it points. */
+export function seenFrom(pose, direction, worldUp) {
+  const above = dot(direction, unit(worldUp, DEFAULT_UP));
+  const eye = addScaled(pose.target, direction, distance(pose.eye, pose.target));
+  if (Math.abs(above) < Math.cos(POLE_MARGIN)) return { ...pose, eye, up: worldUp };
+  // From straight above, what was ahead is up; from below it is down: right stays right.
+  const { forward } = axes(pose);
+  return { ...pose, eye, up: Math.abs(dot(forward, direction)) > 0.99 ? pose.up : scale(forward, Math.sign(above)) };
+}
+
 /** Where to start looking at a scene of which nothing is known but where it lies. */
 export function firstPose({ centre, radius, up }) {
   const worldUp = unit(up ?? DEFAULT_UP, DEFAULT_UP);

@@ -11,8 +11,9 @@ import {
   pivotedAt,
   poseOfView,
   project,
-  upOf,
+  upOfViews,
 } from "./camera.js";
+import { fittedPose, looksAt } from "./fit.js";
 import { History } from "./history.js";
 import { changesScene, previewKey, requestOf } from "./requests.js";
 import { proposalOf } from "./selection.js";
@@ -29,6 +30,7 @@ export const NOTHING_OPEN = {
   scene: null,
   views: [],
   viewsKind: null,
+  floorClicks: null, // Points of the floor that were clicked on to say which way is up; null: nobody is about to.
   viewName: null, // The view that the pose was taken from; null once it has been moved.
   pose: null,
   version: 0, // The version that is looked at and edited.
@@ -170,7 +172,7 @@ export class Editor {
       version,
       handles,
       selection: placed(stored.selection),
-      pose: pose ?? (scene.dataset ? null : firstPose(scene)),
+      pose,
       viewName: pose ? (stored.viewName ?? null) : null,
     });
     await Promise.allSettled([this.#loadViews(opening), this.#loadEdits(opening)]);
@@ -192,18 +194,26 @@ export class Editor {
   }
 
   async #loadViews(opening) {
-    const fallback = () => this.state.pose ?? firstPose(this.state.scene);
+    if (this.state.pose === null && !this.state.scene.dataset) this.#lookAtAll();
     try {
       const { views, kind } = await api.views(this.state.scene.id);
       if (opening !== this.#opened) return;
       this.store.set({ views, viewsKind: kind });
-      if (this.state.pose === null && views.length) this.lookFrom(views[0].name);
-      else this.store.set({ pose: fallback() });
+      if (this.state.pose === null && this.state.scene.dataset) this.home();
     } catch (error) {
       if (opening !== this.#opened) return;
-      this.store.set({ pose: fallback() });
+      this.store.set({ pose: this.state.pose ?? firstPose(this.state.scene) });
       this.say(`The views of this scene could not be listed: ${error.message}`, { kind: "bad" });
     }
+  }
+
+  /** From where all of the scene shows, unless there is a pose already when that is known. */
+  async #lookAtAll() {
+    const { scene, version, pose: before } = this.state;
+    const opening = this.#opened;
+    // Without pictures of it, from where captures mostly look.
+    const pose = await fittedPose(scene, this.aspect, looksAt(scene.id, version)).catch(() => firstPose(scene));
+    if (opening === this.#opened && this.state.pose === before) this.store.set({ pose, viewName: null });
   }
 
   async reloadScene() {
@@ -222,8 +232,10 @@ export class Editor {
 
   // --- looking ---------------------------------------------------------------------------------------------------
 
+  /** The scene's up direction: as it was declared, or as its cameras were held. */
   get worldUp() {
-    return this.state.scene?.up ?? DEFAULT_UP;
+    const { scene, views, viewsKind } = this.state;
+    return scene?.up ?? (viewsKind === "dataset" ? upOfViews(views) : DEFAULT_UP);
   }
 
   setPose(pose) {
@@ -266,18 +278,14 @@ export class Editor {
   home() {
     const { scene, views } = this.state;
     if (scene?.dataset && views.length) this.lookFrom(views[0].name);
-    else if (scene) this.store.set({ pose: firstPose(scene), viewName: null });
+    else if (scene) this.#lookAtAll();
   }
 
-  /** Declares the top of the screen to be the scene's up. */
+  /** Declares the scene's up direction; null: as its cameras were held, or the default. */
   async setUp(up) {
     const scene = await api.patchScene(this.state.scene.id, { up });
     this.store.set({ scene });
     if (this.state.pose) this.setPose(levelled(this.state.pose, this.worldUp));
-  }
-
-  setUpFromView() {
-    return this.setUp(upOf(this.state.pose));
   }
 
   async rename(name) {

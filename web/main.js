@@ -14,6 +14,7 @@ import { buildSelectionPanel, buildTools, SELECT_TOOLS } from "./selection_panel
 import { SceneMemory, Store } from "./store.js";
 import { buildThingBar } from "./thing_bar.js";
 import { buildToolbar } from "./toolbar.js";
+import { buildUp } from "./up.js";
 import { buildVersions } from "./versions.js";
 import { Viewer } from "./viewer.js";
 import { hasEnded } from "./watch.js";
@@ -35,6 +36,7 @@ const viewer = new Viewer(editor);
 buildToolbar(editor, viewer);
 buildTools(editor);
 buildThingBar(editor);
+buildUp(editor);
 const run = buildRequestPanel(editor);
 const versions = buildVersions(editor);
 byId("tab-drag").append(
@@ -178,6 +180,7 @@ function listenToKeys() {
     backspace: () => editor.state.selected !== null && editor.remove(editor.state.selected),
     escape: () =>
       viewer.giveUpDrag() ||
+      (store.state.floorClicks && (store.set({ floorClicks: null }), true)) ||
       (editor.state.selectMode
         ? editor.selecting.use(null)
         : editor.state.thingMode && editor.state.handles.length === 0

@@ -41,6 +41,11 @@ const HINTS = {
   ],
 };
 
+HINTS.floor = [
+  "Click three places on the floor",
+  "What is at right angles to them is up.",
+  "Click: on the floor · Drag: orbit · Wheel: nearer · Esc: give up",
+];
 HINTS.rectangle = HINTS.lasso.map((text) => text.replace("Draw around", "Draw a rectangle around"));
 
 export function buildToolbar(editor, viewer) {
@@ -122,9 +127,9 @@ export function buildToolbar(editor, viewer) {
   const hint = h("strong", {});
   const hintMore = h("span", {});
   byId("hint").append(hint, hintMore);
-  store.watch(["selectMode", "selectTool", "thingMode"], () => {
+  store.watch(["selectMode", "selectTool", "thingMode", "floorClicks"], ({ floorClicks }) => {
     const [lead, more, keys] = HINTS[viewer.tool];
-    text(hint, lead);
+    text(hint, lead + (floorClicks?.length ? `: ${3 - floorClicks.length} more` : ""));
     text(hintMore, more);
     text(keysLine, keys);
   });
@@ -132,7 +137,7 @@ export function buildToolbar(editor, viewer) {
   store.watch(
     [
       ...["scene", "version", "views", "viewName", "viewsKind", "layer", "comparing", "compareWith", "preview"],
-      ...["handles", "selection", "mode", "selectMode", "thingMode"],
+      ...["handles", "selection", "mode", "selectMode", "thingMode", "floorClicks"],
     ],
     (state) => {
       const { scene } = state;
@@ -172,7 +177,7 @@ export function buildToolbar(editor, viewer) {
       attrs(chip, { class: previewing ? "chip preview" : state.comparing ? "chip compare" : "chip" });
       back.hidden = !previewing;
       const begun = isStated(state) || scene.versions.length > 1;
-      byId("hint").hidden = state.selection.length > 0 || (!state.selectMode && begun);
+      byId("hint").hidden = !state.floorClicks && (state.selection.length > 0 || (!state.selectMode && begun));
     },
   );
 }

@@ -22,6 +22,7 @@ import { AdaptiveSide, FrameQueue, Recent, serverTime } from "./frames.js";
 import { Overlay } from "./overlay.js";
 import { partOf } from "./requests.js";
 import { clicksOf, proposalOf, thinned } from "./selection.js";
+import { clickFloor } from "./up.js";
 import { add, sub } from "./vectors.js";
 
 // All of these are choices, tried by hand.
@@ -35,7 +36,7 @@ const THING_PX = 14; // A thing is taken hold of within this of its middle, howe
 const SKETCH_PX = 2; // A line that is drawn has a corner this often at most.
 const MAX_CACHED_PICTURES = 6; // Enough to go back and forth between two versions and three layers.
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }; // Right, down.
-const CONTROLS = "button, a, input, select"; // What lies on the picture and is no part of it.
+const CONTROLS = "button, a, input, select, summary, .end"; // What lies on the picture and is no part of it.
 const THUMBNAIL = { width: 320, height: 200 };
 
 /** How much a turn of the wheel multiplies by. */
@@ -85,10 +86,10 @@ export class Viewer {
       () => this.refresh(),
     );
     store.watch(["scene"], ({ scene }) => this.#sceneChanged(scene));
-    store.watch(["handles", "selected", "selection", "selectMode", "region", "problem", "pose"], () =>
+    store.watch(["handles", "selected", "selection", "selectMode", "region", "problem", "pose", "floorClicks"], () =>
       this.#drawOverlay(),
     );
-    store.watch(["selectMode", "selectTool", "thingMode", "brushRadius"], () => this.#toolChanged());
+    store.watch(["selectMode", "selectTool", "thingMode", "brushRadius", "floorClicks"], () => this.#toolChanged());
     new ResizeObserver(() => this.#resized()).observe(this.#view);
   }
 
@@ -280,7 +281,7 @@ export class Viewer {
   #drawOverlay() {
     const { camera } = this;
     if (!camera) return;
-    const { handles, selected, problem, region, selection, selectMode } = this.#state;
+    const { handles, selected, problem, region, selection, selectMode, floorClicks } = this.#state;
     const at = problem ? partOf(problem.error.where) : {};
     const items = handles.map((handle, i) => ({
       handle,
@@ -289,7 +290,7 @@ export class Viewer {
     }));
     this.#overlay.draw(camera, items, {
       region,
-      clicks: selectMode ? clicksOf(selection) : [],
+      clicks: floorClicks?.map((point) => ({ point, kind: "inside" })) ?? (selectMode ? clicksOf(selection) : []),
       spheres: selection.length === 0,
     });
   }
@@ -301,9 +302,10 @@ export class Viewer {
     if (this.#gesture?.kind === "draw") this.giveUpDrag();
   }
 
-  /** What the pointer does: "thing", "handle", "grow", "brush", "lasso" or "rectangle". */
+  /** What the pointer does: "floor", "thing", "handle", "grow", "brush", "lasso" or "rectangle". */
   get tool() {
-    const { selectMode, selectTool, thingMode } = this.#state;
+    const { selectMode, selectTool, thingMode, floorClicks } = this.#state;
+    if (floorClicks) return "floor";
     return selectMode ? selectTool : thingMode ? "thing" : "handle";
   }
 
@@ -495,7 +497,8 @@ export class Viewer {
   #click({ x, y }, other = false) {
     const { tool, camera } = this;
     const { selecting } = this.#editor;
-    if (tool === "handle") this.#editor.place(camera, x, y);
+    if (tool === "floor") clickFloor(this.#editor, camera, x, y);
+    else if (tool === "handle") this.#editor.place(camera, x, y);
     else if (tool === "thing") {
       // What has been moved is not where the version has it: a click on it says nothing new.
       const moved = this.#state.handles.some((handle) => handle.target);
