@@ -119,22 +119,25 @@ export function onPlane(camera, x, y, through, normal) {
   return addScaled(addScaled(origin, normal, height), bearing, Math.sqrt(farthest ** 2 - height ** 2));
 }
 
-/** Where a dragged point goes.
- *    from        where it was when the drag began
- *    x, y        where it is asked to be, pixels
- *    constraint  "view" (the plane that faces the camera), "level" (the plane at right angles to `up`), "x", "y", "z", or
- *                "normal" (along `normal`, if there is one)
- *  An axis that nearly faces the camera says nothing about where a pixel is on it: there the point goes along it by as
- *  much as the hand moves up (towards the camera) or down. */
-export function dragged(camera, from, x, y, constraint, { normal = null, up = DEFAULT_UP } = {}) {
-  if (constraint === "level") return onPlane(camera, x, y, from, unit(up, DEFAULT_UP));
-  const axis = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1], normal: normal && unit(normal) }[constraint];
-  if (!axis) return onViewPlane(camera, x, y, from);
+/** Where a point goes that is dragged along the unit vector `axis`. One that nearly faces the camera says nothing about
+ *  where a pixel is on it: there it goes by as much as the hand moves up (towards the camera) or down. */
+export function draggedAlong(camera, from, x, y, axis) {
   const towards = dot(axis, unit(sub(camera.eye, from)));
   if (Math.abs(towards) < FACES_CAMERA) return onLine(camera, x, y, from, axis);
   const seen = project(camera, from);
   const up_px = seen ? seen.y - y : 0;
   return addScaled(from, axis, Math.sign(towards) * up_px * unitsPerPixel(camera, from));
+}
+
+/** Where a dragged point goes.
+ *    from        where it was when the drag began
+ *    x, y        where it is asked to be, pixels
+ *    constraint  "view" (the plane that faces the camera), "level" (the plane at right angles to `up`), "x", "y", "z", or
+ *                "normal" (along `normal`, if there is one) */
+export function dragged(camera, from, x, y, constraint, { normal = null, up = DEFAULT_UP } = {}) {
+  if (constraint === "level") return onPlane(camera, x, y, from, unit(up, DEFAULT_UP));
+  const axis = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1], normal: normal && unit(normal) }[constraint];
+  return axis ? draggedAlong(camera, from, x, y, axis) : onViewPlane(camera, x, y, from);
 }
 
 /** World units that a pixel covers at the depth of a point; 0 behind the camera. */

@@ -42,9 +42,10 @@ export class Selecting {
   #lost = null; // Id of a selection that had to be posted again, until it has been seen.
 
   /**   place(selection, more)  puts a selection on the screen, and more of what is placed; can be undone
-   *    say(message, options)   a short message to the user */
-  constructor(store, { place, say }) {
-    Object.assign(this, { store, place, say });
+   *    say(message, options)   a short message to the user
+   *    pickSeen(camera, x, y)  Editor.pickSeen() */
+  constructor(store, { place, say, pickSeen }) {
+    Object.assign(this, { store, place, say, pickSeen });
     // Of the selections made while one is being asked about, only the latest is asked about next.
     this.#queue = new FrameQueue({
       load: ({ scene, version, selection }, signal) => api.select(scene, version, selection, signal),
@@ -129,13 +130,13 @@ export class Selecting {
     this.place(next);
   }
 
-  /** What the version shows there, as the service picks it; null where it does not say, or nobody wants to know any
+  /** What is seen there, as the editor picks it; null where it does not say, or nobody wants to know any
    *  more. */
   async #pick(camera, x, y, signal = undefined) {
     const { scene, version } = this.#state;
     let picked;
     try {
-      picked = await api.pick(scene.id, version, { camera: onTheWire(camera), x, y }, signal);
+      picked = await this.pickSeen(camera, x, y, signal);
     } catch (error) {
       if (!api.wasGivenUp(error)) this.say(`Nothing could be selected: ${error.message}`, { kind: "bad" });
       return null;
@@ -162,7 +163,9 @@ export class Selecting {
         seconds: 6,
         action: { label: "Let go of it", run: () => this.place([], { handles: [] }) },
       });
-    this.store.set({ tab: "drag", nextThing: false });
+    // What has been moved is not where the version has it: a click on it says nothing new.
+    if (picked.moved) return;
+    this.store.set({ tab: "drag", nextThing: false, clickedOn: picked.hit ? picked : null });
     this.place(picked.hit ? thingAt(picked.point) : [], { handles: [] });
   }
 

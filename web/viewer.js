@@ -19,6 +19,7 @@ import {
 import { attrs, byId, text } from "./dom.js";
 import { shownVersion } from "./editor.js";
 import { AdaptiveSide, FrameQueue, Recent, serverTime } from "./frames.js";
+import { HeldView } from "./held.js";
 import { Overlay } from "./overlay.js";
 import { partOf } from "./requests.js";
 import { clicksOf, proposalOf, thinned } from "./selection.js";
@@ -51,6 +52,7 @@ export class Viewer {
   #view = byId("view");
   #canvas = byId("picture");
   #overlay;
+  #held;
   #adaptive = new AdaptiveSide();
   #recent = new Recent(MAX_CACHED_PICTURES);
   #displayed = null; // {picture, job}: what is on the canvas.
@@ -79,6 +81,10 @@ export class Viewer {
       wheel: (id, event) => this.#resize(id, event),
       focused: (id) => editor.select(id),
     });
+    this.#held = new HeldView(byId("overlay"), editor, {
+      take: (event, begin) => this.#take(event, begin),
+      redraw: () => this.#drawOverlay(),
+    });
     this.#listen();
     const { store } = editor;
     store.watch(
@@ -86,8 +92,12 @@ export class Viewer {
       () => this.refresh(),
     );
     store.watch(["scene"], ({ scene }) => this.#sceneChanged(scene));
-    store.watch(["handles", "selected", "selection", "selectMode", "region", "problem", "pose", "floorClicks"], () =>
-      this.#drawOverlay(),
+    store.watch(
+      [
+        ...["handles", "selected", "selection", "selectionAnswer", "selectionWaits", "selectMode", "thingMode", "mode"],
+        ...["region", "problem", "pose", "floorClicks", "gizmo", "frame", "dragging", "comparing", "scene"],
+      ],
+      () => this.#drawOverlay(),
     );
     store.watch(["selectMode", "selectTool", "thingMode", "brushRadius", "floorClicks"], () => this.#toolChanged());
     new ResizeObserver(() => this.#resized()).observe(this.#view);
@@ -283,16 +293,21 @@ export class Viewer {
     if (!camera) return;
     const { handles, selected, problem, region, selection, selectMode, floorClicks } = this.#state;
     const at = problem ? partOf(problem.error.where) : {};
+    // While the view moves, nobody asks what is in front.
+    const still = this.#displayed?.job.complete && !this.#state.dragging ? this.#displayed.job : null;
+    const behind = (point) => !!still && !!point && this.#held.isHidden(camera, still.version, point);
     const items = handles.map((handle, i) => ({
       handle,
       selected: handle.id === selected,
       bad: at.part === "handle" && at.index === i,
+      behind: { source: behind(handle.source), target: behind(handle.target) },
     }));
     this.#overlay.draw(camera, items, {
       region,
       clicks: floorClicks?.map((point) => ({ point, kind: "inside" })) ?? (selectMode ? clicksOf(selection) : []),
       spheres: selection.length === 0,
     });
+    this.#held.draw(camera);
   }
 
   #toolChanged() {
@@ -415,6 +430,11 @@ export class Viewer {
 
   /** The pointer took hold of a handle's dot. */
   #grab(id, event) {
+    this.#take(event, (from) => this.#editor.dragTarget(id, this.camera, from));
+  }
+
+  /** The pointer takes hold of something that is drawn over the picture: begin({x, y}) returns the drag. */
+  #take(event, begin) {
     if (event.button !== 0 || event.shiftKey || !this.camera) return;
     event.stopPropagation();
     event.preventDefault();
@@ -422,7 +442,7 @@ export class Viewer {
     this.#pointers.set(event.pointerId, this.#place(event));
     this.#view.setPointerCapture(event.pointerId);
     const from = this.#place(event);
-    this.#gesture = { kind: "drag", from, drag: this.#editor.dragTarget(id, this.camera, from) };
+    this.#gesture = { kind: "drag", from, drag: begin(from) };
   }
 
   #pinch() {

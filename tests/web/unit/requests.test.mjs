@@ -58,7 +58,9 @@ test("a removal has no targets, and with a selection no handles", () => {
   assert.ok(isStated(state) && changesScene(state));
   assert.ok(!isStated({ ...state, selection: [] }) && !isStated({ ...state, mode: "move" }));
   assert.ok(changesScene({ mode: "remove", handles: [{ ...handle, target: null }] }));
-  assert.ok(!changesScene({ mode: "move", handles: [{ ...handle, target: null }], selection }));
+  const anchor = { ...handle, target: null, rotation: null, scale: null };
+  assert.ok(!changesScene({ mode: "move", handles: [anchor], selection }));
+  assert.ok(changesScene({ mode: "move", handles: [{ ...anchor, scale: 2 }], selection }), "what grows in place changes, too");
   const read = only(JSON.stringify({ mode: "remove", selection, heal }));
   assert.deepEqual([read.mode, read.handles, read.selection, read.heal], ["remove", [], selection, heal]);
   refused({ mode: "move", selection }, "handles");
