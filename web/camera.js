@@ -240,11 +240,20 @@ export const levelled = (pose, worldUp) => ({ ...pose, up: worldUp });
 /** The camera's own up direction: what the person in front of the screen calls up. */
 export const upOf = (pose) => scale(axes(pose).down, -1);
 
-/** How the cameras of a dataset were held, on the whole. */
+/** What the people who held the cameras of a dataset would call up: as nearly at right angles to all their right axes as
+ *  can be. Their own up would be tilted as far as they look down. */
 export function upOfViews(views) {
-  const sum = views.reduce((up, view) => sub(up, view.cam_from_world[1]), [0, 0, 0]);
+  const axis = (view, row) => view.cam_from_world[row].slice(0, 3);
+  const sum = views.reduce((up, view) => sub(up, axis(view, 1)), [0, 0, 0]);
   // Held every way, they say nothing.
-  return length(sum) > 0.3 * views.length ? unit(sum) : DEFAULT_UP;
+  if (length(sum) < 0.3 * views.length || views.length === 0) return DEFAULT_UP;
+  // The eigenvector of sum r r^T with the least value, by powers of n - sum r r^T; where all look one way, the nearest
+  // of many to the mean.
+  const rights = views.map((view) => axis(view, 0));
+  let up = unit(sum);
+  for (let i = 0; i < 100; ++i)
+    up = unit(rights.reduce((rest, right) => addScaled(rest, right, -dot(right, up)), scale(up, views.length)));
+  return up;
 }
 
 /** The pose that looks at the same from another direction, of length 1: from where it points. */

@@ -154,7 +154,7 @@ export function showHelp({ letterKeys, setLetterKeys }) {
     [". and ,", "more, less of the thing that is taken"],
     ["D, H", "drag things, place handles"],
     ["S", "select what moves, and back"],
-    ["1, 2, 3, 4", "select by clicks, brush, lasso, rectangle"],
+    ["1 to 6", "select by clicks, brush, lasso, rectangle, sphere, box"],
     ["Right click, or Alt", "selecting: what is not meant"],
     ["V, U, L, X, Y, Z, N", "drag in the view's plane, on surfaces, level, along an axis, along the normal"],
     ["G, W", "next part of the gizmo: move, turn, size; next of its axes: world, view, surface"],

@@ -19,8 +19,9 @@ import { beforeMoves } from "./held.js";
 import { isMoved, moved, scaledAbout, shifted, turnedAbout, withMotion } from "./motion.js";
 import { changesScene, previewKey, requestOf } from "./requests.js";
 import { proposalOf } from "./selection.js";
+import { centreOf, changedShape, lastShape, withShape } from "./shapes.js";
 import { slider } from "./surface.js";
-import { NOTHING_SELECTED, Selecting } from "./selecting.js";
+import { isShape, NOTHING_SELECTED, Selecting } from "./selecting.js";
 import { distance } from "./vectors.js";
 import { follow, hasEnded, merged } from "./watch.js";
 
@@ -119,6 +120,7 @@ export class Editor {
   #abandoned = new Set(); // Ids of edits that were begun and that nobody wants to hear of.
   #opened = 0;
   #lastView = null;
+  #upOf = null; // {views, up}: worked out once.
 
   /**   say(message, options)  a short message to the user */
   constructor(store, memory, say) {
@@ -229,7 +231,8 @@ export class Editor {
   /** The scene's up direction: as it was declared, or as its cameras were held. */
   get worldUp() {
     const { scene, views, viewsKind } = this.state;
-    return scene?.up ?? (viewsKind === "dataset" ? upOfViews(views) : DEFAULT_UP);
+    if (this.#upOf?.views !== views) this.#upOf = { views, up: viewsKind === "dataset" ? upOfViews(views) : DEFAULT_UP };
+    return scene?.up ?? this.#upOf.up;
   }
 
   setPose(pose) {
@@ -424,12 +427,17 @@ export class Editor {
     return this.#drag(handle, this.#byPointer({ handle, pivot: handle.source, bounds: null }, camera, at));
   }
 
-  /** What is held, for a gizmo: {handle, pivot, bounds}. A handle, or of a thing that was just taken the source of the one
+  /** What is held, for a gizmo: {handle, pivot, bounds}, and while selecting `shape`: the sphere or box that selects last. A handle, or of a thing that was just taken the source of the one
    *  that would come; what is turned about, at rest; the box of it, null of a sphere. Null: nothing is held. */
   get held() {
     const { selection, selectionAnswer: answer, selectionWaits, handles, selected } = this.state;
     const { selectMode, thingMode, comparing, mode } = this.state;
-    if (selectMode || comparing) return null;
+    if (comparing) return null;
+    if (selectMode) {
+      const shape = isShape(this.state.selectTool) ? lastShape(selection) : null;
+      const centre = shape && centreOf(shape);
+      return shape && { shape, handle: { source: centre }, pivot: centre, bounds: null };
+    }
     if (!thingMode) {
       const handle = handles.find(({ id }) => id === selected);
       return handle && mode !== "remove" ? { handle, pivot: handle.source, bounds: null } : null;
@@ -450,6 +458,8 @@ export class Editor {
 
   /** Drags by a part of the gizmo, which means(x, y): as gizmo.js. Letting go of a thing repairs it. */
   dragHeld(means) {
+    const { shape } = this.held;
+    if (shape) return this.dragShape((x, y) => changedShape(shape, means(x, y)));
     const held = this.#taken();
     const at = (x, y, put) => put(changedBy(held, means(x, y)));
     return this.#drag(held.handle, { at, ...this.#ofThing() });
@@ -457,8 +467,28 @@ export class Editor {
 
   /** Moves, turns or scales what is held by so much, as one step. */
   nudgeHeld(meant) {
+    const { shape } = this.held;
+    if (shape) return this.changeShape(changedShape(shape, meant));
     const held = this.#taken();
     this.#changeHeld(held, changedBy(held, meant));
+  }
+
+  /** Puts another shape in place of the one that selects last. `note`: can be undone. */
+  changeShape(shape, note = true) {
+    this.#place({ selection: withShape(this.state.selection, shape) }, note);
+  }
+
+  /** Drags that shape: by(x, y) is what becomes of it. */
+  dragShape(by) {
+    let begun = false;
+    return {
+      move: (x, y) => {
+        this.changeShape(by(x, y), !begun);
+        begun = true;
+      },
+      end: () => {},
+      giveUp: () => begun && this.undo(),
+    };
   }
 
   /** Puts what is held where motion.js would say {shift, turn, size} of it. */

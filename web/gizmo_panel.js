@@ -84,14 +84,16 @@ export function buildGizmoPanel(editor, camera) {
   store.watch(
     [
       ...["thingMode", "selectMode", "selection", "selectionAnswer", "selectionWaits", "handles", "selected", "comparing"],
-      ...["mode", "gizmo", "frame", "pose", "scene"],
+      ...["mode", "gizmo", "frame", "pose", "scene", "selectTool"],
     ],
     (state) => {
       const { held } = editor;
-      element.hidden = inPicture.hidden = !held || !state.pose;
-      if (element.hidden) return;
+      inPicture.hidden = !held || !state.pose;
+      element.hidden = inPicture.hidden || !!held.shape;
+      if (inPicture.hidden) return;
       TOOLS.forEach((tool, i) => attrs(tools[i], { "aria-pressed": String(tool === state.gizmo) }));
       frame.update(state.frame);
+      if (held.shape) return;
       const motion = motionOf(held.handle, held.pivot);
       shift.update(inFrame(motion.shift).map(exact(motion.shift)));
       turn.update(inFrame(scale(motion.turn, DEGREES)).map(exact([180])));

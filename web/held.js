@@ -157,7 +157,8 @@ export class HeldView {
 
   /** What is held, where it would go. */
   #outline(camera, { handle, bounds }) {
-    if (!bounds) return pathOf(sphereOutline(camera, handle.target, handle.radius) ?? [], true);
+    const round = bounds ? null : sphereOutline(camera, moved(handle, handle.source), handle.radius);
+    if (!bounds) return round && pathOf(round, true);
     const [center, size] = [bounds.low.map((l, i) => (l + bounds.high[i]) / 2), sub(bounds.high, bounds.low)];
     return boxEdges(center, size)
       .map(([a, b]) => projectSegment(camera, moved(handle, a), moved(handle, b)))

@@ -131,16 +131,17 @@ export class Overlay {
     const { tool, points, radius, subtracts } = line;
     const brush = tool === "brush";
     const [[x0, y0], [x1, y1]] = [points[0], points.at(-1)];
-    const corners = [
-      [x0, y0],
-      [x1, y0],
-      [x1, y1],
-      [x0, y1],
-    ];
+    const box = (x, y, toX, toY) => [[x, y], [toX, y], [toX, toY], [x, toY]];
+    const round = (k) => [x0 + radius * Math.cos((Math.PI * k) / 24), y0 + radius * Math.sin((Math.PI * k) / 24)];
+    const drawn = {
+      rectangle: () => box(x0, y0, x1, y1),
+      box: () => box(x0 - radius, y0 - radius, x0 + radius, y0 + radius),
+      sphere: () => Array.from({ length: 48 }, (_, k) => round(k)),
+    }[tool]?.();
     attrs(this.#sketch, {
       class: `sketch ${brush ? "brush" : "lasso"}${subtracts ? " subtracts" : ""}`,
       // A dot is a line of no length.
-      d: tool === "rectangle" ? pathOf(corners, true) : pathOf(points.length > 1 ? points : [points[0], points[0]], !brush),
+      d: drawn ? pathOf(drawn, true) : pathOf(points.length > 1 ? points : [points[0], points[0]], !brush),
       "stroke-width": brush ? 2 * radius : 2,
     });
   }

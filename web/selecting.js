@@ -1,11 +1,12 @@
 // Selecting: clicks, strokes and lassos become operations, and the service says what they hold. No elements here.
 
 import * as api from "./api.js";
-import { onTheWire } from "./camera.js";
+import { unitsPerPixel, onTheWire } from "./camera.js";
 import { FrameQueue } from "./frames.js";
 import {
   furtherBorders,
   inverted,
+  operation,
   polygonOf,
   proposalOf,
   rectangleOf,
@@ -15,6 +16,7 @@ import {
   widened,
   withClick,
 } from "./selection.js";
+import { shapeAround } from "./shapes.js";
 
 /** What there is before anything is selected. Tool, depth, radius and tint outlive a reload. */
 export const NOTHING_SELECTED = {
@@ -23,7 +25,7 @@ export const NOTHING_SELECTED = {
   selectionWaits: false, // Whether that is of an earlier selection.
   thingMode: true, // The pointer takes hold of whole things; else it places and drags handles.
   selectMode: false, // The pointer selects, whatever it does else.
-  selectTool: "grow", // "grow", "brush", "lasso" or "rectangle"
+  selectTool: "grow", // "grow", "brush", "lasso", "rectangle", "sphere" or "box"
   selectOp: "add",
   clickKind: "inside", // Of a click to grow: on the thing ("inside"), or not.
   nextThing: false, // The next click begins another thing.
@@ -31,6 +33,9 @@ export const NOTHING_SELECTED = {
   brushRadius: 18, // Pixels; a choice.
   tinted: true,
 };
+
+/** Whether a tool makes shapes, which have handles of their own. */
+export const isShape = (tool) => tool === "sphere" || tool === "box";
 
 const OPPOSITE = { add: "subtract", subtract: "add", intersect: "subtract" };
 const PASSING = [0, 429, 503]; // The service is full, restarting, or loads the scene: it will answer later.
@@ -187,6 +192,19 @@ export class Selecting {
     if (!made) return this.say(`Draw the ${tool} around what you mean.`, { seconds: 3 });
     this.store.set({ tab: "drag" });
     this.place([...selection, made]);
+  }
+
+  /** A sphere or a box around what is seen at a place.
+   *    reach  how far it goes from there, pixels */
+  async drawShape(tool, camera, { x, y }, reach, up, other = false) {
+    const picked = await this.#pick(camera, x, y);
+    if (!picked) return;
+    if (!picked.hit) return this.say("There is nothing here to select.", { seconds: 3 });
+    const { selectOp, selection } = this.#state;
+    const op = other ? OPPOSITE[selectOp] : selectOp;
+    const shape = shapeAround(tool, picked.point, reach * unitsPerPixel(camera, picked.point), up);
+    this.store.set({ tab: "drag" });
+    this.place([...selection, operation(op, shape)]);
   }
 
   /** Whether the next stroke or lasso takes away. */

@@ -7,7 +7,7 @@ import { counted, gaussians } from "./format.js";
 export const opOf = (operation) => operation.op ?? "add";
 
 /** An operation in which "add", the default, is left out. */
-const operation = (op, action) => (op === "add" ? action : { op, ...action });
+export const operation = (op, action) => (op === "add" ? action : { op, ...action });
 
 /** Whether two numbers in a row of points are nearer than `apart` pixels. */
 const near = (a, b, apart) => Math.hypot(a[0] - b[0], a[1] - b[1]) < apart;

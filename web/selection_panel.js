@@ -5,6 +5,8 @@ import { choice, segments, toggle } from "./fields.js";
 import { count, gaussians } from "./format.js";
 import { warnings } from "./request_panel.js";
 import { describe, sentence, share } from "./selection.js";
+import { isShape } from "./selecting.js";
+import { shapeFields } from "./shapes.js";
 
 const HANDS = [
   ["thing", "Drag", "Click a thing and drag it to where it should go (D)"],
@@ -16,6 +18,8 @@ export const SELECT_TOOLS = [
   ["brush", "Brush", "Paint over what is meant (2)"],
   ["lasso", "Lasso", "Draw around what is meant (3)"],
   ["rectangle", "Frame", "Draw a rectangle around what is meant, from corner to corner (4)"],
+  ["sphere", "Sphere", "Press where its middle is and draw it out; then pull its dot, or the gizmo (5)"],
+  ["box", "Box", "Press where its middle is and draw it out; then pull its faces, or the gizmo (6)"],
 ];
 const OPS = [
   ["add", "Add", "To what is selected"],
@@ -92,7 +96,7 @@ export function buildTools(editor) {
     attrs(next, { "aria-pressed": String(state.nextThing) });
     next.disabled = !state.selection.some((o) => o.grow);
     kind.element.hidden = next.hidden = selectTool !== "grow";
-    depth.element.hidden = selectTool === "grow";
+    depth.element.hidden = selectTool === "grow" || isShape(selectTool);
     brushSize.hidden = selectTool !== "brush";
     undo.disabled = !editor.canUndo;
     redo.disabled = !editor.canRedo;
@@ -143,7 +147,7 @@ export function buildSelectionPanel(editor) {
     "section",
     { class: "selection", "aria-label": "Selection" },
     h("div", { class: "row between" }, h("h2", {}, "Selection"), tools),
-    ...[empty, held, problem, notes, list, changes],
+    ...[empty, held, problem, notes, list, shapeFields(editor), changes],
   );
 
   store.watch(["selection", "selectionAnswer", "selectionWaits", "tinted", "scene", "version"], (state) => {

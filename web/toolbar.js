@@ -41,6 +41,12 @@ const HINTS = {
   ],
 };
 
+HINTS.sphere = [
+  "Press in the middle of what you mean, and draw",
+  "All within is selected. Pull the dots and the arrows until it fits.",
+  "Drag: draw · Alt + drag: the opposite · Right drag: orbit · Wheel: nearer",
+];
+HINTS.box = HINTS.sphere;
 HINTS.floor = [
   "Click three places on the floor",
   "What is at right angles to them is up.",

@@ -14,6 +14,7 @@ import {
   pictureSize,
   project,
   samePose,
+  unitsPerPixel,
   zoomedAt,
 } from "./camera.js";
 import { attrs, byId, text } from "./dom.js";
@@ -22,9 +23,11 @@ import { AdaptiveSide, FrameQueue, Recent, serverTime } from "./frames.js";
 import { HeldView } from "./held.js";
 import { Overlay } from "./overlay.js";
 import { partOf } from "./requests.js";
+import { isShape } from "./selecting.js";
 import { clicksOf, proposalOf, thinned } from "./selection.js";
+import { lastShape, ShapeView } from "./shapes.js";
 import { clickFloor } from "./up.js";
-import { add, sub } from "./vectors.js";
+import { add, sub, unit } from "./vectors.js";
 
 // All of these are choices, tried by hand.
 const MAX_SIDE = 1600; // Pixels of the longer side of a picture at rest: sharp enough on a large window.
@@ -37,6 +40,8 @@ const THING_PX = 14; // A thing is taken hold of within this of its middle, howe
 const SKETCH_PX = 2; // A line that is drawn has a corner this often at most.
 const MAX_CACHED_PICTURES = 6; // Enough to go back and forth between two versions and three layers.
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }; // Right, down.
+const DRAWING = ["brush", "lasso", "rectangle", "sphere", "box"]; // With the left button.
+const SHAPE_PX = 50; // How far a sphere or a box goes that is clicked rather than drawn.
 const CONTROLS = "button, a, input, select, summary, .end"; // What lies on the picture and is no part of it.
 const THUMBNAIL = { width: 320, height: 200 };
 
@@ -53,6 +58,7 @@ export class Viewer {
   #canvas = byId("picture");
   #overlay;
   #held;
+  #shapes;
   #adaptive = new AdaptiveSide();
   #recent = new Recent(MAX_CACHED_PICTURES);
   #displayed = null; // {picture, job}: what is on the canvas.
@@ -85,6 +91,7 @@ export class Viewer {
       take: (event, begin) => this.#take(event, begin),
       redraw: () => this.#drawOverlay(),
     });
+    this.#shapes = new ShapeView(byId("overlay"), editor, { take: (event, begin) => this.#take(event, begin) });
     this.#listen();
     const { store } = editor;
     store.watch(
@@ -95,7 +102,7 @@ export class Viewer {
     store.watch(
       [
         ...["handles", "selected", "selection", "selectionAnswer", "selectionWaits", "selectMode", "thingMode", "mode"],
-        ...["region", "problem", "pose", "floorClicks", "gizmo", "frame", "dragging", "comparing", "scene"],
+        ...["region", "problem", "pose", "floorClicks", "gizmo", "frame", "dragging", "comparing", "scene", "selectTool"],
       ],
       () => this.#drawOverlay(),
     );
@@ -308,6 +315,12 @@ export class Viewer {
       spheres: selection.length === 0,
     });
     this.#held.draw(camera);
+    const { held } = this.#editor;
+    this.#shapes.draw(camera, {
+      shapes: selectMode ? selection.map((o) => lastShape([o])).filter(Boolean) : [],
+      held: held?.shape ?? null,
+      perPixel: held ? unitsPerPixel(camera, held.pivot) : 0,
+    });
   }
 
   #toolChanged() {
@@ -396,7 +409,7 @@ export class Viewer {
 
   /** What a pointer that goes down on the picture begins. Where the left button draws, the right one orbits. */
   #kindOf({ button, shiftKey }) {
-    const draws = ["brush", "lasso", "rectangle"].includes(this.tool);
+    const draws = DRAWING.includes(this.tool);
     if (button === 1 || shiftKey) return "pan";
     if (draws) return button === 2 ? "orbit" : "draw";
     return button === 2 ? "pan" : "orbit";
@@ -407,22 +420,27 @@ export class Viewer {
     const { tool, camera } = this;
     const selecting = this.#editor.selecting;
     let points = [[x, y]];
+    const reach = () => {
+      const r = Math.hypot(points.at(-1)[0] - x, points.at(-1)[1] - y);
+      return r < CLICK_PX ? SHAPE_PX : r;
+    };
     const show = () =>
       this.#overlay.sketch({
         tool,
         points,
-        radius: this.#state.brushRadius,
+        radius: isShape(tool) ? reach() : this.#state.brushRadius,
         subtracts: selecting.subtracts(other),
       });
     show();
     return {
       move: (toX, toY) => {
-        points = tool === "rectangle" ? [points[0], [toX, toY]] : thinned([...points, [toX, toY]], SKETCH_PX);
+        points = tool === "rectangle" || isShape(tool) ? [points[0], [toX, toY]] : thinned([...points, [toX, toY]], SKETCH_PX);
         show();
       },
       end: () => {
         this.#overlay.sketch(null);
-        selecting.draw(tool, camera, points, other);
+        if (isShape(tool)) selecting.drawShape(tool, camera, { x, y }, reach(), unit(this.#editor.worldUp), other);
+        else selecting.draw(tool, camera, points, other);
       },
       giveUp: () => this.#overlay.sketch(null),
     };
@@ -526,6 +544,7 @@ export class Viewer {
     }
     else if (tool === "grow") selecting.click(camera, x, y, other);
     else if (tool === "brush") selecting.draw("brush", camera, [[x, y]], other);
+    else if (isShape(tool)) selecting.drawShape(tool, camera, { x, y }, SHAPE_PX, unit(this.#editor.worldUp), other);
   }
 
   #turn(change) {

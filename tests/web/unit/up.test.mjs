@@ -13,6 +13,13 @@ test("cameras were held upright on the whole, or say nothing", () => {
   const [x, y, z] = upOfViews([view([0.6, 0.8, 0]), view([-0.6, 0.8, 0])]);
   near([x, y, z], [0, -1, 0]);
   near(upOfViews([view([1, 0, 0]), view([-1, 0, 0])]), [0, -1, 0]);
+  // Cameras around a thing, on one side of it, that all look down by 30 degrees.
+  const around = [-0.6, -0.2, 0.1, 0.7].map((angle) => {
+    const pose = { eye: [4 * Math.sin(angle), -4 * Math.tan(Math.PI / 6), -4 * Math.cos(angle)], target: [0, 0, 0], up: [0, -1, 0] };
+    const { right, down, forward } = axes(pose);
+    return { cam_from_world: [[...right, 1], [...down, 2], [...forward, 3]] };
+  });
+  assert.ok(distance(upOfViews(around), [0, -1, 0]) < 1e-3, `${upOfViews(around)}`);
   near(upOfViews([]), [0, -1, 0]);
 });
 
