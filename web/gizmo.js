@@ -4,8 +4,8 @@ import { axes, draggedAlong, onPlane, project, projectSegment, unitsPerPixel } f
 import { addScaled, cross, dot, length, perpendicular, scale, sub, unit } from "./vectors.js";
 
 // Choices, in pixels.
-const ARM = 86;
-const FREE = 24; // Around the middle, where what is held is itself taken hold of.
+const ARM = 62; // Of an arrow, from where it begins.
+const FREE = { least: 24, most: 90 }; // Around the middle, where what is held is itself taken hold of: as far as that goes.
 const HEAD = 11;
 const SHORT = 26; // An axis that is shorter in the picture faces the camera: it has no arrow.
 const CORNERS = 64; // Of a ring.
@@ -34,19 +34,21 @@ export function frameAxes(frame, camera, { up, normal }) {
  *    nudge(dx, dy)    what a step of the arrow keys means
  *  What it means adds to where it was when the drag began.
  *    frame  frameAxes()
- *    at     the middle, world units; behind the camera there is nothing */
-export function gizmoParts(tool, frame, at, camera) {
+ *    at     the middle, world units; behind the camera there is nothing
+ *    reach  how far what is held goes from there in the picture */
+export function gizmoParts(tool, frame, at, camera, reach = 0) {
   const middle = project(camera, at);
   if (!middle) return [];
   const px = unitsPerPixel(camera, at);
-  return { move, turn, size }[tool](frame, at, camera, { middle, px, arm: ARM * px });
+  const free = Math.min(FREE.most, Math.max(FREE.least, reach));
+  return { move, turn, size }[tool](frame, at, camera, { middle, px, free, arm: free + ARM });
 }
 
 const seen = (camera, points) => points.map((point) => project(camera, point)).filter(Boolean).map(({ x, y }) => [x, y]);
 
-function move(frame, at, camera, { middle, px, arm }) {
+function move(frame, at, camera, { middle, px, free, arm }) {
   const arrows = frame.map((axis, i) => {
-    const tip = project(camera, addScaled(at, axis, arm));
+    const tip = project(camera, addScaled(at, axis, arm * px));
     const long = tip ? Math.hypot(tip.x - middle.x, tip.y - middle.y) : 0;
     if (long < SHORT) return null;
     const [ux, uy] = [(tip.x - middle.x) / long, (tip.y - middle.y) / long];
@@ -57,7 +59,7 @@ function move(frame, at, camera, { middle, px, arm }) {
       axis: i,
       label: `Move along ${NAMES[i]}`,
       lines: [
-        { points: [place(Math.min(FREE, 0.5 * long), 0), place(long - HEAD, 0)] },
+        { points: [place(Math.min(free, 0.5 * long), 0), place(long - HEAD, 0)] },
         { points: [place(long, 0), place(long - HEAD, 0.5 * HEAD), place(long - HEAD, -0.5 * HEAD)], closed: true },
       ],
       drag: (x0, y0) => {
@@ -70,13 +72,14 @@ function move(frame, at, camera, { middle, px, arm }) {
   const planes = frame.map((normal, i) => {
     const [u, v] = [frame[(i + 1) % 3], frame[(i + 2) % 3]];
     if (Math.abs(dot(normal, unit(sub(camera.eye, at)))) < 0.3) return null;
-    const corner = (a, b) => addScaled(addScaled(at, u, a * arm), v, b * arm);
+    const [near, far] = [0.71 * free + 17, 0.71 * free + 36].map((x) => x * px);
+    const corner = (a, b) => addScaled(addScaled(at, u, a), v, b);
     const on = (x, y) => onPlane(camera, x, y, at, normal);
     return {
       name: `move-${NAMES[(i + 1) % 3]}${NAMES[(i + 2) % 3]}`,
       axis: i,
       label: `Move in the plane of ${NAMES[(i + 1) % 3]} and ${NAMES[(i + 2) % 3]}`,
-      lines: [{ points: seen(camera, [corner(0.4, 0.4), corner(0.62, 0.4), corner(0.62, 0.62), corner(0.4, 0.62)]), closed: true }],
+      lines: [{ points: seen(camera, [corner(near, near), corner(far, near), corner(far, far), corner(near, far)]), closed: true }],
       drag: (x0, y0) => {
         const from = on(x0, y0);
         return (x, y) => ({ shift: sub(on(x, y), from) });
@@ -87,7 +90,7 @@ function move(frame, at, camera, { middle, px, arm }) {
   return [...planes, ...arrows].filter(Boolean);
 }
 
-function turn(frame, at, camera, { middle, arm }) {
+function turn(frame, at, camera, { middle, px, arm }) {
   const towards = unit(sub(camera.eye, at));
   const ring = (axis, i, radius) => {
     const u = perpendicular(axis);
@@ -107,7 +110,7 @@ function turn(frame, at, camera, { middle, arm }) {
       else lines.push({ points: [a, b], far });
     }
     const facing = dot(axis, towards);
-    const tip = project(camera, addScaled(at, axis, arm)) ?? middle;
+    const tip = project(camera, addScaled(at, axis, arm * px)) ?? middle;
     return {
       name: i < 3 ? `turn-${NAMES[i]}` : "turn-view",
       axis: i,
@@ -118,8 +121,8 @@ function turn(frame, at, camera, { middle, arm }) {
         const aside = unit([tip.y - middle.y, middle.x - tip.x, 0]);
         return (x, y) => {
           if (Math.abs(facing) < EDGE_ON) {
-            // What is in front of the axis goes with the hand; ARM pixels are a radian, as they are on the ring.
-            angle = ((x - x0) * aside[0] + (y - y0) * aside[1]) / ARM;
+            // What is in front of the axis goes with the hand: a ring's radius is a radian.
+            angle = ((x - x0) * aside[0] + (y - y0) * aside[1]) / arm;
             return { turn: scale(axis, -angle) };
           }
           const now = Math.atan2(y - middle.y, x - middle.x);
@@ -133,19 +136,19 @@ function turn(frame, at, camera, { middle, arm }) {
       nudge: (dx, dy) => ({ turn: scale(axis, ((dx - dy) * Math.PI) / 180) }),
     };
   };
-  return [ring(towards, 3, 1.12 * arm), ...frame.map((axis, i) => ring(axis, i, 0.94 * arm))];
+  return [ring(towards, 3, (arm + 10) * px), ...frame.map((axis, i) => ring(axis, i, (arm - 6) * px))];
 }
 
-function size(frame, at, camera, { middle }) {
+function size(frame, at, camera, { middle, free, arm }) {
   const place = (along) => [middle.x + along * 0.71, middle.y - along * 0.71];
-  const box = (r) => [[-r, -r], [r, -r], [r, r], [-r, r]].map(([x, y]) => [place(ARM)[0] + x, place(ARM)[1] + y]);
+  const box = (r) => [[-r, -r], [r, -r], [r, r], [-r, r]].map(([x, y]) => [place(arm)[0] + x, place(arm)[1] + y]);
   const away = (x, y) => Math.max(4, Math.hypot(x - middle.x, y - middle.y));
   return [
     {
       name: "size",
       axis: 3,
       label: "Size",
-      lines: [{ points: [place(FREE), place(ARM - 8)] }, { points: box(8), closed: true }],
+      lines: [{ points: [place(free), place(arm - 8)] }, { points: box(8), closed: true }],
       drag: (x0, y0) => (x, y) => ({ size: away(x, y) / away(x0, y0) }),
       nudge: (dx, dy) => ({ size: 1.01 ** (dx - dy) }),
     },

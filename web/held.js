@@ -10,20 +10,22 @@ import { add, addScaled, cross, distance, dot, perpendicular, scale, sub, unit }
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }; // Right, down.
 const STEP = 8; // Pixels, degrees or per cent that an arrow key means; with Shift 1.
 const LIFTED = 0.5; // Of the way up to its middle, from where it looks down: what stands on a table has that below it.
+const NEAREST = 0.25; // World units: what is as near as 0.2 to a camera, the service does not show.
 const MARK = 0.25; // Of its height: the radius of the ring below it.
 const NEAR_ENOUGH = 0.03; // Of the distance: a point this little behind a surface is on it.
+
+const boxCorners = ({ low, high }) => Array.from({ length: 8 }, (_, i) => low.map((l, k) => ((i >> k) & 1 ? high[k] : l)));
+
+/** The lesser radius of the ellipse that some pixels are in. */
+const reachOf = (pixels) =>
+  Math.min(...["x", "y"].map((k) => pixels.map((p) => p[k])).map((all) => (Math.max(...all) - Math.min(...all)) / 2));
 
 /** Where what is held touches ground, and how it reaches down to there: {place, height}. `place`: of its pivot, now.
  *    bounds  of it at rest, {low, high}; null: what it is, is a point */
 export function footOf({ handle, pivot }, bounds, up) {
   const place = moved(handle, pivot);
   if (!bounds) return { place, height: 0 };
-  const { low, high } = bounds;
-  const lowest = Math.min(
-    ...Array.from({ length: 8 }, (_, i) => low.map((l, k) => ((i >> k) & 1 ? high[k] : l))).map((corner) =>
-      dot(sub(moved(handle, corner), place), up),
-    ),
-  );
+  const lowest = Math.min(...boxCorners(bounds).map((corner) => dot(sub(moved(handle, corner), place), up)));
   return { place, height: Math.max(0, -lowest) };
 }
 
@@ -146,7 +148,9 @@ export class HeldView {
     }
     const { place, height } = footOf(held, held.bounds, unit(up));
     const axes = frameAxes(frame, camera, { up: unit(up), normal: held.handle.normal });
-    const parts = gizmoParts(gizmo, axes, place, camera);
+    const { bounds, handle } = held;
+    const corners = bounds && boxCorners(bounds).map((corner) => project(camera, moved(handle, corner)));
+    const parts = gizmoParts(gizmo, axes, place, camera, corners?.every(Boolean) ? reachOf(corners) : 0);
     this.#part = new Map(parts.map((part) => [part.name, part]));
     // While a part is dragged, the hand has it: the others would only lie in the way.
     this.#update(parts);
@@ -169,7 +173,7 @@ export class HeldView {
 
   /** From the middle of what is held down to the surface below, with a ring on that. */
   #dropLine(camera, place, height, up) {
-    const eye = addScaled(place, up, -(1 - LIFTED) * height);
+    const eye = addScaled(place, up, Math.max(LIFTED * height, NEAREST) - height);
     const { scene, version } = this.#editor.state;
     const below = this.#answers.get(JSON.stringify([scene.id, version, eye]), () =>
       this.#editor.pick({ ...lookingAlong(eye, scale(up, -1)) }, 4.5, 4.5),

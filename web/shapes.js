@@ -111,7 +111,7 @@ export class ShapeView {
             class: "face",
             tabindex: "0",
             role: "button",
-            testid: `shape-${name}`,
+            testid: name === "radius" ? "shape-radius-dot" : `shape-${name}`,
             onpointerdown: (event) => take(event, ({ x, y }) => editor.dragShape(this.#handles.get(name).drag(x, y))),
             onkeydown: (event) => {
               const step = { ArrowUp: 8, ArrowRight: 8, ArrowDown: -8, ArrowLeft: -8 }[event.key];
