@@ -208,7 +208,7 @@ export class Editor {
     const { scene, version, pose: before } = this.state;
     const opening = this.#opened;
     // Without pictures of it, from where captures mostly look.
-    const pose = await fittedPose(scene, this.aspect, looksAt(scene.id, version)).catch(() => firstPose(scene));
+    const pose = await fittedPose(scene, () => this.aspect, looksAt(scene.id, version)).catch(() => firstPose(scene));
     if (opening === this.#opened && this.state.pose === before) this.store.set({ pose, viewName: null });
   }
 

@@ -44,6 +44,7 @@ export function framed(pose, [left, top, right, low], aspect) {
 }
 
 /** The first look at a version.
+ *    aspect()    width by height of the picture; asked for when it is needed: the page may just be laid out
  *    look(pose)  {rim, box} of what a pose shows */
 export async function fittedPose(scene, aspect, look) {
   const first = firstPose(scene);
@@ -53,10 +54,10 @@ export async function fittedPose(scene, aspect, look) {
     const pose = dollied(first, factor, 0);
     if (factor > 1) seen = await look(pose);
     if (seen.rim > 0) continue;
-    const fitted = framed(pose, seen.box, aspect);
+    const fitted = framed(pose, seen.box, aspect());
     // What is nearer than the middle is larger than it was from farther away, so its box is taken once more.
     const { box, rim } = await look(fitted);
-    return box && rim === 0 ? framed(fitted, box, aspect) : fitted;
+    return box && rim === 0 ? framed(fitted, box, aspect()) : fitted;
   }
   return first;
 }

@@ -234,14 +234,14 @@ export class Selecting {
 
   /** Takes whole things in hand, or handles. */
   takeThings(things) {
-    this.store.set({ thingMode: things, selectMode: false });
+    this.store.set({ thingMode: things, selectMode: false, floorClicks: null });
   }
 
   /** Takes a tool in hand; null: whatever it was before, things or handles. */
   use(tool) {
     if (!tool) return this.store.set({ selectMode: false });
     // Depth and changes have no tint: what is selected has to be seen.
-    this.store.set({ selectMode: true, selectTool: tool, layer: "color", comparing: false, selected: null });
+    this.store.set({ selectMode: true, selectTool: tool, layer: "color", comparing: false, selected: null, floorClicks: null });
   }
 
   toggle() {

@@ -59,6 +59,14 @@ export function buildUp(editor) {
     ),
   );
   byId("view-tools").append(menu);
+  // As menus do: a press anywhere else, or Esc, closes it.
+  document.addEventListener("pointerdown", ({ target }) => menu.contains(target) || (menu.open = false), true);
+  menu.addEventListener("keydown", (event) => {
+    if (event.key !== "Escape") return;
+    event.stopPropagation();
+    menu.open = false;
+    menu.firstElementChild.focus();
+  });
 
   const ends = AXES.map(({ name, sign, direction }) => {
     const look = () => editor.setPose(seenFrom(store.state.pose, direction, editor.worldUp));

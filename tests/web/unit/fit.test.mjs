@@ -45,7 +45,7 @@ test("a thing taller, wider or farther aside than a first look is seen whole, an
   ]) {
     const points = boxOf(size, at);
     const scene = { centre: at, radius: 0.7, up: null };
-    const pose = await fittedPose(scene, aspect, lookAt(points));
+    const pose = await fittedPose(scene, () => aspect, lookAt(points));
     const camera = { ...pose, width: 1000 * aspect, height: 1000 };
     const seen = points.map((point) => project(camera, point));
     const [x, y] = ["x", "y"].map((axis) => seen.map((p) => p[axis]));
@@ -64,7 +64,7 @@ test("who stands in a room stays there", async () => {
   // A wall so near that its points would have gaps between them: shown as one.
   const look = lookAt(room, asked);
   const filled = async (pose) => ({ ...(await look(pose)), rim: 0.9 });
-  assert.deepEqual(await fittedPose(scene, 1.5, filled), firstPose(scene));
+  assert.deepEqual(await fittedPose(scene, () => 1.5, filled), firstPose(scene));
   assert.equal(asked.length, 1);
-  assert.deepEqual(await fittedPose(scene, 1.5, lookAt([])), firstPose(scene), "nor is there anything to fit");
+  assert.deepEqual(await fittedPose(scene, () => 1.5, lookAt([])), firstPose(scene), "nor is there anything to fit");
 });
