@@ -2,7 +2,7 @@
 
 import { onTheWire } from "./camera.js";
 import { attrs, byId, h, text } from "./dom.js";
-import { labelled, numberField, pointField, segments } from "./fields.js";
+import { icon, labelled, numberField, pointField, segments } from "./fields.js";
 import { FRAMES, frameAxes, TOOLS } from "./gizmo.js";
 import { motionOf } from "./motion.js";
 import { addScaled, dot, scale, unit } from "./vectors.js";
@@ -35,9 +35,8 @@ export const next = (store, name) => {
 export function buildGizmoPanel(editor, camera) {
   const { store } = editor;
   const tools = TOOLS.map((tool) => {
-    const [icon, title] = ICONS[tool];
-    const onclick = () => store.set({ gizmo: tool });
-    return h("button", { type: "button", class: "icon", testid: `gizmo-tool-${tool}`, title, "aria-label": title, onclick }, icon);
+    const [sign, title] = ICONS[tool];
+    return icon(sign, `gizmo-tool-${tool}`, title, () => store.set({ gizmo: tool }));
   });
   const inPicture = h("div", { id: "gizmo-tools", role: "group", "aria-label": "Move, turn or size" }, tools);
   byId("view-tools").append(inPicture);

@@ -1,13 +1,12 @@
 // Drawn over the picture about what is held: the gizmo, where it would go, and the surface below it.
 
 import { boxEdges, project, projectSegment, sphereOutline } from "./camera.js";
-import { attrs, keyedList, s } from "./dom.js";
+import { ARROWS, attrs, keyedList, s } from "./dom.js";
 import { frameAxes, gizmoParts } from "./gizmo.js";
 import { isMoved, moved, unmoved } from "./motion.js";
 import { pathOf } from "./overlay.js";
 import { add, addScaled, cross, distance, dot, perpendicular, scale, sub, unit } from "./vectors.js";
 
-const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }; // Right, down.
 const STEP = 8; // Pixels, degrees or per cent that an arrow key means; with Shift 1.
 const LIFTED = 0.5; // Of the way up to its middle, from where it looks down: what stands on a table has that below it.
 const NEAREST = 0.25; // World units: what is as near as 0.2 to a camera, the service does not show.

@@ -2,7 +2,7 @@
 
 import { attrs, byId, h, text } from "./dom.js";
 import { parentOf, shownVersion } from "./editor.js";
-import { choice, segments } from "./fields.js";
+import { button, choice, icon, segments } from "./fields.js";
 import { gaussians } from "./format.js";
 import { isStated } from "./requests.js";
 
@@ -56,9 +56,6 @@ HINTS.rectangle = HINTS.lasso.map((text) => text.replace("Draw around", "Draw a 
 
 export function buildToolbar(editor, viewer) {
   const { store } = editor;
-  const icon = (label, testid, title, onclick) =>
-    h("button", { type: "button", class: "icon", testid, title, "aria-label": title, onclick }, label);
-
   const version = choice({
     label: "Version",
     testid: "version-select",
@@ -116,11 +113,7 @@ export function buildToolbar(editor, viewer) {
   );
 
   const chip = h("span", { class: "chip", testid: "shown-chip" });
-  const back = h(
-    "button",
-    { type: "button", class: "small", testid: "drop-preview", onclick: () => editor.dropPreview() },
-    "End preview",
-  );
+  const back = button("End preview", "drop-preview", null, () => editor.dropPreview());
   byId("chips").append(chip, back);
 
   const keysLine = h("span", { class: "muted keys-line" });

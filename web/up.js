@@ -2,6 +2,7 @@
 
 import { axes, seenFrom, upOf } from "./camera.js";
 import { attrs, byId, h, problemText, s } from "./dom.js";
+import { button } from "./fields.js";
 import { cross, dot, scale, sub, unit } from "./vectors.js";
 
 const ARM = 28; // Pixels from the middle of the axes to their ends.
@@ -36,10 +37,10 @@ export async function clickFloor(editor, camera, x, y) {
 export function buildUp(editor) {
   const { store } = editor;
   const choose = (label, testid, title, up) =>
-    h("button", { type: "button", class: "small", testid, title, onclick: async () => {
+    button(label, testid, title, async () => {
       menu.open = false;
       await Promise.resolve(up()).catch((error) => editor.say(problemText(error), { kind: "bad" }));
-    } }, label);
+    });
   const reset = choose("Default", "reset-up", "As the cameras of the dataset were held; without one, −y", () => editor.setUp(null));
   const menu = h(
     "details",

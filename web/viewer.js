@@ -17,7 +17,7 @@ import {
   unitsPerPixel,
   zoomedAt,
 } from "./camera.js";
-import { attrs, byId, text } from "./dom.js";
+import { ARROWS, attrs, byId, text } from "./dom.js";
 import { shownVersion } from "./editor.js";
 import { AdaptiveSide, FrameQueue, Recent, serverTime } from "./frames.js";
 import { HeldView } from "./held.js";
@@ -39,7 +39,6 @@ const ORBIT_PER_PX = 0.0055; // Radians: half a turn across 570 pixels.
 const THING_PX = 14; // A thing is taken hold of within this of its middle, however small it is.
 const SKETCH_PX = 2; // A line that is drawn has a corner this often at most.
 const MAX_CACHED_PICTURES = 6; // Enough to go back and forth between two versions and three layers.
-const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }; // Right, down.
 const DRAWING = ["brush", "lasso", "rectangle", "sphere", "box"]; // With the left button.
 const SHAPE_PX = 50; // How far a sphere or a box goes that is clicked rather than drawn.
 const CONTROLS = "button, a, input, select, summary, .end"; // What lies on the picture and is no part of it.

@@ -106,6 +106,11 @@ test("what is exported can be imported again", () => {
     const exported = requestOf({ ...request, scene: "s000001", version: 2 });
     assert.deepEqual(only(JSON.stringify(exported)), request);
   }
+  const handle = { source: [0, 0, 0], target: [1, 0, 0], radius: 1, group: 0, rotation: [0.5, 0.5, 0.5, 0.5], scale: 2 };
+  const asked = requestOf({ ...only(JSON.stringify({ handles: [handle] })), scene: "s000001", version: 0 });
+  assert.deepEqual(asked.handles, [handle], "turned and scaled, too");
+  refused({ handles: [{ ...handle, rotation: [0, 0, 0, 0] }] }, "handles[0].rotation");
+  refused({ handles: [{ ...handle, scale: 0 }] }, "handles[0].scale");
 });
 
 test("a request with a selection needs no radius, and keeps one that it has", () => {
