@@ -22,11 +22,16 @@ Result<Selection> parse_selection(std::string_view text, const JsonLimits& limit
 std::string to_json(const Selection& selection) { return pretty({{"selection", encode(selection)}}); }
 
 std::string to_json(const SelectionSummary& summary) {
+  using nlohmann::ordered_json;
+  const auto& at = summary.border;
+  const auto border =
+      at ? ordered_json{{"wider", at->wider}, {"more", at->more}, {"less", at->less}} : ordered_json(nullptr);
   return pretty({{"id", summary.id},
                  {"count", summary.count},
                  {"bounds", {{"low", summary.low}, {"high", summary.high}}},
                  {"centre", summary.centre},
                  {"undecided", summary.undecided},
+                 {"border", border},
                  {"warnings", summary.warnings}});
 }
 

@@ -153,13 +153,21 @@ using Selection = std::vector<selection::Operation>;
 /// The selection as JSON that parse_selection() reads back.
 [[nodiscard]] std::string to_json(const Selection& selection);
 
+/// Where a whole ends, among the natural borders around its click.
+struct SelectionBorder {
+  int wider = 0;      ///< Grow::wider, or nearer to 0 where there are fewer borders on that side.
+  bool more = false;  ///< One may lie farther out.
+  bool less = false;  ///< One lies farther in.
+};
+
 /// What has been selected.
 struct SelectionSummary {
-  std::string id;             ///< By which a render shows it for a while; the same for the same selection.
-  std::size_t count = 0;      ///< Gaussians.
-  Point low{}, high{};        ///< Box of their means, world units; all 0 without any.
-  Point centre{};             ///< Mean of their means, world units; 0 without any.
-  std::size_t undecided = 0;  ///< Gaussians that masks leave nearly even.
+  std::string id;                         ///< By which a render shows it for a while; the same for the same selection.
+  std::size_t count = 0;                  ///< Gaussians.
+  Point low{}, high{};                    ///< Box of their means, world units; all 0 without any.
+  Point centre{};                         ///< Mean of their means, world units; 0 without any.
+  std::size_t undecided = 0;              ///< Gaussians that masks leave nearly even.
+  std::optional<SelectionBorder> border;  ///< Of the last operation that grows a whole.
   std::vector<std::string> warnings;
 };
 

@@ -119,22 +119,25 @@ export function onPlane(camera, x, y, through, normal) {
   return addScaled(addScaled(origin, normal, height), bearing, Math.sqrt(farthest ** 2 - height ** 2));
 }
 
-/** Where a dragged point goes.
- *    from        where it was when the drag began
- *    x, y        where it is asked to be, pixels
- *    constraint  "view" (the plane that faces the camera), "level" (the plane at right angles to `up`), "x", "y", "z", or
- *                "normal" (along `normal`, if there is one)
- *  An axis that nearly faces the camera says nothing about where a pixel is on it: there the point goes along it by as
- *  much as the hand moves up (towards the camera) or down. */
-export function dragged(camera, from, x, y, constraint, { normal = null, up = DEFAULT_UP } = {}) {
-  if (constraint === "level") return onPlane(camera, x, y, from, unit(up, DEFAULT_UP));
-  const axis = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1], normal: normal && unit(normal) }[constraint];
-  if (!axis) return onViewPlane(camera, x, y, from);
+/** Where a point goes that is dragged along the unit vector `axis`. One that nearly faces the camera says nothing about
+ *  where a pixel is on it: there it goes by as much as the hand moves up (towards the camera) or down. */
+export function draggedAlong(camera, from, x, y, axis) {
   const towards = dot(axis, unit(sub(camera.eye, from)));
   if (Math.abs(towards) < FACES_CAMERA) return onLine(camera, x, y, from, axis);
   const seen = project(camera, from);
   const up_px = seen ? seen.y - y : 0;
   return addScaled(from, axis, Math.sign(towards) * up_px * unitsPerPixel(camera, from));
+}
+
+/** Where a dragged point goes.
+ *    from        where it was when the drag began
+ *    x, y        where it is asked to be, pixels
+ *    constraint  "view" (the plane that faces the camera), "level" (the plane at right angles to `up`), "x", "y", "z", or
+ *                "normal" (along `normal`, if there is one) */
+export function dragged(camera, from, x, y, constraint, { normal = null, up = DEFAULT_UP } = {}) {
+  if (constraint === "level") return onPlane(camera, x, y, from, unit(up, DEFAULT_UP));
+  const axis = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1], normal: normal && unit(normal) }[constraint];
+  return axis ? draggedAlong(camera, from, x, y, axis) : onViewPlane(camera, x, y, from);
 }
 
 /** World units that a pixel covers at the depth of a point; 0 behind the camera. */
@@ -236,6 +239,32 @@ export const levelled = (pose, worldUp) => ({ ...pose, up: worldUp });
 
 /** The camera's own up direction: what the person in front of the screen calls up. */
 export const upOf = (pose) => scale(axes(pose).down, -1);
+
+/** What the people who held the cameras of a dataset would call up: as nearly at right angles to all their right axes as
+ *  can be. Their own up would be tilted as far as they look down. */
+export function upOfViews(views) {
+  const axis = (view, row) => view.cam_from_world[row].slice(0, 3);
+  const sum = views.reduce((up, view) => sub(up, axis(view, 1)), [0, 0, 0]);
+  // Held every way, they say nothing.
+  if (length(sum) < 0.3 * views.length || views.length === 0) return DEFAULT_UP;
+  // The eigenvector of sum r r^T with the least value, by powers of n - sum r r^T; where all look one way, the nearest
+  // of many to the mean.
+  const rights = views.map((view) => axis(view, 0));
+  let up = unit(sum);
+  for (let i = 0; i < 100; ++i)
+    up = unit(rights.reduce((rest, right) => addScaled(rest, right, -dot(right, up)), scale(up, views.length)));
+  return up;
+}
+
+/** The pose that looks at the same from another direction, of length 1: from where it points. */
+export function seenFrom(pose, direction, worldUp) {
+  const above = dot(direction, unit(worldUp, DEFAULT_UP));
+  const eye = addScaled(pose.target, direction, distance(pose.eye, pose.target));
+  if (Math.abs(above) < Math.cos(POLE_MARGIN)) return { ...pose, eye, up: worldUp };
+  // From straight above, what was ahead is up; from below it is down: right stays right.
+  const { forward } = axes(pose);
+  return { ...pose, eye, up: Math.abs(dot(forward, direction)) > 0.99 ? pose.up : scale(forward, Math.sign(above)) };
+}
 
 /** Where to start looking at a scene of which nothing is known but where it lies. */
 export function firstPose({ centre, radius, up }) {

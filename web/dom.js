@@ -1,5 +1,8 @@
 // Elements from code. Text is always text: nothing is ever parsed as HTML.
 
+/** What the arrow keys mean in the picture: [right, down]. */
+export const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+
 const SVG = "http://www.w3.org/2000/svg";
 
 function fill(element, props, children) {

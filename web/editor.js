@@ -11,12 +11,18 @@ import {
   pivotedAt,
   poseOfView,
   project,
-  upOf,
+  upOfViews,
 } from "./camera.js";
+import { fittedPose, looksAt } from "./fit.js";
 import { History } from "./history.js";
+import { beforeMoves } from "./held.js";
+import { isMoved, moved, scaledAbout, shifted, turnedAbout, withMotion } from "./motion.js";
 import { changesScene, previewKey, requestOf } from "./requests.js";
 import { proposalOf } from "./selection.js";
-import { NOTHING_SELECTED, Selecting } from "./selecting.js";
+import { centreOf, changedShape, lastShape, withShape } from "./shapes.js";
+import { slider } from "./surface.js";
+import { isShape, NOTHING_SELECTED, Selecting } from "./selecting.js";
+import { distance } from "./vectors.js";
 import { follow, hasEnded, merged } from "./watch.js";
 
 // Choices: how long after the last change of a handle or of the request something is done about it.
@@ -29,6 +35,8 @@ export const NOTHING_OPEN = {
   scene: null,
   views: [],
   viewsKind: null,
+  clickedOn: null, // {point, normal} of the surface where a thing was clicked on.
+  floorClicks: null, // Points of the floor that were clicked on to say which way is up; null: nobody is about to.
   viewName: null, // The view that the pose was taken from; null once it has been moved.
   pose: null,
   version: 0, // The version that is looked at and edited.
@@ -36,10 +44,12 @@ export const NOTHING_OPEN = {
   comparing: false,
   compareWith: null, // A version; null: the one before.
   ...NOTHING_SELECTED,
-  handles: [], // {id, source, normal, target, radius, grip, group}; grip: the radius to go with a selection, or null
+  handles: [], // {id, source, normal, target, rotation, scale, radius, grip, group}; grip: the radius with a selection, or null
   selected: null, // Id of a handle.
   dragging: false,
   constraint: "view",
+  gizmo: "move", // "move", "turn" or "size"
+  frame: "world", // Of the gizmo: "world", "view" or "surface".
   counts: {}, // By handle id: {key, gaussians, error}
   region: null,
   mode: "move",
@@ -71,7 +81,7 @@ const OF_THE_VERSION = { comparing: false, compareWith: null, preview: null, pro
 
 // What outlives a reload: as it is; and all, of which open() puts back what still fits the scene.
 const LASTING_KEYS = [
-  ...["region", "mode", "preset", "crumbs", "prompt", "params", "autoPreview", "layer", "tab", "constraint"],
+  ...["region", "mode", "preset", "crumbs", "prompt", "params", "autoPreview", "layer", "tab", "constraint", "gizmo", "frame"],
   ...["thingMode", "selectTool", "selectDepth", "brushRadius", "tinted", "draftOnRelease"],
 ];
 const STORED_KEYS = ["pose", "version", "handles", "selection", "viewName", ...LASTING_KEYS];
@@ -110,6 +120,7 @@ export class Editor {
   #abandoned = new Set(); // Ids of edits that were begun and that nobody wants to hear of.
   #opened = 0;
   #lastView = null;
+  #upOf = null; // {views, up}: worked out once.
 
   /**   say(message, options)  a short message to the user */
   constructor(store, memory, say) {
@@ -117,28 +128,15 @@ export class Editor {
     this.selecting = new Selecting(store, {
       place: (selection, more = {}) => this.#place({ selection, ...more }),
       say,
+      pickSeen: (...what) => this.pickSeen(...what),
     });
     store.watch(["handles", "selection", "version", "scene", "dragging"], () => this.#countSoon());
     store.watch(["layer", "version", "preview"], ({ layer, version, preview }) => {
       // Version 0 does not differ from itself.
       if (layer === "mask" && version === 0 && !preview) store.set({ layer: "color" });
     });
-    store.watch(
-      [
-        "handles",
-        "selection",
-        "version",
-        "region",
-        "mode",
-        "preset",
-        "crumbs",
-        "params",
-        "autoPreview",
-        "dragging",
-        "selectMode",
-      ],
-      () => this.#requestChanged(),
-    );
+    const ofRequest = ["handles", "selection", "version", "region", "mode", "preset", "crumbs", "attach", "params"];
+    store.watch([...ofRequest, "autoPreview", "dragging", "selectMode"], () => this.#requestChanged());
     store.watch([...PLACED_KEYS], () => this.#draftOutdated());
     store.watch(STORED_KEYS, () => this.#saveSoon());
   }
@@ -170,7 +168,7 @@ export class Editor {
       version,
       handles,
       selection: placed(stored.selection),
-      pose: pose ?? (scene.dataset ? null : firstPose(scene)),
+      pose,
       viewName: pose ? (stored.viewName ?? null) : null,
     });
     await Promise.allSettled([this.#loadViews(opening), this.#loadEdits(opening)]);
@@ -192,18 +190,26 @@ export class Editor {
   }
 
   async #loadViews(opening) {
-    const fallback = () => this.state.pose ?? firstPose(this.state.scene);
+    if (this.state.pose === null && !this.state.scene.dataset) this.#lookAtAll();
     try {
       const { views, kind } = await api.views(this.state.scene.id);
       if (opening !== this.#opened) return;
       this.store.set({ views, viewsKind: kind });
-      if (this.state.pose === null && views.length) this.lookFrom(views[0].name);
-      else this.store.set({ pose: fallback() });
+      if (this.state.pose === null && this.state.scene.dataset) this.home();
     } catch (error) {
       if (opening !== this.#opened) return;
-      this.store.set({ pose: fallback() });
+      this.store.set({ pose: this.state.pose ?? firstPose(this.state.scene) });
       this.say(`The views of this scene could not be listed: ${error.message}`, { kind: "bad" });
     }
+  }
+
+  /** From where all of the scene shows, unless there is a pose already when that is known. */
+  async #lookAtAll() {
+    const { scene, version, pose: before } = this.state;
+    const opening = this.#opened;
+    // Without pictures of it, from where captures mostly look.
+    const pose = await fittedPose(scene, () => this.aspect, looksAt(scene.id, version)).catch(() => firstPose(scene));
+    if (opening === this.#opened && this.state.pose === before) this.store.set({ pose, viewName: null });
   }
 
   async reloadScene() {
@@ -222,8 +228,11 @@ export class Editor {
 
   // --- looking ---------------------------------------------------------------------------------------------------
 
+  /** The scene's up direction: as it was declared, or as its cameras were held. */
   get worldUp() {
-    return this.state.scene?.up ?? DEFAULT_UP;
+    const { scene, views, viewsKind } = this.state;
+    if (this.#upOf?.views !== views) this.#upOf = { views, up: viewsKind === "dataset" ? upOfViews(views) : DEFAULT_UP };
+    return scene?.up ?? this.#upOf.up;
   }
 
   setPose(pose) {
@@ -266,18 +275,14 @@ export class Editor {
   home() {
     const { scene, views } = this.state;
     if (scene?.dataset && views.length) this.lookFrom(views[0].name);
-    else if (scene) this.store.set({ pose: firstPose(scene), viewName: null });
+    else if (scene) this.#lookAtAll();
   }
 
-  /** Declares the top of the screen to be the scene's up. */
+  /** Declares the scene's up direction; null: as its cameras were held, or the default. */
   async setUp(up) {
     const scene = await api.patchScene(this.state.scene.id, { up });
     this.store.set({ scene });
     if (this.state.pose) this.setPose(levelled(this.state.pose, this.worldUp));
-  }
-
-  setUpFromView() {
-    return this.setUp(upOf(this.state.pose));
   }
 
   async rename(name) {
@@ -349,9 +354,8 @@ export class Editor {
   async place(camera, x, y) {
     this.#placing?.abort();
     const abort = (this.#placing = new AbortController());
-    const { scene, version } = this.state;
     try {
-      const picked = await api.pick(scene.id, version, { camera: onTheWire(camera), x, y }, abort.signal);
+      const picked = await this.pickSeen(camera, x, y, abort.signal);
       if (abort.signal.aborted) return;
       if (!picked.hit) return this.say("There is nothing here to take hold of.", { seconds: 3 });
       const handle = this.#newHandle(picked.point, picked.normal);
@@ -361,6 +365,23 @@ export class Editor {
     } catch (error) {
       if (!api.wasGivenUp(error)) this.say(`No handle could be placed: ${error.message}`, { kind: "bad" });
     }
+  }
+
+  /** What a version shows under a pixel, as the service picks it: {hit, point, normal, ...}. */
+  pick(camera, x, y, version = this.state.version, signal = undefined) {
+    return api.pick(this.state.scene.id, version, { camera: onTheWire(camera), x, y }, signal);
+  }
+
+  /** What is seen under a pixel: on a preview, too, but told as of the version that it was made of. `moved`: it is part
+   *  of what the preview has moved. */
+  async pickSeen(camera, x, y, signal) {
+    const shown = shownVersion(this.state);
+    const { handles, selection, selectionAnswer: answer, comparing } = this.state;
+    const picked = await this.pick(camera, x, y, comparing ? undefined : shown, signal);
+    if (!picked.hit || comparing || !String(shown).startsWith("p")) return picked;
+    const holds = (handle) =>
+      selection.length > 0 ? within(answer?.bounds) : (point) => distance(point, handle.source) <= handle.radius;
+    return { ...picked, ...beforeMoves(picked.point, handles.filter(isMoved).map((handle) => ({ handle, holds: holds(handle) }))) };
   }
 
   #newHandle(source, normal = null) {
@@ -377,8 +398,7 @@ export class Editor {
 
   /** The point of the surface under a pixel; null if there is none. */
   async surfaceAt(camera, x, y) {
-    const { scene, version } = this.state;
-    const picked = await api.pick(scene.id, version, { camera: onTheWire(camera), x, y });
+    const picked = await this.pickSeen(camera, x, y);
     return picked.hit ? picked.point : null;
   }
 
@@ -403,21 +423,119 @@ export class Editor {
    *    at  {x, y} where the pointer took hold, pixels
    *  Returns {move(x, y), end(), giveUp()}. */
   dragTarget(id, camera, at) {
-    const { handles } = this.state;
-    return this.#drag(
-      handles.find((h) => h.id === id),
-      { camera, at },
-    );
+    const handle = this.state.handles.find((h) => h.id === id);
+    return this.#drag(handle, this.#byPointer({ handle, pivot: handle.source, bounds: null }, camera, at));
+  }
+
+  /** What is held, for a gizmo: {handle, pivot, bounds}, and while selecting `shape`: the sphere or box that selects last. A handle, or of a thing that was just taken the source of the one
+   *  that would come; what is turned about, at rest; the box of it, null of a sphere. Null: nothing is held. */
+  get held() {
+    const { selection, selectionAnswer: answer, selectionWaits, handles, selected } = this.state;
+    const { selectMode, thingMode, comparing, mode } = this.state;
+    if (comparing) return null;
+    if (selectMode) {
+      const shape = isShape(this.state.selectTool) ? lastShape(selection) : null;
+      const centre = shape && centreOf(shape);
+      return shape && { shape, handle: { source: centre }, pivot: centre, bounds: null };
+    }
+    if (!thingMode) {
+      const handle = handles.find(({ id }) => id === selected);
+      return handle && mode !== "remove" ? { handle, pivot: handle.source, bounds: null } : null;
+    }
+    if (selection.length === 0 || selectionWaits || !answer?.count) return null;
+    const { clickedOn } = this.state;
+    const source = proposalOf(selection)?.inside[0] ?? answer.centre;
+    const normal = clickedOn?.point === source ? clickedOn.normal : null;
+    return { handle: handles.at(-1) ?? { source, normal }, pivot: answer.centre, bounds: answer.bounds };
+  }
+
+  /** What is held with a handle of its own. */
+  #taken() {
+    const { held } = this;
+    const { source, normal, id } = held.handle;
+    return id === undefined ? { ...held, handle: this.#newHandle(source, normal) } : held;
+  }
+
+  /** Drags by a part of the gizmo, which means(x, y): as gizmo.js. Letting go of a thing repairs it. */
+  dragHeld(means) {
+    const { shape } = this.held;
+    if (shape) return this.dragShape((x, y) => changedShape(shape, means(x, y)));
+    const held = this.#taken();
+    const at = (x, y, put) => put(changedBy(held, means(x, y)));
+    return this.#drag(held.handle, { at, ...this.#ofThing() });
+  }
+
+  /** Moves, turns or scales what is held by so much, as one step. */
+  nudgeHeld(meant) {
+    const { shape } = this.held;
+    if (shape) return this.changeShape(changedShape(shape, meant));
+    const held = this.#taken();
+    this.#changeHeld(held, changedBy(held, meant));
+  }
+
+  /** Puts another shape in place of the one that selects last. `note`: can be undone. */
+  changeShape(shape, note = true) {
+    this.#place({ selection: withShape(this.state.selection, shape) }, note);
+  }
+
+  /** Drags that shape: by(x, y) is what becomes of it. */
+  dragShape(by) {
+    let begun = false;
+    return {
+      move: (x, y) => {
+        this.changeShape(by(x, y), !begun);
+        begun = true;
+      },
+      end: () => {},
+      giveUp: () => begun && this.undo(),
+    };
+  }
+
+  /** Puts what is held where motion.js would say {shift, turn, size} of it. */
+  setHeld(motion) {
+    const held = this.#taken();
+    this.#changeHeld(held, withMotion(held.handle, held.pivot, motion));
+  }
+
+  #changeHeld({ handle }, patch) {
+    const { handles, mode } = this.state;
+    const others = handles.filter(({ id }) => id !== handle.id);
+    this.#place({ handles: [...others, { ...handle, ...patch }], mode: mode === "remove" ? "move" : mode });
+    this.store.set({ selected: handle.id });
+  }
+
+  /** How a drag of a whole thing differs from one of a handle's target. */
+  #ofThing() {
+    const { thingMode, mode } = this.state;
+    return {
+      // What is removed goes nowhere: who drags has changed their mind.
+      settings: mode === "remove" ? { mode: "move" } : {},
+      ended: () => thingMode && this.state.draftOnRelease && this.runDraft(),
+    };
+  }
+
+  /** A mover that follows the pointer as the constraint says. */
+  #byPointer(held, camera, at) {
+    const { handle } = held;
+    const { constraint, version } = this.state;
+    const up = this.worldUp;
+    if (constraint === "surface") return slider({ held, camera, at, up, pick: (x, y) => this.pick(camera, x, y, version) });
+    const from = handle.target ?? handle.source;
+    const seen = project(camera, from) ?? at;
+    const [gripX, gripY] = [seen.x - at.x, seen.y - at.y];
+    const axes = { normal: handle.normal, up };
+    return { at: (x, y, put) => put({ target: dragged(camera, from, x + gripX, y + gripY, this.state.constraint, axes) }) };
   }
 
   /** Drags what is selected as a body, by the handle that is there or one that comes with the first movement; letting
    *  go repairs it as a draft, if that is wished. As dragTarget(). */
   dragThing(camera, at) {
-    const { handles, selection, selectionAnswer, mode } = this.state;
-    const handle = handles.at(-1) ?? this.#newHandle(proposalOf(selection)?.inside[0] ?? selectionAnswer.centre);
-    // What is removed goes nowhere: who drags has changed their mind.
-    const settings = mode === "remove" ? { mode: "move" } : {};
-    return this.#drag(handle, { camera, at, settings, ended: () => this.state.draftOnRelease && this.runDraft() });
+    const { held } = this;
+    // The service may still be looking for the thing's border: then a handle where it was clicked on is all there is.
+    const { handles, selection } = this.state;
+    const handle = held ? this.#taken().handle : (handles.at(-1) ?? this.#newHandle(proposalOf(selection).inside[0]));
+    const mover = this.#byPointer({ pivot: handle.source, bounds: null, ...held, handle }, camera, at);
+    return this.#drag(handle, { ...mover, ...this.#ofThing() });
   }
 
   /** Takes away what is selected, for good. */
@@ -442,34 +560,39 @@ export class Editor {
     this.store.set({ selected: handle.id });
   }
 
-  #drag(handle, { camera, at, settings = {}, ended = () => {} }) {
+  /**   at(x, y, put)  puts what changes of the handle when the pointer is there, at once or later
+   *    settled()      waits for the last of it */
+  #drag(handle, { at, settled = null, giveUp = () => {}, settings = {}, ended = () => {} }) {
     const before = this.#present();
     const { id } = handle;
-    const from = handle.target ?? handle.source;
-    const seen = project(camera, from) ?? at;
-    const [gripX, gripY] = [seen.x - at.x, seen.y - at.y];
-    let moved = false;
+    let begun = false;
+    let over = false;
     this.store.set({ selected: id });
+    const put = (patch) => {
+      if (!over) this.change(id, patch, false);
+    };
+    const end = () => {
+      over = true;
+      this.store.set({ dragging: false });
+      if (begun) ended();
+    };
     return {
       move: (x, y) => {
-        if (!moved) {
+        if (!begun) {
           this.#giveUpDraft();
           this.#history.note(before);
           const there = this.state.handles.some((h) => h.id === id);
           this.#place({ ...settings, handles: there ? this.state.handles : [...this.state.handles, handle] }, false);
         }
-        moved = true;
-        const axes = { normal: handle.normal, up: this.worldUp };
-        const target = dragged(camera, from, x + gripX, y + gripY, this.state.constraint, axes);
+        begun = true;
         this.store.set({ dragging: true, selected: id });
-        this.change(id, { target }, false);
+        at(x, y, put);
       },
-      end: () => {
-        this.store.set({ dragging: false });
-        if (moved) ended();
-      },
+      end: () => (settled ? settled().then(end) : end()),
       giveUp: () => {
-        if (moved) this.undo();
+        giveUp();
+        over = true;
+        if (begun) this.undo();
         this.store.set({ dragging: false });
       },
     };
@@ -702,7 +825,7 @@ export class Editor {
       radius: handle.radius ?? this.#defaultRadius(),
       grip: selection.length ? (handle.grip ?? handle.radius ?? null) : null,
       group: handle.group ?? 0,
-      rotation: handle.rotation ?? null, // a request may have these; the page has no field for them yet
+      rotation: handle.rotation ?? null,
       scale: handle.scale ?? null,
     }));
     this.#place({
@@ -861,6 +984,17 @@ export class Editor {
     if (this.state.scene) this.#save();
   }
 }
+
+/** What changes of a held handle by what a part of the gizmo means. */
+function changedBy({ handle, pivot }, { shift, turn, size }) {
+  if (shift) return shifted(handle, shift);
+  const place = moved(handle, pivot);
+  return turn ? turnedAbout(handle, place, turn) : scaledAbout(handle, place, size);
+}
+
+/** Whether a point is in a box, or just beside it. */
+const within = (bounds) => (point) =>
+  !!bounds && point.every((x, i) => Math.abs(2 * x - bounds.low[i] - bounds.high[i]) <= 1.1 * (bounds.high[i] - bounds.low[i]));
 
 /** 128 random bits. crypto.randomUUID() is not there on a page without TLS that is not on this machine. */
 function freshKey() {

@@ -1,7 +1,7 @@
 // The list of handles: coordinates, radius, group, and how many Gaussians each holds.
 
 import { attrs, h, keyedList, problemPlace, showProblem, text } from "./dom.js";
-import { numberField, pointField } from "./fields.js";
+import { button, icon, labelled, numberField, pointField } from "./fields.js";
 import { coordinate, count, gaussians } from "./format.js";
 import { groupClass } from "./overlay.js";
 import { partOf } from "./requests.js";
@@ -39,11 +39,7 @@ export class HandleList {
       (handle) => handle.id,
       (handle) => this.#card(handle.id),
     );
-    const clear = h(
-      "button",
-      { type: "button", class: "small", testid: "clear-handles", onclick: () => editor.removeAll() },
-      "Clear",
-    );
+    const clear = button("Clear", "clear-handles", null, () => editor.removeAll());
     const empty = h("p", { class: "empty", testid: "no-handles" });
     this.element = h("section", {}, h("div", { class: "row between" }, h("h2", {}, "Handles"), clear), empty, list);
     editor.store.watch(
@@ -75,17 +71,7 @@ export class HandleList {
       kind,
       held,
     );
-    const remove = h(
-      "button",
-      {
-        type: "button",
-        class: "icon",
-        "aria-label": "Remove handle",
-        title: "Remove (Del)",
-        onclick: () => editor.remove(id),
-      },
-      "✕",
-    );
+    const remove = icon("✕", null, "Remove (Del)", () => editor.remove(id));
 
     const source = pointField({
       label: "Source",
@@ -93,22 +79,10 @@ export class HandleList {
       changed: (p) => change({ source: p, normal: null }),
     });
     const target = pointField({ label: "Target", testid: "target", changed: (p) => change({ target: p }) });
-    const anchor = h(
-      "button",
-      {
-        type: "button",
-        class: "small",
-        testid: "make-anchor",
-        title: "Without a target, what the handle holds stays where it is",
-        onclick: () => change({ target: null }),
-      },
-      "Make anchor",
+    const anchor = button("Make anchor", "make-anchor", "Without a target, what the handle holds stays where it is", () =>
+      change({ target: null, rotation: null, scale: null }),
     );
-    const release = h(
-      "button",
-      { type: "button", class: "small", testid: "add-target", onclick: () => change({ target: current().source }) },
-      "Give it a target",
-    );
+    const release = button("Give it a target", "add-target", null, () => change({ target: current().source }));
     const targetRow = h(
       "div",
       { class: "field" },
@@ -165,13 +139,13 @@ export class HandleList {
     const body = h(
       "div",
       { class: "handle-body" },
-      h("div", { class: "field" }, h("span", { class: "name" }, "Source"), source.element),
+      labelled("Source", source.element),
       targetRow,
       anchorRow,
       h(
         "div",
         { class: "radius-row" },
-        h("div", { class: "field" }, h("span", { class: "name" }, "Radius"), radiusRow),
+        labelled("Radius", radiusRow),
         h(
           "div",
           {

@@ -7,6 +7,7 @@ import { attrs, byId, h, problemText, showProblem, text } from "./dom.js";
 import { buildEdits } from "./edits.js";
 import { Editor, NOTHING_OPEN } from "./editor.js";
 import { counted } from "./format.js";
+import { buildGizmoPanel, next } from "./gizmo_panel.js";
 import { HandleList } from "./handles.js";
 import { buildRequestPanel, importFile } from "./request_panel.js";
 import { buildScenes, SCENE_FILES } from "./scenes.js";
@@ -14,6 +15,7 @@ import { buildSelectionPanel, buildTools, SELECT_TOOLS } from "./selection_panel
 import { SceneMemory, Store } from "./store.js";
 import { buildThingBar } from "./thing_bar.js";
 import { buildToolbar } from "./toolbar.js";
+import { buildUp } from "./up.js";
 import { buildVersions } from "./versions.js";
 import { Viewer } from "./viewer.js";
 import { hasEnded } from "./watch.js";
@@ -35,10 +37,18 @@ const viewer = new Viewer(editor);
 buildToolbar(editor, viewer);
 buildTools(editor);
 buildThingBar(editor);
+buildUp(editor);
 const run = buildRequestPanel(editor);
 const versions = buildVersions(editor);
 byId("tab-drag").append(
-  h("div", { class: "scroll" }, buildSelectionPanel(editor), new HandleList(editor).element, run.element),
+  h(
+    "div",
+    { class: "scroll" },
+    buildSelectionPanel(editor),
+    buildGizmoPanel(editor, () => viewer.camera),
+    new HandleList(editor).element,
+    run.element,
+  ),
   run.footer,
 );
 byId("tab-edits").append(h("div", { class: "scroll" }, buildEdits(editor)));
@@ -161,13 +171,15 @@ function listenToKeys() {
     event.target.closest?.("input, select, textarea, dialog") ||
     document.querySelector("dialog[open]") ||
     byId("workspace").hidden;
-  const constraints = { v: "view", l: "level", x: "x", y: "y", z: "z", n: "normal" };
+  const constraints = { v: "view", u: "surface", l: "level", x: "x", y: "y", z: "z", n: "normal" };
   const plain = {
     "[": () => editor.stepView(-1),
     "]": () => editor.stepView(1),
     r: () => editor.home(),
     f: () => viewer.focusHere(),
     p: () => editor.preview(),
+    g: () => next(store, "gizmo"),
+    w: () => next(store, "frame"),
     d: () => editor.selecting.takeThings(true),
     h: () => editor.selecting.takeThings(false),
     ".": () => editor.selecting.widen(1),
@@ -178,6 +190,7 @@ function listenToKeys() {
     backspace: () => editor.state.selected !== null && editor.remove(editor.state.selected),
     escape: () =>
       viewer.giveUpDrag() ||
+      (store.state.floorClicks && (store.set({ floorClicks: null }), true)) ||
       (editor.state.selectMode
         ? editor.selecting.use(null)
         : editor.state.thingMode && editor.state.handles.length === 0

@@ -9,7 +9,8 @@ const GROUP_COLOURS = 8;
 /** The class that gives a group its colour. */
 export const groupClass = (group) => `group-${group % GROUP_COLOURS}`;
 
-const path = (points, closed) =>
+/** A polyline as the `d` of a path. */
+export const pathOf = (points, closed = false) =>
   points.map(([x, y], i) => `${i ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`).join("") + (closed ? "Z" : "");
 
 const at = ({ x, y }) => `translate(${x.toFixed(2)} ${y.toFixed(2)})`;
@@ -75,7 +76,7 @@ export class Overlay {
 
   /** Draws.
    *    camera   that of the picture on the screen, in CSS pixels
-   *    items    [{handle, selected, bad}]
+   *    items    [{handle, selected, bad, behind}]; behind: {source, target}, whether something is in front of them
    *    region   a box, or null
    *    clicks   [{point, kind}] of a selection
    *    spheres  whether it is their spheres that say what handles move */
@@ -90,7 +91,7 @@ export class Overlay {
     attrs(this.#region, {
       d: lines
         .map(([a, b]) =>
-          path(
+          pathOf(
             [
               [a.x, a.y],
               [b.x, b.y],
@@ -130,16 +131,17 @@ export class Overlay {
     const { tool, points, radius, subtracts } = line;
     const brush = tool === "brush";
     const [[x0, y0], [x1, y1]] = [points[0], points.at(-1)];
-    const corners = [
-      [x0, y0],
-      [x1, y0],
-      [x1, y1],
-      [x0, y1],
-    ];
+    const box = (x, y, toX, toY) => [[x, y], [toX, y], [toX, toY], [x, toY]];
+    const round = (k) => [x0 + radius * Math.cos((Math.PI * k) / 24), y0 + radius * Math.sin((Math.PI * k) / 24)];
+    const drawn = {
+      rectangle: () => box(x0, y0, x1, y1),
+      box: () => box(x0 - radius, y0 - radius, x0 + radius, y0 + radius),
+      sphere: () => Array.from({ length: 48 }, (_, k) => round(k)),
+    }[tool]?.();
     attrs(this.#sketch, {
       class: `sketch ${brush ? "brush" : "lasso"}${subtracts ? " subtracts" : ""}`,
       // A dot is a line of no length.
-      d: tool === "rectangle" ? path(corners, true) : path(points.length > 1 ? points : [points[0], points[0]], !brush),
+      d: drawn ? pathOf(drawn, true) : pathOf(points.length > 1 ? points : [points[0], points[0]], !brush),
       "stroke-width": brush ? 2 * radius : 2,
     });
   }
@@ -149,7 +151,7 @@ export class Overlay {
     attrs(this.#cursor, place ? { cx: place.x, cy: place.y, r: radius, display: null } : { display: "none" });
   }
 
-  #draw({ handle, selected, bad }, i, { element, sphere, line, source, target }) {
+  #draw({ handle, selected, bad, behind }, i, { element, sphere, line, source, target }) {
     const camera = this.#camera;
     attrs(element, {
       class: `handle ${groupClass(handle.group)}${selected ? " selected" : ""}${bad ? " bad" : ""}`,
@@ -158,11 +160,12 @@ export class Overlay {
     const from = project(camera, handle.source);
     const to = handle.target ? project(camera, handle.target) : null;
     const outline = this.#spheres ? sphereOutline(camera, handle.source, handle.radius) : null;
-    attrs(sphere, { d: outline ? path(outline, true) : null });
+    attrs(sphere, { d: outline ? pathOf(outline, true) : null });
     attrs(source, {
       transform: from ? at(from) : null,
       display: from ? null : "none",
       "data-testid": `handle-${i}-source`,
+      "data-behind": behind.source,
       "aria-label": handle.target ? `Handle ${i + 1}` : `Handle ${i + 1}: drag to set its target`,
     });
     source.querySelector(".label").textContent = String(i + 1);
@@ -170,12 +173,13 @@ export class Overlay {
       transform: to ? at(to) : null,
       display: to ? null : "none",
       "data-testid": `handle-${i}-target`,
+      "data-behind": behind.target,
       "aria-label": `Target of handle ${i + 1}`,
     });
     const seen = handle.target ? projectSegment(camera, handle.source, handle.target) : null;
     attrs(line, {
       d: seen
-        ? path(
+        ? pathOf(
             seen.map(({ x, y }) => [x, y]),
             false,
           )

@@ -10,6 +10,7 @@ import { whatMoves } from "./selection.js";
 
 const CONSTRAINTS = [
   ["view", "View", "In the plane that faces you (V)"],
+  ["surface", "Surface", "On the surface under the pointer: what is dragged stands on it (U)"],
   ["level", "Level", "At its height above the ground (L)"],
   ["x", "X", "Along the x axis (X)"],
   ["y", "Y", "Along the y axis (Y)"],
@@ -182,19 +183,8 @@ export function buildRequestPanel(editor) {
 
   store.watch(
     [
-      "constraint",
-      "mode",
-      "region",
-      "preset",
-      "crumbs",
-      "selection",
-      "params",
-      "autoPreview",
-      "draftOnRelease",
-      "info",
-      "handles",
-      "scene",
-      "prompt",
+      ...["constraint", "mode", "region", "preset", "crumbs", "selection", "params", "autoPreview", "draftOnRelease"],
+      ...["info", "handles", "scene", "prompt"],
     ],
     (state) => {
       constraint.update(state.constraint);
@@ -222,21 +212,8 @@ export function buildRequestPanel(editor) {
   store.watch(["selection", "selectionAnswer"], (state) => text(moving, whatMoves(state)));
   store.watch(
     [
-      "handles",
-      "selection",
-      "previewing",
-      "submitting",
-      "problem",
-      "preview",
-      "estimate",
-      "scene",
-      "version",
-      "region",
-      "mode",
-      "preset",
-      "crumbs",
-      "params",
-      "prompt",
+      ...["handles", "selection", "previewing", "submitting", "problem", "preview", "estimate", "scene", "version"],
+      ...["region", "mode", "preset", "crumbs", "attach", "params", "prompt"],
     ],
     (state) => {
       const ready = state.scene !== null && isStated(state);

@@ -1,5 +1,6 @@
 // Edit requests: from what is on the screen, and from and to files. The names are those of the service's contract.
 
+import { isMoved } from "./motion.js";
 import { add } from "./vectors.js";
 
 /** A file that cannot be imported: what is wrong, and where in it. */
@@ -46,7 +47,7 @@ export const isStated = ({ mode, handles, selection = [] }) =>
 
 /** Would it change the scene? What is removed goes nowhere; else a handle has a target. */
 export const changesScene = (state) =>
-  isStated(state) && (state.mode === "remove" || state.handles.some((handle) => handle.target));
+  isStated(state) && (state.mode === "remove" || state.handles.some(isMoved));
 
 /** A handle's sphere says what moves only where no selection does. With one, a radius is given if somebody gave one. */
 function radiusGiven({ radius, grip = null }, selection) {
@@ -124,6 +125,11 @@ function point(value, where) {
   throw new ImportError("expected three numbers", where);
 }
 
+function quaternion(value, where) {
+  if (Array.isArray(value) && value.length === 4 && value.every(Number.isFinite) && value.some((x) => x !== 0)) return [...value];
+  throw new ImportError("expected four numbers that are not all 0", where);
+}
+
 function positive(value, where) {
   if (Number.isFinite(value) && value > 0) return value;
   throw new ImportError("expected a number above 0", where);
@@ -168,12 +174,14 @@ function readRequest(document, where) {
   const handles = (needless ? [] : list(document.handles, within(where, "handles"))).map((handle, i) => {
     const at = within(where, `handles[${i}]`);
     if (!isObject(handle)) throw new ImportError("expected an object", at);
-    known(handle, ["source", "target", "radius", "group"], at);
+    known(handle, ["source", "target", "radius", "group", "rotation", "scale"], at);
     return {
       source: point(handle.source, `${at}.source`),
       target: handle.target === undefined ? null : point(handle.target, `${at}.target`),
       ...readRadius(handle.radius, selection, `${at}.radius`),
       group: groupNumber(handle.group ?? 0, `${at}.group`),
+      ...(handle.rotation === undefined ? {} : { rotation: quaternion(handle.rotation, `${at}.rotation`) }),
+      ...(handle.scale === undefined ? {} : { scale: positive(handle.scale, `${at}.scale`) }),
     };
   });
   let region = null;

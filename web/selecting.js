@@ -1,11 +1,12 @@
 // Selecting: clicks, strokes and lassos become operations, and the service says what they hold. No elements here.
 
 import * as api from "./api.js";
-import { onTheWire } from "./camera.js";
+import { unitsPerPixel, onTheWire } from "./camera.js";
 import { FrameQueue } from "./frames.js";
 import {
   furtherBorders,
   inverted,
+  operation,
   polygonOf,
   proposalOf,
   rectangleOf,
@@ -15,6 +16,7 @@ import {
   widened,
   withClick,
 } from "./selection.js";
+import { shapeAround } from "./shapes.js";
 
 /** What there is before anything is selected. Tool, depth, radius and tint outlive a reload. */
 export const NOTHING_SELECTED = {
@@ -23,7 +25,7 @@ export const NOTHING_SELECTED = {
   selectionWaits: false, // Whether that is of an earlier selection.
   thingMode: true, // The pointer takes hold of whole things; else it places and drags handles.
   selectMode: false, // The pointer selects, whatever it does else.
-  selectTool: "grow", // "grow", "brush", "lasso" or "rectangle"
+  selectTool: "grow", // "grow", "brush", "lasso", "rectangle", "sphere" or "box"
   selectOp: "add",
   clickKind: "inside", // Of a click to grow: on the thing ("inside"), or not.
   nextThing: false, // The next click begins another thing.
@@ -31,6 +33,9 @@ export const NOTHING_SELECTED = {
   brushRadius: 18, // Pixels; a choice.
   tinted: true,
 };
+
+/** Whether a tool makes shapes, which have handles of their own. */
+export const isShape = (tool) => tool === "sphere" || tool === "box";
 
 const OPPOSITE = { add: "subtract", subtract: "add", intersect: "subtract" };
 const PASSING = [0, 429, 503]; // The service is full, restarting, or loads the scene: it will answer later.
@@ -42,9 +47,10 @@ export class Selecting {
   #lost = null; // Id of a selection that had to be posted again, until it has been seen.
 
   /**   place(selection, more)  puts a selection on the screen, and more of what is placed; can be undone
-   *    say(message, options)   a short message to the user */
-  constructor(store, { place, say }) {
-    Object.assign(this, { store, place, say });
+   *    say(message, options)   a short message to the user
+   *    pickSeen(camera, x, y)  Editor.pickSeen() */
+  constructor(store, { place, say, pickSeen }) {
+    Object.assign(this, { store, place, say, pickSeen });
     // Of the selections made while one is being asked about, only the latest is asked about next.
     this.#queue = new FrameQueue({
       load: ({ scene, version, selection }, signal) => api.select(scene, version, selection, signal),
@@ -129,13 +135,13 @@ export class Selecting {
     this.place(next);
   }
 
-  /** What the version shows there, as the service picks it; null where it does not say, or nobody wants to know any
+  /** What is seen there, as the editor picks it; null where it does not say, or nobody wants to know any
    *  more. */
   async #pick(camera, x, y, signal = undefined) {
     const { scene, version } = this.#state;
     let picked;
     try {
-      picked = await api.pick(scene.id, version, { camera: onTheWire(camera), x, y }, signal);
+      picked = await this.pickSeen(camera, x, y, signal);
     } catch (error) {
       if (!api.wasGivenUp(error)) this.say(`Nothing could be selected: ${error.message}`, { kind: "bad" });
       return null;
@@ -162,7 +168,9 @@ export class Selecting {
         seconds: 6,
         action: { label: "Let go of it", run: () => this.place([], { handles: [] }) },
       });
-    this.store.set({ tab: "drag", nextThing: false });
+    // What has been moved is not where the version has it: a click on it says nothing new.
+    if (picked.moved) return;
+    this.store.set({ tab: "drag", nextThing: false, clickedOn: picked.hit ? picked : null });
     this.place(picked.hit ? thingAt(picked.point) : [], { handles: [] });
   }
 
@@ -184,6 +192,19 @@ export class Selecting {
     if (!made) return this.say(`Draw the ${tool} around what you mean.`, { seconds: 3 });
     this.store.set({ tab: "drag" });
     this.place([...selection, made]);
+  }
+
+  /** A sphere or a box around what is seen at a place.
+   *    reach  how far it goes from there, pixels */
+  async drawShape(tool, camera, { x, y }, reach, up, other = false) {
+    const picked = await this.#pick(camera, x, y);
+    if (!picked) return;
+    if (!picked.hit) return this.say("There is nothing here to select.", { seconds: 3 });
+    const { selectOp, selection } = this.#state;
+    const op = other ? OPPOSITE[selectOp] : selectOp;
+    const shape = shapeAround(tool, picked.point, reach * unitsPerPixel(camera, picked.point), up);
+    this.store.set({ tab: "drag" });
+    this.place([...selection, operation(op, shape)]);
   }
 
   /** Whether the next stroke or lasso takes away. */
@@ -213,14 +234,14 @@ export class Selecting {
 
   /** Takes whole things in hand, or handles. */
   takeThings(things) {
-    this.store.set({ thingMode: things, selectMode: false });
+    this.store.set({ thingMode: things, selectMode: false, floorClicks: null });
   }
 
   /** Takes a tool in hand; null: whatever it was before, things or handles. */
   use(tool) {
     if (!tool) return this.store.set({ selectMode: false });
     // Depth and changes have no tint: what is selected has to be seen.
-    this.store.set({ selectMode: true, selectTool: tool, layer: "color", comparing: false, selected: null });
+    this.store.set({ selectMode: true, selectTool: tool, layer: "color", comparing: false, selected: null, floorClicks: null });
   }
 
   toggle() {

@@ -7,7 +7,7 @@ import { counted, gaussians } from "./format.js";
 export const opOf = (operation) => operation.op ?? "add";
 
 /** An operation in which "add", the default, is left out. */
-const operation = (op, action) => (op === "add" ? action : { op, ...action });
+export const operation = (op, action) => (op === "add" ? action : { op, ...action });
 
 /** Whether two numbers in a row of points are nearer than `apart` pixels. */
 const near = (a, b, apart) => Math.hypot(a[0] - b[0], a[1] - b[1]) < apart;
@@ -51,16 +51,12 @@ export function proposalOf(selection) {
 /** A proposal with its border so many natural borders farther out (below 0: in) than the service says that it is. */
 export function widened(selection, by, answer = null) {
   const { wider = 0, ...grow } = proposalOf(selection);
-  const last = /there is no border farther \w+ than wider = (-?\d+)/.exec((answer?.warnings ?? []).join("\n"))?.[1];
-  const sum = (last === undefined ? wider : Number(last)) + by;
+  const sum = (answer?.border?.wider ?? wider) + by;
   return [{ grow: sum === 0 ? grow : { ...grow, wider: sum } }];
 }
 
-/** On which sides of a proposal the service knows a further border: {more, less}. Both until it has said otherwise. */
-export function furtherBorders(answer) {
-  const last = /there is no border farther (out|in) /.exec((answer?.warnings ?? []).join("\n"))?.[1];
-  return { more: last !== "out", less: last !== "in" };
-}
+/** On which sides of a proposal there is a further border: {more, less}. Both until the service has said otherwise. */
+export const furtherBorders = (answer) => answer?.border ?? { more: true, less: true };
 
 /** A line drawn with the brush.
  *    camera  as the service takes it; points and radius are pixels of it */

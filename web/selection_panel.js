@@ -1,10 +1,12 @@
 // Selecting, for the eye and the hand: the row of tools above the picture, and in the panel what is selected.
 
 import { attrs, byId, h, keyedList, problemPlace, showProblem, text } from "./dom.js";
-import { choice, segments, toggle } from "./fields.js";
+import { button, choice, icon, segments, toggle } from "./fields.js";
 import { count, gaussians } from "./format.js";
 import { warnings } from "./request_panel.js";
 import { describe, sentence, share } from "./selection.js";
+import { isShape } from "./selecting.js";
+import { shapeFields } from "./shapes.js";
 
 const HANDS = [
   ["thing", "Drag", "Click a thing and drag it to where it should go (D)"],
@@ -16,6 +18,8 @@ export const SELECT_TOOLS = [
   ["brush", "Brush", "Paint over what is meant (2)"],
   ["lasso", "Lasso", "Draw around what is meant (3)"],
   ["rectangle", "Frame", "Draw a rectangle around what is meant, from corner to corner (4)"],
+  ["sphere", "Sphere", "Press where its middle is and draw it out; then pull its dot, or the gizmo (5)"],
+  ["box", "Box", "Press where its middle is and draw it out; then pull its faces, or the gizmo (6)"],
 ];
 const OPS = [
   ["add", "Add", "To what is selected"],
@@ -44,16 +48,8 @@ export function buildTools(editor) {
   const tool = row("Select by", "select-tool", SELECT_TOOLS, (value) => selecting.use(value));
   const op = choice({ label: "What is done with it", testid: "select-op", options: OPS, changed: set("selectOp") });
   const kind = row("A click is", "click-kind", KINDS, set("clickKind"));
-  const next = h(
-    "button",
-    {
-      type: "button",
-      class: "small",
-      testid: "next-thing",
-      title: "The next click begins another thing, instead of saying more of this one",
-      onclick: () => store.set({ nextThing: !store.state.nextThing, clickKind: "inside" }),
-    },
-    "Next thing",
+  const next = button("Next thing", "next-thing", "The next click begins another thing, instead of saying more of this one", () =>
+    store.set({ nextThing: !store.state.nextThing, clickKind: "inside" }),
   );
   const depth = row("How deep", "select-depth", DEPTHS, set("selectDepth"));
   const size = h("input", { type: "range", min: BRUSH.low, max: BRUSH.high, step: 1, testid: "brush-radius" });
@@ -69,8 +65,8 @@ export function buildTools(editor) {
     brushSize,
     depth.element,
   );
-  const undo = step("↶", "undo", "Undo (Ctrl + Z)", () => editor.undo());
-  const redo = step("↷", "redo", "Redo (Ctrl + Shift + Z)", () => editor.redo());
+  const undo = icon("↶", "undo", "Undo (Ctrl + Z)", () => editor.undo());
+  const redo = icon("↷", "redo", "Redo (Ctrl + Shift + Z)", () => editor.redo());
   byId("tools").append(
     hand.element,
     tools,
@@ -92,21 +88,16 @@ export function buildTools(editor) {
     attrs(next, { "aria-pressed": String(state.nextThing) });
     next.disabled = !state.selection.some((o) => o.grow);
     kind.element.hidden = next.hidden = selectTool !== "grow";
-    depth.element.hidden = selectTool === "grow";
+    depth.element.hidden = selectTool === "grow" || isShape(selectTool);
     brushSize.hidden = selectTool !== "brush";
     undo.disabled = !editor.canUndo;
     redo.disabled = !editor.canRedo;
   });
 }
 
-const step = (label, testid, title, onclick) =>
-  h("button", { type: "button", class: "icon", title, "aria-label": title, testid, onclick }, label);
-
 /** What is selected, in the panel. */
 export function buildSelectionPanel(editor) {
   const { store, selecting } = editor;
-  const button = (label, testid, title, onclick) =>
-    h("button", { type: "button", class: "small", testid, title, onclick }, label);
   const invert = button("Invert", "invert-selection", "Select all that is not selected now", () => selecting.invert());
   const wider = button("Wider", "expand-selection", "Take along what is next to it, all around", () => selecting.spread(1));
   const narrower = button("Narrower", "shrink-selection", "Leave out what is at its edge, all around", () =>
@@ -143,7 +134,7 @@ export function buildSelectionPanel(editor) {
     "section",
     { class: "selection", "aria-label": "Selection" },
     h("div", { class: "row between" }, h("h2", {}, "Selection"), tools),
-    ...[empty, held, problem, notes, list, changes],
+    ...[empty, held, problem, notes, list, shapeFields(editor), changes],
   );
 
   store.watch(["selection", "selectionAnswer", "selectionWaits", "tinted", "scene", "version"], (state) => {

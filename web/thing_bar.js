@@ -2,13 +2,12 @@
 
 import { attrs, byId, h, text } from "./dom.js";
 import { statusLine } from "./edits.js";
+import { button } from "./fields.js";
 import { duration, gaussians } from "./format.js";
 import { furtherBorders, proposalOf, sentence } from "./selection.js";
 
 export function buildThingBar(editor) {
   const { store, selecting } = editor;
-  const button = (label, testid, title, onclick, extra = {}) =>
-    h("button", { type: "button", class: "small", testid, title, onclick, ...extra }, label);
 
   const line = h("span", { class: "thing-line", role: "status", testid: "thing-line" });
   const problem = h("span", { class: "thing-problem", role: "alert", hidden: true, testid: "thing-problem" });

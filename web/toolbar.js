@@ -2,7 +2,7 @@
 
 import { attrs, byId, h, text } from "./dom.js";
 import { parentOf, shownVersion } from "./editor.js";
-import { choice, segments } from "./fields.js";
+import { button, choice, icon, segments } from "./fields.js";
 import { gaussians } from "./format.js";
 import { isStated } from "./requests.js";
 
@@ -41,13 +41,21 @@ const HINTS = {
   ],
 };
 
+HINTS.sphere = [
+  "Press in the middle of what you mean, and draw",
+  "All within is selected. Pull the dots and the arrows until it fits.",
+  "Drag: draw · Alt + drag: the opposite · Right drag: orbit · Wheel: nearer",
+];
+HINTS.box = HINTS.sphere;
+HINTS.floor = [
+  "Click three places on the floor",
+  "What is at right angles to them is up.",
+  "Click: on the floor · Drag: orbit · Wheel: nearer · Esc: give up",
+];
 HINTS.rectangle = HINTS.lasso.map((text) => text.replace("Draw around", "Draw a rectangle around"));
 
 export function buildToolbar(editor, viewer) {
   const { store } = editor;
-  const icon = (label, testid, title, onclick) =>
-    h("button", { type: "button", class: "icon", testid, title, "aria-label": title, onclick }, label);
-
   const version = choice({
     label: "Version",
     testid: "version-select",
@@ -105,11 +113,7 @@ export function buildToolbar(editor, viewer) {
   );
 
   const chip = h("span", { class: "chip", testid: "shown-chip" });
-  const back = h(
-    "button",
-    { type: "button", class: "small", testid: "drop-preview", onclick: () => editor.dropPreview() },
-    "End preview",
-  );
+  const back = button("End preview", "drop-preview", null, () => editor.dropPreview());
   byId("chips").append(chip, back);
 
   const keysLine = h("span", { class: "muted keys-line" });
@@ -122,9 +126,9 @@ export function buildToolbar(editor, viewer) {
   const hint = h("strong", {});
   const hintMore = h("span", {});
   byId("hint").append(hint, hintMore);
-  store.watch(["selectMode", "selectTool", "thingMode"], () => {
+  store.watch(["selectMode", "selectTool", "thingMode", "floorClicks"], ({ floorClicks }) => {
     const [lead, more, keys] = HINTS[viewer.tool];
-    text(hint, lead);
+    text(hint, lead + (floorClicks?.length ? `: ${3 - floorClicks.length} more` : ""));
     text(hintMore, more);
     text(keysLine, keys);
   });
@@ -132,7 +136,7 @@ export function buildToolbar(editor, viewer) {
   store.watch(
     [
       ...["scene", "version", "views", "viewName", "viewsKind", "layer", "comparing", "compareWith", "preview"],
-      ...["handles", "selection", "mode", "selectMode", "thingMode"],
+      ...["handles", "selection", "mode", "selectMode", "thingMode", "floorClicks"],
     ],
     (state) => {
       const { scene } = state;
@@ -172,7 +176,7 @@ export function buildToolbar(editor, viewer) {
       attrs(chip, { class: previewing ? "chip preview" : state.comparing ? "chip compare" : "chip" });
       back.hidden = !previewing;
       const begun = isStated(state) || scene.versions.length > 1;
-      byId("hint").hidden = state.selection.length > 0 || (!state.selectMode && begun);
+      byId("hint").hidden = !state.floorClicks && (state.selection.length > 0 || (!state.selectMode && begun));
     },
   );
 }

@@ -74,30 +74,14 @@ export function buildVersions(editor) {
       if (name) await editor.rename(name);
     }),
   );
-  const up = button(
-    "Up is up on the screen",
-    "set-up",
-    asking(problem, () => editor.setUpFromView()),
-    {
-      title:
-        "The scene's up direction becomes that of the present view; orbits turn about it. The scene's data stays as it is.",
-    },
-  );
-  const resetUp = button(
-    "Forget",
-    "reset-up",
-    asking(problem, () => editor.setUp(null)),
-    { title: "Back to the default, -y" },
-  );
 
-  store.watch(["scene", "version"], ({ scene, version }) => {
+  store.watch(["scene", "version", "views"], ({ scene, version }) => {
     if (!scene) return;
     const parent = parentOf(scene, version);
     undo.hidden = parent === null;
     text(undo, `Undo: back to version ${parent}`);
     update([...scene.versions].reverse());
     dataset.replaceChildren(...datasetFacts(scene));
-    resetUp.hidden = scene.up === null;
     const rows = [
       ["Name", scene.name],
       ["Format", `${scene.format.replace("_", " ")}, SH degree ${scene.sh_degree}`],
@@ -105,7 +89,7 @@ export function buildVersions(editor) {
       ["From", point(scene.bounds.low)],
       ["To", point(scene.bounds.high)],
       ["Centre", `${point(scene.centre)}; half within ${scene.radius.toPrecision(3)}`],
-      ["Up", scene.up ? point(scene.up) : "0, -1, 0 (default)"],
+      ["Up", `${point(editor.worldUp)}${scene.up ? "" : " (default)"}`],
       ["On disk", bytes(scene.disk_bytes)],
       ["In memory", bytes(scene.memory_bytes)],
       ["Added", when(scene.created)],
@@ -131,7 +115,7 @@ export function buildVersions(editor) {
       uploads,
       paths,
     ),
-    h("section", {}, h("h2", {}, "Scene"), facts, problem, h("div", { class: "row wrap" }, rename, up, resetUp)),
+    h("section", {}, h("h2", {}, "Scene"), facts, problem, h("div", { class: "row wrap" }, rename)),
   );
   return { element, uploadDataset: upload };
 }

@@ -14,15 +14,20 @@ import {
   pictureSize,
   project,
   samePose,
+  unitsPerPixel,
   zoomedAt,
 } from "./camera.js";
-import { attrs, byId, text } from "./dom.js";
+import { ARROWS, attrs, byId, text } from "./dom.js";
 import { shownVersion } from "./editor.js";
 import { AdaptiveSide, FrameQueue, Recent, serverTime } from "./frames.js";
+import { HeldView } from "./held.js";
 import { Overlay } from "./overlay.js";
 import { partOf } from "./requests.js";
+import { isShape } from "./selecting.js";
 import { clicksOf, proposalOf, thinned } from "./selection.js";
-import { add, sub } from "./vectors.js";
+import { lastShape, ShapeView } from "./shapes.js";
+import { clickFloor } from "./up.js";
+import { add, sub, unit } from "./vectors.js";
 
 // All of these are choices, tried by hand.
 const MAX_SIDE = 1600; // Pixels of the longer side of a picture at rest: sharp enough on a large window.
@@ -34,8 +39,9 @@ const ORBIT_PER_PX = 0.0055; // Radians: half a turn across 570 pixels.
 const THING_PX = 14; // A thing is taken hold of within this of its middle, however small it is.
 const SKETCH_PX = 2; // A line that is drawn has a corner this often at most.
 const MAX_CACHED_PICTURES = 6; // Enough to go back and forth between two versions and three layers.
-const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }; // Right, down.
-const CONTROLS = "button, a, input, select"; // What lies on the picture and is no part of it.
+const DRAWING = ["brush", "lasso", "rectangle", "sphere", "box"]; // With the left button.
+const SHAPE_PX = 50; // How far a sphere or a box goes that is clicked rather than drawn.
+const CONTROLS = "button, a, input, select, summary, .end"; // What lies on the picture and is no part of it.
 const THUMBNAIL = { width: 320, height: 200 };
 
 /** How much a turn of the wheel multiplies by. */
@@ -50,6 +56,8 @@ export class Viewer {
   #view = byId("view");
   #canvas = byId("picture");
   #overlay;
+  #held;
+  #shapes;
   #adaptive = new AdaptiveSide();
   #recent = new Recent(MAX_CACHED_PICTURES);
   #displayed = null; // {picture, job}: what is on the canvas.
@@ -78,6 +86,11 @@ export class Viewer {
       wheel: (id, event) => this.#resize(id, event),
       focused: (id) => editor.select(id),
     });
+    this.#held = new HeldView(byId("overlay"), editor, {
+      take: (event, begin) => this.#take(event, begin),
+      redraw: () => this.#drawOverlay(),
+    });
+    this.#shapes = new ShapeView(byId("overlay"), editor, { take: (event, begin) => this.#take(event, begin) });
     this.#listen();
     const { store } = editor;
     store.watch(
@@ -85,10 +98,14 @@ export class Viewer {
       () => this.refresh(),
     );
     store.watch(["scene"], ({ scene }) => this.#sceneChanged(scene));
-    store.watch(["handles", "selected", "selection", "selectMode", "region", "problem", "pose"], () =>
-      this.#drawOverlay(),
+    store.watch(
+      [
+        ...["handles", "selected", "selection", "selectionAnswer", "selectionWaits", "selectMode", "thingMode", "mode"],
+        ...["region", "problem", "pose", "floorClicks", "gizmo", "frame", "dragging", "comparing", "scene", "selectTool"],
+      ],
+      () => this.#drawOverlay(),
     );
-    store.watch(["selectMode", "selectTool", "thingMode", "brushRadius"], () => this.#toolChanged());
+    store.watch(["selectMode", "selectTool", "thingMode", "brushRadius", "floorClicks"], () => this.#toolChanged());
     new ResizeObserver(() => this.#resized()).observe(this.#view);
   }
 
@@ -280,17 +297,28 @@ export class Viewer {
   #drawOverlay() {
     const { camera } = this;
     if (!camera) return;
-    const { handles, selected, problem, region, selection, selectMode } = this.#state;
+    const { handles, selected, problem, region, selection, selectMode, floorClicks } = this.#state;
     const at = problem ? partOf(problem.error.where) : {};
+    // While the view moves, nobody asks what is in front.
+    const still = this.#displayed?.job.complete && !this.#state.dragging ? this.#displayed.job : null;
+    const behind = (point) => !!still && !!point && this.#held.isHidden(camera, still.version, point);
     const items = handles.map((handle, i) => ({
       handle,
       selected: handle.id === selected,
       bad: at.part === "handle" && at.index === i,
+      behind: { source: behind(handle.source), target: behind(handle.target) },
     }));
     this.#overlay.draw(camera, items, {
       region,
-      clicks: selectMode ? clicksOf(selection) : [],
+      clicks: floorClicks?.map((point) => ({ point, kind: "inside" })) ?? (selectMode ? clicksOf(selection) : []),
       spheres: selection.length === 0,
+    });
+    this.#held.draw(camera);
+    const { held } = this.#editor;
+    this.#shapes.draw(camera, {
+      shapes: selectMode ? selection.map((o) => lastShape([o])).filter(Boolean) : [],
+      held: held?.shape ?? null,
+      perPixel: held ? unitsPerPixel(camera, held.pivot) : 0,
     });
   }
 
@@ -301,9 +329,10 @@ export class Viewer {
     if (this.#gesture?.kind === "draw") this.giveUpDrag();
   }
 
-  /** What the pointer does: "thing", "handle", "grow", "brush", "lasso" or "rectangle". */
+  /** What the pointer does: "floor", "thing", "handle", "grow", "brush", "lasso" or "rectangle". */
   get tool() {
-    const { selectMode, selectTool, thingMode } = this.#state;
+    const { selectMode, selectTool, thingMode, floorClicks } = this.#state;
+    if (floorClicks) return "floor";
     return selectMode ? selectTool : thingMode ? "thing" : "handle";
   }
 
@@ -379,7 +408,7 @@ export class Viewer {
 
   /** What a pointer that goes down on the picture begins. Where the left button draws, the right one orbits. */
   #kindOf({ button, shiftKey }) {
-    const draws = ["brush", "lasso", "rectangle"].includes(this.tool);
+    const draws = DRAWING.includes(this.tool);
     if (button === 1 || shiftKey) return "pan";
     if (draws) return button === 2 ? "orbit" : "draw";
     return button === 2 ? "pan" : "orbit";
@@ -390,22 +419,27 @@ export class Viewer {
     const { tool, camera } = this;
     const selecting = this.#editor.selecting;
     let points = [[x, y]];
+    const reach = () => {
+      const r = Math.hypot(points.at(-1)[0] - x, points.at(-1)[1] - y);
+      return r < CLICK_PX ? SHAPE_PX : r;
+    };
     const show = () =>
       this.#overlay.sketch({
         tool,
         points,
-        radius: this.#state.brushRadius,
+        radius: isShape(tool) ? reach() : this.#state.brushRadius,
         subtracts: selecting.subtracts(other),
       });
     show();
     return {
       move: (toX, toY) => {
-        points = tool === "rectangle" ? [points[0], [toX, toY]] : thinned([...points, [toX, toY]], SKETCH_PX);
+        points = tool === "rectangle" || isShape(tool) ? [points[0], [toX, toY]] : thinned([...points, [toX, toY]], SKETCH_PX);
         show();
       },
       end: () => {
         this.#overlay.sketch(null);
-        selecting.draw(tool, camera, points, other);
+        if (isShape(tool)) selecting.drawShape(tool, camera, { x, y }, reach(), unit(this.#editor.worldUp), other);
+        else selecting.draw(tool, camera, points, other);
       },
       giveUp: () => this.#overlay.sketch(null),
     };
@@ -413,6 +447,11 @@ export class Viewer {
 
   /** The pointer took hold of a handle's dot. */
   #grab(id, event) {
+    this.#take(event, (from) => this.#editor.dragTarget(id, this.camera, from));
+  }
+
+  /** The pointer takes hold of something that is drawn over the picture: begin({x, y}) returns the drag. */
+  #take(event, begin) {
     if (event.button !== 0 || event.shiftKey || !this.camera) return;
     event.stopPropagation();
     event.preventDefault();
@@ -420,7 +459,7 @@ export class Viewer {
     this.#pointers.set(event.pointerId, this.#place(event));
     this.#view.setPointerCapture(event.pointerId);
     const from = this.#place(event);
-    this.#gesture = { kind: "drag", from, drag: this.#editor.dragTarget(id, this.camera, from) };
+    this.#gesture = { kind: "drag", from, drag: begin(from) };
   }
 
   #pinch() {
@@ -495,7 +534,8 @@ export class Viewer {
   #click({ x, y }, other = false) {
     const { tool, camera } = this;
     const { selecting } = this.#editor;
-    if (tool === "handle") this.#editor.place(camera, x, y);
+    if (tool === "floor") clickFloor(this.#editor, camera, x, y);
+    else if (tool === "handle") this.#editor.place(camera, x, y);
     else if (tool === "thing") {
       // What has been moved is not where the version has it: a click on it says nothing new.
       const moved = this.#state.handles.some((handle) => handle.target);
@@ -503,6 +543,7 @@ export class Viewer {
     }
     else if (tool === "grow") selecting.click(camera, x, y, other);
     else if (tool === "brush") selecting.draw("brush", camera, [[x, y]], other);
+    else if (isShape(tool)) selecting.drawShape(tool, camera, { x, y }, SHAPE_PX, unit(this.#editor.worldUp), other);
   }
 
   #turn(change) {

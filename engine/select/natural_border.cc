@@ -190,6 +190,8 @@ NaturalBorder natural_border(const neighbours::NeighbourGraph& graph, std::span<
     });
     const auto wanted = std::min<std::ptrdiff_t>(choice.wider, borders.end() - first);
     out.wider = int(wanted);
+    out.more = wanted < borders.end() - first;
+    out.less = wanted > 0;
     if (wanted == 0) {
       for (std::size_t node = 0; node < n; ++node) out.inside[node] = given[node] == Given::inside;
       return out;
@@ -202,6 +204,8 @@ NaturalBorder natural_border(const neighbours::NeighbourGraph& graph, std::span<
         if (levels[borders[i]].cost <= nearly_as_weak * levels[chosen].cost) at = i;
     const auto wanted = std::clamp(std::ptrdiff_t(at) + choice.wider, std::ptrdiff_t{0}, std::ssize(borders) - 1);
     out.wider = int(wanted - std::ptrdiff_t(at));
+    out.more = wanted + 1 < std::ssize(borders);
+    out.less = wanted > 0;
     chosen = borders[std::size_t(wanted)];
   }
   for (std::size_t i = 0; i < levels[chosen].taken; ++i) out.inside[order[i]] = 1;

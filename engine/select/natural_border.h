@@ -30,6 +30,8 @@ struct BorderChoice {
 struct NaturalBorder {
   std::vector<std::uint8_t> inside;  ///< [nodes] 1: inside.
   int wider = 0;                     ///< As chosen; nearer to 0 where there are fewer borders on that side.
+  bool more = false;                 ///< There is one farther out than this.
+  bool less = false;                 ///< There is one farther in; with `beyond`, what is given counts as one.
 };
 
 /// Divides the graph at a level of the potentials: nodes at or above it are inside. Of all levels the one where the

@@ -192,7 +192,7 @@ Result<Grown> Neighbourhood::grow(const scene::GaussianCloud& cloud, const Grow&
   const auto seeds = seeds_of(cloud, grow);
   if (!seeds) return propagate(seeds);
   const NaturalBorder border = grow.whole ? whole_border(*seeds, grow.wider) : border_of(*seeds, {false, grow.wider});
-  return Grown{rows_where_marked(border.inside), border.wider, is_cut_short_};
+  return Grown{rows_where_marked(border.inside), border.wider, border.more, border.less, is_cut_short_};
 }
 
 Result<Grown> Neighbourhood::grow_beyond(const scene::GaussianCloud& cloud, const Grow& grow,
@@ -202,7 +202,7 @@ Result<Grown> Neighbourhood::grow_beyond(const scene::GaussianCloud& cloud, cons
   for (std::size_t node = 0; node < rows_.size(); ++node)
     if (std::binary_search(rows.begin(), rows.end(), rows_[node])) seeds->given[node] = Given::inside;
   const NaturalBorder border = border_of(*seeds, {.wider = farther, .beyond = true});
-  return Grown{rows_where_marked(border.inside), border.wider, is_cut_short_};
+  return Grown{rows_where_marked(border.inside), border.wider, border.more, border.less, is_cut_short_};
 }
 
 NaturalBorder Neighbourhood::border_of(const Seeds& seeds, const BorderChoice& choice) const {

@@ -50,6 +50,8 @@ constexpr std::size_t max_neighbourhood = 250'000;
 struct Grown {
   std::vector<std::uint32_t> rows;  ///< Of the cloud, ascending.
   int wider = 0;              ///< Grow::wider, or nearer to 0 where there are fewer borders: NaturalBorder::wider.
+  bool more = false;          ///< NaturalBorder::more, within the surroundings.
+  bool less = false;          ///< NaturalBorder::less
   bool is_cut_short = false;  ///< Neighbourhood::is_cut_short().
 };
 

@@ -80,14 +80,21 @@ Result<Grown> Selector::grown(const Grow& grow) {
   const Neighbourhood* around = &neighbourhood(surroundings);
   auto out = around->grow(cloud_, grow);
   if (!grow.whole || grow.reach) return out;
-  for (int i = 0; i < farther_reaches && out && out->wider < grow.wider; ++i) {
-    if (around->is_cut_short() || around->rows().size() == cloud_.size()) break;  // there is no more to look at
+  int reaches = 0;
+  const auto is_more_to_look_at = [&] {
+    return reaches < farther_reaches && !around->is_cut_short() && around->rows().size() < cloud_.size();
+  };
+  for (; out && out->wider < grow.wider && is_more_to_look_at(); ++reaches) {
     surroundings.reach *= 2;
     around = &neighbourhood(surroundings);
-    const int so_far = out->wider;
-    out = around->grow_beyond(cloud_, grow, out->rows, grow.wider - so_far);
-    if (out) out->wider += so_far;
+    const Grown within = *std::move(out);
+    out = around->grow_beyond(cloud_, grow, within.rows, grow.wider - within.wider);
+    if (!out) break;
+    out->wider += within.wider;
+    out->less = out->less || within.less;
   }
+  // Not looked for: it would cost a walk that nobody has asked for.
+  if (out) out->more = out->more || (out->wider >= grow.wider && is_more_to_look_at());
   return out;
 }
 
@@ -97,6 +104,7 @@ Result<RowSet> Selector::rows_of(const Grow& grow, const std::string& where, Sel
   const auto found = grown(grow);
   if (!found) return fail(found.error().code, found.error().message, where + ".grow." + found.error().where);
   for (const std::uint32_t row : found->rows) named[row] = 1;
+  if (grow.whole) so_far.border = WholeBorder{found->wider, found->more, found->less};
   if (found->wider != grow.wider)
     so_far.warnings.push_back({"there is no border farther " + std::string(grow.wider > 0 ? "out" : "in") +
                                    " than wider = " + std::to_string(found->wider),

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,15 @@ struct Warning {
   bool operator==(const Warning&) const = default;
 };
 
+/// Where the border of a whole lies among the natural borders around its click: what one who widens it step by step has
+/// to know.
+struct WholeBorder {
+  int wider = 0;      ///< Grow::wider, or nearer to 0 where there are fewer borders on that side.
+  bool more = false;  ///< One may lie farther out. A reach that nobody has looked beyond yet may hold one, or none.
+  bool less = false;  ///< One lies farther in.
+  bool operator==(const WholeBorder&) const = default;
+};
+
 /// The rows that are meant.
 struct Selected {
   RowSet rows;                ///< [N] 1: selected; as scene::select() takes it.
@@ -31,6 +41,7 @@ struct Selected {
   scene::Bounds bounds;       ///< Of their means, world units; {0,0,0} twice where none is selected.
   DVec3 centre{0.0};          ///< Mean of their means, world units; 0 where none is selected.
   std::size_t undecided = 0;  ///< Rows that masks leave nearly even: MaskedRows::undecided, over all operations.
+  std::optional<WholeBorder> border;  ///< Of the last operation that grows a whole.
   std::vector<Warning>
       warnings;  ///< Nothing is selected; an operation names no row; a reach was cut short; there is no such border.
 };

@@ -11,6 +11,7 @@ namespace server::service {
 struct EmbeddedFile {
   std::string_view name;  ///< Path below its folder: "index.html", "icons/drag.svg".
   std::string_view bytes;
+  std::string_view gzip;  ///< The same, compressed; empty: not at hand.
 };
 
 /// The page: what lies below web/.

@@ -156,10 +156,16 @@ TEST(Selection, OfAnEditSaysWhatMovesSoThatARadiusMayBeLeftOut) {
 }
 
 TEST(SelectionSummary, IsWrittenWhole) {
-  SelectionSummary summary{"q1", 3, {0, 0, 0}, {1, 2, 3}, {0.5, 1, 1.5}, 2, {"nothing is selected"}};
-  EXPECT_EQ(json::parse(to_json(summary)),
-            json::parse(R"({"id": "q1", "count": 3, "bounds": {"low": [0, 0, 0], "high": [1, 2, 3]},
-                            "centre": [0.5, 1, 1.5], "undecided": 2, "warnings": ["nothing is selected"]})"));
+  SelectionSummary summary{
+      "q1", 3, {0, 0, 0}, {1, 2, 3}, {0.5, 1, 1.5}, 2, SelectionBorder{-1, true, false}, {"nothing is selected"}};
+  json written = json::parse(R"({"id": "q1", "count": 3, "bounds": {"low": [0, 0, 0], "high": [1, 2, 3]},
+                                 "centre": [0.5, 1, 1.5], "undecided": 2,
+                                 "border": {"wider": -1, "more": true, "less": false},
+                                 "warnings": ["nothing is selected"]})");
+  EXPECT_EQ(json::parse(to_json(summary)), written);
+  summary.border.reset();
+  written["border"] = nullptr;
+  EXPECT_EQ(json::parse(to_json(summary)), written);
 }
 
 }  // namespace

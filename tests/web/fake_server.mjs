@@ -602,6 +602,7 @@ export function start({ port = 0, token = null, slow = 0, empty = false, tick = 
           },
           centre: over((x) => x.reduce((a, b) => a + b) / x.length),
           undecided: 0,
+          border: json.selection.some(({ grow }) => grow?.whole) ? { wider: 0, more: false, less: false } : null,
           warnings: held.length ? [] : ["nothing is selected"],
         };
       },

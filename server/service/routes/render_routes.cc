@@ -215,6 +215,7 @@ proto::SelectionSummary summary_of(const edits::MadeSelection& made) {
   summary.high = edits::to_point(engine::DVec3(selected.bounds.high));
   summary.centre = edits::to_point(selected.centre);
   summary.undecided = selected.undecided;
+  if (const auto& border = selected.border) summary.border = {border->wider, border->more, border->less};
   summary.warnings = edits::warnings_of(selected);
   return summary;
 }

@@ -32,15 +32,25 @@ Reply file_reply(const std::string& name, std::string_view bytes, const std::str
   return reply;
 }
 
+/// Where a client names no encodings it gets none: it may be unable to undo it.
+bool takes_gzip(const Call& call) {
+  const std::string encodings = call.header("accept-encoding");
+  return !encodings.empty() && http::accepts(encodings, "gzip");
+}
+
 void add_page(http::Router& router, const std::vector<EmbeddedFile>& page) {
   for (const EmbeddedFile& file : page) {
-    const auto handler = [name = std::string(file.name), bytes = file.bytes,
-                          etag = http::etag_of(file.bytes)](const Call&) -> Result<Reply> {
-      Reply reply = file_reply(name, bytes, etag);
-      reply.headers = {{"Content-Security-Policy", page_policy},
+    const auto handler = [file, etag = http::etag_of(file.bytes)](const Call& call) -> Result<Reply> {
+      const bool packed = !file.gzip.empty() && takes_gzip(call);
+      // Other bytes are another representation: its tag is another one.
+      Reply reply = packed ? file_reply(std::string(file.name), file.gzip, etag + "-gzip")
+                           : file_reply(std::string(file.name), file.bytes, etag);
+      reply.headers = {{"Vary", "Accept-Encoding"},
+                       {"Content-Security-Policy", page_policy},
                        {"Referrer-Policy", "no-referrer"},
                        {"X-Frame-Options", "DENY"},
                        {"Cross-Origin-Opener-Policy", "same-origin"}};
+      if (packed) reply.headers.emplace_back("Content-Encoding", "gzip");
       return reply;
     };
     get(router, "/" + std::string(file.name), handler, Access::open);

@@ -70,6 +70,8 @@ TEST(GrowOnTheDemoScene, TakesMoreOrLessOfAThingByBorders) {
   for (grow.wider = -3; grow.wider <= 1; ++grow.wider) {
     const Selected found = selector.select({{Op::add, grow}}).value();
     EXPECT_TRUE(found.warnings.empty()) << grow.wider << ": " << found.warnings.at(0).message;
+    EXPECT_EQ(found.border->wider, grow.wider);
+    EXPECT_TRUE(found.border->more) << grow.wider;
     counts.push_back(found.count);
   }
   for (std::size_t i = 0; i + 1 < counts.size(); ++i) EXPECT_LT(1.1 * double(counts[i]), double(counts[i + 1])) << i;
@@ -78,6 +80,10 @@ TEST(GrowOnTheDemoScene, TakesMoreOrLessOfAThingByBorders) {
   ASSERT_EQ(all.warnings.size(), 1u);
   EXPECT_EQ(all.warnings[0].where, "selection[0].grow.wider");
   EXPECT_EQ(all.warnings[0].message.find("there is no border farther out than wider = "), 0u);
+  EXPECT_EQ(all.border, (WholeBorder{all.border->wider, false, true}));
+  grow.wider = all.border->wider;
+  EXPECT_TRUE(selector.select({{Op::add, grow}}).value().warnings.empty());
+  EXPECT_EQ(selector.select({{Op::add, {Sphere{{0, 0, 0}, 1}}}}).value().border, std::nullopt);
 }
 
 TEST(MasksOfTheDemoScene, AreLiftedToTheirThings) {

@@ -113,6 +113,23 @@ TEST(NaturalBorder, SaysHowFarItWentWhereThereAreNoMore) {
   EXPECT_LE(inmost.size(), 200u);
 }
 
+TEST(NaturalBorder, SaysOnWhichSidesThereAreOthers) {
+  const WeightedGraph strips = three_strips(0.05f, 0.2f);
+  std::vector<Given> given(strips.graph.size(), Given::no);
+  given[10] = Given::inside;
+  given[1190] = Given::outside;
+  const std::vector<double> potential = random_walk(strips.graph, strips.weight, given);
+  const auto at = [&](int wider) {
+    return natural_border(strips.graph, strips.weight, potential, given, {{10}, {1190}}, {.wider = wider});
+  };
+  const int first = at(-60).wider, last = at(60).wider;
+  ASSERT_LT(first, last);
+  for (int wider = first; wider <= last; ++wider) {
+    EXPECT_EQ(at(wider).more, wider < last) << wider;
+    EXPECT_EQ(at(wider).less, wider > first) << wider;
+  }
+}
+
 TEST(NaturalBorder, IsCountedFromWhatIsInsideAlreadyWhereThatIsAsked) {
   const WeightedGraph strips = three_strips(0.05f, 0.4f);
   std::vector<Given> given(strips.graph.size(), Given::no);
@@ -130,6 +147,10 @@ TEST(NaturalBorder, IsCountedFromWhatIsInsideAlreadyWhereThatIsAsked) {
   EXPECT_GT(count(taken(1)), 1.15 * 200);
   EXPECT_EQ(taken(1).wider, 1);
   EXPECT_LT(taken(60).wider, 60);
+  EXPECT_TRUE(taken(0).more);
+  EXPECT_FALSE(taken(0).less) << "nothing is known of what was before";
+  EXPECT_TRUE(taken(1).less) << "what was given is farther in";
+  EXPECT_FALSE(taken(60).more);
 }
 
 TEST(NaturalBorder, TakesAllThatCanBeReachedWhereNothingIsOutside) {

@@ -43,10 +43,20 @@ export const openPage = async (browser, service, { viewport = { width: 1280, hei
 
 /// The hand on the picture of an open page.
 export const handOn = ({ page, id }) => {
-  const state = (wanted) => page.waitForFunction((name) => {
+  const state = (wanted, timeout = 120_000) => page.waitForFunction((name) => {
     const bar = document.querySelector('[data-testid=thing-bar]');
     return !bar.hidden && bar.dataset.state === name;
-  }, wanted, { timeout: 120_000 });
+  }, wanted, { timeout });
+  /// The camera of the picture, and where that is on the screen.
+  const looksFrom = async () => {
+    await page.waitForTimeout(600);  // it saves a little later
+    const pose = await page.evaluate(() => {
+      const id = location.hash.split('/').at(-1);
+      return JSON.parse(localStorage.getItem(`splatdrag.scene.${id}`)).pose;
+    });
+    const box = await id('view').boundingBox();
+    return { camera: { ...pose, width: box.width, height: box.height }, box };
+  };
   return {
     state,
     /// Until the picture on the screen is the full one of a version.
@@ -56,15 +66,11 @@ export const handOn = ({ page, id }) => {
     }, version, { timeout: patience }),
     /// Where a point of the world is on the screen, once the page has remembered where it looks from.
     onScreen: async (point) => {
-      await page.waitForTimeout(600);  // it saves a little later
-      const pose = await page.evaluate(() => {
-        const name = Object.keys(localStorage).find((key) => key.startsWith('splatdrag.scene.'));
-        return JSON.parse(localStorage.getItem(name)).pose;
-      });
-      const box = await id('view').boundingBox();
-      const { x, y } = project({ ...pose, width: box.width, height: box.height }, point);
+      const { camera, box } = await looksFrom();
+      const { x, y } = project(camera, point);
       return [box.x + x, box.y + y];
     },
+    looksFrom,
     /// How many Gaussians are taken, once the page knows and the picture shows them.
     count: async () => Number(await (await page.waitForFunction(() => {
       const { count, waits } = document.querySelector('[data-testid=selection-count]').dataset;

@@ -40,6 +40,12 @@ export const editedByCommandLine = async (scene, dataset, request) => {
   return readFile(path.join(folder, 'out', 'scene.ply'));
 };
 
+/// A single scene of the shared data, without cameras: {bytes}; or why the test has to be skipped.
+export const single = (name) => {
+  const file = path.join(data, 'scenes', name);
+  return existsSync(file) ? { bytes: readFileSync(file) } : { absent: `${file} is absent: the shared data is not on this machine` };
+};
+
 const data = process.env.SPLATDRAG_DATA ?? path.join(root, '../shared/data');
 /// The capture of the fox: {folder, ply, drags}; or why the test has to be skipped. In CI its absence is an error.
 export const fox = () => {

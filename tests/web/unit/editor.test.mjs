@@ -248,6 +248,7 @@ async function take() {
     bounds: { low: [0, 0, 0], high: [1, 1, 1] },
     centre: [0.5, 0.5, 0.5],
     undecided: 0,
+    border: null,
     warnings: [],
   });
   service["POST /v1/previews"] = () => ({ version: "p000001", handles: [{ gaussians: 7 }], gaussians: { crumbs: 0 } });
@@ -281,6 +282,94 @@ test("a thing that is dragged and let go is repaired as a draft, and its result 
   await editor.runBetter();
   assert.deepEqual([asked[1].preset, asked[1].version], ["standard", 0], "the same drag, on the version before");
   assert.deepEqual(asked[1].handles, asked[0].handles);
+});
+
+test("what is held is moved on, turned and sized about its centre, each as one step of undo", async () => {
+  await take();
+  const { pivot, bounds } = editor.held;
+  assert.deepEqual([pivot, bounds.high, editor.state.handles], [[0.5, 0.5, 0.5], [1, 1, 1], []]);
+  editor.nudgeHeld({ shift: [1, 0, 0] });
+  editor.nudgeHeld({ turn: [0, 0, Math.PI] });
+  editor.nudgeHeld({ size: 2 });
+  const [{ source, target, rotation, scale }] = editor.request().handles;
+  // The source [0.5, 0, 0] hangs half a unit off the centre, which is at [1.5, 0.5, 0.5] by now.
+  assert.deepEqual(source, [0.5, 0, 0]);
+  assert.ok([1.5, 1.5, -0.5].every((x, i) => Math.abs(target[i] - x) < 1e-9), `${target}`);
+  assert.ok(Math.abs(rotation[3] - 1) < 1e-9 && scale === 2, `${rotation}`);
+  editor.undo();
+  assert.equal(editor.request().handles[0].scale, undefined);
+  editor.setHeld({ shift: [0, 0, 0.25], turn: [0, 0, 0], size: 1 });
+  const [{ id, ...handle }] = editor.state.handles;
+  assert.deepEqual([handle.target, handle.rotation, handle.scale], [[0.5, 0, 0.25], null, null]);
+  for (let i = 0; i < 3; ++i) editor.undo();
+  assert.deepEqual(editor.state.handles, [], "three steps, and none of them is left");
+});
+
+test("a part of the gizmo that is pulled and let go repairs the thing, as a drag of it does", async () => {
+  const asked = [];
+  service["POST /v1/edits"] = (body) => (asked.push(body), edit());
+  await take();
+  const drag = editor.dragHeld((x) => ({ shift: [x, 0, 0] }));
+  drag.move(1, 0);
+  drag.move(2, 0);
+  drag.end();
+  await settle();
+  assert.deepEqual(asked.map(({ handles }) => handles[0].target), [[2.5, 0, 0]], "from where the drag began");
+  assert.equal(editor.state.draft.id, "e000001");
+});
+
+test("what is dragged on a surface goes where the service says that is, and is repaired only then", async () => {
+  const asked = [];
+  service["POST /v1/edits"] = (body) => (asked.push(body), edit());
+  await take();
+  editor.store.set({ constraint: "surface", thingMode: true });
+  let answer;
+  service["POST /v1/scenes/s000001/versions/0/pick"] = () =>
+    new Promise((resolve) => (answer = () => resolve({ hit: true, point: [4, 1, 0.5], normal: [0, -1, 0] })));
+  const drag = editor.dragThing(CAMERA, { x: 230, y: 150 });
+  drag.move(390, 150);
+  drag.end();
+  await settle();
+  assert.deepEqual(asked, [], "it is still being asked");
+  answer();
+  while (asked.length === 0) await settle();
+  assert.deepEqual(asked[0].handles[0].target, [4, 0, 0], "its box is half a unit high, and stands on the point");
+});
+
+test("a click on a preview asks what that shows, told as of the version", async () => {
+  await take();
+  editor.nudgeHeld({ shift: [3, 0, 0] });
+  await editor.preview();
+  const asked = [];
+  const shows = (point) => {
+    service["POST /v1/scenes/s000001/versions/p000001/pick"] = () => (asked.push(point), { hit: true, point, normal: [0, -1, 0] });
+    return editor.pickSeen(CAMERA, 1, 1);
+  };
+  const moved = await shows([3.5, 0.5, 0.5]);
+  assert.deepEqual([moved.point, moved.moved], [[0.5, 0.5, 0.5], true]);
+  const other = await shows([8, 0, 0]);
+  assert.deepEqual([other.point, other.moved], [[8, 0, 0], false]);
+  assert.equal(asked.length, 2);
+});
+
+test("a shape that selects is what the gizmo has while its tool is in hand; a drag of it is one step", async () => {
+  editor.selecting.use("sphere");
+  const select = "POST /v1/scenes/s000001/versions/0/select";
+  service[select] = () => ({ id: "q1", count: 1, bounds: { low: [0, 0, 0], high: [1, 1, 1] }, centre: [0, 0, 0], border: null, warnings: [] });
+  await editor.selecting.drawShape("sphere", CAMERA, { x: 200, y: 150 }, 30, [0, -1, 0]);
+  const drawn = editor.held.shape.sphere;
+  assert.deepEqual(drawn.center, [0.5, 0, 0]);
+  const drag = editor.dragHeld((x) => ({ size: x }));
+  drag.move(2);
+  drag.move(3);
+  drag.end();
+  assert.ok(Math.abs(editor.held.shape.sphere.radius - 3 * drawn.radius) < 1e-12);
+  editor.undo();
+  assert.deepEqual(editor.held.shape.sphere, drawn);
+  editor.nudgeHeld({ shift: [0, 1, 0] });
+  assert.deepEqual(editor.state.selection.at(-1).sphere.center, [0.5, 1, 0]);
+  editor.selecting.use("grow");
+  assert.equal(editor.held, null);
 });
 
 test("a draft is given up when the thing is dragged on, and never takes the screen", async () => {

@@ -58,7 +58,9 @@ test("a removal has no targets, and with a selection no handles", () => {
   assert.ok(isStated(state) && changesScene(state));
   assert.ok(!isStated({ ...state, selection: [] }) && !isStated({ ...state, mode: "move" }));
   assert.ok(changesScene({ mode: "remove", handles: [{ ...handle, target: null }] }));
-  assert.ok(!changesScene({ mode: "move", handles: [{ ...handle, target: null }], selection }));
+  const anchor = { ...handle, target: null, rotation: null, scale: null };
+  assert.ok(!changesScene({ mode: "move", handles: [anchor], selection }));
+  assert.ok(changesScene({ mode: "move", handles: [{ ...anchor, scale: 2 }], selection }), "what grows in place changes, too");
   const read = only(JSON.stringify({ mode: "remove", selection, heal }));
   assert.deepEqual([read.mode, read.handles, read.selection, read.heal], ["remove", [], selection, heal]);
   refused({ mode: "move", selection }, "handles");
@@ -104,6 +106,11 @@ test("what is exported can be imported again", () => {
     const exported = requestOf({ ...request, scene: "s000001", version: 2 });
     assert.deepEqual(only(JSON.stringify(exported)), request);
   }
+  const handle = { source: [0, 0, 0], target: [1, 0, 0], radius: 1, group: 0, rotation: [0.5, 0.5, 0.5, 0.5], scale: 2 };
+  const asked = requestOf({ ...only(JSON.stringify({ handles: [handle] })), scene: "s000001", version: 0 });
+  assert.deepEqual(asked.handles, [handle], "turned and scaled, too");
+  refused({ handles: [{ ...handle, rotation: [0, 0, 0, 0] }] }, "handles[0].rotation");
+  refused({ handles: [{ ...handle, scale: 0 }] }, "handles[0].scale");
 });
 
 test("a request with a selection needs no radius, and keeps one that it has", () => {

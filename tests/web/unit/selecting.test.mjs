@@ -20,6 +20,7 @@ const answer = (selection) => ({
   bounds: { low: [0, 0, 0], high: [1, 1, 1] },
   centre: [0, 0, 0],
   undecided: 0,
+  border: null,
   warnings: [],
 });
 const problem = (status, where) =>

@@ -304,12 +304,31 @@ TEST_F(RenderRoutes, SelectAndSayWhat) {
   EXPECT_NEAR(answer["bounds"]["high"][0].get<double>(), -0.1, 1e-6);
   EXPECT_NEAR(answer["centre"][0].get<double>(), -0.55, 1e-6);
   EXPECT_EQ(answer["undecided"], 0);
+  EXPECT_TRUE(answer["border"].is_null()) << "nothing was grown";
   EXPECT_EQ(answer["warnings"], json::array());
   EXPECT_EQ(json::parse(call("POST", select_path, with_body(id, left_half))->body)["id"], answer["id"]);
   const auto nothing = call("POST", select_path, with_body(id, R"({"selection": []})"));
   ASSERT_TRUE(nothing) << "it is not an error";
   EXPECT_EQ(json::parse(nothing->body)["count"], 0);
   EXPECT_EQ(json::parse(nothing->body)["warnings"], json::array({"nothing is selected"}));
+}
+
+TEST_F(RenderRoutes, SayWhetherAWholeHasBordersFartherOutAndIn) {
+  const std::string id = add_wall();
+  const auto border = [&](const std::string& wider) {
+    const auto reply = call("POST", select_path, with_body(id, R"({"selection": [{"grow": {"inside": [[0, 0, 0]],
+      "whole": true, "wider": )" + wider + "}}]}"));
+    return json::parse(reply->body)["border"];
+  };
+  const json out = border("64"), in = border("-64");
+  EXPECT_FALSE(out["more"].get<bool>()) << "that it asked for more than there are was told";
+  EXPECT_FALSE(in["less"].get<bool>());
+  EXPECT_GE(out["wider"].get<int>(), 0);
+  EXPECT_LE(in["wider"].get<int>(), 0);
+  if (out["wider"] != in["wider"]) {
+    EXPECT_TRUE(out["less"].get<bool>());
+    EXPECT_TRUE(in["more"].get<bool>());
+  }
 }
 
 TEST_F(RenderRoutes, SelectByWhatACameraShows) {

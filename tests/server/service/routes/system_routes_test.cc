@@ -25,7 +25,7 @@ class SystemRoutes : public testing::Test {
       info.limits.handles = 256;
       info.token_required = guard.needs_token();
       const std::vector<EmbeddedFile> page{
-          {"index.html", "<!doctype html>"}, {"main.js", "start()"}, {"icons/a.svg", "<svg/>"}};
+          {"index.html", "<!doctype html>", ""}, {"main.js", "start()", "as gzip"}, {"icons/a.svg", "<svg/>", ""}};
       add_system_routes(router, {guard, metrics, info, [trouble] { return trouble; }, page, "openapi: 3.1.0\n"});
       http::ServerOptions options;
       options.port = 0;
@@ -130,12 +130,36 @@ TEST_F(SystemRoutes, WantNoSessionWithoutAToken) {
   EXPECT_EQ(answer.header("set-cookie"), "");
 }
 
+TEST_F(SystemRoutes, SendThePageCompressedToWhoTakesThat) {
+  const RawAnswer plain = open.get("/main.js");
+  const RawAnswer packed = open.get("/main.js", "Accept-Encoding: deflate, gzip;q=0.8\r\n");
+  EXPECT_EQ(plain.body, "start()");
+  EXPECT_EQ(plain.header("content-encoding"), "");
+  EXPECT_EQ(packed.body, "as gzip");
+  EXPECT_EQ(packed.header("content-encoding"), "gzip");
+  EXPECT_EQ(packed.header("content-type"), plain.header("content-type"));
+  for (const RawAnswer& answer : {plain, packed}) EXPECT_EQ(answer.header("vary"), "Accept-Encoding");
+  EXPECT_NE(packed.header("etag"), plain.header("etag")) << "a cache must not take one for the other";
+  const std::string known = "If-None-Match: " + packed.header("etag") + "\r\n";
+  EXPECT_EQ(open.get("/main.js", "Accept-Encoding: gzip\r\n" + known).status, 304);
+  EXPECT_EQ(open.get("/main.js", known).status, 200);
+  for (const char* refusal : {"gzip;q=0", "identity", "br", ""})
+    EXPECT_EQ(open.get("/main.js", std::string("Accept-Encoding: ") + refusal + "\r\n").body, "start()") << refusal;
+  EXPECT_EQ(open.get("/icons/a.svg", "Accept-Encoding: gzip\r\n").body, "<svg/>") << "where it is not at hand";
+}
+
 TEST(EmbeddedFiles, HoldThePageAndTheContract) {
   const auto page = page_files();
   const auto index =
       std::find_if(page.begin(), page.end(), [](const EmbeddedFile& f) { return f.name == "index.html"; });
   ASSERT_NE(index, page.end());
   EXPECT_NE(index->bytes.find("</html>"), std::string_view::npos);
+  std::size_t sent = 0;
+  for (const EmbeddedFile& file : page) {
+    EXPECT_TRUE(file.gzip.starts_with("\x1f\x8b\x08")) << file.name;
+    sent += file.gzip.size();
+  }
+  EXPECT_LT(sent, 250'000u) << "a page that is there at once on a slow line";
   ASSERT_EQ(contract_files().size(), 1u);
   EXPECT_TRUE(contract_files().front().bytes.starts_with("openapi: ")) << contract_files().front().bytes.substr(0, 20);
 }

@@ -1,0 +1,282 @@
+// Hands on the thing: the gizmo, depth and surfaces, views, and shapes that select, in a real browser on a small scene.
+import assert from 'node:assert/strict';
+import { after, before, beforeEach, afterEach, describe, test } from 'node:test';
+import { handOn, launch, openPage } from './support/browser.mjs';
+import { Service } from './support/program.mjs';
+import { datasetZip, demoScene } from './support/scenes.mjs';
+
+// The mug of the demo scene, which stands on the table; y points down.
+const mug = [1.3, -0.16, -0.6];
+
+let browser, demo, service, scene;
+before(async () => {
+  browser = await launch();
+  demo = await demoScene({ gaussians: 20_000, views: 24, size: '800x600', photos: false });
+  service = await Service.start();
+  scene = await service.client.upload(demo.ply, { name: 'desk' });
+  await service.client.putDataset(scene.id, await datasetZip(demo.folder));
+});
+after(async () => {
+  await browser?.close();
+  await service?.stop();
+});
+
+let page, id, hand, complaints;
+beforeEach(async () => {
+  ({ page, id, complaints } = await openPage(browser, service, { viewport: { width: 1366, height: 768 } }));
+  hand = handOn({ page, id });
+  await id(`scene-${scene.id}`).getByTestId('scene-open').click();
+  await hand.shown(0);
+});
+afterEach(async () => {
+  assert.deepEqual(complaints, []);
+  await page.context().close();
+});
+
+const middle = async (name) => {
+  const { x, y, width, height } = await id(name).boundingBox();
+  return [x + width / 2, y + height / 2];
+};
+const numbers = (name) => Promise.all(['x', 'y', 'z'].map(async (axis) => Number(await id(`${name}-${axis}`).inputValue())));
+/// Takes the mug, to be moved without being repaired.
+const take = async () => {
+  await id('auto-repair').uncheck();
+  const at = await hand.onScreen(mug);
+  await page.mouse.click(...at);
+  await hand.count();
+  await id('gizmo').locator('.part').first().waitFor();
+  return at;
+};
+/// What is asked for when something is done that leads to a preview: the newest request whose handle is `as` it should be.
+const previewOf = async (act, as = () => true) => {
+  const [response] = await Promise.all([
+    page.waitForResponse((r) => r.url().endsWith('/v1/previews') && as(r.request().postDataJSON().handles[0])),
+    act(),
+  ]);
+  assert.equal(response.status(), 200, await response.text());
+  return response.request().postDataJSON();
+};
+const shiftOf = ({ source, target }) => target.map((x, i) => x - source[i]);
+
+describe('the gizmo', () => {
+  test('moves along one axis by its arrow, and says by how much', async () => {
+    await take();
+    const [x, y] = await middle('gizmo-move-x');
+    const { selection, handles } = await previewOf(() => hand.drag([x + 10, y], [x + 110, y + 30]), (handle) => shiftOf(handle)[0] > 0.2);
+    assert.equal(selection.length, 1);
+    const [along, ...aside] = shiftOf(handles[0]);
+    assert.ok(aside.every((a) => Math.abs(a) < 1e-9), `${aside}`);
+    await hand.state('moved');
+    const [shown] = await numbers('shift');
+    assert.ok(shown >= along - 1e-4, `${shown} shown, ${along} asked for on the way`);
+    await hand.shot('hands-moved');
+    await page.keyboard.press('Control+z');
+    assert.deepEqual(await numbers('shift'), [0, 0, 0], 'one step');
+  });
+
+  test('turns by a ring, and by arrow keys, in the frame that was chosen', async () => {
+    await take();
+    await page.keyboard.press('g');
+    await id('gizmo-turn-y').focus();
+    await page.keyboard.press('ArrowRight');
+    await page.keyboard.press('Shift+ArrowRight');
+    assert.deepEqual(await numbers('turn'), [0, 9, 0]);
+    await page.keyboard.press('w');
+    assert.equal(await id('frame-view').getAttribute('aria-pressed'), 'true');
+    const ring = await id('gizmo-turn-view').boundingBox();
+    const [cx, cy, r] = [ring.x + ring.width / 2, ring.y + ring.height / 2, 0.5 * (ring.width - 20)];
+    const before = await numbers('turn');
+    await hand.drag([cx + r, cy], [cx, cy - r]);
+    const after = await numbers('turn');
+    assert.ok(after[2] - before[2] > 60 && after[2] - before[2] < 120, `from ${before} to ${after}: a quarter of a turn`);
+    await hand.shot('hands-turned');
+  });
+
+  test('takes all of it as numbers, and what it is joined to is said', async () => {
+    await take();
+    const type = async (name, value) => {
+      await id(name).fill(value);
+      await id(name).blur();
+    };
+    await type('shift-x', '-0.4');
+    await type('turn-y', '90');
+    await id('attach-free').click();
+    const { attach, handles } = await previewOf(() => type('size', '1.5'), ({ scale }) => scale === 1.5);
+    assert.equal(attach, 'free');
+    assert.deepEqual([handles[0].scale, handles[0].rotation.map((x) => Number(x.toFixed(6)))], [1.5, [0.707107, 0, 0.707107, 0]]);
+    await id('attach-answer').getByText('Comes off').waitFor();
+    await page.waitForFunction(() => /^p\d/.test(document.querySelector('[data-testid=view]').dataset.version));
+    await hand.shot('hands-numbers');
+    await type('turn-y', '0');
+    await type('size', '1');
+    assert.deepEqual(await numbers('turn'), [0, 0, 0]);
+    assert.deepEqual((await numbers('shift')).map((x) => Number(x.toFixed(4))), [-0.4, 0, 0], 'about its middle: that is where it was');
+  });
+
+  test('sizes by its knob', async () => {
+    await take();
+    await id('gizmo-tool-size').click();
+    const { x, y, width } = await id('gizmo-size').boundingBox();
+    await hand.drag([x + width - 16, y + 16], [x + width + 44, y - 44]);
+    assert.ok(Number(await id('size').inputValue()) > 1.3, await id('size').inputValue());
+  });
+
+  test('is that of a handle, too', async () => {
+    await id('hand-handle').click();
+    await page.mouse.click(...await hand.onScreen(mug));
+    await id('gizmo-move-y').focus();
+    await page.keyboard.press('ArrowLeft');
+    const [x, y, z] = await numbers('shift');
+    assert.ok(x === 0 && y < 0 && z === 0, `${[x, y, z]}`);
+    await id('handle-0-target').waitFor();
+  });
+});
+
+describe('depth', () => {
+  test('a thing that is dragged on surfaces stands on the table wherever the pointer is on it', async () => {
+    const at = await take();
+    await id('constraint-surface').click();
+    await hand.drag(at, [at[0] - 260, at[1] + 30]);
+    await hand.state('moved');
+    const [x, y, z] = await numbers('shift');
+    assert.ok(x < -0.3, `${[x, y, z]}`);
+    assert.ok(Math.abs(y) < 0.12, `it neither floats nor sinks: ${y}`);
+    await id('ghost').and(page.locator('[d]')).waitFor();
+    await id('drop-line').and(page.locator('[d]')).waitFor();
+    const [drop, ghost] = await Promise.all(['drop-line', 'ghost'].map((name) => id(name).boundingBox()));
+    assert.ok(Math.abs(drop.y + drop.height - ghost.y - ghost.height) < 40, `down to the table it stands on: ${JSON.stringify({ drop, ghost })}`);
+    await hand.shot('hands-surface');
+  });
+
+  test('a click on what a preview shows hits what is seen', async () => {
+    const at = await take();
+    await hand.drag(at, [at[0] - 320, at[1] - 60]);
+    await page.waitForFunction(() => /^p\d/.test(document.querySelector('[data-testid=view]').dataset.version));
+    const [response] = await Promise.all([
+      page.waitForResponse((r) => r.url().endsWith('/pick') && r.request().postDataJSON().x > 100),
+      page.mouse.click(...at),
+    ]);
+    assert.match(response.url(), /versions\/p\d+\/pick$/, 'the preview, where the mug is gone');
+    await page.waitForFunction(() => document.querySelector('[data-testid=thing-bar]').dataset.state === 'taken');
+    const { point } = await response.json();
+    const [step] = await id('selection-steps').locator('li').allTextContents();
+    assert.match(step, /a whole thing/);
+    assert.ok(Math.hypot(...point.map((x, i) => x - mug[i])) > 0.1, `${point} is not the mug's`);
+  });
+
+  test('a handle behind a thing is drawn as hidden', async () => {
+    await id('hand-handle').click();
+    await page.mouse.click(...await hand.onScreen(mug));
+    await id('handle-card-0').waitFor();
+    assert.equal(await id('handle-0-source').getAttribute('data-behind'), null);
+    await id('look-z').focus();
+    await page.keyboard.press('Enter');
+    await page.waitForFunction(() => document.querySelector('[data-testid=handle-0-source]').hasAttribute('data-behind'));
+    await hand.shot('hands-behind');
+  });
+});
+
+describe('the view', () => {
+  test('looks along an axis of the widget, about the same point', async () => {
+    const before = (await hand.looksFrom()).camera;
+    await id('look-minus-y').click();
+    const { camera } = await hand.looksFrom();
+    assert.deepEqual(camera.target, before.target);
+    const away = camera.eye.map((x, i) => x - camera.target[i]);
+    assert.ok(away[1] < 0 && Math.hypot(away[0], away[2]) < 1e-6, `from above: ${away}`);
+  });
+
+  test('up is as the cameras were held, can be flipped, and told by three clicks on the table', async () => {
+    const up = async () => (await service.client.get(`/v1/scenes/${scene.id}`)).json().up;
+    const saved = () => page.waitForResponse((r) => r.request().method() === 'PATCH');
+    const choose = async (name) => {
+      await id('up-menu').click();
+      await id(name).click();
+    };
+    await Promise.all([saved(), choose('flip-up')]);
+    assert.ok((await up())[1] > 0.99, 'the table of the demo scene is level: y points down');
+    await Promise.all([saved(), choose('reset-up')]);
+    assert.equal(await up(), null);
+    await choose('floor-up');
+    await id('hint').getByText('three places').waitFor();
+    const table = [[-1, 0.05, -0.9], [0.6, 0.05, -0.9], [1.9, 0.05, 0.2]];
+    const places = [];
+    for (const point of table) places.push(await hand.onScreen(point));
+    for (const [i, place] of places.entries()) {
+      const picked = page.waitForResponse((r) => r.url().endsWith('/pick'));
+      const done = i === 2 ? saved() : null;
+      await page.mouse.click(...place);
+      await picked;
+      await done;
+      if (i < 2) await id('hint').getByText(`${2 - i} more`).waitFor();
+    }
+    const found = await up();
+    assert.ok(found[1] < -0.98, `${found}`);
+    await Promise.all([saved(), choose('reset-up')]);
+  });
+
+  test('a scene without cameras is seen whole when it is opened', async () => {
+    const other = await service.client.upload(demo.ply, { name: 'no cameras' });
+    await page.evaluate((name) => (location.hash = `#/scenes/${name}`), other.id);
+    await page.waitForFunction(() => document.querySelector('[data-testid=view-select]').textContent.includes('Virtual'));
+    await hand.shown(0);
+    for (const corner of [mug, [-1.4, 0.05, -0.8]]) {
+      const [x, y] = await hand.onScreen(corner);
+      const box = await id('view').boundingBox();
+      assert.ok(x > box.x && x < box.x + box.width && y > box.y && y < box.y + box.height, `${corner} at ${[x, y]}`);
+    }
+    await service.client.delete(`/v1/scenes/${other.id}`);
+  });
+});
+
+describe('shapes', () => {
+  /// The selection that is asked for when something is done.
+  const asked = async (act) => (await Promise.all([page.waitForResponse((r) => r.url().endsWith('/select')), act()]))[0].request().postDataJSON().selection;
+  const settled = () => page.waitForFunction(() => {
+    const { count, waits } = document.querySelector('[data-testid=selection-count]').dataset;
+    return count !== undefined && waits === undefined;
+  });
+
+  test('a sphere is drawn out, made larger by its dot, and moved by the gizmo', async () => {
+    await page.keyboard.press('s');
+    await page.keyboard.press('5');
+    const at = await hand.onScreen(mug);
+    const [{ sphere }] = await asked(() => hand.drag(at, [at[0] + 50, at[1]]));
+    assert.ok(Math.hypot(...sphere.center.map((x, i) => x - mug[i])) < 0.3, `${sphere.center}`);
+    const few = await hand.count();
+    const dot = await middle('shape-radius-dot');
+    await hand.drag(dot, [dot[0], dot[1] - 40]);
+    await settled();
+    const radius = Number(await id('shape-radius').inputValue());
+    assert.ok(radius > 1.4 * sphere.radius, `${radius} was ${sphere.radius}`);
+    assert.ok(await hand.count() > few);
+    await hand.shot('hands-sphere');
+    await id('gizmo-move-x').focus();
+    const [{ sphere: moved }] = await asked(() => page.keyboard.press('ArrowLeft'));
+    assert.ok(moved.center[0] < sphere.center[0] && moved.center[1] === sphere.center[1]);
+    await page.keyboard.press('Control+z');
+    await page.keyboard.press('Control+z');
+    assert.equal(Number(await id('shape-radius').inputValue()).toFixed(4), sphere.radius.toFixed(4), 'a drag is one step');
+  });
+
+  test('a box has faces to pull and numbers, and is turned', async () => {
+    await page.keyboard.press('s');
+    await page.keyboard.press('6');
+    const at = await hand.onScreen(mug);
+    const [{ box }] = await asked(() => hand.drag(at, [at[0] + 60, at[1]]));
+    const face = await middle('shape-minus-x');
+    await hand.drag(face, [face[0] - 100, face[1]]);
+    await settled();
+    const [width, height] = await numbers('shape-size');
+    assert.ok(width > box.size[0] + 0.1 && Math.abs(height - box.size[1]) < 1e-3, `${[width, height]}, was ${box.size}`);
+    await id('shape-minus-y').focus();
+    await page.keyboard.press('ArrowUp');
+    await id('shape-turn-y').fill('30');
+    const last = await asked(() => id('shape-turn-y').blur());
+    assert.ok(Math.abs(last.at(-1).box.rotation[2] - Math.sin(Math.PI / 12)) < 1e-9);
+    assert.ok(last.at(-1).box.size[1] > box.size[1]);
+    await settled();
+    await hand.shot('hands-box');
+    await id('clear-selection').click();
+  });
+});
