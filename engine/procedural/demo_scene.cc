@@ -65,6 +65,8 @@ Result<void> validate(const DemoOptions& options) {
   if (options.views < 1 || options.views > 1000) return bad("views", "1 to 1000", options.views);
   if (options.width < 16 || options.width > 16384) return bad("width", "16 to 16384 pixels", options.width);
   if (options.height < 16 || options.height > 16384) return bad("height", "16 to 16384 pixels", options.height);
+  const double shift = glm::length(options.ball_shift);
+  if (!(shift <= max_ball_shift)) return bad("ball-shift", "three numbers, together no longer than 100", shift);  // NaN
   return {};
 }
 
