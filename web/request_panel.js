@@ -5,6 +5,7 @@ import { attrs, h, problemPlace, problemText, showProblem, text } from "./dom.js
 import { choice, labelled, pointField, segments, toggle } from "./fields.js";
 import { bytes, count, counted, duration, gaussians } from "./format.js";
 import { paramFields } from "./params.js";
+import { buildPresets, runPresets } from "./presets.js";
 import { changesScene, isStated, partOf, readRequests } from "./requests.js";
 import { whatMoves } from "./selection.js";
 
@@ -16,9 +17,6 @@ const CONSTRAINTS = [
   ["z", "Z", "Along the z axis (Z)"],
   ["normal", "Normal", "Along the surface normal where the handle was placed (N)"],
 ];
-
-/** Presets that make sense for a run: `preview` is what the Preview button does. */
-const runPresets = (info) => (info?.presets ?? ["draft", "standard", "paper"]).filter((name) => name !== "preview");
 
 export function buildRequestPanel(editor) {
   const { store } = editor;
@@ -153,7 +151,7 @@ export function buildRequestPanel(editor) {
   );
   const estimate = h(
     "button",
-    { type: "button", testid: "estimate", title: "What a run will take", onclick: () => editor.estimate() },
+    { type: "button", testid: "estimate", title: "What a run will take", onclick: () => (presets.ask(), editor.estimate()) },
     "Estimate",
   );
   const run = h("button", { type: "button", class: "primary", testid: "run", onclick: () => editor.run() }, "Run edit");
@@ -172,11 +170,13 @@ export function buildRequestPanel(editor) {
     h("div", { class: "row between" }, files, h("div", {}, auto.element, repair.element)),
     importProblem,
   );
+  const presets = buildPresets(editor);
   const footer = h(
     "div",
     { class: "footer" },
     answer,
     problem,
+    presets.element,
     h("div", { class: "row buttons" }, preview, estimate, run),
   );
 
@@ -219,7 +219,7 @@ export function buildRequestPanel(editor) {
     },
   );
 
-  store.watch(["selection", "selectionAnswer"], (state) => text(moving, whatMoves(state)));
+  store.watch(["selection", "selectionAnswer", "heal", "healing"], (state) => text(moving, whatMoves(state)));
   store.watch(
     [
       "handles",

@@ -21,7 +21,7 @@ import { shownVersion } from "./editor.js";
 import { AdaptiveSide, FrameQueue, Recent, serverTime } from "./frames.js";
 import { Overlay } from "./overlay.js";
 import { partOf } from "./requests.js";
-import { clicksOf, proposalOf, thinned } from "./selection.js";
+import { clicksOf, listOf, proposalOf, thinned } from "./selection.js";
 import { add, sub } from "./vectors.js";
 
 // All of these are choices, tried by hand.
@@ -35,7 +35,7 @@ const THING_PX = 14; // A thing is taken hold of within this of its middle, howe
 const SKETCH_PX = 2; // A line that is drawn has a corner this often at most.
 const MAX_CACHED_PICTURES = 6; // Enough to go back and forth between two versions and three layers.
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }; // Right, down.
-const CONTROLS = "button, a, input, select"; // What lies on the picture and is no part of it.
+const CONTROLS = "button, a, input, select, details"; // What lies on the picture and is no part of it.
 const THUMBNAIL = { width: 320, height: 200 };
 
 /** How much a turn of the wheel multiplies by. */
@@ -85,7 +85,7 @@ export class Viewer {
       () => this.refresh(),
     );
     store.watch(["scene"], ({ scene }) => this.#sceneChanged(scene));
-    store.watch(["handles", "selected", "selection", "selectMode", "region", "problem", "pose"], () =>
+    store.watch(["handles", "selected", "selection", "heal", "healing", "selectMode", "region", "problem", "pose"], () =>
       this.#drawOverlay(),
     );
     store.watch(["selectMode", "selectTool", "thingMode", "brushRadius"], () => this.#toolChanged());
@@ -219,6 +219,7 @@ export class Viewer {
       "data-selection": job.selection,
       "data-quality": job.complete ? "full" : "moving",
     });
+    this.#view.dispatchEvent(new CustomEvent("shown", { detail: job }));
     const time = ms === null ? "" : ` · ${Math.round(ms)} ms`;
     text(byId("picture-size"), `${job.size.width} × ${job.size.height}${time}`);
   }
@@ -289,7 +290,7 @@ export class Viewer {
     }));
     this.#overlay.draw(camera, items, {
       region,
-      clicks: selectMode ? clicksOf(selection) : [],
+      clicks: selectMode ? clicksOf(listOf(this.#state)) : [],
       spheres: selection.length === 0,
     });
   }
