@@ -2,8 +2,10 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "server/http/negotiation.h"
+#include "server/service/page_text.h"
 
 namespace server::service::routes {
 namespace {
@@ -34,8 +36,10 @@ Reply file_reply(const std::string& name, std::string_view bytes, const std::str
 
 void add_page(http::Router& router, const std::vector<EmbeddedFile>& page) {
   for (const EmbeddedFile& file : page) {
-    const auto handler = [name = std::string(file.name), bytes = file.bytes,
-                          etag = http::etag_of(file.bytes)](const Call&) -> Result<Reply> {
+    std::string text = page_text(file.name, file.bytes);
+    const std::string tag = http::etag_of(text);
+    const auto handler = [name = std::string(file.name), bytes = std::move(text),
+                          etag = tag](const Call&) -> Result<Reply> {
       Reply reply = file_reply(name, bytes, etag);
       reply.headers = {{"Content-Security-Policy", page_policy},
                        {"Referrer-Policy", "no-referrer"},
