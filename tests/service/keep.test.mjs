@@ -2,9 +2,10 @@
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import { createRequire } from 'node:module';
+import path from 'node:path';
 import { after, before, describe, test } from 'node:test';
 import { handOn, launch, openPage, patience } from './support/browser.mjs';
-import { Service } from './support/program.mjs';
+import { root, Service } from './support/program.mjs';
 import { datasetZip, demoScene } from './support/scenes.mjs';
 
 const ball = [-0.28, -0.21, -0.62];
@@ -290,6 +291,45 @@ describe('a run', () => {
     await id('confirm-yes').click();
     await page.locator('[data-testid^="edit-e"][data-state=cancelled]').waitFor();
     assert.deepEqual(complaints, []);
+  });
+});
+
+describe('a request from a file', () => {
+  let desk, page, id, hand, complaints;
+  before(async () => {
+    desk = await serviceWithScene();
+    ({ page, id, hand, complaints } = await opened(desk));
+  });
+  after(async () => {
+    await page?.context().close();
+    await desk?.service.stop();
+  });
+  const previewed = () => page.waitForFunction(() => /^p\d/.test(document.querySelector('[data-testid=view]').dataset.version));
+
+  test('as released with 3DGS-Drag is carried out on the demo scene, which it is of', async () => {
+    await id('import-file').setInputFiles(path.join(root, 'proto/examples/released_config.json'));
+    await previewed();
+    await id('preview-answer').getByText('Preview of').waitFor();
+    assert.equal(await id('handle-2').count(), 1);
+    assert.ok(await id('region-on').isChecked());
+  });
+
+  test('whose box leaves nothing to move says so on the picture, whatever the panel shows, and the box can go', async () => {
+    await id('settings').locator('summary').click();
+    await id('region-center-x').fill('50');
+    await id('region-center-x').blur();
+    await id('notes').getByText('Refused').waitFor();
+    await id('tab-button-scene').click();
+    await hand.shot('refused');
+    assert.ok(await id('note-no-region').isVisible());
+    assert.deepEqual(await violations(page), []);
+    await id('note-no-region').click();
+    await previewed();
+    await id('note-no-region').waitFor({ state: 'hidden' });
+    await page.keyboard.press('Control+z');
+    assert.ok(await id('region-on').isChecked(), 'undo covers the box');
+    await id('hand-thing').click();
+    assert.deepEqual(complaints.filter((text) => !/status of 422/.test(text)), []);
   });
 });
 
