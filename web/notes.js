@@ -29,6 +29,7 @@ export function buildNotes(editor, viewer) {
   const mark = h("div", { id: "open-mark", hidden: true, testid: "open-mark" }, h("span", {}, "made up: no camera saw it"));
   byId("view").append(mark, details);
 
+  let told = null;
   const update = () => {
     const { state } = store;
     if (!state.scene) return (details.hidden = mark.hidden = true);
@@ -37,7 +38,8 @@ export function buildNotes(editor, viewer) {
     details.hidden = all === 0;
     text(summary, refused ? "Refused" : all === 1 ? "1 note" : `${all} notes`);
     details.classList.toggle("bad", refused !== null);
-    if (refused) details.open = true;
+    if (refused && refused !== told) details.open = true; // Once: who closes it has read it.
+    told = refused;
     list.replaceChildren(...lines(editor, { notes, open, refused }));
     const view = viewOf(state);
     const here = open.find((one) => one.view === view?.name && one.box);
@@ -62,10 +64,9 @@ function lines(editor, { notes, open, refused }) {
   }
   said.push(...notes.map((note) => h("p", {}, `${note[0].toUpperCase()}${note.slice(1)}`)));
   const [worst] = open;
-  if (worst) {
-    said.push(h("p", {}, `Made up, since no camera saw it: ${share(worst.share, 1)} of what the part has left, in ${worst.view}.`));
-    if (editor.state.views.some(({ name }) => name === worst.view))
-      said.push(button("Look there", "note-look", () => editor.lookFrom(worst.view)));
+  if (worst && editor.state.views.some(({ name }) => name === worst.view)) {
+    said.push(h("p", {}, `Made up in ${worst.view}: ${share(worst.share, 1)} of what the part has left there.`));
+    said.push(button("Look there", "note-look", () => editor.lookFrom(worst.view)));
   }
   return said;
 }
