@@ -837,6 +837,7 @@ export class Editor {
         run: () => this.showVersion(edit.result_version),
       });
     this.#finish(edit);
+    this.#dropDrafts({ version: edit.result_version, base: edit.version });
     say(`Version ${edit.result_version} is ready. ${HOLD} to compare it with version ${edit.version}.`);
   }
 

@@ -27,7 +27,8 @@ export function buildNotes(editor, viewer) {
   const list = h("div", { class: "stack" });
   const details = h("details", { id: "notes", testid: "notes", hidden: true }, summary, list);
   const mark = h("div", { id: "open-mark", hidden: true, testid: "open-mark" }, h("span", {}, "made up: no camera saw it"));
-  byId("view").append(mark, details);
+  byId("chips").append(details);
+  byId("view").append(mark);
 
   let told = null;
   const update = () => {

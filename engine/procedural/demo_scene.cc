@@ -137,6 +137,11 @@ DemoScene make_demo_scene(const DemoOptions& options) {
   demo.object = std::move(surfels.object);
   for (const Object& object : still_life.objects) demo.object_names.push_back(object.name);
   demo.drags = std::move(still_life.drags);
+  if (options.ball_shift != DVec3(0.0)) {
+    SuggestedDrag::Handle& ball = demo.drags.front().handles.front();  // from where it stands now, back to its place
+    ball.target = ball.source;
+    ball.source += options.ball_shift;
+  }
   return demo;
 }
 

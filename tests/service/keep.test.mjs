@@ -504,3 +504,82 @@ describe('photos', () => {
     assert.deepEqual(complaints, []);
   });
 });
+
+describe('by fingers, on a phone', () => {
+  const phone = { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true };
+  let desk, page, id, hand, complaints, touch;
+  before(async () => {
+    desk = await serviceWithScene();
+    await ballMoved(desk);
+    ({ page, id, hand, complaints } = await opened(desk, phone));
+    const session = await page.context().newCDPSession(page);
+    touch = async (...places) => {
+      const send = (type, points) => session.send('Input.dispatchTouchEvent', { type, touchPoints: points.map(([x, y]) => ({ x, y })) });
+      await send('touchStart', [places[0]]);
+      for (const place of places.slice(1)) await send('touchMove', [place]);
+      await send('touchEnd', []);
+    };
+  });
+  after(async () => {
+    await page?.context().close();
+    await desk?.service.stop();
+  });
+  /// No rule for access is broken, and all that can be pressed is large enough and within the page.
+  const check = async (state) => {
+    await hand.shot(`phone-${state}`);
+    assert.deepEqual(await violations(page), [], state);
+    assert.deepEqual(await page.evaluate(() => [...document.querySelectorAll('button, a[href], select, input:not([type=file]), summary')]
+      .filter((element) => element.checkVisibility() && !element.closest('label'))
+      .map((element) => ({ element, box: element.getBoundingClientRect() }))
+      .filter(({ box }) => box.width > 0 && (box.height < 24 || box.width < 24 || box.right > innerWidth + 1))
+      .map(({ element, box }) => `${element.dataset.testid ?? element.outerHTML.slice(0, 80)}: ${box.width}x${box.height} at ${box.left}`)), [], state);
+  };
+
+  test('the line between two versions is moved, and the rest of the picture turns', async () => {
+    await id('compare-mode').selectOption('slider');
+    await compared(page, 'slider');
+    const box = await id('view').boundingBox();
+    const middle = [box.x + box.width / 2, box.y + 0.8 * box.height];
+    await touch(middle, ...[0.6, 0.7, 0.8].map((part) => [box.x + part * box.width, middle[1]]));
+    assert.ok(Math.abs(Number(await id('compare-split').inputValue()) - 80) < 4, await id('compare-split').inputValue());
+    await check('slider');
+    await touch([box.x + 60, middle[1]], [box.x + 80, middle[1]], [box.x + 120, middle[1]]);
+    await page.waitForFunction(() => document.querySelector('[data-testid=view-select]').value === '');
+    await hand.shown(1);
+    await id('compare-mode').selectOption('difference');
+    await compared(page, 'difference');
+    await check('difference');
+    await id('compare-mode').selectOption('');
+  });
+
+  test('what is healed is painted', async () => {
+    await id('hand-heal').tap();
+    await id('select-tool-brush').tap();
+    const box = await id('view').boundingBox();
+    await touch([box.x + 150, box.y + 0.7 * box.height], [box.x + 170, box.y + 0.7 * box.height], [box.x + 200, box.y + 0.7 * box.height]);
+    await hand.count();
+    await check('heal');
+    await id('undo').tap();
+    await id('no-selection').waitFor();
+    await id('hand-thing').tap();
+  });
+
+  test('versions are named and deleted, and an edit is looked at step by step', async () => {
+    await id('tab-button-scene').tap();
+    await id('version-1-name').tap();
+    await id('ask-input').fill('by thumb');
+    await id('ask-ok').tap();
+    await id('version-1').getByText('by thumb').waitFor();
+    await check('versions');
+    await id('tab-button-edits').tap();
+    await id('thumb-1-0').tap();
+    await page.waitForFunction(() => document.querySelector('[data-testid=scrub-picture]').naturalWidth > 0);
+    await check('steps');
+    await page.getByRole('button', { name: 'Close' }).tap();
+    await id('tab-button-scene').tap();
+    await id('version-1-delete').tap();
+    await id('confirm-yes').tap();
+    await hand.shown(0);
+    assert.deepEqual(complaints, []);
+  });
+});

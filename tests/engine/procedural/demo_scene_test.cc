@@ -74,6 +74,9 @@ TEST(DemoScene, WithItsBallCarriedElsewhereIsTheSameButForThatAndClosedAllOver) 
   }
   EXPECT_TRUE(below_pot) << "the table, where the pot stands on it";
   EXPECT_TRUE(below_ball) << "the side that the ball lay on";
+  const auto &there = demo.drags[0].handles[0], &back = after.drags[0].handles[0];
+  EXPECT_EQ(back.source, there.source + carried.ball_shift) << "the drag takes hold of it where it is";
+  EXPECT_EQ(back.target, there.source);
 }
 
 TEST(DemoScene, LooksDifferentFromEachSideOnGlazedThingsOnly) {
