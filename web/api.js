@@ -108,7 +108,7 @@ export const createSession = (token) =>
   send("/v1/session", { method: "POST", headers: { Authorization: `Bearer ${token}` } });
 export const deleteSession = () => send("/v1/session", { method: "DELETE" });
 
-export const scenes = async () => (await json("/v1/scenes")).scenes;
+export const scenes = async (signal) => (await json("/v1/scenes", { signal })).scenes;
 export const scene = (id, signal) => json(`/v1/scenes/${part(id)}`, { signal });
 /** Server-sent events: "scene", "edit", "alive" each second, "gone". */
 export const sceneEvents = (id) => new EventSource(`/v1/scenes/${part(id)}/events`);

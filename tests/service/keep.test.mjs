@@ -447,6 +447,14 @@ describe('a service that goes away', () => {
     await page.keyboard.press(']');
     await page.waitForFunction(() => document.querySelector('[data-testid=view-select]').value === 'view_01.png');
     await hand.shown(0);
+    await id('home-link').click();
+    await id(`scene-${desk.scene}`).waitFor();
+    desk.service.process.kill('SIGSTOP');
+    await id('scenes-problem').getByText('does not answer').waitFor();
+    desk.service.process.kill('SIGCONT');
+    await id('scenes-problem').waitFor({ state: 'hidden' });
+    const other = await desk.service.client.upload(demo.ply, { name: 'theirs' });
+    await id(`scene-${other.id}`).waitFor();
     await page.context().close();
     await desk.service.stop();
   });
