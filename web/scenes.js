@@ -2,7 +2,7 @@
 
 import * as api from "./api.js";
 import { askConfirmation, askText } from "./dialogs.js";
-import { asking, h, keyedList, problemPlace, showProblem, text } from "./dom.js";
+import { asking, button, h, keyedList, problemPlace, showProblem, text } from "./dom.js";
 import { bytes, count, counted, gaussians, nameOfFile, when } from "./format.js";
 import { pathForm, showUpload } from "./uploads.js";
 
@@ -162,8 +162,8 @@ function card(id, { memory, open, refresh }) {
     h(
       "div",
       { class: "row card-actions" },
-      h("button", { type: "button", class: "small", testid: "scene-rename", onclick: rename }, "Rename"),
-      h("button", { type: "button", class: "small quiet-danger", testid: "scene-delete", onclick: remove }, "Delete"),
+      button("Rename", "scene-rename", rename),
+      button("Delete", "scene-delete", remove, { class: "small quiet-danger" }),
     ),
   );
   return {

@@ -1,6 +1,6 @@
 // Selecting, for the eye and the hand: the row of tools above the picture, and in the panel what is selected.
 
-import { attrs, byId, h, keyedList, problemPlace, showProblem, text } from "./dom.js";
+import { attrs, button, byId, h, iconButton, keyedList, problemPlace, showProblem, text } from "./dom.js";
 import { choice, segments, toggle } from "./fields.js";
 import { count, gaussians } from "./format.js";
 import { warnings } from "./request_panel.js";
@@ -50,16 +50,11 @@ export function buildTools(editor) {
   const tool = row("Select by", "select-tool", SELECT_TOOLS, (value) => selecting.use(value));
   const op = choice({ label: "What is done with it", testid: "select-op", options: OPS, changed: set("selectOp") });
   const kind = row("A click is", "click-kind", KINDS, set("clickKind"));
-  const next = h(
-    "button",
-    {
-      type: "button",
-      class: "small",
-      testid: "next-thing",
-      title: "The next click begins another thing, instead of saying more of this one",
-      onclick: () => store.set({ nextThing: !store.state.nextThing, clickKind: "inside" }),
-    },
+  const next = button(
     "Next thing",
+    "next-thing",
+    () => store.set({ nextThing: !store.state.nextThing, clickKind: "inside" }),
+    { title: "The next click begins another thing, instead of saying more of this one" },
   );
   const depth = row("How deep", "select-depth", DEPTHS, set("selectDepth"));
   const size = h("input", { type: "range", min: BRUSH.low, max: BRUSH.high, step: 1, testid: "brush-radius" });
@@ -75,8 +70,8 @@ export function buildTools(editor) {
     brushSize,
     depth.element,
   );
-  const undo = step("↶", "undo", "Undo (Ctrl + Z)", () => editor.undo());
-  const redo = step("↷", "redo", "Redo (Ctrl + Shift + Z)", () => editor.redo());
+  const undo = iconButton("↶", "undo", "Undo (Ctrl + Z)", () => editor.undo());
+  const redo = iconButton("↷", "redo", "Redo (Ctrl + Shift + Z)", () => editor.redo());
   byId("tools").append(
     hand.element,
     tools,
@@ -105,20 +100,16 @@ export function buildTools(editor) {
   });
 }
 
-const step = (label, testid, title, onclick) =>
-  h("button", { type: "button", class: "icon", title, "aria-label": title, testid, onclick }, label);
-
 /** What is selected, in the panel. */
 export function buildSelectionPanel(editor) {
   const { store, selecting } = editor;
-  const button = (label, testid, title, onclick) =>
-    h("button", { type: "button", class: "small", testid, title, onclick }, label);
-  const invert = button("Invert", "invert-selection", "Select all that is not selected now", () => selecting.invert());
-  const wider = button("Wider", "expand-selection", "Take along what is next to it, all around", () => selecting.spread(1));
-  const narrower = button("Narrower", "shrink-selection", "Leave out what is at its edge, all around", () =>
+  const press = (label, testid, title, onclick) => button(label, testid, onclick, { title });
+  const invert = press("Invert", "invert-selection", "Select all that is not selected now", () => selecting.invert());
+  const wider = press("Wider", "expand-selection", "Take along what is next to it, all around", () => selecting.spread(1));
+  const narrower = press("Narrower", "shrink-selection", "Leave out what is at its edge, all around", () =>
     selecting.spread(-1),
   );
-  const clear = button("Clear", "clear-selection", "Select nothing", () => selecting.clear());
+  const clear = press("Clear", "clear-selection", "Select nothing", () => selecting.clear());
   const tinted = toggle({
     label: "Tint",
     testid: "tinted",

@@ -1,6 +1,6 @@
 // Above the picture: versions, views, layers, the comparison. On it: what it shows. Below it: what it took.
 
-import { attrs, byId, h, text } from "./dom.js";
+import { attrs, byId, h, iconButton, text } from "./dom.js";
 import { parentOf, shownVersion } from "./editor.js";
 import { choice, segments } from "./fields.js";
 import { gaussians } from "./format.js";
@@ -45,9 +45,6 @@ HINTS.rectangle = HINTS.lasso.map((text) => text.replace("Draw around", "Draw a 
 
 export function buildToolbar(editor, viewer) {
   const { store } = editor;
-  const icon = (label, testid, title, onclick) =>
-    h("button", { type: "button", class: "icon", testid, title, "aria-label": title, onclick }, label);
-
   const version = choice({
     label: "Version",
     testid: "version-select",
@@ -60,8 +57,8 @@ export function buildToolbar(editor, viewer) {
     options: [],
     changed: (value) => value && editor.lookFrom(value),
   });
-  const previous = icon("‹", "view-previous", "Previous view ([)", () => editor.stepView(-1));
-  const next = icon("›", "view-next", "Next view (])", () => editor.stepView(1));
+  const previous = iconButton("‹", "view-previous", "Previous view ([)", () => editor.stepView(-1));
+  const next = iconButton("›", "view-next", "Next view (])", () => editor.stepView(1));
   const layer = segments({
     label: "Layer",
     testid: "layer",
@@ -100,8 +97,8 @@ export function buildToolbar(editor, viewer) {
     h("div", { class: "row tight" }, compare, compareWith.element),
   );
   byId("view-tools").append(
-    icon("⊕", "focus", "Turn about the point under the pointer (F); here: about the middle", () => viewer.focusHere()),
-    icon("⌂", "reset-view", "Back to the start (R)", () => editor.home()),
+    iconButton("⊕", "focus", "Turn about the point under the pointer (F); here: about the middle", () => viewer.focusHere()),
+    iconButton("⌂", "reset-view", "Back to the start (R)", () => editor.home()),
   );
 
   const chip = h("span", { class: "chip", testid: "shown-chip" });
