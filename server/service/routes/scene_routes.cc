@@ -271,6 +271,52 @@ Result<Reply> get_file(const Call& call, SceneStore& store) {
   return reply;
 }
 
+void add_dataset_routes(http::Router& router, const SceneRouteDependencies& dependencies) {
+  SceneViews& views = dependencies.views;
+  router.add({.method = "PUT",
+              .path = "/v1/scenes/{id}/dataset",
+              .handler = [dependencies](const Call& call) { return put_dataset(call, dependencies); },
+              .body = http::Body::upload,
+              .queries = {}});
+  router.add({.method = "DELETE",
+              .path = "/v1/scenes/{id}/dataset",
+              .handler = [dependencies](const Call& call) { return delete_dataset(call, dependencies); },
+              .queries = {}});
+  router.add({.method = "GET",
+              .path = "/v1/scenes/{id}/photo",
+              .handler = [dependencies](const Call& call) { return get_photo(call, dependencies); },
+              .queries = {"view", "max_side"}});
+  router.add({.method = "GET",
+              .path = "/v1/scenes/{id}/views",
+              .handler = [&views](const Call& call) { return get_views(call, views); },
+              .queries = {}});
+}
+
+void add_version_routes(http::Router& router, const SceneRouteDependencies& dependencies) {
+  SceneStore& store = dependencies.store;
+  router.add({.method = "GET",
+              .path = "/v1/scenes/{id}/versions/{v}",
+              .handler = [&store](const Call& call) { return get_version(call, store); },
+              .queries = {}});
+  router.add({.method = "PATCH",
+              .path = "/v1/scenes/{id}/versions/{v}",
+              .handler = [&store](const Call& call) { return patch_version(call, store); },
+              .body = http::Body::json,
+              .queries = {}});
+  router.add({.method = "DELETE",
+              .path = "/v1/scenes/{id}/versions/{v}",
+              .handler = [dependencies](const Call& call) -> Result<Reply> {
+                const auto removed = dependencies.remove_version(call.path("id"), call.path("v"));
+                if (!removed) return propagate(removed);
+                return Reply::no_content();
+              },
+              .queries = {}});
+  router.add({.method = "GET",
+              .path = "/v1/scenes/{id}/versions/{v}/file",
+              .handler = [&store](const Call& call) { return get_file(call, store); },
+              .queries = {"format"}});
+}
+
 }  // namespace
 
 proto::Scene told(const SceneInfo& scene) {
@@ -292,7 +338,6 @@ proto::Scene told(const SceneInfo& scene) {
 
 void add_scene_routes(http::Router& router, const SceneRouteDependencies& dependencies) {
   SceneStore& store = dependencies.store;
-  SceneViews& views = dependencies.views;
   router.add({.method = "GET",
               .path = "/v1/scenes",
               .handler = [&store](const Call&) { return list_scenes(store); },
@@ -320,44 +365,8 @@ void add_scene_routes(http::Router& router, const SceneRouteDependencies& depend
                 return Reply::no_content();
               },
               .queries = {}});
-  router.add({.method = "PUT",
-              .path = "/v1/scenes/{id}/dataset",
-              .handler = [dependencies](const Call& call) { return put_dataset(call, dependencies); },
-              .body = http::Body::upload,
-              .queries = {}});
-  router.add({.method = "DELETE",
-              .path = "/v1/scenes/{id}/dataset",
-              .handler = [dependencies](const Call& call) { return delete_dataset(call, dependencies); },
-              .queries = {}});
-  router.add({.method = "GET",
-              .path = "/v1/scenes/{id}/photo",
-              .handler = [dependencies](const Call& call) { return get_photo(call, dependencies); },
-              .queries = {"view", "max_side"}});
-  router.add({.method = "GET",
-              .path = "/v1/scenes/{id}/views",
-              .handler = [&views](const Call& call) { return get_views(call, views); },
-              .queries = {}});
-  router.add({.method = "GET",
-              .path = "/v1/scenes/{id}/versions/{v}",
-              .handler = [&store](const Call& call) { return get_version(call, store); },
-              .queries = {}});
-  router.add({.method = "PATCH",
-              .path = "/v1/scenes/{id}/versions/{v}",
-              .handler = [&store](const Call& call) { return patch_version(call, store); },
-              .body = http::Body::json,
-              .queries = {}});
-  router.add({.method = "DELETE",
-              .path = "/v1/scenes/{id}/versions/{v}",
-              .handler = [dependencies](const Call& call) -> Result<Reply> {
-                const auto removed = dependencies.remove_version(call.path("id"), call.path("v"));
-                if (!removed) return propagate(removed);
-                return Reply::no_content();
-              },
-              .queries = {}});
-  router.add({.method = "GET",
-              .path = "/v1/scenes/{id}/versions/{v}/file",
-              .handler = [&store](const Call& call) { return get_file(call, store); },
-              .queries = {"format"}});
+  add_dataset_routes(router, dependencies);
+  add_version_routes(router, dependencies);
 }
 
 }  // namespace server::service::routes
