@@ -25,6 +25,7 @@ ordered_json encode(const SceneVersion& version, const std::string& scene) {
   return {{"version", version.version},
           {"parent", or_null(version.parent)},
           {"edit", or_null(version.edit)},
+          {"name", or_null(version.name)},
           {"created", version.created},
           {"gaussians", version.gaussians},
           {"disk_bytes", version.disk_bytes},
@@ -107,6 +108,13 @@ ScenePatch read_scene_patch(const JsonField& field) {
   return patch;
 }
 
+VersionPatch read_version_patch(const JsonField& field) {
+  const Members members(field, {"name"});
+  VersionPatch patch;
+  if (const auto f = members.required("name"); f && !f->is_null()) patch.name = read_name(*f);
+  return patch;
+}
+
 template <class T>
 Result<T> parse(std::string_view text, const JsonLimits& limits, T (*read)(const JsonField&)) {
   const auto document = parse_document(text, limits);
@@ -145,6 +153,9 @@ Result<PathSource> parse_dataset_source(std::string_view text, const JsonLimits&
 }
 Result<ScenePatch> parse_scene_patch(std::string_view text, const JsonLimits& limits) {
   return parse(text, limits, read_scene_patch);
+}
+Result<VersionPatch> parse_version_patch(std::string_view text, const JsonLimits& limits) {
+  return parse(text, limits, read_version_patch);
 }
 
 }  // namespace proto

@@ -17,6 +17,7 @@ struct SceneVersion {
   int version = 0;
   std::optional<int> parent;  ///< Version that was edited; none for version 0.
   std::string edit;           ///< Id of the edit that made it; empty for version 0.
+  std::string name;           ///< Empty: it has none.
   std::string created;
   std::size_t gaussians = 0;
   std::uint64_t disk_bytes = 0;  ///< What it takes beside version 0.
@@ -76,9 +77,15 @@ struct ScenePatch {
   bool operator==(const ScenePatch&) const = default;
 };
 
+/// What is to change about a version.
+struct VersionPatch {
+  std::string name;  ///< Empty: the name that it had is forgotten.
+};
+
 // All strict, as parse_edit_request(), with its errors.
 [[nodiscard]] Result<PathSource> parse_scene_source(std::string_view text, const JsonLimits& limits = {});
 [[nodiscard]] Result<PathSource> parse_dataset_source(std::string_view text, const JsonLimits& limits = {});
 [[nodiscard]] Result<ScenePatch> parse_scene_patch(std::string_view text, const JsonLimits& limits = {});
+[[nodiscard]] Result<VersionPatch> parse_version_patch(std::string_view text, const JsonLimits& limits = {});
 
 }  // namespace proto

@@ -108,17 +108,24 @@ export const createSession = (token) =>
   send("/v1/session", { method: "POST", headers: { Authorization: `Bearer ${token}` } });
 export const deleteSession = () => send("/v1/session", { method: "DELETE" });
 
-export const scenes = async () => (await json("/v1/scenes")).scenes;
-export const scene = (id) => json(`/v1/scenes/${part(id)}`);
+export const scenes = async (signal) => (await json("/v1/scenes", { signal })).scenes;
+export const scene = (id, signal) => json(`/v1/scenes/${part(id)}`, { signal });
+/** Server-sent events: "scene", "edit", "alive" each second, "gone". */
+export const sceneEvents = (id) => new EventSource(`/v1/scenes/${part(id)}/events`);
 export const uploadScene = (file, name, options) => upload("POST", `/v1/scenes?name=${part(name)}`, file, options);
 export const addScenePath = (path) => json("/v1/scenes", jsonBody("POST", { path }));
 export const patchScene = (id, patch) => json(`/v1/scenes/${part(id)}`, jsonBody("PATCH", patch));
 export const deleteScene = (id) => send(`/v1/scenes/${part(id)}`, { method: "DELETE" });
 export const uploadDataset = (id, file, options) => upload("PUT", `/v1/scenes/${part(id)}/dataset`, file, options);
 export const putDatasetPath = (id, path) => json(`/v1/scenes/${part(id)}/dataset`, jsonBody("PUT", { path }));
+export const deleteDataset = (id) => json(`/v1/scenes/${part(id)}/dataset`, { method: "DELETE" });
+export const photoUrl = (id, view, side) => `/v1/scenes/${part(id)}/photo?view=${part(view)}&max_side=${side}`;
 export const views = (id) => json(`/v1/scenes/${part(id)}/views`);
 
 const versionPath = (id, version) => `/v1/scenes/${part(id)}/versions/${part(version)}`;
+
+export const renameVersion = (id, version, name) => json(versionPath(id, version), jsonBody("PATCH", { name }));
+export const deleteVersion = (id, version) => send(versionPath(id, version), { method: "DELETE" });
 
 /** A picture: {blob, timing}, its Server-Timing. `body`: {camera, what, format, ...}. */
 export async function render(id, version, body, signal) {
@@ -140,22 +147,9 @@ export const createPreview = (request, signal) => json("/v1/previews", jsonBody(
 
 export const createEdit = (request, key) =>
   json("/v1/edits", jsonBody("POST", request, { headers: { "Idempotency-Key": key } }));
-export const estimateEdit = (request) => json("/v1/edits?validate_only=true", jsonBody("POST", request));
-export const edits = async (scene, limit = 30) => (await json(`/v1/edits?scene=${part(scene)}&limit=${limit}`)).edits;
-
-/** An edit and its ETag; null if it still is what that ETag names. */
-export async function edit(id, etag) {
-  const response = await send(`/v1/edits/${part(id)}`, etag ? { headers: { "If-None-Match": etag } } : {});
-  if (response.status === 304) return null;
-  try {
-    return { edit: await response.json(), etag: response.headers.get("ETag") };
-  } catch {
-    throw unreachable();
-  }
-}
-
-/** Server-sent events of an edit; each named "edit", its data an edit. */
-export const editEvents = (id) => new EventSource(`/v1/edits/${part(id)}/events`);
+export const estimateEdit = (request, signal) =>
+  json("/v1/edits?validate_only=true", jsonBody("POST", request, { signal }));
+export const edits = async (scene, signal) => (await json(`/v1/edits?scene=${part(scene)}&limit=30`, { signal })).edits;
 export const stopEdit = (id) => json(`/v1/edits/${part(id)}/stop`, { method: "POST" });
 export const cancelEdit = (id) => json(`/v1/edits/${part(id)}/cancel`, { method: "POST" });
 export const deleteEdit = (id) => send(`/v1/edits/${part(id)}`, { method: "DELETE" });

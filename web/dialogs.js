@@ -1,7 +1,7 @@
 // Questions, the token, and short messages.
 
 import * as api from "./api.js";
-import { byId, h, problemPlace, showProblem } from "./dom.js";
+import { byId, h, iconButton, problemPlace, showProblem } from "./dom.js";
 
 /** A short message at the foot of the page; read out by screen readers.
  *    kind    "good", "bad", or nothing
@@ -13,7 +13,7 @@ export function say(message, { kind = "", action = null, seconds = 6 } = {}) {
     { class: `toast ${kind}`, testid: "toast" },
     h("span", {}, message),
     action && h("button", { class: "small", onclick: () => (close(), action.run()) }, action.label),
-    h("button", { class: "icon", "aria-label": "Dismiss", onclick: close }, "✕"),
+    iconButton("✕", null, "Dismiss", close),
   );
   const all = byId("toasts");
   all.append(element);
@@ -21,114 +21,80 @@ export function say(message, { kind = "", action = null, seconds = 6 } = {}) {
   setTimeout(close, seconds * 1000);
 }
 
-function modal(element) {
-  document.body.append(element);
-  element.addEventListener("close", () => element.remove());
-  element.showModal();
-  return element;
+/** A dialog with a heading.
+ *    closes   whether it has a button for that alone
+ *    returns  the dialog, open */
+export function openDialog(testid, title, content, { closes = false, class: more = "" } = {}) {
+  const heading = h("h2", { id: `${testid}-title` }, title);
+  const close = iconButton("✕", null, "Close", () => dialog.close());
+  const dialog = h(
+    "dialog",
+    { class: `dialog ${more}`, testid, "aria-labelledby": `${testid}-title` },
+    closes ? h("div", { class: "row between" }, heading, close) : heading,
+    content,
+  );
+  document.body.append(dialog);
+  dialog.addEventListener("close", () => dialog.remove());
+  dialog.showModal();
+  return dialog;
 }
+
+/** A dialog that is answered: read(returnValue) once it is closed. */
+function asked(testid, title, content, read) {
+  const dialog = openDialog(testid, title, content((value) => dialog.close(value)));
+  return new Promise((resolve) => dialog.addEventListener("close", () => resolve(read(dialog.returnValue))));
+}
+
+const end = (...buttons) => h("div", { class: "row end" }, ...buttons);
 
 /** Asks before something that cannot be undone. */
-export function askConfirmation({ title, detail, yes, danger = true }) {
-  return new Promise((resolve) => {
-    const dialog = modal(
-      h(
-        "dialog",
-        { class: "dialog", testid: "confirm", "aria-labelledby": "confirm-title" },
-        h("h2", { id: "confirm-title" }, title),
-        h("p", {}, detail),
-        h(
-          "div",
-          { class: "row end" },
-          h("button", { testid: "confirm-no", onclick: () => dialog.close("no"), autofocus: true }, "Keep"),
-          h(
-            "button",
-            { class: danger ? "danger" : "primary", testid: "confirm-yes", onclick: () => dialog.close("yes") },
-            yes,
-          ),
-        ),
-      ),
-    );
-    dialog.addEventListener("close", () => resolve(dialog.returnValue === "yes"));
-  });
+export function askConfirmation({ title, detail, yes }) {
+  const content = (close) => [
+    h("p", {}, detail),
+    end(
+      h("button", { testid: "confirm-no", onclick: () => close("no"), autofocus: true }, "Keep"),
+      h("button", { class: "danger", testid: "confirm-yes", onclick: () => close("yes") }, yes),
+    ),
+  ];
+  return asked("confirm", title, content, (value) => value === "yes");
 }
 
-/** Asks for a line of text; null: given up. */
-export function askText({ title, label, value }) {
-  return new Promise((resolve) => {
-    const input = h("input", {
-      type: "text",
-      value,
-      maxlength: 200,
-      required: true,
-      testid: "ask-input",
-      id: "ask-input",
-    });
-    const dialog = modal(
-      h(
-        "dialog",
-        { class: "dialog", testid: "ask", "aria-labelledby": "ask-title" },
-        h(
-          "form",
-          { method: "dialog" },
-          h("h2", { id: "ask-title" }, title),
-          h("label", { class: "field" }, h("span", {}, label), input),
-          h(
-            "div",
-            { class: "row end" },
-            h("button", { type: "button", onclick: () => dialog.close() }, "Cancel"),
-            h("button", { class: "primary", value: "ok", testid: "ask-ok" }, "Save"),
-          ),
-        ),
+/** Asks for a line of text; null: given up.
+ *    optional  whether it may be empty */
+export function askText({ title, label, value, optional = false }) {
+  const id = "ask-input";
+  const input = h("input", { type: "text", value, maxlength: 200, required: !optional, testid: id, id });
+  const content = (close) =>
+    h(
+      "form",
+      { method: "dialog" },
+      h("label", { class: "field" }, h("span", {}, label), input),
+      end(
+        h("button", { type: "button", onclick: () => close("") }, "Cancel"),
+        h("button", { class: "primary", value: "ok", testid: "ask-ok" }, "Save"),
       ),
     );
-    input.select();
-    dialog.addEventListener("close", () => resolve(dialog.returnValue === "ok" ? input.value.trim() : null));
-  });
+  const answer = asked("ask", title, content, (value) => (value === "ok" ? input.value.trim() : null));
+  input.select();
+  return answer;
 }
 
 /** Asks to choose one of several; null: given up. */
 export function askChoice({ title, options }) {
-  return new Promise((resolve) => {
-    const dialog = modal(
-      h(
-        "dialog",
-        { class: "dialog", testid: "choose", "aria-labelledby": "choose-title" },
-        h("h2", { id: "choose-title" }, title),
-        h(
-          "div",
-          { class: "stack" },
-          options.map((o) => h("button", { onclick: () => dialog.close(o) }, o)),
-        ),
-        h("div", { class: "row end" }, h("button", { onclick: () => dialog.close() }, "Cancel")),
-      ),
-    );
-    dialog.addEventListener("close", () => resolve(options.includes(dialog.returnValue) ? dialog.returnValue : null));
-  });
+  const content = (close) => [
+    h("div", { class: "stack" }, options.map((o) => h("button", { onclick: () => close(o) }, o))),
+    end(h("button", { onclick: () => close("") }, "Cancel")),
+  ];
+  return asked("choose", title, content, (value) => (options.includes(value) ? value : null));
 }
 
-/** Pictures at their full size, side by side. */
-export function showPictures(title, pictures) {
-  const dialog = modal(
-    h(
-      "dialog",
-      { class: "dialog pictures", testid: "pictures", "aria-labelledby": "pictures-title" },
-      h(
-        "div",
-        { class: "row between" },
-        h("h2", { id: "pictures-title" }, title),
-        h("button", { class: "icon", "aria-label": "Close", onclick: () => dialog.close() }, "✕"),
-      ),
-      h(
-        "div",
-        { class: "side-by-side" },
-        pictures.map(({ label, url }) =>
-          h("figure", {}, h("img", { src: url, alt: `${title}, ${label}` }), h("figcaption", {}, label)),
-        ),
-      ),
-    ),
-  );
-}
+const STEPS = [
+  "Click a thing: all of it is found and tinted. “More” and “Less” widen and narrow it.",
+  "Drag it to where it should go, and let go: what it uncovers is repaired, as a draft.",
+  "“Run it well” takes longer and does it better. Each result is a new version; the old ones stay, but for drafts that a better one has replaced.",
+  "For a part of a thing, select it (clicks, brush, lasso), or place handles: each holds the Gaussians within its radius. One without a target is an anchor: what it holds stays.",
+  "“Heal” selects what is made anew in the next run: a stain, a shadow that stays behind.",
+];
 
 /**   letterKeys, setLetterKeys(on)  whether single letters are keys for commands */
 export function showHelp({ letterKeys, setLetterKeys }) {
@@ -138,7 +104,7 @@ export function showHelp({ letterKeys, setLetterKeys }) {
     ["Drag beside it", "orbit"],
     ["Two fingers", "move sideways, nearer, farther"],
     ["Tap twice", "turn about that point"],
-    ["Hold to compare", "see it as it was before"],
+    ["Hold to compare", "see it as it was before; beside it, a slider, blinking, the difference"],
   ];
   const keys = [
     ["Click", "take the thing under the pointer; with Handles: place one; with Select: select"],
@@ -154,6 +120,8 @@ export function showHelp({ letterKeys, setLetterKeys }) {
     [". and ,", "more, less of the thing that is taken"],
     ["D, H", "drag things, place handles"],
     ["S", "select what moves, and back"],
+    ["E", "mark what a run heals"],
+    ["O", "the dataset's photo over its camera's picture"],
     ["1 to 6", "select by clicks, brush, lasso, rectangle, sphere, box"],
     ["Right click, or Alt", "selecting: what is not meant"],
     ["V, U, L, X, Y, Z, N", "drag in the view's plane, on surfaces, level, along an axis, along the normal"],
@@ -162,6 +130,7 @@ export function showHelp({ letterKeys, setLetterKeys }) {
     ["[ and ]", "previous, next view"],
     ["R", "back to the start"],
     ["B (hold)", "compare with before"],
+    ["C", "the next way to compare: slider, blink, difference, none"],
     ["P", "preview"],
     ["Del", "remove the selected handle"],
     ["Ctrl + Z, Ctrl + Shift + Z", "undo, redo"],
@@ -171,35 +140,15 @@ export function showHelp({ letterKeys, setLetterKeys }) {
   const rows = matchMedia("(hover: none)").matches ? touch : keys;
   const letters = h("input", { type: "checkbox", testid: "letter-keys", checked: letterKeys });
   letters.addEventListener("change", () => setLetterKeys(letters.checked));
-  const dialog = modal(
-    h(
-      "dialog",
-      { class: "dialog", testid: "help", "aria-labelledby": "help-title" },
-      h(
-        "div",
-        { class: "row between" },
-        h("h2", { id: "help-title" }, "How to edit a scene"),
-        h("button", { class: "icon", "aria-label": "Close", onclick: () => dialog.close() }, "✕"),
-      ),
-      h(
-        "ol",
-        { class: "steps" },
-        h("li", {}, "Click a thing: all of it is found and tinted. “More” and “Less” widen and narrow it."),
-        h("li", {}, "Drag it to where it should go, and let go: what it uncovers is repaired, as a draft."),
-        h("li", {}, "“Run it well” takes longer and does it better. Each result is a new version; the old ones stay."),
-        h(
-          "li",
-          {},
-          "For a part of a thing, select it (clicks, brush, lasso), or place handles: each holds the Gaussians within its radius. One without a target is an anchor: what it holds stays.",
-        ),
-      ),
-      h(
-        "dl",
-        { class: "keys" },
-        rows.flatMap(([key, what]) => [h("dt", {}, key), h("dd", {}, what)]),
-      ),
+  openDialog(
+    "help",
+    "How to edit a scene",
+    [
+      h("ol", { class: "steps" }, STEPS.map((step) => h("li", {}, step))),
+      h("dl", { class: "keys" }, rows.flatMap(([key, what]) => [h("dt", {}, key), h("dd", {}, what)])),
       h("label", { class: "toggle" }, letters, "Single letters are keys for these commands"),
-    ),
+    ],
+    { closes: true },
   );
 }
 
@@ -234,25 +183,22 @@ function askForToken() {
       }
       button.disabled = false;
     };
-    const dialog = modal(
+    const dialog = openDialog(
+      "sign-in",
+      "This service needs a token",
       h(
-        "dialog",
-        { class: "dialog", testid: "sign-in", "aria-labelledby": "sign-in-title" },
+        "form",
+        { onsubmit: submit },
         h(
-          "form",
-          { onsubmit: submit },
-          h("h2", { id: "sign-in-title" }, "This service needs a token"),
-          h(
-            "p",
-            {},
-            "It is in the file that the service was started with (--token-file). This browser keeps a session, not the token.",
-          ),
-          // Password managers file what they keep under a name.
-          h("input", { type: "text", autocomplete: "username", value: "splatdrag", hidden: true }),
-          h("label", { class: "field" }, h("span", {}, "Token"), input),
-          problem,
-          h("div", { class: "row end" }, button),
+          "p",
+          {},
+          "It is in the file that the service was started with (--token-file). This browser keeps a session, not the token.",
         ),
+        // Password managers file what they keep under a name.
+        h("input", { type: "text", autocomplete: "username", value: "splatdrag", hidden: true }),
+        h("label", { class: "field" }, h("span", {}, "Token"), input),
+        problem,
+        end(button),
       ),
     );
     dialog.addEventListener("close", () => resolve(dialog.returnValue === "ok"));

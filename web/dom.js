@@ -21,6 +21,16 @@ function fill(element, props, children) {
 export const h = (tag, props, ...children) => fill(document.createElement(tag), props, children);
 export const s = (tag, props, ...children) => fill(document.createElementNS(SVG, tag), props, children);
 
+/** A small button. */
+export const button = (label, testid, onclick, more = {}) =>
+  h("button", { type: "button", class: "small", testid, onclick, ...more }, label);
+
+/** A button that is a sign, with what it does as its name. */
+export const iconButton = (label, testid, title, onclick, more = {}) =>
+  button(label, testid, onclick, { class: "icon", title, "aria-label": title, ...more });
+
+export const row = (...children) => h("div", { class: "row" }, ...children);
+
 export const byId = (id) => document.getElementById(id);
 
 /** Sets attributes of an element; null removes one. */

@@ -13,6 +13,7 @@ import {
   project,
   upOfViews,
 } from "./camera.js";
+import { superseded } from "./drafts.js";
 import { fittedPose, looksAt } from "./fit.js";
 import { History } from "./history.js";
 import { beforeMoves } from "./held.js";
@@ -23,12 +24,13 @@ import { centreOf, changedShape, lastShape, withShape } from "./shapes.js";
 import { slider } from "./surface.js";
 import { isShape, NOTHING_SELECTED, Selecting } from "./selecting.js";
 import { distance } from "./vectors.js";
-import { follow, hasEnded, merged } from "./watch.js";
+import { followScene, hasEnded, merged } from "./watch.js";
 
 // Choices: how long after the last change of a handle or of the request something is done about it.
 const COUNT_DELAY_MS = 150; // Counting the Gaussians of handles: cheap.
 const PREVIEW_DELAY_MS = 300; // A preview: it costs the service a second or so.
 const SAVE_DELAY_MS = 400; // Writing to the browser's storage: nobody waits for it.
+const ANSWER_MS = 2000; // An answer about the scene that takes longer is none.
 
 /** What there is before a scene is open. */
 export const NOTHING_OPEN = {
@@ -42,6 +44,8 @@ export const NOTHING_OPEN = {
   version: 0, // The version that is looked at and edited.
   layer: "color",
   comparing: false,
+  contrast: null, // How two versions are compared beside each other: "slider", "blink", "difference".
+  photoOn: false, // The dataset's photo lies over the picture.
   compareWith: null, // A version; null: the one before.
   ...NOTHING_SELECTED,
   handles: [], // {id, source, normal, target, rotation, scale, radius, grip, group}; grip: the radius with a selection, or null
@@ -57,7 +61,7 @@ export const NOTHING_OPEN = {
   prompt: null,
   attach: null,
   crumbs: null, // What becomes of what the selection has left out; null: it goes along.
-  heal: [], // Operations on the scene: what a run makes anew. A request may have them; the page has no brush for them yet.
+  heal: [], // Operations: what a run makes anew.
   params: {},
   autoPreview: true,
   preview: null, // What the service answered, and `key`: of what it is a preview.
@@ -67,8 +71,11 @@ export const NOTHING_OPEN = {
   submitting: false,
   draftOnRelease: true, // A thing that was dragged is repaired as a draft as soon as it is let go.
   draft: null, // {id, body} of the draft that is under way: id null until the service has it, and what it was made of.
+  drafts: [], // {version, base} of drafts that nobody has said to keep.
   drafted: null, // {version, base, request}: what the last draft made, of which version, of which request.
   edits: [],
+  answering: true, // Whether the service answers.
+  gone: false, // Whether somebody has deleted the scene.
   tab: "drag",
 };
 
@@ -82,7 +89,7 @@ const OF_THE_VERSION = { comparing: false, compareWith: null, preview: null, pro
 // What outlives a reload: as it is; and all, of which open() puts back what still fits the scene.
 const LASTING_KEYS = [
   ...["region", "mode", "preset", "crumbs", "prompt", "params", "autoPreview", "layer", "tab", "constraint", "gizmo", "frame"],
-  ...["thingMode", "selectTool", "selectDepth", "brushRadius", "tinted", "draftOnRelease"],
+  ...["thingMode", "selectTool", "selectDepth", "brushRadius", "tinted", "draftOnRelease", "drafts"],
 ];
 const STORED_KEYS = ["pose", "version", "handles", "selection", "viewName", ...LASTING_KEYS];
 
@@ -111,7 +118,10 @@ export class Editor {
   #history = new History();
   #placed = null;
   #timers = new Map();
-  #following = new Map();
+  #unfollow = () => {};
+  #submitting = 0; // How many submissions are on their way.
+  #early = []; // Edits that ended meanwhile.
+  #mine = new Set(); // Ids of edits that were asked for here, or were there when the scene was opened.
   #counting = null;
   #previewing = null;
   #placing = null;
@@ -121,12 +131,13 @@ export class Editor {
   #opened = 0;
   #lastView = null;
   #upOf = null; // {views, up}: worked out once.
+  #viewsAsked = 0;
 
   /**   say(message, options)  a short message to the user */
   constructor(store, memory, say) {
     Object.assign(this, { store, memory, say });
     this.selecting = new Selecting(store, {
-      place: (selection, more = {}) => this.#place({ selection, ...more }),
+      place: (patch) => this.#place(patch),
       say,
       pickSeen: (...what) => this.pickSeen(...what),
     });
@@ -172,14 +183,16 @@ export class Editor {
       viewName: pose ? (stored.viewName ?? null) : null,
     });
     await Promise.allSettled([this.#loadViews(opening), this.#loadEdits(opening)]);
+    if (opening === this.#opened) this.follow();
   }
 
   close() {
     this.#opened += 1;
     for (const timer of this.#timers.values()) clearTimeout(timer);
     this.#timers.clear();
-    for (const end of this.#following.values()) end();
-    this.#following.clear();
+    this.#unfollow();
+    this.#mine.clear();
+    this.#early = [];
     for (const abort of [this.#counting, this.#previewing, this.#placing]) abort?.abort();
     this.#previewing = null;
     this.#lost = null;
@@ -190,14 +203,16 @@ export class Editor {
   }
 
   async #loadViews(opening) {
+    const asked = (this.#viewsAsked += 1); // Those of a dataset may overtake the virtual ones from before it.
+    const outdated = () => opening !== this.#opened || asked !== this.#viewsAsked;
     if (this.state.pose === null && !this.state.scene.dataset) this.#lookAtAll();
     try {
       const { views, kind } = await api.views(this.state.scene.id);
-      if (opening !== this.#opened) return;
+      if (outdated()) return;
       this.store.set({ views, viewsKind: kind });
       if (this.state.pose === null && this.state.scene.dataset) this.home();
     } catch (error) {
-      if (opening !== this.#opened) return;
+      if (outdated()) return;
       this.store.set({ pose: this.state.pose ?? firstPose(this.state.scene) });
       this.say(`The views of this scene could not be listed: ${error.message}`, { kind: "bad" });
     }
@@ -725,11 +740,17 @@ export class Editor {
     const body = JSON.stringify(request);
     const key = this.#lost?.body === body ? this.#lost.key : freshKey();
     this.#lost = null;
+    this.#submitting += 1;
     try {
-      return await api.createEdit(request, key);
+      const edit = await api.createEdit(request, key);
+      this.#mine.add(edit.id);
+      return edit;
     } catch (error) {
       if (!(error.status > 0)) this.#lost = { body, key };
       throw error;
+    } finally {
+      this.#submitting -= 1;
+      setTimeout(() => this.#submitting || this.#early.splice(0).forEach((edit) => this.#editEnded(edit)));
     }
   }
 
@@ -739,7 +760,6 @@ export class Editor {
     try {
       const edit = await this.#submit(request);
       this.store.set({ edits: merged(this.state.edits, edit), tab: "edits", problem: null });
-      this.#followAll();
     } catch (error) {
       this.store.set({ problem: { error, key: JSON.stringify(request), from: "run" } });
     }
@@ -761,7 +781,6 @@ export class Editor {
       const edit = await this.#submit(request);
       if (this.state.draft !== draft) return this.#abandon(edit.id);
       this.store.set({ draft: { ...draft, id: edit.id }, edits: merged(this.state.edits, edit) });
-      this.#followAll();
     } catch (error) {
       if (this.state.draft !== draft) return;
       this.store.set({ draft: null, problem: { error, key: JSON.stringify(this.request()), from: "run" } });
@@ -807,7 +826,6 @@ export class Editor {
       // Undone meanwhile, it is an edit like any other.
       if (this.state.drafted === drafted) this.store.set({ drafted: { ...drafted, better: edit.id } });
       this.store.set({ edits: merged(this.state.edits, edit) });
-      this.#followAll();
     } catch (error) {
       this.say(`It could not be run: ${error.detail ?? error.message}`, { kind: "bad" });
     }
@@ -849,55 +867,59 @@ export class Editor {
     try {
       const edits = await api.edits(this.state.scene.id);
       if (opening !== this.#opened) return;
+      for (const { id } of edits) this.#mine.add(id);
       this.store.set({ edits });
-      this.#followAll();
     } catch (error) {
       if (opening === this.#opened)
         this.say(`The edits of this scene could not be listed: ${error.message}`, { kind: "bad" });
     }
   }
 
-  /** Follows every edit that has not ended: the oldest of them, which runs or is next to, by events; the others, which
-   *  wait, by asking. Browsers allow few connections at once. */
-  #followAll() {
-    const open = this.state.edits.filter((e) => !hasEnded(e) && !this.#abandoned.has(e.id)).reverse();
-    open.forEach((edit, i) => {
-      const how = i === 0 ? "events" : "ask";
-      const current = this.#following.get(edit.id);
-      if (current?.how === how) return;
-      current?.();
-      const end = follow(edit.id, {
-        onUpdate: (update) => this.#editUpdated(update),
-        onGone: () => this.#editGone(edit.id),
-        events: how === "events" ? api.editEvents : null,
-        fetchEdit: api.edit,
-        every: how === "events" ? 1000 : 3000,
-      });
-      this.#following.set(
-        edit.id,
-        Object.assign(() => end(), { how }),
-      );
+  /** Listens to what happens to the scene, here and elsewhere. */
+  follow() {
+    const { scene } = this.state;
+    if (!scene) return;
+    this.#unfollow();
+    const opening = this.#opened;
+    this.#unfollow = followScene({
+      events: () => api.sceneEvents(scene.id),
+      ask: async () => {
+        const signal = AbortSignal.timeout(ANSWER_MS);
+        const [fresh, edits] = await Promise.all([api.scene(scene.id, signal), api.edits(scene.id, signal)]);
+        return { scene: fresh, edits };
+      },
+      onScene: (fresh) => this.#sceneTold(fresh),
+      onEdit: (edit) => this.#editUpdated(edit),
+      onGone: () => opening === this.#opened && this.store.set({ gone: true }),
+      onAnswering: (answering) => this.store.set({ answering }),
     });
   }
 
-  #editUpdated(edit) {
-    if (this.#abandoned.has(edit.id)) {
-      if (!hasEnded(edit)) return;
-      this.#following.delete(edit.id);
-      return this.#followAll();
-    }
-    const before = this.state.edits.find((e) => e.id === edit.id);
-    this.store.set({ edits: merged(this.state.edits, edit) });
-    if (!hasEnded(edit)) return;
-    this.#following.delete(edit.id);
-    if (before && !hasEnded(before)) this.#editEnded(edit);
-    this.#followAll();
+  /** Nobody looks: the browser has few connections, and those who do need them. */
+  unfollow() {
+    this.#unfollow();
   }
 
-  #editGone(id) {
-    this.#following.delete(id);
-    this.store.set({ edits: this.state.edits.filter((e) => e.id !== id) });
-    this.#followAll();
+  #sceneTold(scene) {
+    const { version, scene: before } = this.state;
+    const dataset = ({ dataset: d }) => d && [d.kind, d.views, d.photos].join();
+    this.store.set({ scene });
+    // Somebody else has deleted what is looked at.
+    if (!scene.versions.some((v) => v.version === version)) {
+      this.say(`Version ${version} has been deleted.`);
+      this.showVersion(scene.versions.findLast((v) => v.version < version).version);
+    }
+    if (dataset(scene) !== dataset(before)) this.#loadViews(this.#opened);
+  }
+
+  #editUpdated(edit) {
+    if (this.#abandoned.has(edit.id)) return;
+    const before = this.state.edits.find((e) => e.id === edit.id);
+    this.store.set({ edits: merged(this.state.edits, edit) });
+    if (!hasEnded(edit) || (before && hasEnded(before))) return;
+    // It may be the very one that is being submitted: whose it is shows when the answer is there.
+    if (this.#submitting > 0) this.#early.push(edit);
+    else if (before || this.#mine.has(edit.id)) this.#editEnded(edit);
   }
 
   async #editEnded(edit) {
@@ -923,20 +945,58 @@ export class Editor {
       if (this.state.draft?.id !== edit.id) return;
       this.#finish(edit);
       const done = { version: edit.result_version, base: edit.version, request: edit.request, edit: edit.id };
-      return this.store.set({ draft: null, drafted: done });
+      this.store.set({ draft: null, drafted: done, drafts: [...this.state.drafts, { version: done.version, base: done.base }] });
+      return this.#dropDrafts(done);
     }
     const { drafted, version, dragging } = this.state;
     if (drafted?.better === edit.id && version === drafted.version) {
       this.showVersion(edit.result_version);
+      this.#dropDrafts({ version: edit.result_version, base: edit.version });
       return say(`Version ${edit.result_version} is what the draft was for. ${HOLD} to compare.`);
     }
-    if (version !== edit.version || dragging)
-      return say(`Version ${edit.result_version} is ready.`, {
+    if (version !== edit.version || dragging || !this.#mine.has(edit.id))
+      return say(`Version ${edit.result_version} is ready${this.#mine.has(edit.id) ? "" : ", made elsewhere"}.`, {
         label: "Show",
         run: () => this.showVersion(edit.result_version),
       });
     this.#finish(edit);
+    this.#dropDrafts({ version: edit.result_version, base: edit.version });
     say(`Version ${edit.result_version} is ready. ${HOLD} to compare it with version ${edit.version}.`);
+  }
+
+  /** Deletes the drafts that a result has replaced. One that cannot be deleted stays: nothing is lost by that. */
+  async #dropDrafts(made) {
+    const { scene, drafts, version: shown } = this.state;
+    const gone = superseded(drafts, made, scene.versions, shown);
+    this.store.set({ drafts: drafts.filter(({ version }) => !gone.includes(version)) });
+    for (const version of gone) await this.deleteVersion(version).catch(() => {});
+  }
+
+  /** A draft is not deleted for a better one any more. */
+  keep(version) {
+    this.store.set({ drafts: this.state.drafts.filter((draft) => draft.version !== version) });
+  }
+
+  async nameVersion(version, name) {
+    const named = await api.renameVersion(this.state.scene.id, version, name || null);
+    this.#versionsAre((versions) => versions.map((v) => (v.version === version ? named : v)));
+  }
+
+  /** Deletes a version for good; the one it was made from is shown in its place. */
+  async deleteVersion(version) {
+    const { scene } = this.state;
+    const parent = parentOf(scene, version);
+    await api.deleteVersion(scene.id, version);
+    if (this.state.scene?.id !== scene.id) return;
+    if (this.state.version === version) this.showVersion(parent);
+    this.keep(version);
+    const below = (v) => (v.parent === version ? { ...v, parent } : v);
+    this.#versionsAre((versions) => versions.filter((v) => v.version !== version).map(below));
+  }
+
+  #versionsAre(change) {
+    const { scene } = this.state;
+    this.store.set({ scene: { ...scene, versions: change(scene.versions) } });
   }
 
   /** Shows what an edit has made of the version on the screen. What was dragged is where it should be: handles, selection
@@ -958,7 +1018,7 @@ export class Editor {
 
   async deleteEdit(id) {
     await api.deleteEdit(id);
-    this.#editGone(id);
+    this.store.set({ edits: this.state.edits.filter((e) => e.id !== id) });
   }
 
   // --- remembering -----------------------------------------------------------------------------------------------

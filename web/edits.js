@@ -1,9 +1,12 @@
 // The edits of a scene: the queue, the one that runs, those that ended.
 
-import { askConfirmation, say, showPictures } from "./dialogs.js";
-import { attrs, h, keyedList, problemPlace, showProblem, text } from "./dom.js";
+import { askConfirmation, say } from "./dialogs.js";
+import { attrs, button, h, iconButton, keyedList, problemPlace, showProblem, text } from "./dom.js";
 import { count, counted, duration, gaussians, loss, when } from "./format.js";
+import { frameAround, insetOf, pointsOf } from "./framing.js";
+import { lossCurve } from "./loss_curve.js";
 import { warnings } from "./request_panel.js";
+import { showScrubber } from "./scrubber.js";
 import { describe } from "./selection.js";
 import { hasEnded } from "./watch.js";
 
@@ -89,9 +92,6 @@ function card(editor, id) {
     }
     showProblem(problem, refused ?? current()?.error);
   };
-  const button = (label, testid, onclick, extra = {}) =>
-    h("button", { type: "button", class: "small", testid, onclick, ...extra }, label);
-
   const name = h("span", { class: "edit-name" });
   const state = h("span", { class: "state", testid: "edit-state" });
   const line = h("p", { class: "line", testid: "edit-line" });
@@ -100,7 +100,7 @@ function card(editor, id) {
     "Stop and keep",
     "edit-stop",
     asking(() => editor.stopEdit(id)),
-    { title: "Ends with the last finished interval as the result" },
+    { title: "Ends at once, with the last finished interval as the result" },
   );
   const cancel = button(
     "Cancel",
@@ -125,17 +125,18 @@ function card(editor, id) {
     const what = edit.request.selection?.length ? "The handles and the selection" : "The handles";
     say(`${what} of ${id} are back on version ${edit.version}.`);
   });
-  const forget = button(
+  const forget = iconButton(
     "✕",
     "edit-forget",
+    "Remove from the list",
     asking(() => editor.deleteEdit(id)),
-    { class: "icon", title: "Remove from the list", "aria-label": "Remove from the list" },
   );
+  const curve = lossCurve();
   const intervals = h("div", { class: "intervals" });
   const updateIntervals = keyedList(
     intervals,
     (u) => u.interval,
-    (u) => intervalRow(id, u),
+    (u) => intervalRow(editor, id, u),
   );
   const notes = h("div", {});
   const facts = h("dl", { class: "facts" });
@@ -147,6 +148,7 @@ function card(editor, id) {
     h("div", { class: "row between" }, h("div", { class: "row" }, name, state), forget),
     line,
     progress,
+    curve.element,
     problem,
     intervals,
     notes,
@@ -174,6 +176,7 @@ function card(editor, id) {
       reuse.hidden = !ended;
       forget.hidden = !ended;
       showProblem(problem, refused ?? edit.error);
+      curve.update(edit);
       updateIntervals(edit.finished_intervals);
       notes.replaceChildren(...warnings(edit.warnings));
       facts.replaceChildren(...factsOf(edit).flatMap(([key, value]) => [h("dt", {}, key), h("dd", {}, value)]));
@@ -181,12 +184,24 @@ function card(editor, id) {
   };
 }
 
+/** The part of a view's picture that an edit is about. */
+function frameOf(editor, edit, name) {
+  const view = editor.state.views.find((v) => v.name === name);
+  return frameAround(view ?? {}, view ? pointsOf(edit) : []);
+}
+
 /** The pictures of a finished interval, as it found the scene and as it left it. */
-function intervalRow(id, { interval, seconds, loss: reached, renders }) {
+function intervalRow(editor, id, { interval, seconds, loss: reached, renders }) {
   const took = duration(seconds) + (typeof reached === "number" ? `, loss ${loss(reached)}` : "");
+  const edit = () => editor.state.edits.find((e) => e.id === id);
   const pictures = renders.slice(0, 4).map(({ view, stages }, k) => {
-    const shown = Object.entries(stages);
-    const [, last] = shown.at(-1);
+    const urls = Object.values(stages);
+    const last = urls.at(-1);
+    const picture = (src, more = {}) => {
+      const img = h("img", { src, alt: "", loading: "lazy", ...more });
+      img.style.objectViewBox = insetOf(frameOf(editor, edit(), view));
+      return img;
+    };
     return h(
       "button",
       {
@@ -194,17 +209,11 @@ function intervalRow(id, { interval, seconds, loss: reached, renders }) {
         class: "thumb",
         testid: `thumb-${interval}-${k}`,
         title: `${view}: before and after interval ${interval}`,
-        "aria-label": `Interval ${interval}, view ${view}: show before and after`,
-        onclick: () =>
-          showPictures(
-            `${id}, interval ${interval}, ${view}`,
-            shown.map(([label, url]) => ({ label, url })),
-          ),
+        "aria-label": `Interval ${interval}, view ${view}: show how it came about`,
+        onclick: () => showScrubber(edit(), { view, url: last }, (name) => frameOf(editor, edit(), name)),
       },
-      h("img", { src: last, alt: "", loading: "lazy" }),
-      stages.before && shown.length > 1
-        ? h("img", { class: "before", src: stages.before, alt: "", loading: "lazy" })
-        : null,
+      picture(last),
+      stages.before && urls.length > 1 ? picture(stages.before, { class: "before" }) : null,
     );
   });
   return {

@@ -3,14 +3,6 @@
 import { attrs, fieldValue, h } from "./dom.js";
 import { coordinate, coordinates } from "./format.js";
 
-/** A small button; `more`: further properties. */
-export const button = (label, testid, title, onclick, more = {}) =>
-  h("button", { type: "button", class: "small", testid, title, onclick, ...more }, label);
-
-/** A button that is a sign only: its title is its name. */
-export const icon = (label, testid, title, onclick) =>
-  h("button", { type: "button", class: "icon", testid, title, "aria-label": title, onclick }, label);
-
 /** A number. `changed` is called with valid values only; an invalid one marks the field. */
 export function numberField({
   label,

@@ -1,8 +1,8 @@
 // Moving, turning and scaling what is held: which part of the gizmo is in the picture, its frame, and all of it in numbers.
 
 import { onTheWire } from "./camera.js";
-import { attrs, byId, h, text } from "./dom.js";
-import { icon, labelled, numberField, pointField, segments } from "./fields.js";
+import { attrs, byId, h, iconButton, text } from "./dom.js";
+import { labelled, numberField, pointField, segments } from "./fields.js";
 import { FRAMES, frameAxes, TOOLS } from "./gizmo.js";
 import { motionOf } from "./motion.js";
 import { addScaled, dot, scale, unit } from "./vectors.js";
@@ -36,7 +36,7 @@ export function buildGizmoPanel(editor, camera) {
   const { store } = editor;
   const tools = TOOLS.map((tool) => {
     const [sign, title] = ICONS[tool];
-    return icon(sign, `gizmo-tool-${tool}`, title, () => store.set({ gizmo: tool }));
+    return iconButton(sign, `gizmo-tool-${tool}`, title, () => store.set({ gizmo: tool }));
   });
   const inPicture = h("div", { id: "gizmo-tools", role: "group", "aria-label": "Move, turn or size" }, tools);
   byId("view-tools").append(inPicture);

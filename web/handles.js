@@ -1,7 +1,7 @@
 // The list of handles: coordinates, radius, group, and how many Gaussians each holds.
 
-import { attrs, h, keyedList, problemPlace, showProblem, text } from "./dom.js";
-import { button, icon, labelled, numberField, pointField } from "./fields.js";
+import { attrs, button, h, iconButton, keyedList, problemPlace, showProblem, text } from "./dom.js";
+import { labelled, numberField, pointField } from "./fields.js";
 import { coordinate, count, gaussians } from "./format.js";
 import { groupClass } from "./overlay.js";
 import { partOf } from "./requests.js";
@@ -39,7 +39,7 @@ export class HandleList {
       (handle) => handle.id,
       (handle) => this.#card(handle.id),
     );
-    const clear = button("Clear", "clear-handles", null, () => editor.removeAll());
+    const clear = button("Clear", "clear-handles", () => editor.removeAll());
     const empty = h("p", { class: "empty", testid: "no-handles" });
     this.element = h("section", {}, h("div", { class: "row between" }, h("h2", {}, "Handles"), clear), empty, list);
     editor.store.watch(
@@ -71,7 +71,7 @@ export class HandleList {
       kind,
       held,
     );
-    const remove = icon("✕", null, "Remove (Del)", () => editor.remove(id));
+    const remove = iconButton("✕", null, "Remove (Del)", () => editor.remove(id));
 
     const source = pointField({
       label: "Source",
@@ -79,10 +79,13 @@ export class HandleList {
       changed: (p) => change({ source: p, normal: null }),
     });
     const target = pointField({ label: "Target", testid: "target", changed: (p) => change({ target: p }) });
-    const anchor = button("Make anchor", "make-anchor", "Without a target, what the handle holds stays where it is", () =>
-      change({ target: null, rotation: null, scale: null }),
+    const anchor = button(
+      "Make anchor",
+      "make-anchor",
+      () => change({ target: null, rotation: null, scale: null }),
+      { title: "Without a target, what the handle holds stays where it is" },
     );
-    const release = button("Give it a target", "add-target", null, () => change({ target: current().source }));
+    const release = button("Give it a target", "add-target", () => change({ target: current().source }));
     const targetRow = h(
       "div",
       { class: "field" },

@@ -4,11 +4,14 @@
 import * as api from "./api.js";
 import { say, showHelp, signIn } from "./dialogs.js";
 import { attrs, byId, h, problemText, showProblem, text } from "./dom.js";
+import { buildCompare, nextWay } from "./compare.js";
 import { buildEdits } from "./edits.js";
 import { Editor, NOTHING_OPEN } from "./editor.js";
 import { counted } from "./format.js";
 import { buildGizmoPanel, next } from "./gizmo_panel.js";
 import { HandleList } from "./handles.js";
+import { buildNotes } from "./notes.js";
+import { buildPhoto } from "./photo.js";
 import { buildRequestPanel, importFile } from "./request_panel.js";
 import { buildScenes, SCENE_FILES } from "./scenes.js";
 import { buildSelectionPanel, buildTools, SELECT_TOOLS } from "./selection_panel.js";
@@ -38,6 +41,9 @@ buildToolbar(editor, viewer);
 buildTools(editor);
 buildThingBar(editor);
 buildUp(editor);
+buildCompare(editor);
+buildPhoto(editor, viewer);
+buildNotes(editor, viewer);
 const run = buildRequestPanel(editor);
 const versions = buildVersions(editor);
 byId("tab-drag").append(
@@ -65,8 +71,19 @@ byId("sign-out").addEventListener("click", async () => {
 window.addEventListener("hashchange", route);
 window.addEventListener("pagehide", () => editor.flush());
 document.addEventListener("visibilitychange", () => {
-  if (document.visibilityState === "hidden") editor.flush();
-  else if (!byId("home").hidden) scenes.refresh();
+  if (document.visibilityState === "hidden") {
+    editor.flush();
+    editor.unfollow();
+  } else if (!byId("home").hidden) scenes.refresh();
+  else editor.follow();
+});
+store.watch(["answering"], ({ answering }) => {
+  byId("away").hidden = answering;
+});
+store.watch(["gone"], ({ gone }) => {
+  if (!gone) return;
+  say("This scene has been deleted.", { kind: "bad" });
+  goTo(null);
 });
 store.watch(["scene"], ({ scene }) => {
   text(byId("scene-title"), scene?.name ?? "");
@@ -197,6 +214,9 @@ function listenToKeys() {
           ? editor.selecting.clear()
           : editor.select(null)),
     b: () => store.set({ comparing: true }),
+    c: () => store.set({ contrast: nextWay(store.state.contrast) }),
+    o: () => store.set({ photoOn: !store.state.photoOn }),
+    e: () => editor.selecting.start(true),
   };
   document.addEventListener("keydown", (event) => {
     // Who dictates, or brushes against keys, turns single characters off (WCAG 2.1.4); keys with a name stay.

@@ -1,10 +1,11 @@
 // The panel of the request besides its handles, with its buttons: preview, estimate, run; import and export.
 
 import { askChoice, say } from "./dialogs.js";
-import { attrs, h, problemPlace, problemText, showProblem, text } from "./dom.js";
+import { attrs, button, h, problemPlace, problemText, row, showProblem, text } from "./dom.js";
 import { choice, labelled, pointField, segments, toggle } from "./fields.js";
 import { bytes, count, counted, duration, gaussians } from "./format.js";
 import { paramFields } from "./params.js";
+import { buildPresets, runPresets } from "./presets.js";
 import { changesScene, isStated, partOf, readRequests } from "./requests.js";
 import { whatMoves } from "./selection.js";
 
@@ -17,9 +18,6 @@ const CONSTRAINTS = [
   ["z", "Z", "Along the z axis (Z)"],
   ["normal", "Normal", "Along the surface normal where the handle was placed (N)"],
 ];
-
-/** Presets that make sense for a run: `preview` is what the Preview button does. */
-const runPresets = (info) => (info?.presets ?? ["draft", "standard", "paper"]).filter((name) => name !== "preview");
 
 export function buildRequestPanel(editor) {
   const { store } = editor;
@@ -116,21 +114,11 @@ export function buildRequestPanel(editor) {
     file.value = "";
     if (chosenFile) await importFile(editor, chosenFile, importProblem);
   });
-  const files = h(
-    "div",
-    { class: "row" },
-    h(
-      "button",
-      {
-        type: "button",
-        class: "small",
-        testid: "import",
-        title: "An edit request, or a configuration as released with 3DGS-Drag",
-        onclick: () => file.click(),
-      },
-      "Import…",
-    ),
-    h("button", { type: "button", class: "small", testid: "export", onclick: () => exportFile(editor) }, "Export"),
+  const files = row(
+    button("Import…", "import", () => file.click(), {
+      title: "An edit request, or a configuration as released with 3DGS-Drag",
+    }),
+    button("Export", "export", () => exportFile(editor)),
     file,
   );
 
@@ -147,17 +135,13 @@ export function buildRequestPanel(editor) {
     title: "A thing that was dragged is repaired as a draft as soon as it is let go; each draft is a version",
     changed: (on) => store.set({ draftOnRelease: on }),
   });
-  const preview = h(
-    "button",
-    { type: "button", testid: "preview", title: "Preview (P)", onclick: () => editor.preview() },
-    "Preview",
-  );
-  const estimate = h(
-    "button",
-    { type: "button", testid: "estimate", title: "What a run will take", onclick: () => editor.estimate() },
-    "Estimate",
-  );
-  const run = h("button", { type: "button", class: "primary", testid: "run", onclick: () => editor.run() }, "Run edit");
+  const large = (label, testid, title, onclick, kind = null) => button(label, testid, onclick, { class: kind, title });
+  const preview = large("Preview", "preview", "Preview (P)", () => editor.preview());
+  const estimate = large("Estimate", "estimate", "What a run will take", () => {
+    presets.ask();
+    editor.estimate();
+  });
+  const run = large("Run edit", "run", null, () => editor.run(), "primary");
   const problem = problemPlace("run-problem");
   const answer = h("div", { class: "answer", role: "status", testid: "run-answer" });
 
@@ -166,18 +150,20 @@ export function buildRequestPanel(editor) {
     "section",
     { class: "run" },
     moving,
-    h("div", { class: "field" }, h("span", { class: "name" }, "Drag targets"), constraint.element),
-    h("div", { class: "field" }, h("span", { class: "name" }, "Mode"), mode.element),
+    labelled("Drag targets", constraint.element),
+    labelled("Mode", mode.element),
     settings,
     paramProblem,
     h("div", { class: "row between" }, files, h("div", {}, auto.element, repair.element)),
     importProblem,
   );
+  const presets = buildPresets(editor);
   const footer = h(
     "div",
     { class: "footer" },
     answer,
     problem,
+    presets.element,
     h("div", { class: "row buttons" }, preview, estimate, run),
   );
 
@@ -209,7 +195,7 @@ export function buildRequestPanel(editor) {
     },
   );
 
-  store.watch(["selection", "selectionAnswer"], (state) => text(moving, whatMoves(state)));
+  store.watch(["selection", "selectionAnswer", "heal", "healing"], (state) => text(moving, whatMoves(state)));
   store.watch(
     [
       ...["handles", "selection", "previewing", "submitting", "problem", "preview", "estimate", "scene", "version"],

@@ -13,6 +13,8 @@ export class ImportError extends Error {
 
 /** The request that the screen describes. What is left to the service's defaults is left out. */
 export function requestOf(state) {
+  // Where nothing moves, what is healed is removed: then all that a run does is to heal it.
+  if (onlyHeals(state)) return requestOf({ ...state, mode: "remove", selection: state.heal });
   const { scene, version, mode, preset, prompt, handles, selection = [], heal = [], attach, crumbs, region, params } = state;
   const goes = mode !== "remove"; // else targets stay on the screen, for when the mode changes back
   const given = Object.entries(params ?? {}).filter(
@@ -41,13 +43,16 @@ export function requestOf(state) {
   };
 }
 
-/** Is there anything that could be sent: something to take hold of, or to remove? */
-export const isStated = ({ mode, handles, selection = [] }) =>
-  handles.length > 0 || (mode === "remove" && selection.length > 0);
+/** Is it only to be healed, what is marked? Nothing else is placed. */
+const onlyHeals = ({ handles, selection = [], heal = [] }) => heal.length > 0 && handles.length + selection.length === 0;
+
+/** Is there anything that could be sent: something to take hold of, to remove, or to heal? */
+export const isStated = (state) =>
+  state.handles.length > 0 || (state.mode === "remove" && state.selection?.length > 0) || onlyHeals(state);
 
 /** Would it change the scene? What is removed goes nowhere; else a handle has a target. */
 export const changesScene = (state) =>
-  isStated(state) && (state.mode === "remove" || state.handles.some(isMoved));
+  isStated(state) && (state.mode === "remove" || onlyHeals(state) || state.handles.some(isMoved));
 
 /** A handle's sphere says what moves only where no selection does. With one, a radius is given if somebody gave one. */
 function radiusGiven({ radius, grip = null }, selection) {

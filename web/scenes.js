@@ -2,11 +2,13 @@
 
 import * as api from "./api.js";
 import { askConfirmation, askText } from "./dialogs.js";
-import { asking, h, keyedList, problemPlace, showProblem, text } from "./dom.js";
+import { asking, button, h, keyedList, problemPlace, showProblem, text } from "./dom.js";
 import { bytes, count, counted, gaussians, nameOfFile, when } from "./format.js";
 import { pathForm, showUpload } from "./uploads.js";
 
 export const SCENE_FILES = /\.(ply|splat|spz|sog|glb)$/i;
+
+const EVERY_MS = 1400; // Asked and not answered twice is less than three seconds. A choice.
 
 /** The page.  open(id): go to a scene. */
 export function buildScenes(home, { store, memory, open }) {
@@ -101,13 +103,20 @@ export function buildScenes(home, { store, memory, open }) {
     text(limit, info?.limits?.upload_bytes ? `, up to ${bytes(info.limits.upload_bytes)}` : "");
   });
 
+  // Others bring and take scenes, too, and a service that went away is said to have: the list has no stream. Who has not
+  // signed in is not asked each time.
+  let refused = false;
+  setInterval(() => home.hidden || document.hidden || refused || refresh(), EVERY_MS);
+
   async function refresh() {
     try {
-      const scenes = await api.scenes();
+      const scenes = await api.scenes(AbortSignal.timeout(EVERY_MS));
+      refused = false;
       // Youngest first: ids count up.
       store.set({ scenes: [...scenes].sort((a, b) => (a.id < b.id ? 1 : -1)) });
       showProblem(problem, null);
     } catch (error) {
+      refused = error.status === 401;
       showProblem(problem, error);
     }
   }
@@ -153,8 +162,8 @@ function card(id, { memory, open, refresh }) {
     h(
       "div",
       { class: "row card-actions" },
-      h("button", { type: "button", class: "small", testid: "scene-rename", onclick: rename }, "Rename"),
-      h("button", { type: "button", class: "small quiet-danger", testid: "scene-delete", onclick: remove }, "Delete"),
+      button("Rename", "scene-rename", rename),
+      button("Delete", "scene-delete", remove, { class: "small quiet-danger" }),
     ),
   );
   return {

@@ -6,6 +6,7 @@ import { FrameQueue } from "./frames.js";
 import {
   furtherBorders,
   inverted,
+  listOf,
   operation,
   polygonOf,
   proposalOf,
@@ -25,6 +26,7 @@ export const NOTHING_SELECTED = {
   selectionWaits: false, // Whether that is of an earlier selection.
   thingMode: true, // The pointer takes hold of whole things; else it places and drags handles.
   selectMode: false, // The pointer selects, whatever it does else.
+  healing: false, // It selects what a run makes anew (`heal`), not what moves.
   selectTool: "grow", // "grow", "brush", "lasso", "rectangle", "sphere" or "box"
   selectOp: "add",
   clickKind: "inside", // Of a click to grow: on the thing ("inside"), or not.
@@ -46,7 +48,7 @@ export class Selecting {
   #proposing = null; // Ends the wait for where a thing was clicked.
   #lost = null; // Id of a selection that had to be posted again, until it has been seen.
 
-  /**   place(selection, more)  puts a selection on the screen, and more of what is placed; can be undone
+  /**   place(patch)            puts a selection on the screen, and more of what is placed; can be undone
    *    say(message, options)   a short message to the user
    *    pickSeen(camera, x, y)  Editor.pickSeen() */
   constructor(store, { place, say, pickSeen }) {
@@ -57,24 +59,34 @@ export class Selecting {
       onPicture: (answer, { key, version }) => this.#answered({ ...answer, key, version }),
       onError: (error, { key, version }) => this.#failed({ key, version, error }),
     });
-    store.watch(["selection", "version", "scene"], () => this.#changed());
+    store.watch(["selection", "heal", "healing", "version", "scene"], () => this.#changed());
   }
 
   get #state() {
     return this.store.state;
   }
 
+  /** What the tools work on: the operations that say what moves, or what is healed. */
+  get #list() {
+    return listOf(this.#state);
+  }
+
+  #put(list) {
+    this.place({ [this.#state.healing ? "heal" : "selection"]: list });
+  }
+
   // --- what it holds ---------------------------------------------------------------------------------------------
 
   #job() {
-    const { scene, version, selection } = this.#state;
+    const { scene, version } = this.#state;
+    const selection = this.#list;
     return { key: JSON.stringify([scene.id, version, selection]), scene: scene.id, version, selection };
   }
 
   #changed() {
     clearTimeout(this.#again);
-    const { scene, selection, selectionAnswer } = this.#state;
-    if (!scene || selection.length === 0) {
+    const { scene, selectionAnswer } = this.#state;
+    if (!scene || this.#list.length === 0) {
       this.#queue.clear();
       return this.store.set({ selectionAnswer: null, selectionWaits: false });
     }
@@ -127,12 +139,12 @@ export class Selecting {
     const kind = (clickKind === "outside") !== other ? "outside" : "inside";
     const picked = await this.#pick(camera, x, y);
     if (!picked) return;
-    const { selection, selectOp: op, nextThing: fresh } = this.#state;
+    const { selectOp: op, nextThing: fresh } = this.#state;
     if (!picked.hit) return this.say("There is nothing here to select.", { seconds: 3 });
-    const next = withClick(selection, { op, kind, point: picked.point, fresh });
+    const next = withClick(this.#list, { op, kind, point: picked.point, fresh });
     if (!next) return this.say("First click the thing itself, then what is not part of it.", { seconds: 4 });
     this.store.set({ nextThing: false, tab: "drag" });
-    this.place(next);
+    this.#put(next);
   }
 
   /** What is seen there, as the editor picks it; null where it does not say, or nobody wants to know any
@@ -166,12 +178,12 @@ export class Selecting {
     if (!clicked || handles.length > came)
       return this.say("What you have placed stays.", {
         seconds: 6,
-        action: { label: "Let go of it", run: () => this.place([], { handles: [] }) },
+        action: { label: "Let go of it", run: () => this.place({ selection: [], handles: [] }) },
       });
     // What has been moved is not where the version has it: a click on it says nothing new.
     if (picked.moved) return;
     this.store.set({ tab: "drag", nextThing: false, clickedOn: picked.hit ? picked : null });
-    this.place(picked.hit ? thingAt(picked.point) : [], { handles: [] });
+    this.place({ selection: picked.hit ? thingAt(picked.point) : [], handles: [] });
   }
 
   /** More of the proposed thing (1), or less (-1): the next border. */
@@ -179,19 +191,19 @@ export class Selecting {
     const { selection, selectionAnswer, selectionWaits } = this.#state;
     if (!proposalOf(selection) || selectionWaits) return;
     const { more, less } = furtherBorders(selectionAnswer);
-    if (by > 0 ? more : less) this.place(widened(selection, by, selectionAnswer));
+    if (by > 0 ? more : less) this.place({ selection: widened(selection, by, selectionAnswer) });
   }
 
   /** A stroke of the brush, a lasso, or a rectangle.
    *    points  [x, y], pixels of the camera
    *    other   subtracts where adding is switched on, and the other way round */
   draw(tool, camera, points, other = false) {
-    const { selection, selectOp, selectDepth: depth, brushRadius: radius } = this.#state;
+    const { selectOp, selectDepth: depth, brushRadius: radius } = this.#state;
     const drawn = { op: other ? OPPOSITE[selectOp] : selectOp, camera: onTheWire(camera), points, radius, depth };
     const made = { brush: strokeOf, lasso: polygonOf, rectangle: rectangleOf }[tool](drawn);
     if (!made) return this.say(`Draw the ${tool} around what you mean.`, { seconds: 3 });
     this.store.set({ tab: "drag" });
-    this.place([...selection, made]);
+    this.#put([...this.#list, made]);
   }
 
   /** A sphere or a box around what is seen at a place.
@@ -200,11 +212,11 @@ export class Selecting {
     const picked = await this.#pick(camera, x, y);
     if (!picked) return;
     if (!picked.hit) return this.say("There is nothing here to select.", { seconds: 3 });
-    const { selectOp, selection } = this.#state;
+    const { selectOp } = this.#state;
     const op = other ? OPPOSITE[selectOp] : selectOp;
     const shape = shapeAround(tool, picked.point, reach * unitsPerPixel(camera, picked.point), up);
     this.store.set({ tab: "drag" });
-    this.place([...selection, operation(op, shape)]);
+    this.#put([...this.#list, operation(op, shape)]);
   }
 
   /** Whether the next stroke or lasso takes away. */
@@ -213,39 +225,46 @@ export class Selecting {
   }
 
   remove(index) {
-    this.place(this.#state.selection.filter((_, i) => i !== index));
+    this.#put(this.#list.filter((_, i) => i !== index));
   }
 
   /** Wider (1) or narrower (-1) all around. */
   spread(by) {
-    const { selection, selectionAnswer: answer, selectionWaits } = this.#state;
-    if (answer?.count > 0 && !selectionWaits) this.place(spread(selection, by, answer));
+    const { selectionAnswer: answer, selectionWaits } = this.#state;
+    if (answer?.count > 0 && !selectionWaits) this.#put(spread(this.#list, by, answer));
   }
 
   invert() {
-    this.place(inverted(this.#state.selection));
+    this.#put(inverted(this.#list));
   }
 
   clear() {
-    if (this.#state.selection.length) this.place([]);
+    if (this.#list.length) this.#put([]);
   }
 
   // --- tools -----------------------------------------------------------------------------------------------------
 
   /** Takes whole things in hand, or handles. */
   takeThings(things) {
-    this.store.set({ thingMode: things, selectMode: false, floorClicks: null });
+    this.store.set({ thingMode: things, selectMode: false, healing: false, floorClicks: null });
   }
 
   /** Takes a tool in hand; null: whatever it was before, things or handles. */
   use(tool) {
-    if (!tool) return this.store.set({ selectMode: false });
+    if (!tool) return this.store.set({ selectMode: false, healing: false });
     // Depth and changes have no tint: what is selected has to be seen.
     this.store.set({ selectMode: true, selectTool: tool, layer: "color", comparing: false, selected: null, floorClicks: null });
   }
 
+  /** The same tools say what moves, or what is healed. */
+  start(healing) {
+    this.store.set({ healing });
+    this.use(this.#state.selectTool);
+  }
+
   toggle() {
-    const { selectMode, selectTool } = this.#state;
-    this.use(selectMode ? null : selectTool);
+    const { selectMode, healing } = this.#state;
+    if (selectMode && !healing) this.use(null);
+    else this.start(false);
   }
 }

@@ -3,6 +3,9 @@
 
 import { counted, gaussians } from "./format.js";
 
+/** The operations that the tools work on now. */
+export const listOf = ({ healing, heal, selection }) => (healing ? heal : selection);
+
 /** What is done with what an operation names. */
 export const opOf = (operation) => operation.op ?? "add";
 
@@ -137,7 +140,12 @@ export function sentence(warning) {
 }
 
 /** What says what moves, for the panel of the request. */
-export function whatMoves({ selection, selectionAnswer: answer }) {
+export function whatMoves({ healing, heal = [], ...state }) {
+  const answer = healing ? null : state.selectionAnswer;
+  return `${moves(state.selection, answer)}${heal.length > 0 ? " A run also heals what you have marked." : ""}`;
+}
+
+function moves(selection, answer) {
   if (selection.length === 0) return "What moves: the Gaussians in the handles' spheres.";
   if (!answer) return "What moves: what is selected.";
   if (answer.error) return "What moves: the selection, but the service could not carry it out: see there.";

@@ -1,10 +1,10 @@
 // Selecting, for the eye and the hand: the row of tools above the picture, and in the panel what is selected.
 
-import { attrs, byId, h, keyedList, problemPlace, showProblem, text } from "./dom.js";
-import { button, choice, icon, segments, toggle } from "./fields.js";
+import { attrs, button, byId, h, iconButton, keyedList, problemPlace, showProblem, text } from "./dom.js";
+import { choice, segments, toggle } from "./fields.js";
 import { count, gaussians } from "./format.js";
 import { warnings } from "./request_panel.js";
-import { describe, sentence, share } from "./selection.js";
+import { describe, listOf, sentence, share } from "./selection.js";
 import { isShape } from "./selecting.js";
 import { shapeFields } from "./shapes.js";
 
@@ -12,6 +12,7 @@ const HANDS = [
   ["thing", "Drag", "Click a thing and drag it to where it should go (D)"],
   ["handle", "Handles", "Click to place a handle, drag its dot to where it should go (H)"],
   ["select", "Select", "Say what moves (S)"],
+  ["heal", "Heal", "Say what a run makes anew: a stain, a shadow that stays behind (E)"],
 ];
 export const SELECT_TOOLS = [
   ["grow", "Click", "Click a thing: it is selected up to its border (1)"],
@@ -36,6 +37,11 @@ const DEPTHS = [
 ];
 const BRUSH = { low: 3, high: 80 }; // Pixels.
 
+const NOTHING = {
+  move: "Nothing is selected: each handle moves the Gaussians in its sphere. Select, to say more exactly what moves.",
+  heal: "Nothing is marked. What you mark goes in the next run, and the surface around it goes on over its place.",
+};
+
 /** The tools, above the picture. */
 export function buildTools(editor) {
   const { store, selecting } = editor;
@@ -43,13 +49,16 @@ export function buildTools(editor) {
   const row = (label, testid, options, changed) => segments({ label, testid, options, changed });
 
   const hand = row("What the pointer does", "hand", HANDS, (value) =>
-    value === "select" ? selecting.use(store.state.selectTool) : selecting.takeThings(value === "thing"),
+    ["select", "heal"].includes(value) ? selecting.start(value === "heal") : selecting.takeThings(value === "thing"),
   );
   const tool = row("Select by", "select-tool", SELECT_TOOLS, (value) => selecting.use(value));
   const op = choice({ label: "What is done with it", testid: "select-op", options: OPS, changed: set("selectOp") });
   const kind = row("A click is", "click-kind", KINDS, set("clickKind"));
-  const next = button("Next thing", "next-thing", "The next click begins another thing, instead of saying more of this one", () =>
-    store.set({ nextThing: !store.state.nextThing, clickKind: "inside" }),
+  const next = button(
+    "Next thing",
+    "next-thing",
+    () => store.set({ nextThing: !store.state.nextThing, clickKind: "inside" }),
+    { title: "The next click begins another thing, instead of saying more of this one" },
   );
   const depth = row("How deep", "select-depth", DEPTHS, set("selectDepth"));
   const size = h("input", { type: "range", min: BRUSH.low, max: BRUSH.high, step: 1, testid: "brush-radius" });
@@ -65,8 +74,8 @@ export function buildTools(editor) {
     brushSize,
     depth.element,
   );
-  const undo = icon("↶", "undo", "Undo (Ctrl + Z)", () => editor.undo());
-  const redo = icon("↷", "redo", "Redo (Ctrl + Shift + Z)", () => editor.redo());
+  const undo = iconButton("↶", "undo", "Undo (Ctrl + Z)", () => editor.undo());
+  const redo = iconButton("↷", "redo", "Redo (Ctrl + Shift + Z)", () => editor.redo());
   byId("tools").append(
     hand.element,
     tools,
@@ -74,11 +83,11 @@ export function buildTools(editor) {
     h("div", { class: "row tight" }, undo, redo),
   );
 
-  const shown = ["selectMode", "thingMode", "selectTool", "selectOp", "clickKind", "nextThing", "selectDepth", "brushRadius"];
-  const undone = ["version", "handles", "selection", "region", "mode", "preset", "params", "crumbs"];
+  const shown = ["healing", "selectMode", "thingMode", "selectTool", "selectOp", "clickKind", "nextThing", "selectDepth", "brushRadius"];
+  const undone = ["version", "handles", "selection", "region", "mode", "preset", "params", "crumbs", "heal"];
   store.watch([...shown, ...undone], (state) => {
     const { selectMode, selectTool } = state;
-    hand.update(selectMode ? "select" : state.thingMode ? "thing" : "handle");
+    hand.update(selectMode ? (state.healing ? "heal" : "select") : state.thingMode ? "thing" : "handle");
     tools.hidden = !selectMode;
     tool.update(selectTool);
     op.update(state.selectOp);
@@ -86,7 +95,7 @@ export function buildTools(editor) {
     depth.update(state.selectDepth);
     size.valueAsNumber = state.brushRadius;
     attrs(next, { "aria-pressed": String(state.nextThing) });
-    next.disabled = !state.selection.some((o) => o.grow);
+    next.disabled = !listOf(state).some((o) => o.grow);
     kind.element.hidden = next.hidden = selectTool !== "grow";
     depth.element.hidden = selectTool === "grow" || isShape(selectTool);
     brushSize.hidden = selectTool !== "brush";
@@ -98,12 +107,13 @@ export function buildTools(editor) {
 /** What is selected, in the panel. */
 export function buildSelectionPanel(editor) {
   const { store, selecting } = editor;
-  const invert = button("Invert", "invert-selection", "Select all that is not selected now", () => selecting.invert());
-  const wider = button("Wider", "expand-selection", "Take along what is next to it, all around", () => selecting.spread(1));
-  const narrower = button("Narrower", "shrink-selection", "Leave out what is at its edge, all around", () =>
+  const press = (label, testid, title, onclick) => button(label, testid, onclick, { title });
+  const invert = press("Invert", "invert-selection", "Select all that is not selected now", () => selecting.invert());
+  const wider = press("Wider", "expand-selection", "Take along what is next to it, all around", () => selecting.spread(1));
+  const narrower = press("Narrower", "shrink-selection", "Leave out what is at its edge, all around", () =>
     selecting.spread(-1),
   );
-  const clear = button("Clear", "clear-selection", "Select nothing", () => selecting.clear());
+  const clear = press("Clear", "clear-selection", "Select nothing", () => selecting.clear());
   const tinted = toggle({
     label: "Tint",
     testid: "tinted",
@@ -113,11 +123,8 @@ export function buildSelectionPanel(editor) {
   const held = h("p", { class: "selected-count", role: "status", testid: "selection-count" });
   const notes = h("div", { class: "stack", testid: "selection-warnings" });
   const problem = problemPlace("selection-problem");
-  const empty = h(
-    "p",
-    { class: "note", testid: "no-selection" },
-    "Nothing is selected: each handle moves the Gaussians in its sphere. Select, to say more exactly what moves.",
-  );
+  const heading = h("h2", {});
+  const empty = h("p", { class: "note", testid: "no-selection" });
   const list = h("ol", {
     class: "steps-of-selection",
     testid: "selection-steps",
@@ -133,12 +140,15 @@ export function buildSelectionPanel(editor) {
   const element = h(
     "section",
     { class: "selection", "aria-label": "Selection" },
-    h("div", { class: "row between" }, h("h2", {}, "Selection"), tools),
+    h("div", { class: "row between" }, heading, tools),
     ...[empty, held, problem, notes, list, shapeFields(editor), changes],
   );
 
-  store.watch(["selection", "selectionAnswer", "selectionWaits", "tinted", "scene", "version"], (state) => {
-    const { selection, selectionAnswer: answer } = state;
+  store.watch(["selection", "heal", "healing", "selectionAnswer", "selectionWaits", "tinted", "scene", "version"], (state) => {
+    const { selectionAnswer: answer, healing } = state;
+    const selection = listOf(state);
+    text(heading, healing ? "What is healed" : "Selection");
+    text(empty, NOTHING[healing ? "heal" : "move"]);
     empty.hidden = selection.length > 0;
     for (const part of [tools, held, list, changes]) part.hidden = selection.length === 0;
     wider.disabled = narrower.disabled = state.selectionWaits || !answer?.count;

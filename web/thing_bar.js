@@ -1,42 +1,42 @@
 // On the picture: what was taken hold of, how it is made more or less of, and what becomes of it once it is let go.
 
-import { attrs, byId, h, text } from "./dom.js";
+import { attrs, button, byId, h, text } from "./dom.js";
 import { statusLine } from "./edits.js";
-import { button } from "./fields.js";
 import { duration, gaussians } from "./format.js";
 import { furtherBorders, proposalOf, sentence } from "./selection.js";
 
 export function buildThingBar(editor) {
   const { store, selecting } = editor;
+  const press = (label, testid, title, onclick, more = {}) => button(label, testid, onclick, { title, ...more });
 
   const line = h("span", { class: "thing-line", role: "status", testid: "thing-line" });
   const problem = h("span", { class: "thing-problem", role: "alert", hidden: true, testid: "thing-problem" });
-  const less = button("\u2212 Less", "thing-less", "Only up to the next border within (,)", () => selecting.widen(-1));
-  const more = button("+ More", "thing-more", "Up to the next border beyond (.)", () => selecting.widen(1));
-  const hold = button("By keys", "thing-hold", "A handle to move by arrow keys, or by numbers in the panel", () => {
+  const less = press("\u2212 Less", "thing-less", "Only up to the next border within (,)", () => selecting.widen(-1));
+  const more = press("+ More", "thing-more", "Up to the next border beyond (.)", () => selecting.widen(1));
+  const hold = press("By keys", "thing-hold", "A handle to move by arrow keys, or by numbers in the panel", () => {
     editor.holdThing();
     const { handles, selected } = store.state;
     const index = handles.findIndex((handle) => handle.id === selected);
     requestAnimationFrame(() => document.querySelector(`[data-testid=handle-${index}-target]`)?.focus());
   });
-  const remove = button("Remove", "thing-remove", "Take it away for good, and complete what it hid", () =>
+  const remove = press("Remove", "thing-remove", "Take it away for good, and complete what it hid", () =>
     editor.removeThing(),
   );
-  const repair = button("Repair", "thing-repair", "Run it as a draft", () => editor.runDraft(), {
+  const repair = press("Repair", "thing-repair", "Run it as a draft", () => editor.runDraft(), {
     class: "small primary",
   });
-  const drop = button("Let go", "thing-drop", "", () => editor.letGo());
-  const cancel = button("Stop", "thing-cancel", "Give up the repair; it stays where you dragged it", () =>
+  const drop = press("Let go", "thing-drop", "", () => editor.letGo());
+  const cancel = press("Stop", "thing-cancel", "Give up the repair; it stays where you dragged it", () =>
     editor.cancelDraft(),
   );
-  const better = button(
+  const better = press(
     "Run it well",
     "thing-better",
     "Runs the same drag once more with the preset standard: slower, and better",
     () => editor.runBetter(),
     { class: "small primary" },
   );
-  const undo = button("Undo", "thing-undo", "Back to before (Ctrl + Z)", () => editor.undo());
+  const undo = press("Undo", "thing-undo", "Back to before (Ctrl + Z)", () => editor.undo());
   byId("thing-bar").append(line, problem, less, more, hold, remove, repair, drop, cancel, better, undo);
 
   store.watch(

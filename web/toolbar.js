@@ -1,8 +1,8 @@
 // Above the picture: versions, views, layers, the comparison. On it: what it shows. Below it: what it took.
 
-import { attrs, byId, h, text } from "./dom.js";
+import { attrs, button, byId, h, iconButton, text } from "./dom.js";
 import { parentOf, shownVersion } from "./editor.js";
-import { button, choice, icon, segments } from "./fields.js";
+import { choice, segments } from "./fields.js";
 import { gaussians } from "./format.js";
 import { isStated } from "./requests.js";
 
@@ -68,8 +68,8 @@ export function buildToolbar(editor, viewer) {
     options: [],
     changed: (value) => value && editor.lookFrom(value),
   });
-  const previous = icon("‹", "view-previous", "Previous view ([)", () => editor.stepView(-1));
-  const next = icon("›", "view-next", "Next view (])", () => editor.stepView(1));
+  const previous = iconButton("‹", "view-previous", "Previous view ([)", () => editor.stepView(-1));
+  const next = iconButton("›", "view-next", "Next view (])", () => editor.stepView(1));
   const layer = segments({
     label: "Layer",
     testid: "layer",
@@ -108,12 +108,12 @@ export function buildToolbar(editor, viewer) {
     h("div", { class: "row tight" }, compare, compareWith.element),
   );
   byId("view-tools").append(
-    icon("⊕", "focus", "Turn about the point under the pointer (F); here: about the middle", () => viewer.focusHere()),
-    icon("⌂", "reset-view", "Back to the start (R)", () => editor.home()),
+    iconButton("⊕", "focus", "Turn about the point under the pointer (F); here: about the middle", () => viewer.focusHere()),
+    iconButton("⌂", "reset-view", "Back to the start (R)", () => editor.home()),
   );
 
   const chip = h("span", { class: "chip", testid: "shown-chip" });
-  const back = button("End preview", "drop-preview", null, () => editor.dropPreview());
+  const back = button("End preview", "drop-preview", () => editor.dropPreview());
   byId("chips").append(chip, back);
 
   const keysLine = h("span", { class: "muted keys-line" });

@@ -1,8 +1,7 @@
 // Which way is up: the axes in the corner of the picture, to look along, and the menu of the scene's up direction.
 
 import { axes, seenFrom, upOf } from "./camera.js";
-import { attrs, byId, h, problemText, s } from "./dom.js";
-import { button } from "./fields.js";
+import { attrs, button, byId, h, problemText, s } from "./dom.js";
 import { cross, dot, scale, sub, unit } from "./vectors.js";
 
 const ARM = 28; // Pixels from the middle of the axes to their ends.
@@ -37,10 +36,15 @@ export async function clickFloor(editor, camera, x, y) {
 export function buildUp(editor) {
   const { store } = editor;
   const choose = (label, testid, title, up) =>
-    button(label, testid, title, async () => {
-      menu.open = false;
-      await Promise.resolve(up()).catch((error) => editor.say(problemText(error), { kind: "bad" }));
-    });
+    button(
+      label,
+      testid,
+      async () => {
+        menu.open = false;
+        await Promise.resolve(up()).catch((error) => editor.say(problemText(error), { kind: "bad" }));
+      },
+      { title },
+    );
   const reset = choose("Default", "reset-up", "As the cameras of the dataset were held; without one, −y", () => editor.setUp(null));
   const menu = h(
     "details",

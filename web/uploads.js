@@ -1,7 +1,7 @@
 // A file on its way to the service: name, how far it is, and what went wrong; or the path of one that is there already.
 
 import { wasGivenUp } from "./api.js";
-import { asking, attrs, h, problemPlace, showProblem, text } from "./dom.js";
+import { asking, attrs, button, h, problemPlace, showProblem, text } from "./dom.js";
 import { bytes } from "./format.js";
 
 /** Shows an upload as a row in `place`.
@@ -13,11 +13,7 @@ export async function showUpload(place, file, send, done) {
   const bar = h("progress", { max: 1, value: 0, "aria-label": `Upload of ${file.name}`, testid: "upload-progress" });
   const state = h("span", { class: "muted" }, "0 %");
   const problem = problemPlace("upload-problem");
-  const close = h(
-    "button",
-    { type: "button", class: "small", testid: "upload-cancel", onclick: () => abort.abort() },
-    "Cancel",
-  );
+  const close = button("Cancel", "upload-cancel", () => abort.abort());
   const row = h(
     "div",
     { class: "upload", testid: "upload" },

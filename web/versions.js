@@ -1,26 +1,26 @@
-// The scene itself: its versions with undo and downloads, its dataset, its up direction.
+// The scene itself: its versions as a tree, with names and downloads; its dataset, its up direction.
 
 import * as api from "./api.js";
-import { askText, say } from "./dialogs.js";
-import { asking, attrs, h, keyedList, problemPlace, text } from "./dom.js";
+import { askConfirmation, askText, say } from "./dialogs.js";
+import { asking, attrs, button, h, keyedList, problemPlace, row, text } from "./dom.js";
+import { treeOf } from "./drafts.js";
 import { parentOf } from "./editor.js";
 import { bytes, count, gaussians, point, when } from "./format.js";
 import { warnings } from "./request_panel.js";
 import { pathForm, showUpload } from "./uploads.js";
 
+const ORIGINAL = "as uploaded";
+
 export function buildVersions(editor) {
   const { store } = editor;
-  const undo = h("button", {
-    type: "button",
-    class: "small",
-    testid: "undo-version",
-    onclick: () => editor.showVersion(parentOf(store.state.scene, store.state.version)),
-  });
+  const problem = problemPlace("scene-tab-problem");
+  const act = (fn) => asking(problem, fn);
+  const undo = button("", "undo-version", () => editor.showVersion(parentOf(store.state.scene, store.state.version)));
   const list = h("ol", { class: "versions", testid: "versions" });
   const update = keyedList(
     list,
-    (version) => version.version,
-    (version) => row(editor, version.version),
+    ({ version }) => version.version,
+    ({ version }) => versionRow(editor, version.version, act),
   );
 
   const dataset = h("div", { testid: "dataset" });
@@ -47,6 +47,20 @@ export function buildVersions(editor) {
     zip.value = "";
     if (file) upload(file);
   });
+  const remove = button(
+    "Remove",
+    "dataset-remove",
+    act(async () => {
+      const { id, dataset: info } = store.state.scene;
+      const sure = await askConfirmation({
+        title: "Remove the dataset?",
+        detail: `Its ${count(info.views)} cameras and ${count(info.photos)} photos go; the scene and its versions stay. A folder of the service's own is left as it is.`,
+        yes: "Remove",
+      });
+      if (sure) editor.datasetChanged(await api.deleteDataset(id));
+    }),
+    { class: "small quiet-danger" },
+  );
 
   const paths = pathForm({
     label: h("span", { class: "muted" }, "or a folder of the service's scene folder"),
@@ -63,24 +77,21 @@ export function buildVersions(editor) {
   store.watch(["info"], ({ info }) => (paths.hidden = !info?.scene_root));
 
   const facts = h("dl", { class: "facts", testid: "scene-facts" });
-  const problem = problemPlace("scene-tab-problem");
-  const button = (label, testid, onclick, extra) =>
-    h("button", { type: "button", class: "small", testid, onclick, ...extra }, label);
   const rename = button(
     "Rename",
     "rename",
-    asking(problem, async () => {
+    act(async () => {
       const name = await askText({ title: "Rename the scene", label: "Name", value: store.state.scene.name });
       if (name) await editor.rename(name);
     }),
   );
-
-  store.watch(["scene", "version", "views"], ({ scene, version }) => {
+  store.watch(["scene", "version", "views", "edits", "drafts"], ({ scene, version }) => {
     if (!scene) return;
     const parent = parentOf(scene, version);
     undo.hidden = parent === null;
     text(undo, `Undo: back to version ${parent}`);
-    update([...scene.versions].reverse());
+    update(treeOf(scene.versions));
+    remove.hidden = !scene.dataset;
     dataset.replaceChildren(...datasetFacts(scene));
     const rows = [
       ["Name", scene.name],
@@ -100,22 +111,21 @@ export function buildVersions(editor) {
   const element = h(
     "div",
     {},
-    h("section", {}, h("div", { class: "row between" }, h("h2", {}, "Versions"), undo), list),
+    h("section", {}, h("div", { class: "row between" }, h("h2", {}, "Versions"), undo), problem, list),
     h(
       "section",
       {},
       h("h2", {}, "Cameras and photos"),
       dataset,
-      h(
-        "button",
-        { type: "button", class: "small", testid: "dataset-button", onclick: () => zip.click() },
-        "Upload a dataset (.zip)…",
+      row(
+        button("Upload a dataset (.zip)…", "dataset-button", () => zip.click()),
+        remove,
       ),
       zip,
       uploads,
       paths,
     ),
-    h("section", {}, h("h2", {}, "Scene"), facts, problem, h("div", { class: "row wrap" }, rename)),
+    h("section", {}, h("h2", {}, "Scene"), facts, h("div", { class: "row wrap" }, rename)),
   );
   return { element, uploadDataset: upload };
 }
@@ -143,7 +153,8 @@ function datasetFacts({ dataset }) {
   return [...facts, ...warnings(dataset.warnings)];
 }
 
-function row(editor, number) {
+/** A version in the tree: shown by a press, with a name, and what can be had of it. */
+function versionRow(editor, number, act) {
   const name = h("span", {});
   const detail = h("span", { class: "muted" });
   const show = h(
@@ -152,30 +163,69 @@ function row(editor, number) {
     name,
     detail,
   );
-  const links = h("div", { class: "row downloads" });
-  const element = h("li", { class: "version" }, show, links);
+  const current = () => editor.state.scene.versions.find((v) => v.version === number);
+  const tag = `version-${number}`;
+  const rename = button(
+    "Name…",
+    `${tag}-name`,
+    act(async () => {
+      const value = current().name ?? "";
+      const wish = await askText({ title: `Name version ${number}`, label: "Name", value, optional: true });
+      if (wish !== null) await editor.nameVersion(number, wish);
+    }),
+  );
+  const branch = button(
+    "Edit from here",
+    `${tag}-branch`,
+    () => {
+      editor.showVersion(number);
+      editor.store.set({ tab: "drag" });
+    },
+    { title: "What is made next is made of this version; the others stay" },
+  );
+  const keep = button("Keep", `${tag}-keep`, () => editor.keep(number), {
+    title: "A draft goes when a better result of the same version is there, unless it is kept",
+  });
+  const remove = button(
+    "Delete",
+    `${tag}-delete`,
+    act(async () => {
+      const sure = await askConfirmation({
+        title: `Delete version ${number}?`,
+        detail: "It is gone for good. Versions that were made from it stay.",
+        yes: "Delete",
+      });
+      if (sure) await editor.deleteVersion(number);
+    }),
+    { class: "small quiet-danger" },
+  );
+  const links = h("div", { class: "row wrap downloads" });
+  const actions = h("div", { class: "row wrap version-actions" }, branch, rename, keep, number === 0 ? null : remove);
+  const element = h("li", { class: "version" }, show, actions, links);
   return {
     element,
-    update: (version) => {
-      const { scene } = editor.state;
-      const current = editor.state.version === number;
-      attrs(show, { "aria-pressed": String(current) });
-      text(name, number === 0 ? "Version 0 · as uploaded" : `Version ${number} · from ${version.parent}`);
-      text(
-        detail,
-        `${gaussians(version.gaussians)} · ${when(version.created)}${version.edit ? ` · ${version.edit}` : ""}`,
+    update: ({ version, depth }) => {
+      const { scene, edits, drafts, info } = editor.state;
+      const shown = editor.state.version === number;
+      const preset = edits.find(({ id }) => id === version.edit)?.request.preset;
+      attrs(show, { "aria-pressed": String(shown) });
+      attrs(element, { "aria-level": depth + 1, "data-depth": depth });
+      element.style.marginLeft = `${14 * Math.min(depth, 8)}px`;
+      const from = number === 0 ? ORIGINAL : `from ${version.parent}`;
+      text(name, version.name ? `${version.name} · ${number}` : `Version ${number} · ${from}`);
+      const made = version.edit ? ` · ${version.edit}${preset ? `, ${preset}` : ""}` : "";
+      text(detail, `${gaussians(version.gaussians)} · ${when(version.created)}${made}`);
+      keep.hidden = !drafts.some((draft) => draft.version === number);
+      if (links.children.length > 0) return;
+      const formats = [...(info?.formats?.write ?? ["ply", "splat", "spz", "sog", "glb"]), "original"];
+      links.append(
+        h("span", { class: "muted" }, "Download"),
+        ...formats.map((format) => {
+          const more = { href: api.fileUrl(scene.id, number, format), download: "", testid: `download-${number}-${format}` };
+          // What somebody has taken home is not deleted behind their back.
+          return h("a", { ...more, onclick: () => editor.keep(number) }, format.replace("_", " "));
+        }),
       );
-      if (links.children.length === 0)
-        links.append(
-          h("span", { class: "muted" }, "Download"),
-          ...["ply", "splat", "spz", "sog", "glb"].map((format) =>
-            h(
-              "a",
-              { href: api.fileUrl(scene.id, number, format), download: "", testid: `download-${number}-${format}` },
-              format,
-            ),
-          ),
-        );
     },
   };
 }

@@ -24,7 +24,7 @@ import { HeldView } from "./held.js";
 import { Overlay } from "./overlay.js";
 import { partOf } from "./requests.js";
 import { isShape } from "./selecting.js";
-import { clicksOf, proposalOf, thinned } from "./selection.js";
+import { clicksOf, listOf, proposalOf, thinned } from "./selection.js";
 import { lastShape, ShapeView } from "./shapes.js";
 import { clickFloor } from "./up.js";
 import { add, sub, unit } from "./vectors.js";
@@ -41,7 +41,7 @@ const SKETCH_PX = 2; // A line that is drawn has a corner this often at most.
 const MAX_CACHED_PICTURES = 6; // Enough to go back and forth between two versions and three layers.
 const DRAWING = ["brush", "lasso", "rectangle", "sphere", "box"]; // With the left button.
 const SHAPE_PX = 50; // How far a sphere or a box goes that is clicked rather than drawn.
-const CONTROLS = "button, a, input, select, summary, .end"; // What lies on the picture and is no part of it.
+const CONTROLS = "button, a, input, select, summary, details, .end"; // What lies on the picture and is no part of it.
 const THUMBNAIL = { width: 320, height: 200 };
 
 /** How much a turn of the wheel multiplies by. */
@@ -102,6 +102,7 @@ export class Viewer {
       [
         ...["handles", "selected", "selection", "selectionAnswer", "selectionWaits", "selectMode", "thingMode", "mode"],
         ...["region", "problem", "pose", "floorClicks", "gizmo", "frame", "dragging", "comparing", "scene", "selectTool"],
+        ...["heal", "healing"],
       ],
       () => this.#drawOverlay(),
     );
@@ -236,6 +237,7 @@ export class Viewer {
       "data-selection": job.selection,
       "data-quality": job.complete ? "full" : "moving",
     });
+    this.#view.dispatchEvent(new CustomEvent("shown", { detail: job }));
     const time = ms === null ? "" : ` · ${Math.round(ms)} ms`;
     text(byId("picture-size"), `${job.size.width} × ${job.size.height}${time}`);
   }
@@ -310,7 +312,7 @@ export class Viewer {
     }));
     this.#overlay.draw(camera, items, {
       region,
-      clicks: floorClicks?.map((point) => ({ point, kind: "inside" })) ?? (selectMode ? clicksOf(selection) : []),
+      clicks: floorClicks?.map((point) => ({ point, kind: "inside" })) ?? (selectMode ? clicksOf(listOf(this.#state)) : []),
       spheres: selection.length === 0,
     });
     this.#held.draw(camera);

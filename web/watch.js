@@ -1,70 +1,87 @@
-// Follows one edit until it ends: by server-sent events, or by polling where those are not to be had.
+// A scene as all see it who look at it: what happens to it and to its edits, and whether the service answers at all.
+
+// Choices. The service says something each second: after two and a half without a word it is gone, or the way to it.
+const SILENCE_MS = 2500;
+const AGAIN_MS = 1000;
 
 const FINAL = new Set(["succeeded", "failed", "cancelled"]);
 
 export const hasEnded = (edit) => FINAL.has(edit.state);
 
-/** Follows an edit until it ends, and calls back.
- *    onUpdate(edit)       is called each time the edit has changed; the last time with a final state
- *    onGone()             is called when there is no such edit any more
- *    events(id)           returns an EventSource; null: poll only
- *    fetchEdit(id, etag)  returns {edit, etag}, or null if nothing has changed; throws {status}
- *    every                ms between two polls
- *    wait(ms, signal)     resolves after that time, or at once when the signal aborts
+/** Follows a scene until it is ended: by its stream of events, or by asking where there is none to be had.
+ *    onScene(scene), onEdit(edit)  something may be new
+ *    onGone()                      the scene has been deleted
+ *    onAnswering(does)             whether the service answers
+ *    events()                      returns an EventSource
+ *    ask()                         returns {scene, edits}, youngest first; throws {status}
+ *    silence, again                ms without a word that are too many; ms between two attempts
  *  Returns a function that ends it. */
-export function follow(id, { onUpdate, onGone = () => {}, events = null, fetchEdit, every = 1000, wait = pause }) {
+export function followScene({ silence = SILENCE_MS, again = AGAIN_MS, events, ask, ...told }) {
   const controller = new AbortController();
-  let source = null;
-
-  const end = () => {
-    controller.abort();
-    source?.close();
-  };
-  const publish = (edit) => {
-    if (controller.signal.aborted) return;
-    // The end comes before the call: whoever is called may follow the edit again.
-    if (hasEnded(edit)) end();
-    onUpdate(edit);
+  const { signal } = controller;
+  const tell = (name, ...what) => signal.aborted || told[name](...what);
+  const end = () => controller.abort();
+  const gone = () => {
+    tell("onGone");
+    end();
   };
 
-  async function poll() {
-    let etag = null;
-    let delay = every;
-    while (!controller.signal.aborted) {
-      try {
-        const update = await fetchEdit(id, etag);
-        delay = every;
-        if (update) {
-          etag = update.etag;
-          publish(update.edit);
-        }
-      } catch (error) {
-        if (error.status === 404) {
-          if (!controller.signal.aborted) onGone();
-          return end();
-        }
-        // The service may be restarting, and will go on with the edit: keep asking, but less often.
-        delay = Math.min(8000, delay * 2);
-      }
-      await wait(delay, controller.signal);
+  /** Asks for all there is; an edit that ended while nobody listened is told so. */
+  async function catchUp() {
+    try {
+      const { scene, edits } = await ask();
+      tell("onAnswering", true);
+      tell("onScene", scene);
+      for (const edit of [...edits].reverse()) tell("onEdit", edit);
+    } catch (error) {
+      if (error.status === 404) gone();
+      else if (!error.status) tell("onAnswering", false);
     }
   }
 
-  if (events) {
-    source = events(id);
-    source.addEventListener("edit", (event) => publish(JSON.parse(event.data)));
-    source.addEventListener(
-      "error",
-      () => {
-        // No stream left for us (429), a restart, a proxy that cuts long answers.
+  /** Listens to a stream until that is over. */
+  const listen = () =>
+    new Promise((resolve) => {
+      const source = events();
+      const over = () => {
+        clearTimeout(timer);
         source.close();
-        if (!controller.signal.aborted) poll();
-      },
-      { once: true },
-    );
-  } else {
-    poll();
-  }
+        resolve();
+      };
+      const silent = () => {
+        tell("onAnswering", false);
+        over();
+      };
+      let timer = setTimeout(silent, silence);
+      let first = true;
+      const on = (name, fn) =>
+        source.addEventListener(name, ({ data }) => {
+          if (signal.aborted) return;
+          clearTimeout(timer);
+          timer = setTimeout(silent, silence);
+          tell("onAnswering", true);
+          fn(JSON.parse(data));
+        });
+      on("scene", (scene) => {
+        tell("onScene", scene);
+        if (first) catchUp();
+        first = false;
+      });
+      on("edit", (edit) => tell("onEdit", edit));
+      on("alive", () => {});
+      on("gone", gone);
+      // No stream left for us (429), a restart, a proxy that cuts long answers.
+      source.addEventListener("error", over, { once: true });
+      signal.addEventListener("abort", over, { once: true });
+    });
+
+  (async () => {
+    while (!signal.aborted) {
+      await listen();
+      if (!signal.aborted) await catchUp();
+      if (!signal.aborted) await pause(again, signal);
+    }
+  })();
   return end;
 }
 

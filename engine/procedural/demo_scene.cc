@@ -65,6 +65,8 @@ Result<void> validate(const DemoOptions& options) {
   if (options.views < 1 || options.views > 1000) return bad("views", "1 to 1000", options.views);
   if (options.width < 16 || options.width > 16384) return bad("width", "16 to 16384 pixels", options.width);
   if (options.height < 16 || options.height > 16384) return bad("height", "16 to 16384 pixels", options.height);
+  const double shift = glm::length(options.ball_shift);
+  if (!(shift <= max_ball_shift)) return bad("ball-shift", "three numbers, together no longer than 100", shift);  // NaN
   return {};
 }
 
@@ -135,6 +137,11 @@ DemoScene make_demo_scene(const DemoOptions& options) {
   demo.object = std::move(surfels.object);
   for (const Object& object : still_life.objects) demo.object_names.push_back(object.name);
   demo.drags = std::move(still_life.drags);
+  if (options.ball_shift != DVec3(0.0)) {
+    SuggestedDrag::Handle& ball = demo.drags.front().handles.front();  // from where it stands now, back to its place
+    ball.target = ball.source;
+    ball.source += options.ball_shift;
+  }
   return demo;
 }
 

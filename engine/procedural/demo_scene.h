@@ -19,6 +19,10 @@
 
 namespace engine::procedural {
 
+/// How far the ball may be carried, world units: out of the room, and not so far that single precision loses it. A
+/// choice.
+constexpr double max_ball_shift = 100;
+
 /// What the demo scene is made of.
 struct DemoOptions {
   std::size_t gaussians = 150'000;  ///< 2,000 to 5,000,000.
@@ -26,7 +30,8 @@ struct DemoOptions {
   int views = 40;                 ///< 1 to 1000.
   int width = 640, height = 480;  ///< Pixels of a view, 16 to 16384.
   /// How far the ball has been carried from its place, world units. Otherwise than zero, the scene is the true result
-  /// of dragging it there: light and shadows stay as they were, and what no camera has seen is there, too.
+  /// of dragging it there: light and shadows stay as they were, and what no camera has seen is there, too. No longer
+  /// than max_ball_shift.
   DVec3 ball_shift{0.0};
 };
 /// errors  invalid_argument: `where` is the option
@@ -65,7 +70,8 @@ struct StillLife {
 /// evenly as n can be.
 [[nodiscard]] std::vector<scene::Camera> make_arc_cameras(int count, int width, int height);
 
-/// Precondition: validate(options) holds. The cloud's size is within 1 % of options.gaussians. Same options, same
+/// Precondition: validate(options) holds. The cloud's size is within 1 % of options.gaussians; with a ball_shift, what no
+/// camera has seen comes on top, and the drag of the ball leads back to its place. Same options, same
 /// bytes, for any number of threads.
 [[nodiscard]] DemoScene make_demo_scene(const DemoOptions& options = {});
 

@@ -151,12 +151,14 @@ class Run {
     keeper_.publish();
   }
 
-  /// Carries the edit out, or ends it with what it has where it has outlived its time.
+  /// Carries the edit out, or ends it with what it has where that was asked for or it has outlived its time.
   Result<edit::Outcome> run() {
     auto outcome = attempt();
-    // Its end has to be that of its time: another error it would only meet again, or hide.
+    // Its end has to be one of those two: another error it would only meet again, or hide.
     if (outcome || outcome.error().code != ErrorCode::cancelled) return outcome;
-    if (!has_outlived_ || context_.cancel_token().stop_requested()) return outcome;
+    if (context_.cancel_token().stop_requested()) return outcome;
+    if (is_stopped_) return attempt();
+    if (!has_outlived_) return outcome;
     if (context_.finished_intervals() == 0)
       return fail(ErrorCode::too_large,
                   "the edit has not finished an interval in " + whole_seconds(workshop_.outlived_seconds) +
@@ -167,6 +169,14 @@ class Run {
                  ", twice what one may be estimated to take (--edit-time)");
     note(spdlog::level::warn, "has outlived its time, and ends after its last interval");
     return attempt();
+  }
+
+  /// Who stops an edit wants what it has, not what it would have had: the interval in work is given up. The state of
+  /// the last finished one is on disk.
+  void look_whether_to_stop() {
+    if (is_stopped_ || !context_.stop_requested() || context_.finished_intervals() == 0) return;
+    is_stopped_ = true;
+    if (last_interval_ >= context_.finished_intervals()) out_of_time_.request_stop();
   }
 
   /// The edit asks this all the time, which costs no more than looking at a clock.
@@ -184,6 +194,7 @@ class Run {
     observer.assigned = [this](const edit::Report& report) { tell_assignment(report); };
     observer.progress = [this](const edit::Progress& progress) {
       keeper_.advance(progress);
+      look_whether_to_stop();
       look_at_the_time();
     };
     observer.moment = [this](const edit::Moment& moment) { return pictures_->add(moment); };
@@ -279,9 +290,10 @@ class Run {
   std::vector<scene::Camera> cameras_;
   std::shared_ptr<const scene::GaussianCloud> input_;
   std::optional<IntervalPictures> pictures_;
-  int last_interval_ = 0;  ///< That this run has finished or taken over.
+  int last_interval_ = 0;    ///< That this run has finished or taken over.
+  bool is_stopped_ = false;  ///< The rest of the edit has been given up, because somebody has stopped it.
   bool has_outlived_ = false;
-  std::stop_source out_of_time_;  ///< Fires with the context's token, too.
+  std::stop_source out_of_time_;  ///< Ends an attempt; fires with the context's token, too.
   bool stopped_early_ = false;
 
  public:

@@ -147,6 +147,10 @@ Result<SceneInfo> SceneStore::put_dataset_path(const std::string& id, const std:
   return impl_->info(impl_->with(id, [&](const Snapshot& at) { return impl_->datasets.put_path(at, path); }));
 }
 
+Result<SceneInfo> SceneStore::remove_dataset(const std::string& id) {
+  return impl_->info(impl_->with(id, [&](const Snapshot& at) { return impl_->datasets.remove(at); }));
+}
+
 Result<std::shared_ptr<const engine::io::Dataset>> SceneStore::dataset(const std::string& id) {
   return impl_->with(id, [&](const Snapshot& at) { return impl_->datasets.get(at); });
 }
@@ -170,6 +174,15 @@ Result<int> SceneStore::add_version(const std::string& id, int parent, const std
 
 Result<VersionInfo> SceneStore::find_version(const std::string& id, const std::string& version) const {
   return impl_->with(id, [&](const Snapshot& at) { return Versions::find(at, version); });
+}
+
+Result<VersionInfo> SceneStore::rename_version(const std::string& id, const std::string& version,
+                                               const std::string& name) {
+  return impl_->with(id, [&](const Snapshot& at) -> Result<VersionInfo> {
+    if (!name.empty())
+      if (auto checked = checked_name(name); !checked) return propagate(checked);
+    return impl_->versions.rename(at, version, name);
+  });
 }
 
 Result<void> SceneStore::remove_version(const std::string& id, const std::string& version) {

@@ -76,6 +76,9 @@ class SceneStore {
   [[nodiscard]] Result<SceneInfo> put_dataset_zip(const std::string& id, const std::filesystem::path& zip,
                                                   const std::string& filename);
   [[nodiscard]] Result<SceneInfo> put_dataset_path(const std::string& id, const std::string& path);
+  /// Takes the dataset away. Whoever holds it keeps its photos.
+  ///   errors  not_found: there is none (`where` is "dataset")
+  [[nodiscard]] Result<SceneInfo> remove_dataset(const std::string& id);
   /// The dataset without its points; null without one.
   [[nodiscard]] Result<std::shared_ptr<const engine::io::Dataset>> dataset(const std::string& id);
   /// Notes what a comparison of renders with photos found; nothing for figures, if no photo could be compared.
@@ -96,6 +99,10 @@ class SceneStore {
   /// What is known of a version, as find() has it among all of its scene. A preview is none.
   ///   errors  not_found
   [[nodiscard]] Result<VersionInfo> find_version(const std::string& id, const std::string& version) const;
+  /// Calls a version by a name, or by none ("").
+  ///   errors  not_found; invalid_argument: no name for a scene either (`where` is "name")
+  [[nodiscard]] Result<VersionInfo> rename_version(const std::string& id, const std::string& version,
+                                                   const std::string& name);
   /// Deletes a version for good, durable when this returns; its number is not used again. Those that were made from it
   /// are said to have been made from its parent, and stay as they are. Whoever holds it keeps it in memory.
   ///   errors  not_found; conflict: version 0, which all others lie over

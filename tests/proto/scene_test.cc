@@ -16,7 +16,7 @@ Scene sample() {
   scene.low = {-1, -2, -3}, scene.high = {1, 2, 3}, scene.centre = {0.5, 0, 0};
   scene.radius = 1.5;
   scene.views = 50;
-  scene.versions = {{0, std::nullopt, "", "t0", 62000, 0}, {1, 0, "e000001", "t1", 62100, 4096}};
+  scene.versions = {{0, std::nullopt, "", "", "t0", 62000, 0}, {1, 0, "e000001", "a name", "t1", 62100, 4096}};
   return scene;
 }
 
@@ -25,10 +25,10 @@ TEST(SceneOnTheWire, HasTheFieldsOfTheContract) {
   EXPECT_EQ(out, json::parse(R"({"id":"s000001","name":"chair","created":"2026-11-21T11:09:38.123Z","format":"ply",
     "gaussians":62000,"sh_degree":3,"bounds":{"low":[-1,-2,-3],"high":[1,2,3]},"centre":[0.5,0,0],"radius":1.5,
     "up":null,"disk_bytes":0,"memory_bytes":0,"views":50,"dataset":null,"versions":[
-     {"version":0,"parent":null,"edit":null,"created":"t0","gaussians":62000,"disk_bytes":0,"links":{
+     {"version":0,"parent":null,"edit":null,"name":null,"created":"t0","gaussians":62000,"disk_bytes":0,"links":{
       "render":"/v1/scenes/s000001/versions/0/render","pick":"/v1/scenes/s000001/versions/0/pick",
       "file":"/v1/scenes/s000001/versions/0/file?format=ply"}},
-     {"version":1,"parent":0,"edit":"e000001","created":"t1","gaussians":62100,"disk_bytes":4096,"links":{
+     {"version":1,"parent":0,"edit":"e000001","name":"a name","created":"t1","gaussians":62100,"disk_bytes":4096,"links":{
       "render":"/v1/scenes/s000001/versions/1/render","pick":"/v1/scenes/s000001/versions/1/pick",
       "file":"/v1/scenes/s000001/versions/1/file?format=ply"}}],
     "links":{"self":"/v1/scenes/s000001","views":"/v1/scenes/s000001/views","dataset":"/v1/scenes/s000001/dataset"}})"));

@@ -75,6 +75,41 @@ describe('a scene', () => {
     assert.ok(views.views.every((view) => view.photo && view.width === 320 && view.height === 240));
   });
 
+  test('shows the photos of its dataset, and can do without it', async () => {
+    const other = await client.upload(demo.ply, { name: 'with photos' });
+    await client.putDataset(other.id, zipped);
+    const query = { view: 'view_03.png', max_side: 160 };
+    const photo = await client.get(`/v1/scenes/${other.id}/photo`, { query });
+    assert.equal(photo.body.subarray(0, 3).toString('hex'), magic.jpeg);
+    await client.get(`/v1/scenes/${other.id}/photo`, { query, headers: { 'if-none-match': photo.headers.etag }, expect: 304 });
+    await client.get(`/v1/scenes/${other.id}/photo`, { query: { view: 'elsewhere.png' }, expect: 404 });
+    const without = (await client.request('DELETE', `/v1/scenes/${other.id}/dataset`, { expect: 200 })).json();
+    assert.equal(without.dataset, null);
+    assert.equal((await client.get(`/v1/scenes/${other.id}/views`)).json().kind, 'virtual');
+    await client.request('DELETE', `/v1/scenes/${other.id}/dataset`, { expect: 404 });
+    await client.delete(`/v1/scenes/${other.id}`);
+  });
+
+  test('tells all who follow it what happens to it, until it is gone', async () => {
+    const other = await client.upload(demo.ply, { name: 'followed' });
+    let edit = null;
+    const events = await client.sceneEvents(other.id, async ({ event, data }) => {
+      if (event === 'scene' && data.versions.length === 1 && data.versions[0].name === null) {
+        const named = await client.request('PATCH', `/v1/scenes/${other.id}/versions/0`, { json: { name: 'as it came' }, expect: 200 });
+        assert.equal(named.json().name, 'as it came');
+        edit = (await client.submit({ ...demo.ball, scene: other.id })).id;
+      }
+      if (event === 'edit' && data.state === 'succeeded') await client.delete(`/v1/scenes/${other.id}`);
+    });
+    const kinds = events.map(({ event }) => event);
+    assert.equal(kinds.at(-1), 'gone');
+    const last = events.findLast(({ event }) => event === 'scene').data;
+    assert.deepEqual([last.versions[0].name, last.versions[1].edit], ['as it came', edit]);
+    const end = events.findIndex(({ event, data }) => event === 'edit' && data.state === 'succeeded');
+    assert.ok(events.findIndex(({ event, data }) => event === 'scene' && data.versions.length === 2) < end, 'the version before its edit');
+    await client.delete(`/v1/edits/${edit}`);
+  });
+
   test('takes its dataset by path or as a form too, and warns when photos do not fit', async () => {
     const byPath = (await client.request('PUT', `/v1/scenes/${scene.id}/dataset`, { json: { path: 'captures/demo' }, expect: 200 })).json();
     assert.equal(byPath.dataset.views, 16);

@@ -260,7 +260,7 @@ export function start({ port = 0, token = null, slow = 0, empty = false, tick = 
       sh_degree: 3,
       up: null,
       dataset,
-      versions: [{ version: 0, parent: null, edit: null, created: now(), points }],
+      versions: [{ version: 0, parent: null, edit: null, name: null, created: now(), points }],
       previews: new Map(),
       selections: new Map(),
     };
@@ -363,7 +363,7 @@ export function start({ port = 0, token = null, slow = 0, empty = false, tick = 
   }
 
   const told = (edit) => {
-    for (const listener of listeners) if (listener.id === edit.id) listener.send(edit);
+    for (const listener of listeners) if ([edit.id, edit.scene].includes(listener.id)) listener.send(edit);
   };
   const editJson = ({ picture, wanted, ...edit }) => edit;
 
@@ -421,8 +421,8 @@ export function start({ port = 0, token = null, slow = 0, empty = false, tick = 
       if (over) {
         const scene = scenes.get(edit.scene);
         const points = dragged(findPoints(scene, edit.version), edit.picture.get(edit.interval) ?? edit.request);
-        const version = scene.versions.length;
-        scene.versions.push({ version, parent: edit.version, edit: edit.id, created: now(), points });
+        const version = scene.versions.at(-1).version + 1;
+        scene.versions.push({ version, parent: edit.version, edit: edit.id, name: null, created: now(), points });
         Object.assign(edit, {
           state: "succeeded",
           stopped_early: edit.interval < edit.intervals,
@@ -530,6 +530,77 @@ export function start({ port = 0, token = null, slow = 0, empty = false, tick = 
           ],
         };
         return sceneJson(scene);
+      },
+    ],
+    [
+      "DELETE",
+      /^\/v1\/scenes\/(\w+)\/dataset$/,
+      ({ match }) => sceneJson(Object.assign(findScene(match[1]), { dataset: null })),
+    ],
+    [
+      "GET",
+      /^\/v1\/scenes\/(\w+)\/events$/,
+      ({ match, response }) => {
+        findScene(match[1]);
+        response.writeHead(200, { "Content-Type": "text/event-stream", "Cache-Control": "no-cache" });
+        const say = (event, data) => response.write(`event: ${event}\ndata: ${JSON.stringify(data)}\n\n`);
+        let last = null;
+        const look = () => {
+          const scene = scenes.get(match[1]);
+          if (!scene) return say("gone", {}), response.end();
+          const text = JSON.stringify(sceneJson(scene));
+          if (text !== last) say("scene", sceneJson(scene));
+          last = text;
+        };
+        const listener = { id: match[1], send: (edit) => (look(), say("edit", editJson(edit))) };
+        listeners.add(listener);
+        const looking = setInterval(look, 250);
+        const living = setInterval(() => say("alive", {}), 1000);
+        response.on("close", () => {
+          clearInterval(looking);
+          clearInterval(living);
+          listeners.delete(listener);
+        });
+        look();
+        return null;
+      },
+    ],
+    [
+      "GET",
+      /^\/v1\/scenes\/(\w+)\/photo$/,
+      ({ match, query, reply }) => {
+        const scene = findScene(match[1]);
+        const view = ringOfViews(24).find(({ name }) => scene.dataset && name === query.get("view"));
+        if (!view) fail(404, "not_found", "the dataset has no photo of that name", "view");
+        const { width, height, cam_from_world: rows, fy } = view;
+        const eye = [0, 1, 2].map((i) => -rows.reduce((sum, row) => sum + row[i] * row[3], 0));
+        const fov = (2 * Math.atan(height / 2 / fy) * 180) / Math.PI;
+        const camera = { eye, target: add(eye, rows[2].slice(0, 3)), up: scale(rows[1].slice(0, 3), -1), fov, width, height };
+        const { pixels } = draw(scene.versions[0].points, camera, "color");
+        return reply(200, png(pixels, width, height), { "Content-Type": "image/png" });
+      },
+    ],
+    [
+      "PATCH",
+      /^\/v1\/scenes\/(\w+)\/versions\/(\d+)$/,
+      ({ match, json }) => {
+        const scene = findScene(match[1]);
+        findPoints(scene, match[2]);
+        scene.versions.find((v) => v.version === Number(match[2])).name = json.name;
+        return sceneJson(scene).versions.find((v) => v.version === Number(match[2]));
+      },
+    ],
+    [
+      "DELETE",
+      /^\/v1\/scenes\/(\w+)\/versions\/(\d+)$/,
+      ({ match, reply }) => {
+        const scene = findScene(match[1]);
+        const gone = scene.versions.find((v) => v.version === Number(match[2]));
+        if (!gone) fail(404, "not_found", "there is no such version", "version");
+        if (gone.version === 0) fail(409, "conflict", "all versions lie over version 0", "version");
+        scene.versions = scene.versions.filter((v) => v !== gone);
+        for (const version of scene.versions) if (version.parent === gone.version) version.parent = gone.parent;
+        return reply(204);
       },
     ],
     [

@@ -19,10 +19,11 @@ using engine::propagate;
 using nlohmann::json;
 using nlohmann::ordered_json;
 
-constexpr int manifest_format = 3;  // format number of scene.json
+constexpr int manifest_format = 4;  // format number of scene.json
 constexpr int most_versions = 1'000'000'000;
 constexpr int first_with_digests = 2;  // a format before has none
 constexpr int first_with_gaps = 3;     // before, no version was ever deleted
+constexpr int first_with_names = 4;    // of versions
 /// A larger file is refused before it is read: a hundred thousand versions come to less. A choice.
 constexpr std::uint64_t max_manifest_bytes = std::uint64_t{64} << 20;
 
@@ -161,10 +162,15 @@ void read_dataset(const json& value, int format, Manifest& manifest) {
 }
 
 ordered_json encoded(const VersionInfo& version, std::uint64_t memory_bytes, const std::string& digest) {
-  return {{"version", version.version},     {"parent", or_null(version.parent)},
-          {"edit", version.edit},           {"created", encoded(version.created)},
-          {"gaussians", version.gaussians}, {"disk_bytes", version.disk_bytes},
-          {"memory_bytes", memory_bytes},   {"xxh3", encoded_digest(digest)}};
+  return {{"version", version.version},
+          {"parent", or_null(version.parent)},
+          {"edit", version.edit},
+          {"name", version.name},
+          {"created", encoded(version.created)},
+          {"gaussians", version.gaussians},
+          {"disk_bytes", version.disk_bytes},
+          {"memory_bytes", memory_bytes},
+          {"xxh3", encoded_digest(digest)}};
 }
 
 void read_version(const json& value, int format, Manifest& manifest) {
@@ -173,7 +179,7 @@ void read_version(const json& value, int format, Manifest& manifest) {
   const int least = known.empty() ? 0 : known.back().version + 1;
   const bool may_be_later = place > 0 && format >= first_with_gaps;
   const Object in(value, "versions[" + std::to_string(place) + "]",
-                  {"version", "parent", "edit", "created", "gaussians", "disk_bytes", "memory_bytes", "xxh3"});
+                  {"version", "parent", "edit", "name", "created", "gaussians", "disk_bytes", "memory_bytes", "xxh3"});
   VersionInfo version;
   version.version = in.whole("version", least, may_be_later ? most_versions : least);
   version.parent = in.maybe("parent", [&] { return in.whole("parent", 0, std::max(least - 1, 0)); });
@@ -181,6 +187,7 @@ void read_version(const json& value, int format, Manifest& manifest) {
   if (version.parent && !place_of(manifest, *version.parent))
     throw Wrong{"there is no such version", in.address("parent")};
   version.edit = in.text("edit");
+  if (format >= first_with_names) version.name = in.text("name");
   version.created = in.time("created");
   version.gaussians = in.count("gaussians");
   version.disk_bytes = in.count("disk_bytes");

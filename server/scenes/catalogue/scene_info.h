@@ -23,6 +23,7 @@ struct VersionInfo {
   int version = 0;
   std::optional<int> parent;  ///< Version that was edited; none for version 0.
   std::string edit;           ///< Id of the edit that made it; empty for version 0.
+  std::string name;           ///< As somebody has called it; empty: nobody has.
   Time created{};
   std::size_t gaussians = 0;
   std::uint64_t disk_bytes = 0;  ///< What this version takes beside version 0.

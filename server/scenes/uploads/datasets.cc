@@ -151,6 +151,27 @@ Result<ManifestPtr> Datasets::replace(const Snapshot& at, const io::Dataset& fou
   return replaced;
 }
 
+Result<ManifestPtr> Datasets::remove(const Snapshot& at) {
+  std::shared_ptr<Lease> lease;  // once the change is made, of the folder that was the scene's
+  fs::path list;
+  auto changed = catalogue_.change(
+      at,
+      [&](Manifest& manifest) -> Result<void> {
+        if (!manifest.dataset) return fail(ErrorCode::not_found, "the scene has no dataset", "dataset");
+        list = dataset_list_name(*manifest.dataset);
+        ++manifest.next_dataset;  // what is still being found out about it is then dropped
+        manifest.dataset.reset();
+        manifest.scene.dataset.reset();
+        return {};
+      },
+      &lease);
+  if (!changed) return changed;
+  if (lease) lease->end();
+  if (!list.empty()) remove_quietly(at.scene->folder->path() / list);
+  memory_.forget(at.scene->id + "/dataset");
+  return changed;
+}
+
 Result<std::shared_ptr<const io::Dataset>> Datasets::get(const Snapshot& at) {
   const Manifest& manifest = *at.manifest;
   if (!manifest.dataset) return std::shared_ptr<const io::Dataset>();

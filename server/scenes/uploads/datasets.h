@@ -30,6 +30,10 @@ class Datasets {
   /// Replaces it by a folder below the scene root, which is used where it is; the new manifest.
   ///   errors  those of below_root() and io::read_dataset()
   [[nodiscard]] Result<ManifestPtr> put_path(const Snapshot& at, const std::string& path);
+  /// Takes the scene's dataset away; the new manifest. Whoever holds it keeps its photos; a folder below the scene root
+  /// stays as it is.
+  ///   errors  not_found: there is none (`where` is "dataset"); those of write_manifest()
+  [[nodiscard]] Result<ManifestPtr> remove(const Snapshot& at);
   /// The dataset without its points; null without one.
   ///   errors  those of io::read_dataset(); busy; corrupt_data: a file of the dataset, photos apart, is not what was
   ///           stored

@@ -226,6 +226,7 @@ Result<int> Versions::add(const Snapshot& at, int parent, const std::string& edi
     manifest.scene.versions.push_back({.version = number,
                                        .parent = parent,
                                        .edit = edit,
+                                       .name = {},
                                        .created = options_.clock(),
                                        .gaussians = composed->base->size() - rows.removed.size() + rows.added(),
                                        .disk_bytes = bytes_below(file)});
@@ -238,6 +239,21 @@ Result<int> Versions::add(const Snapshot& at, int parent, const std::string& edi
               std::move(composed->reservation));
   forget_if_removed(at, number);
   return number;
+}
+
+Result<VersionInfo> Versions::rename(const Snapshot& at, const std::string& version, const std::string& name) {
+  const auto number = known_version(at, version);
+  if (!number) return propagate(number);
+  VersionInfo renamed;
+  const auto changed = catalogue_.change(at, [&](Manifest& manifest) -> Result<void> {
+    const auto place = place_of(manifest, *number);
+    if (!place) return fail(ErrorCode::not_found, "version " + version + " was deleted meanwhile", "version");
+    manifest.scene.versions[*place].name = name;
+    renamed = manifest.scene.versions[*place];
+    return {};
+  });
+  if (!changed) return propagate(changed);
+  return renamed;
 }
 
 Result<void> Versions::remove(const Snapshot& at, const std::string& version) {

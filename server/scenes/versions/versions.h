@@ -46,6 +46,9 @@ class Versions {
   /// What is known of a version. A preview is none.
   ///   errors  not_found
   [[nodiscard]] static Result<VersionInfo> find(const Snapshot& at, const std::string& version);
+  /// Calls a version by a name ("": by none), and says what is known of it then.
+  ///   errors  not_found; those of write_manifest()
+  [[nodiscard]] Result<VersionInfo> rename(const Snapshot& at, const std::string& version, const std::string& name);
   /// Deletes a version for good: its number is not used again, and those that were made from it are said to have been
   /// made from its parent. Each is an overlay over version 0, so none needs another one's file. Whoever holds it keeps
   /// it in memory.

@@ -2,6 +2,7 @@
 
 #include "server/service/embedded_files.h"
 #include "server/service/routes/render_routes.h"
+#include "server/service/routes/scene_events.h"
 #include "server/service/routes/scene_routes.h"
 #include "server/service/routes/system_routes.h"
 
@@ -18,6 +19,7 @@ http::Router all_routes(const RouteDependencies& dependencies) {
                             }});
   add_render_routes(router, {dependencies.scenes, dependencies.views, dependencies.renders, dependencies.selections});
   add_edit_routes(router, dependencies.edits, {.limits = dependencies.edit_limits});
+  add_scene_event_routes(router, dependencies.scenes, dependencies.edits);
   auto trouble = dependencies.trouble;
   if (!trouble) trouble = [&edits = dependencies.edits] { return edits.trouble(); };
   add_system_routes(router, {dependencies.guard, dependencies.metrics, dependencies.info, std::move(trouble),

@@ -1,13 +1,17 @@
 #include "server/service/routes/scene_routes.h"
 
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <utility>
 
+#include "engine/core/numbers.h"
+#include "engine/io/image_file.h"
 #include "proto/scene.h"
 #include "proto/time_text.h"
 #include "server/edits/cameras.h"
 #include "server/edits/points.h"
+#include "server/http/negotiation.h"
 #include "server/pictures/photo_comparison.h"
 
 namespace server::service::routes {
@@ -28,7 +32,7 @@ using scenes::SceneStore;
 constexpr const char* upload_name = "upload";  // of a file that its client does not name
 
 proto::SceneVersion to_proto(const scenes::VersionInfo& version) {
-  return {version.version,   version.parent,    version.edit, proto::rfc3339(version.created),
+  return {version.version,   version.parent,    version.edit, version.name, proto::rfc3339(version.created),
           version.gaussians, version.disk_bytes};
 }
 
@@ -37,26 +41,9 @@ proto::SceneDataset to_proto(const scenes::DatasetInfo& dataset) {
           dataset.psnr_worst_db, dataset.psnr_worst_view, dataset.warnings};
 }
 
-proto::Scene to_proto(const SceneInfo& scene) {
-  proto::Scene out;
-  out.id = scene.id, out.name = scene.name;
-  out.created = proto::rfc3339(scene.created);
-  out.format = scene.format;
-  out.gaussians = scene.versions[0].gaussians;
-  out.sh_degree = scene.sh_degree;
-  out.low = to_point(scene.low), out.high = to_point(scene.high), out.centre = to_point(scene.centre);
-  out.radius = scene.radius;
-  if (scene.up) out.up = to_point(*scene.up);
-  out.disk_bytes = scene.disk_bytes, out.memory_bytes = scene.memory_bytes;
-  out.views = scene.dataset ? scene.dataset->views : virtual_view_count;
-  if (scene.dataset) out.dataset = to_proto(*scene.dataset);
-  for (const auto& version : scene.versions) out.versions.push_back(to_proto(version));
-  return out;
-}
-
 Result<Reply> reply_with(const Result<SceneInfo>& scene) {
   if (!scene) return propagate(scene);
-  return Reply::json(proto::to_json(to_proto(*scene)));
+  return Reply::json(proto::to_json(told(*scene)));
 }
 
 /// Hands an uploaded file, and its name, to `take`.
@@ -87,14 +74,14 @@ Result<SceneInfo> add_scene(const Call& call, SceneStore& store) {
 Result<Reply> post_scene(const Call& call, SceneStore& store) {
   const auto added = add_scene(call, store);
   if (!added) return propagate(added);
-  Reply reply = Reply::json(proto::to_json(to_proto(*added)), 201);
+  Reply reply = Reply::json(proto::to_json(told(*added)), 201);
   reply.headers.emplace_back("Location", "/v1/scenes/" + added->id);
   return reply;
 }
 
 Result<Reply> list_scenes(SceneStore& store) {
   std::vector<proto::Scene> all;
-  for (const SceneInfo& scene : store.list()) all.push_back(to_proto(scene));
+  for (const SceneInfo& scene : store.list()) all.push_back(told(scene));
   return Reply::json(proto::to_json(all));
 }
 
@@ -171,6 +158,53 @@ Result<Reply> put_dataset(const Call& call, const SceneRouteDependencies& depend
   return reply_with(with_quality(*put, dependencies));
 }
 
+/// A photo of the dataset, undistorted as its camera is, within max_side.
+Result<Reply> get_photo(const Call& call, const SceneRouteDependencies& dependencies) {
+  const std::string view = call.query("view").value_or("");
+  const int limit = dependencies.renders.options().max_side;
+  const auto side = engine::number_in<int>(call.query("max_side").value_or(std::to_string(limit)));
+  if (!side || *side < 1 || *side > limit)
+    return fail(ErrorCode::invalid_argument, "expected 1 to " + std::to_string(limit) + " pixels", "max_side");
+  const auto dataset = dependencies.store.dataset(call.path("id"));
+  if (!dataset) return propagate(dataset);
+  if (!*dataset) return fail(ErrorCode::not_found, "the scene has no dataset", "dataset");
+  const auto& views = (*dataset)->views;
+  const auto found = std::ranges::find(views, view, [](const auto& one) { return one.camera.name; });
+  if (found == views.end() || found->photo.empty())
+    return fail(ErrorCode::not_found, "the dataset has no photo of that name", "view");
+  Result<std::vector<std::byte>> bytes;
+  // Decoding takes as long as a picture: it waits for its turn among them.
+  const auto done = dependencies.renders.run_in_turn([&] {
+    bytes = engine::io::load_photo(*found, dependencies.renders.options().memory)
+                .and_then([&](engine::scene::Image photo) -> Result<engine::scene::Image> {
+                  const auto camera = engine::scene::fit_within(found->camera, *side);
+                  if (photo.width <= camera.width) return photo;
+                  return engine::io::resized(photo, camera.width, camera.height);
+                })
+                .and_then([](const engine::scene::Image& photo) {
+                  return engine::io::encode_image(photo, engine::io::ImageFormat::jpeg);
+                });
+  });
+  if (!done) return propagate(done);
+  if (!bytes) return fail(bytes.error().code, "the photo cannot be read: " + bytes.error().message, "view");
+  Reply reply;
+  reply.media_type = "image/jpeg";
+  reply.body.assign(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+  reply.etag = http::etag_of(reply.body);
+  return reply;
+}
+
+Result<Reply> delete_dataset(const Call& call, const SceneRouteDependencies& dependencies) {
+  const std::string& id = call.path("id");
+  Result<SceneInfo> scene;
+  // An edit that is interrupted goes on with the cameras it began with.
+  const auto done = dependencies.while_idle(id, [&]() -> Result<void> {
+    scene = dependencies.store.remove_dataset(id);
+    return scene.map([](const SceneInfo&) {});
+  });
+  return done ? reply_with(scene) : propagate(done);
+}
+
 Result<Reply> get_views(const Call& call, SceneViews& views) {
   const auto set = views.views_of(call.path("id"), [&call] { return call.gone(); });
   if (!set) return propagate(set);
@@ -183,6 +217,15 @@ Result<Reply> get_views(const Call& call, SceneViews& views) {
 Result<Reply> get_version(const Call& call, SceneStore& store) {
   const std::string& id = call.path("id");
   const auto version = store.find_version(id, call.path("v"));
+  if (!version) return propagate(version);
+  return Reply::json(proto::to_json(to_proto(*version), id));
+}
+
+Result<Reply> patch_version(const Call& call, SceneStore& store) {
+  const auto wanted = proto::parse_version_patch(call.body());
+  if (!wanted) return propagate(wanted);
+  const std::string& id = call.path("id");
+  const auto version = store.rename_version(id, call.path("v"), wanted->name);
   if (!version) return propagate(version);
   return Reply::json(proto::to_json(to_proto(*version), id));
 }
@@ -228,11 +271,73 @@ Result<Reply> get_file(const Call& call, SceneStore& store) {
   return reply;
 }
 
+void add_dataset_routes(http::Router& router, const SceneRouteDependencies& dependencies) {
+  SceneViews& views = dependencies.views;
+  router.add({.method = "PUT",
+              .path = "/v1/scenes/{id}/dataset",
+              .handler = [dependencies](const Call& call) { return put_dataset(call, dependencies); },
+              .body = http::Body::upload,
+              .queries = {}});
+  router.add({.method = "DELETE",
+              .path = "/v1/scenes/{id}/dataset",
+              .handler = [dependencies](const Call& call) { return delete_dataset(call, dependencies); },
+              .queries = {}});
+  router.add({.method = "GET",
+              .path = "/v1/scenes/{id}/photo",
+              .handler = [dependencies](const Call& call) { return get_photo(call, dependencies); },
+              .queries = {"view", "max_side"}});
+  router.add({.method = "GET",
+              .path = "/v1/scenes/{id}/views",
+              .handler = [&views](const Call& call) { return get_views(call, views); },
+              .queries = {}});
+}
+
+void add_version_routes(http::Router& router, const SceneRouteDependencies& dependencies) {
+  SceneStore& store = dependencies.store;
+  router.add({.method = "GET",
+              .path = "/v1/scenes/{id}/versions/{v}",
+              .handler = [&store](const Call& call) { return get_version(call, store); },
+              .queries = {}});
+  router.add({.method = "PATCH",
+              .path = "/v1/scenes/{id}/versions/{v}",
+              .handler = [&store](const Call& call) { return patch_version(call, store); },
+              .body = http::Body::json,
+              .queries = {}});
+  router.add({.method = "DELETE",
+              .path = "/v1/scenes/{id}/versions/{v}",
+              .handler = [dependencies](const Call& call) -> Result<Reply> {
+                const auto removed = dependencies.remove_version(call.path("id"), call.path("v"));
+                if (!removed) return propagate(removed);
+                return Reply::no_content();
+              },
+              .queries = {}});
+  router.add({.method = "GET",
+              .path = "/v1/scenes/{id}/versions/{v}/file",
+              .handler = [&store](const Call& call) { return get_file(call, store); },
+              .queries = {"format"}});
+}
+
 }  // namespace
+
+proto::Scene told(const SceneInfo& scene) {
+  proto::Scene out;
+  out.id = scene.id, out.name = scene.name;
+  out.created = proto::rfc3339(scene.created);
+  out.format = scene.format;
+  out.gaussians = scene.versions[0].gaussians;
+  out.sh_degree = scene.sh_degree;
+  out.low = to_point(scene.low), out.high = to_point(scene.high), out.centre = to_point(scene.centre);
+  out.radius = scene.radius;
+  if (scene.up) out.up = to_point(*scene.up);
+  out.disk_bytes = scene.disk_bytes, out.memory_bytes = scene.memory_bytes;
+  out.views = scene.dataset ? scene.dataset->views : virtual_view_count;
+  if (scene.dataset) out.dataset = to_proto(*scene.dataset);
+  for (const auto& version : scene.versions) out.versions.push_back(to_proto(version));
+  return out;
+}
 
 void add_scene_routes(http::Router& router, const SceneRouteDependencies& dependencies) {
   SceneStore& store = dependencies.store;
-  SceneViews& views = dependencies.views;
   router.add({.method = "GET",
               .path = "/v1/scenes",
               .handler = [&store](const Call&) { return list_scenes(store); },
@@ -260,31 +365,8 @@ void add_scene_routes(http::Router& router, const SceneRouteDependencies& depend
                 return Reply::no_content();
               },
               .queries = {}});
-  router.add({.method = "PUT",
-              .path = "/v1/scenes/{id}/dataset",
-              .handler = [dependencies](const Call& call) { return put_dataset(call, dependencies); },
-              .body = http::Body::upload,
-              .queries = {}});
-  router.add({.method = "GET",
-              .path = "/v1/scenes/{id}/views",
-              .handler = [&views](const Call& call) { return get_views(call, views); },
-              .queries = {}});
-  router.add({.method = "GET",
-              .path = "/v1/scenes/{id}/versions/{v}",
-              .handler = [&store](const Call& call) { return get_version(call, store); },
-              .queries = {}});
-  router.add({.method = "DELETE",
-              .path = "/v1/scenes/{id}/versions/{v}",
-              .handler = [dependencies](const Call& call) -> Result<Reply> {
-                const auto removed = dependencies.remove_version(call.path("id"), call.path("v"));
-                if (!removed) return propagate(removed);
-                return Reply::no_content();
-              },
-              .queries = {}});
-  router.add({.method = "GET",
-              .path = "/v1/scenes/{id}/versions/{v}/file",
-              .handler = [&store](const Call& call) { return get_file(call, store); },
-              .queries = {"format"}});
+  add_dataset_routes(router, dependencies);
+  add_version_routes(router, dependencies);
 }
 
 }  // namespace server::service::routes

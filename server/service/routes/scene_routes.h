@@ -5,6 +5,7 @@
 #include <string>
 
 #include "engine/core/result.h"
+#include "proto/scene.h"
 #include "server/http/router.h"
 #include "server/scenes/scene_store.h"
 #include "server/service/render_service.h"
@@ -23,6 +24,9 @@ struct SceneRouteDependencies {
   /// EditService::remove_version()
   std::function<engine::Result<void>(const std::string& scene, const std::string& version)> remove_version;
 };
+
+/// A scene as its routes tell of it.
+[[nodiscard]] proto::Scene told(const scenes::SceneInfo& scene);
 
 /// Adds these routes.
 void add_scene_routes(http::Router& router, const SceneRouteDependencies& dependencies);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "engine/core/parallel.h"
@@ -73,6 +74,9 @@ TEST(DemoScene, WithItsBallCarriedElsewhereIsTheSameButForThatAndClosedAllOver) 
   }
   EXPECT_TRUE(below_pot) << "the table, where the pot stands on it";
   EXPECT_TRUE(below_ball) << "the side that the ball lay on";
+  const auto &there = demo.drags[0].handles[0], &back = after.drags[0].handles[0];
+  EXPECT_EQ(back.source, there.source + carried.ball_shift) << "the drag takes hold of it where it is";
+  EXPECT_EQ(back.target, there.source);
 }
 
 TEST(DemoScene, LooksDifferentFromEachSideOnGlazedThingsOnly) {
@@ -150,6 +154,9 @@ TEST(DemoScene, NamesTheOptionThatIsOutOfRange) {
   EXPECT_EQ(validate({.views = 0}).error().where, "views");
   EXPECT_EQ(validate({.width = 0}).error().where, "width");
   EXPECT_EQ(validate({.height = 20000}).error().where, "height");
+  for (const double wrong : {std::nan(""), std::numeric_limits<double>::infinity(), 1e300, -101.0})
+    EXPECT_EQ(validate({.ball_shift = {0, wrong, 0}}).error().where, "ball-shift") << wrong;
+  EXPECT_TRUE(validate({.ball_shift = {0, 0, -100}}));
 }
 
 TEST(Surfels, FollowAnObjectThatIsPutElsewhere) {

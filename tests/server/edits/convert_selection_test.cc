@@ -151,7 +151,7 @@ TEST(SelectionToEngine, HoldsOnlySoManyPixelsOfMasks) {
 /// Five rows in a line, of which the middle three are selected.
 select::Selected three_in_a_line() {
   return {
-      .rows = {0, 1, 1, 1, 0}, .count = 3, .bounds = {{1, 0, 0}, {3, 0.5f, 0}}, .centre = {2, 0, 0}, .warnings = {}};
+      .rows = {0, 1, 1, 1, 0}, .count = 3, .bounds = {{1, 0, 0}, {3, 0.5f, 0}}, .centre = {2, 0, 0}, .border = {}, .warnings = {}};
 }
 
 TEST(HandOver, SaysTheRowsAndHowFarHandlesGrip) {
@@ -165,7 +165,7 @@ TEST(HandOver, SaysTheRowsAndHowFarHandlesGrip) {
 }
 
 TEST(HandOver, LetsAHandleOfASingleGaussianGoInOneStep) {
-  select::Selected one{.rows = {1}, .count = 1, .bounds = {}, .centre = {}, .warnings = {}};
+  select::Selected one{.rows = {1}, .count = 1, .bounds = {}, .centre = {}, .border = {}, .warnings = {}};
   engine::edit::Request request;
   request.handles = {{.source = {0, 0, 0}, .target = DVec3(0, 3, 0), .radius = 0}};
   (void)hand_over(one, {}, nullptr, request);

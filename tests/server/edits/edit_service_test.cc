@@ -510,6 +510,19 @@ TEST_F(ServiceTest, StopKeepsTheLastFinishedInterval) {
   EXPECT_EQ(code_of(service->stop(id)), ErrorCode::conflict);
 }
 
+TEST_F(ServiceTest, StopGivesTheIntervalInWorkUp) {
+  proto::EditRequest request = move_ball_for_long(scene);
+  if (!under_thread_sanitizer) request.params.max_image_side = 768;
+  const auto id = submit(request);
+  wait_for_interval(*service, id);  // the next one has a second to go, and is asked all the time whether to go on
+  const auto stopping = value(service->stop(id));
+  const auto done = wait_for_end(*service, id);
+  ASSERT_EQ(done.state, "succeeded") << done.error->message;
+  EXPECT_TRUE(done.stopped_early);
+  EXPECT_EQ(done.finished_intervals.size(), stopping.finished_intervals.size());
+  EXPECT_EQ(versions(), 2u);
+}
+
 TEST_F(ServiceTest, StopNeedsSomethingToKeep) {
   submit(move_ball_for_long(scene));
   const auto waiting = submit(move_ball_for_long(scene, 2));

@@ -199,6 +199,23 @@ TEST_F(SceneStoreTest, DeletesAVersionAndNothingOfThoseMadeFromIt) {
   EXPECT_EQ(*store->add_version(id, 2, "e000009", small_edit(cloud_of(id, "2"))), 4) << "no number is used twice";
 }
 
+TEST_F(SceneStoreTest, CallsAVersionByANameThatOutlivesARestart) {
+  const std::string id = add();
+  ASSERT_TRUE(store->add_version(id, 0, "e000001", small_edit(cloud_of(id, "0"))));
+  const auto renamed = store->rename_version(id, "1", "ball on the right");
+  ASSERT_TRUE(renamed) << renamed.error().message;
+  EXPECT_EQ(renamed->name, "ball on the right");
+  EXPECT_EQ(renamed->edit, "e000001");
+  ASSERT_TRUE(store->rename_version(id, "0", "as it came"));
+  open();
+  EXPECT_EQ(store->find(id)->versions[0].name, "as it came");
+  EXPECT_EQ(store->find(id)->versions[1].name, "ball on the right");
+  ASSERT_TRUE(store->rename_version(id, "1", ""));
+  EXPECT_EQ(store->find_version(id, "1")->name, "");
+  EXPECT_EQ(store->rename_version(id, "7", "none").error().code, ErrorCode::not_found);
+  EXPECT_EQ(store->rename_version(id, "1", std::string(1000, 'x')).error().where, "name");
+}
+
 TEST_F(SceneStoreTest, DeletesNoVersionThatOthersNeedOrThatIsNone) {
   const std::string id = add();
   ASSERT_TRUE(store->add_version(id, 0, "e000001", small_edit(cloud_of(id, "0"))));

@@ -106,37 +106,49 @@ export class Client {
 
   /// Follows an edit's events to the end of the stream: [{event, id, edit}].
   ///   onEvent  called with each
-  events(id, onEvent = () => {}) {
-    const path = `/v1/edits/${id}/events`;
+  async events(id, onEvent = () => {}) {
+    const told = ({ event, id: number, data }) => ({ event, id: number, edit: data });
+    const events = await this.#stream('followEdit', `/v1/edits/${id}/events`, (one) => onEvent(told(one)));
+    return events.map(told);
+  }
+  /// Follows a scene's: [{event, id, data}].
+  ///   onEvent  called with each; ends it by returning false
+  sceneEvents(id, onEvent = () => {}) { return this.#stream('followScene', `/v1/scenes/${id}/events`, onEvent); }
+
+  #stream(operation, path, onEvent) {
     return new Promise((done, failed) => {
       const headers = { accept: 'text/event-stream', ...(this.token ? { authorization: `Bearer ${this.token}` } : {}) };
       const request = http.get(new URL(path, this.url), { headers }, (answer) => {
         const events = [];
         let text = '';
-        answer.setEncoding('utf8');
-        answer.on('data', (chunk) => {
-          text += chunk;
-          for (let end; (end = text.indexOf('\n\n')) >= 0; text = text.slice(end + 2)) {
-            const fields = Object.fromEntries(text.slice(0, end).split('\n').filter((line) => !line.startsWith(':'))
-              .map((line) => [line.slice(0, line.indexOf(':')), line.slice(line.indexOf(':') + 1).replace(/^ /, '')]));
-            if (!fields.data) continue;
-            const edit = JSON.parse(fields.data);
-            const wrong = complaint(named('Edit'), edit);
-            if (wrong) return request.destroy(new Error(`event of ${id}: ${wrong}`));
-            events.push({ event: fields.event, id: fields.id, edit });
-            onEvent(events.at(-1));
-          }
-        });
-        answer.on('end', () => {
+        const end = () => {
           try {
             assert.equal(answer.statusCode, 200, text);
             assert.match(answer.headers['content-type'], /^text\/event-stream/);
-            count('followEdit', 200);
+            count(operation, 200);
             done(events);
           } catch (error) {
             failed(error);
           }
+        };
+        answer.setEncoding('utf8');
+        answer.on('data', (chunk) => {
+          text += chunk;
+          for (let at; (at = text.indexOf('\n\n')) >= 0; text = text.slice(at + 2)) {
+            const lines = text.slice(0, at).split('\n');
+            const field = (name) => lines.filter((line) => line.startsWith(`${name}:`)).map((line) => line.slice(name.length + 1).replace(/^ /, ''));
+            if (field('data').length === 0) continue;
+            const one = { event: field('event')[0], id: field('id')[0], data: JSON.parse(field('data').join('\n')) };
+            const schema = { edit: 'Edit', scene: 'Scene' }[one.event];
+            const wrong = schema && complaint(named(schema), one.data);
+            if (wrong) return request.destroy(new Error(`event of ${path}: ${wrong}`));
+            events.push(one);
+            if (onEvent(one) !== false) continue;
+            end();
+            return request.destroy();
+          }
         });
+        answer.on('end', end);
         answer.on('error', failed);
       });
       request.on('error', failed);

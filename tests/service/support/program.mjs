@@ -46,7 +46,7 @@ export class Service {
   }
 
   async #spawn() {
-    const args = ['serve', '--host', '127.0.0.1', '--port', '0', '--data-dir', this.dataDir, ...this.args];
+    const args = ['serve', '--host', '127.0.0.1', '--port', `${this.port ?? 0}`, '--data-dir', this.dataDir, ...this.args];
     const [command, ...rest] = [...this.within, program, ...args];
     this.process = spawn(command, rest, { env: environment, stdio: ['ignore', 'pipe', 'pipe'] });
     const child = this.process;
@@ -93,7 +93,11 @@ export class Service {
   }
 
   /// Starts it again on the same data.
-  start() { return this.#spawn(); }
+  ///   there  at the same address, where somebody waits for it
+  start({ there = false } = {}) {
+    if (there) this.port = this.url.port;
+    return this.#spawn();
+  }
 
   /// Fails unless it lives and answers.
   async alive() {

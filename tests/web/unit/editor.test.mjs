@@ -53,8 +53,8 @@ beforeEach(async () => {
     close() {
       this.closed = true;
     }
-    send(edit) {
-      this.dispatchEvent(Object.assign(new Event("edit"), { data: JSON.stringify(edit) }));
+    send(data, name = "edit") {
+      this.dispatchEvent(Object.assign(new Event(name), { data: JSON.stringify(data) }));
     }
   };
   await open();
@@ -177,7 +177,6 @@ test("when its edit is done, the page shows the result and the handles have done
   await settle();
   assert.equal(editor.state.version, 1);
   assert.deepEqual(editor.state.handles, []);
-  assert.ok(streams[0].closed);
   editor.showVersion(parentOf(editor.state.scene, 1));
   assert.equal(editor.state.version, 0);
 });
@@ -628,27 +627,62 @@ test("handles, version and camera survive a reload, and a running edit is follow
   assert.equal(editor.state.handles.length, 1);
   assert.deepEqual(editor.state.pose.eye, [1, 2, 3]);
   assert.equal(editor.state.mode, "extend");
-  assert.equal(streams.at(-1).url, "/v1/edits/e000001/events");
+  assert.equal(streams.at(-1).url, "/v1/scenes/s000001/events");
   const { id } = editor.state.handles[0];
   await editor.place(CAMERA, 200, 150);
   assert.notEqual(editor.state.handles[1].id, id);
 });
 
-test("only the first edit that is open takes a stream", async () => {
-  service["GET /v1/edits?scene=s000001&limit=30"] = () => ({
-    edits: [edit({ id: "e000003" }), edit({ id: "e000002" }), edit({ id: "e000001", state: "running" })],
-  });
-  for (const id of ["e000002", "e000003"]) service[`GET /v1/edits/${id}`] = () => edit({ id });
-  editor.close();
-  await open();
+test("one stream tells of the scene and of all its edits, also of those made elsewhere", async () => {
   assert.deepEqual(
-    streams.map((s) => s.url),
-    ["/v1/edits/e000001/events"],
+    streams.map(({ url }) => url),
+    ["/v1/scenes/s000001/events"],
   );
-  streams[0].send(edit({ state: "cancelled" }));
+  streams[0].send(edit({ id: "e000007", state: "running" }));
+  const versions = [...scene().versions, { version: 1, parent: 0 }];
+  service["GET /v1/scenes/s000001"] = () => ({ ...scene(), name: "table", versions });
+  streams[0].send({ ...scene(), name: "table", versions }, "scene");
+  streams[0].send(edit({ id: "e000007", state: "succeeded", result_version: 1 }));
   await settle();
-  assert.deepEqual(
-    streams.map((s) => s.url),
-    ["/v1/edits/e000001/events", "/v1/edits/e000002/events"],
-  );
+  assert.equal(editor.state.scene.name, "table");
+  assert.equal(editor.state.edits[0].state, "succeeded");
+  assert.equal(editor.state.version, 0, "it does not take the screen");
+  assert.deepEqual(said, ["Version 1 is ready, made elsewhere."]);
+});
+
+test("a version that somebody else deletes leaves the screen", async () => {
+  const versions = [...scene().versions, { version: 1, parent: 0 }];
+  streams[0].send({ ...scene(), versions }, "scene");
+  editor.showVersion(1);
+  streams[0].send(scene(), "scene");
+  assert.equal(editor.state.version, 0);
+  assert.deepEqual(said, ["Version 1 has been deleted."]);
+});
+
+test("an edit that ends before its submission is answered is one of ours", async () => {
+  service["POST /v1/edits"] = () => {
+    streams[0].send(edit({ state: "succeeded", result_version: 1 }));
+    return edit({ state: "queued" });
+  };
+  service["GET /v1/scenes/s000001"] = () => ({ ...scene(), versions: [...scene().versions, { version: 1, parent: 0 }] });
+  await editor.place(CAMERA, 200, 150);
+  await editor.run();
+  await new Promise((resolve) => setTimeout(resolve, 5));
+  await settle();
+  assert.equal(editor.state.version, 1);
+});
+
+test("the views of a dataset that comes at once are not overtaken by the virtual ones from before it", async () => {
+  const answers = [];
+  service["GET /v1/scenes/s000001/views"] = () => new Promise((resolve) => answers.push(resolve));
+  editor.close();
+  const opening = open();
+  await settle();
+  const changed = editor.datasetChanged({ ...scene(), dataset: { kind: "colmap", views: 1, photos: 0 } });
+  await settle();
+  answers[1]({ kind: "dataset", views: [] });
+  await settle();
+  answers[0]({ kind: "virtual", views: [] });
+  await Promise.all([opening, changed]);
+  assert.equal(editor.state.viewsKind, "dataset");
 });

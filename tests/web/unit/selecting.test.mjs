@@ -3,11 +3,11 @@ import { afterEach, beforeEach, test } from "node:test";
 
 import { Editor, NOTHING_OPEN, shownVersion } from "../../../web/editor.js";
 import { SceneMemory, Store } from "../../../web/store.js";
-import { fetchFrom, memoryStorage, settle } from "./stand_ins.mjs";
+import { fetchFrom, memoryStorage, settle, SilentEvents } from "./stand_ins.mjs";
 
 const CAMERA = { eye: [0, 0, -5], target: [0, 0, 0], up: [0, -1, 0], fov: 50, width: 400, height: 300 };
 const SELECT = "POST /v1/scenes/s000001/versions/0/select";
-const original = globalThis.fetch;
+const original = { fetch: globalThis.fetch, EventSource: globalThis.EventSource };
 let service;
 let editor;
 let said;
@@ -58,12 +58,13 @@ beforeEach(async () => {
     },
   };
   globalThis.fetch = fetchFrom(service);
+  globalThis.EventSource = SilentEvents;
   await open();
 });
 
 afterEach(() => {
   editor.close();
-  globalThis.fetch = original;
+  Object.assign(globalThis, original);
 });
 
 const { click, draw } = {

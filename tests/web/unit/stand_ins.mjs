@@ -25,3 +25,8 @@ export function fetchFrom(service) {
 export async function settle() {
   for (let i = 0; i < 20; ++i) await new Promise((resolve) => setImmediate(resolve));
 }
+
+/** A stream of events that says nothing. */
+export class SilentEvents extends EventTarget {
+  close() {}
+}

@@ -1,93 +1,114 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { follow, merged } from "../../../web/watch.js";
+import { followScene, merged } from "../../../web/watch.js";
 
-const settle = () => new Promise((resolve) => setImmediate(resolve));
+const settle = async () => {
+  for (let i = 0; i < 5; ++i) await new Promise((resolve) => setImmediate(resolve));
+};
 
+/** An EventSource that says what it is told to. */
 class FakeEvents extends EventTarget {
   closed = false;
   close() {
     this.closed = true;
   }
-  send(edit) {
-    this.dispatchEvent(Object.assign(new Event("edit"), { data: JSON.stringify(edit) }));
+  send(name, data = {}) {
+    this.dispatchEvent(Object.assign(new Event(name), { data: JSON.stringify(data) }));
   }
   fail() {
     this.dispatchEvent(new Event("error"));
   }
 }
 
-test("events are passed on, and the stream is closed after the last", () => {
-  const events = new FakeEvents();
-  const states = [];
-  const fetchEdit = () => assert.fail("need not ask");
-  follow("e1", { onUpdate: (e) => states.push(e.state), events: () => events, fetchEdit });
-  events.send({ state: "running" });
-  events.send({ state: "succeeded" });
-  assert.deepEqual(states, ["running", "succeeded"]);
-  assert.ok(events.closed);
-});
-
-test("without a stream it is asked every second, with the ETag, until the end", async () => {
-  const events = new FakeEvents();
-  const states = [];
-  const waits = [];
-  const etags = [];
-  const answers = [{ edit: { state: "running" }, etag: '"1"' }, null, { edit: { state: "cancelled" }, etag: '"2"' }];
-  follow("e1", {
-    onUpdate: (e) => states.push(e.state),
-    events: () => events,
-    fetchEdit: async (id, etag) => (etags.push(etag), answers.shift()),
-    wait: async (ms) => void waits.push(ms),
-  });
-  events.fail();
-  for (let i = 0; i < 10; ++i) await settle();
-  assert.ok(events.closed);
-  assert.deepEqual(states, ["running", "cancelled"]);
-  assert.deepEqual(etags, [null, '"1"', '"1"']);
-  assert.ok(waits.every((ms) => ms === 1000));
-});
-
-test("a service that does not answer is asked again, less and less often", async () => {
-  const waits = [];
-  let failures = 5;
-  const states = [];
-  follow("e1", {
-    onUpdate: (e) => states.push(e.state),
-    fetchEdit: async () => {
-      if (failures-- > 0) throw Object.assign(new Error("down"), { status: 0 });
-      return { edit: { state: "succeeded" }, etag: "x" };
+/** Follows a scene; `said` is all that it is told. */
+function following(options = {}) {
+  const said = [];
+  const streams = [];
+  const end = followScene({
+    onScene: ({ name }) => said.push(`scene ${name}`),
+    onEdit: ({ id, state }) => said.push(`${id} ${state}`),
+    onGone: () => said.push("gone"),
+    onAnswering: (does) => said.at(-1) !== `answers ${does}` && said.push(`answers ${does}`),
+    events: () => {
+      streams.push(new FakeEvents());
+      return streams.at(-1);
     },
-    wait: async (ms) => void waits.push(ms),
+    ask: async () => ({ scene: { name: "asked" }, edits: [] }),
+    silence: 1e6,
+    again: 0,
+    ...options,
   });
-  for (let i = 0; i < 20; ++i) await settle();
-  assert.deepEqual(waits.slice(0, 5), [2000, 4000, 8000, 8000, 8000]);
-  assert.deepEqual(states, ["succeeded"]);
+  return { said, streams, end };
+}
+
+test("what a stream says is passed on, until the scene is gone", async () => {
+  const { said, streams } = following();
+  streams[0].send("scene", { name: "chair" });
+  streams[0].send("edit", { id: "e1", state: "running" });
+  streams[0].send("alive");
+  streams[0].send("gone");
+  assert.ok(streams[0].closed);
+  streams[0].send("edit", { id: "e1", state: "succeeded" });
+  await settle();
+  assert.equal(streams.length, 1, "and is not asked for again");
+  assert.deepEqual(
+    said.filter((text) => text !== "answers true"),
+    ["scene chair", "e1 running", "gone"],
+  );
 });
 
-test("an edit whose record is gone is not asked for again", async () => {
-  let asked = 0;
-  let gone = 0;
-  follow("e1", {
-    onUpdate: () => assert.fail(),
-    onGone: () => ++gone,
-    fetchEdit: async () => {
-      ++asked;
-      throw Object.assign(new Error("gone"), { status: 404 });
-    },
-    wait: async () => {},
-  });
-  for (let i = 0; i < 5; ++i) await settle();
-  assert.deepEqual([asked, gone], [1, 1]);
-});
-
-test("after its end there are no more updates", () => {
-  const events = new FakeEvents();
-  const end = follow("e1", { onUpdate: () => assert.fail(), events: () => events, fetchEdit: () => null });
+test("an edit that ended while nobody listened is told of when the stream begins, the oldest first", async () => {
+  const edits = [
+    { id: "e2", state: "running" },
+    { id: "e1", state: "succeeded" },
+  ];
+  const { said, streams, end } = following({ ask: async () => ({ scene: { name: "chair" }, edits }) });
+  streams[0].send("scene", { name: "chair" });
+  await settle();
+  assert.deepEqual(
+    said.filter((text) => text.startsWith("e")),
+    ["e1 succeeded", "e2 running"],
+  );
   end();
-  events.send({ state: "running" });
-  assert.ok(events.closed);
+});
+
+test("without a stream it is asked, and a stream is tried again", async () => {
+  const { said, streams, end } = following();
+  streams[0].fail();
+  while (streams.length < 2) await settle();
+  assert.ok(streams[0].closed);
+  assert.deepEqual(said, ["answers true", "scene asked"]);
+  end();
+  assert.ok(streams.at(-1).closed);
+});
+
+test("a stream that says nothing any more is a service that does not answer, until it does", async () => {
+  let up = false;
+  const ask = async () => {
+    if (!up) throw Object.assign(new Error("down"), { status: 0 });
+    return { scene: { name: "back" }, edits: [] };
+  };
+  const { said, streams, end } = following({ silence: 5, ask });
+  while (!said.includes("answers false")) await new Promise((resolve) => setTimeout(resolve, 1));
+  assert.ok(streams[0].closed);
+  up = true;
+  while (!said.includes("scene back")) await new Promise((resolve) => setTimeout(resolve, 1));
+  assert.ok(said.indexOf("answers true") > said.indexOf("answers false"));
+  end();
+});
+
+test("a service that is full is one that answers, and a scene that is not found is gone", async () => {
+  const statuses = [429, 404];
+  const ask = async () => {
+    throw Object.assign(new Error("no"), { status: statuses.shift() });
+  };
+  const { said, streams } = following({ ask });
+  streams[0].fail();
+  while (streams.length < 2) await settle();
+  streams[1].fail();
+  await settle();
+  assert.deepEqual(said, ["gone"]);
 });
 
 test("news is merged by id, youngest first, and an edit that ended stays so", () => {

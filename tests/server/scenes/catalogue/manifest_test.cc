@@ -19,7 +19,8 @@ Manifest full_manifest() {
   scene.radius = 1.25;
   scene.up = engine::DVec3(0, -1, 0);
   scene.dataset = DatasetInfo{"colmap", 50, 49, 35.5, 20.25, "0001.jpg", {"one"}};
-  scene.versions = {{0, std::nullopt, "", scene.created, 100, 0}, {1, 0, "e000001", scene.created, 120, 4096}};
+  scene.versions = {{0, std::nullopt, "", "as it came", scene.created, 100, 0},
+                    {1, 0, "e000001", "", scene.created, 120, 4096}};
   manifest.nonce = "abc";
   manifest.base = "base.ply";
   manifest.base_disk_bytes = 1, manifest.base_memory_bytes = 2;

@@ -115,7 +115,9 @@ TEST_F(SceneRoutes, LeaveASceneToTheEditThatNeedsIt) {
     if (route.method == "DELETE") {
       EXPECT_EQ(route.handler(about(id)).error().code, ErrorCode::conflict);
     }
-    if (route.method == "PATCH") {
+    if (route.method == "PATCH" && route.path.ends_with("/{v}")) {
+      EXPECT_TRUE(route.handler(with_body(id, R"({"name":"nor is a version's"})")));
+    } else if (route.method == "PATCH") {
       EXPECT_EQ(route.handler(with_body(id, R"({"up":[0,0,1]})")).error().code, ErrorCode::conflict);
       EXPECT_TRUE(route.handler(with_body(id, R"({"name":"its name is of no matter to an edit"})")));
     }
@@ -197,6 +199,62 @@ TEST_F(SceneRoutes, CompareADatasetWithItsPhotos) {
   EXPECT_GT(near["psnr_mean_db"].get<double>(), 45);
   EXPECT_TRUE(near["warnings"].empty());
   EXPECT_EQ(json::parse(call("GET", "/v1/scenes/{id}/views", about(id))->body)["views"][0]["photo"], true);
+}
+
+TEST_F(SceneRoutes, ShowAPhotoOfTheDatasetAndTakeTheDatasetAway) {
+  const std::string id = add_wall();
+  engine::scene::Image photo(64, 48, 3, 0.5f);
+  zip_capture(temp.path() / "plain.zip", png(photo));
+  FakeCall request = uploading(support::read_file(temp.path() / "plain.zip"), "capture.zip");
+  request.in_path = {{"id", id}};
+  ASSERT_TRUE(call("PUT", "/v1/scenes/{id}/dataset", request));
+  const std::string view = store->dataset(id).value()->views[0].camera.name;
+  const auto shown = [&](const std::string& name, const std::string& side) {
+    FakeCall asked = about(id);
+    asked.in_query = {{"view", name}, {"max_side", side}};
+    return call("GET", "/v1/scenes/{id}/photo", asked);
+  };
+  for (const auto& [side, width, height] : {std::tuple{"200", 64, 48}, std::tuple{"32", 32, 24}}) {
+    const auto found = shown(view, side);
+    ASSERT_TRUE(found) << found.error().message;
+    EXPECT_EQ(found->media_type, "image/jpeg");
+    EXPECT_FALSE(found->etag.empty());
+    const auto image = engine::io::decode_image(std::as_bytes(std::span(found->body)), "photo.jpg");
+    ASSERT_TRUE(image);
+    EXPECT_EQ(image->width, width);
+    EXPECT_EQ(image->height, height);
+    EXPECT_NEAR(image->data[0], 0.5f, 0.02f);
+  }
+  EXPECT_EQ(shown("none.png", "64").error().where, "view");
+  EXPECT_EQ(shown(view, "0").error().where, "max_side");
+  EXPECT_EQ(shown(view, "100000").error().where, "max_side");
+
+  const auto gone = call("DELETE", "/v1/scenes/{id}/dataset", about(id));
+  ASSERT_TRUE(gone) << gone.error().message;
+  EXPECT_TRUE(json::parse(gone->body)["dataset"].is_null());
+  EXPECT_EQ(json::parse(call("GET", "/v1/scenes/{id}/views", about(id))->body)["kind"], "virtual");
+  EXPECT_EQ(shown(view, "64").error().where, "dataset");
+  EXPECT_EQ(call("DELETE", "/v1/scenes/{id}/dataset", about(id)).error().code, ErrorCode::not_found);
+  open();
+  connect();
+  EXPECT_FALSE(store->find(id)->dataset);
+  for (const auto& entry : std::filesystem::directory_iterator(options.folder / id))
+    EXPECT_FALSE(entry.path().filename().string().starts_with("dataset")) << entry.path();
+  EXPECT_TRUE(call("PUT", "/v1/scenes/{id}/dataset", request)) << "and another one can come";
+}
+
+TEST_F(SceneRoutes, CallAVersionByAName) {
+  const std::string id = add_wall();
+  const auto named = call("PATCH", "/v1/scenes/{id}/versions/{v}", with_body(id, R"({"name": "the wall"})"));
+  ASSERT_TRUE(named) << named.error().message;
+  EXPECT_EQ(json::parse(named->body)["name"], "the wall");
+  EXPECT_EQ(json::parse(call("GET", "/v1/scenes/{id}", about(id))->body)["versions"][0]["name"], "the wall");
+  const auto forgotten = call("PATCH", "/v1/scenes/{id}/versions/{v}", with_body(id, R"({"name": null})"));
+  EXPECT_TRUE(json::parse(forgotten->body)["name"].is_null());
+  for (const char* wrong : {"{}", R"({"name": ""})", R"({"name": 3})", R"({"name": "a", "kept": true})"})
+    EXPECT_EQ(call("PATCH", "/v1/scenes/{id}/versions/{v}", with_body(id, wrong)).error().code,
+              ErrorCode::invalid_argument)
+        << wrong;
 }
 
 TEST_F(SceneRoutes, KeepADatasetThatCannotBeComparedAndSayWhy) {

@@ -1,0 +1,265 @@
+// What stays, in a real browser: versions, photos, other pages, a service that comes back; and all of it by fingers.
+import assert from 'node:assert/strict';
+import { readFile } from 'node:fs/promises';
+import { after, before, describe, test } from 'node:test';
+import { ball, ballMoved, compared, makeDesk, makeRoom, openDesk, tooSmall, violations } from './support/desk.mjs';
+
+let room;
+before(async () => {
+  room = await makeRoom();
+});
+after(() => room?.close());
+
+describe('versions', () => {
+  let desk, page, id, hand, complaints;
+  before(async () => {
+    desk = await makeDesk(room);
+    for (const version of [1, 2]) assert.equal(await ballMoved(desk), version);
+    ({ page, id, hand, complaints } = await openDesk(desk));
+    await id('tab-button-scene').click();
+  });
+  after(async () => {
+    await page?.context().close();
+    await desk?.service.stop();
+  });
+
+  test('are a tree: with names, gone on from, deleted, downloaded in any format', async () => {
+    await id('version-1-name').click();
+    await id('ask-input').fill('ball on the right');
+    await id('ask-ok').click();
+    await id('version-1').getByText('ball on the right').waitFor();
+    await id('version-1-branch').click();
+    await hand.shown(1);
+    assert.equal(await id('tab-button-drag').getAttribute('aria-selected'), 'true');
+    assert.equal(await ballMoved(desk, { version: 1, back: true }), 3);
+    await id('tab-button-scene').click();
+    await id('version-3').waitFor();
+    const levels = await page.evaluate(() => [...document.querySelectorAll('.version')].map((row) => [row.querySelector('.version-head').dataset.testid, row.getAttribute('aria-level')]));
+    assert.deepEqual(levels, [['version-0', '1'], ['version-2', '2'], ['version-1', '2'], ['version-3', '3']]);
+    await hand.shot('versions');
+    assert.deepEqual(await violations(page), []);
+    for (const format of ['compressed_ply', 'original']) {
+      const [download] = await Promise.all([page.waitForEvent('download'), id(`download-3-${format}`).click()]);
+      assert.deepEqual(await readFile(await download.path()), await desk.client.file(desk.scene, 3, format), format);
+    }
+    await id('version-1-delete').click();
+    await id('confirm-yes').click();
+    await id('version-1').waitFor({ state: 'detached' });
+    await hand.shown(0);
+    await id('version-3').getByText('from 0').waitFor();
+  });
+
+  test('two pages stay in step', async () => {
+    const other = await openDesk(desk);
+    await other.id('tab-button-scene').click();
+    await other.id('version-3-name').click();
+    await other.id('ask-input').fill('theirs');
+    await other.id('ask-ok').click();
+    await id('version-3').getByText('theirs').waitFor();
+    await id('version-3').click();
+    await hand.shown(3);
+    await other.id('version-3-delete').click();
+    await other.id('confirm-yes').click();
+    await id('version-3').waitFor({ state: 'detached' });
+    await page.getByTestId('toast').getByText('Version 3 has been deleted').waitFor();
+    await hand.shown(2);
+    // An edit of the one is in the list of the other, and does not take its screen.
+    const made = await ballMoved(desk, { version: 2, back: true });
+    for (const one of [page, other.page]) await one.getByTestId('toast').getByText(`Version ${made} is ready, made elsewhere`).waitFor();
+    await hand.shown(2);
+    assert.deepEqual(other.complaints, []);
+    await other.page.context().close();
+  });
+
+  test('a draft goes when a better one is there, unless it is kept', async () => {
+    await id('version-select').selectOption('0');
+    await id('hand-thing').click();
+    await hand.shown(0);
+    const at = await hand.onScreen(ball);
+    const draft = async (by) => {
+      await page.mouse.click(...at);
+      await hand.count();
+      await hand.drag(at, [at[0] + by, at[1]]);
+      await hand.state('done');
+      const shown = Number(await id('version-select').inputValue());
+      await hand.shown(shown);
+      await id('thing-undo').click();
+      await page.waitForFunction(() => document.querySelector('[data-testid=version-select]').value === '0');
+      await id('thing-drop').click();
+      await hand.shown(0);
+      return shown;
+    };
+    const there = async () => (await desk.client.get(`/v1/scenes/${desk.scene}`)).json().versions.map(({ version }) => version);
+    const [first, second] = [await draft(90), await draft(110)];
+    await id(`version-${first}`).waitFor({ state: 'detached' });  // in the tree, whether that is seen or not
+    assert.ok(!(await there()).includes(first) && (await there()).includes(second));
+    await id('tab-button-scene').click();
+    await id(`version-${second}-keep`).click();
+    const third = await draft(130);
+    assert.ok((await there()).includes(second) && (await there()).includes(third));
+    assert.deepEqual(complaints, []);
+  });
+
+  test('a scene that somebody deletes is left', async () => {
+    await desk.client.delete(`/v1/scenes/${desk.scene}`);
+    await id('home').waitFor();
+    await page.getByTestId('toast').getByText('This scene has been deleted').waitFor();
+  });
+});
+
+describe('a service that goes away', () => {
+  test('is said to, and the page goes on when it is back', async () => {
+    const desk = await makeDesk(room);
+    const { page, id, hand } = await openDesk(desk);
+    assert.equal(await id('away').isVisible(), false);
+    desk.service.process.kill('SIGSTOP');
+    await id('away').waitFor();
+    await hand.shot('away');
+    desk.service.process.kill('SIGCONT');
+    await id('away').waitFor({ state: 'hidden' });
+    await desk.service.kill();
+    await id('away').waitFor();
+    await desk.service.start({ there: true });
+    await id('away').waitFor({ state: 'hidden' });
+    await page.keyboard.press(']');
+    await page.waitForFunction(() => document.querySelector('[data-testid=view-select]').value === 'view_01.png');
+    await hand.shown(0);
+    await id('home-link').click();
+    await id(`scene-${desk.scene}`).waitFor();
+    desk.service.process.kill('SIGSTOP');
+    await id('scenes-problem').getByText('does not answer').waitFor();
+    desk.service.process.kill('SIGCONT');
+    await id('scenes-problem').waitFor({ state: 'hidden' });
+    const other = await desk.service.client.upload(room.demo.ply, { name: 'theirs' });
+    await id(`scene-${other.id}`).waitFor();
+    await page.context().close();
+    await desk.service.stop();
+  });
+});
+
+describe('photos', () => {
+  let desk, page, id, hand, complaints;
+  before(async () => {
+    desk = await makeDesk(room);
+    ({ page, id, hand, complaints } = await openDesk(desk));
+  });
+  after(async () => {
+    await page?.context().close();
+    await desk?.service.stop();
+  });
+
+  test('lie over the picture of their camera, to the pixel', async () => {
+    await id('photo-toggle').click();
+    await page.waitForFunction(() => document.querySelector('[data-testid=photo]').naturalWidth > 0);
+    await hand.shot('photo');
+    // The demo scene's photos are renders of it: where it lies rightly, nothing differs.
+    const differs = () => page.evaluate(() => {
+      const [photo, picture] = ['photo', 'picture'].map((name) => document.querySelector(`[data-testid=${name}]`));
+      const [over, under] = [photo.getBoundingClientRect(), picture.getBoundingClientRect()];
+      const size = { width: photo.naturalWidth, height: photo.naturalHeight };
+      const pixels = (draw) => {
+        const context = Object.assign(document.createElement('canvas'), size).getContext('2d');
+        draw(context);
+        return context.getImageData(0, 0, size.width, size.height).data;
+      };
+      const factor = picture.width / under.width;
+      const a = pixels((context) => context.drawImage(photo, 0, 0));
+      const b = pixels((context) => context.drawImage(picture, (over.left - under.left) * factor, (over.top - under.top) * factor, over.width * factor, over.height * factor, 0, 0, size.width, size.height));
+      return a.reduce((sum, value, i) => sum + Math.abs(value - b[i]), 0) / a.length;
+    });
+    assert.ok(await differs() < 4, `${await differs()} of 255 on average`);
+    await id('photo-strength').focus();
+    await page.keyboard.press('Home');
+    assert.equal(await id('photo').evaluate((img) => img.style.opacity), '0');
+    assert.deepEqual(await violations(page), []);
+    await page.keyboard.press('Escape');
+    await id('view').focus();
+    await page.keyboard.press('ArrowLeft');
+    await id('photo').waitFor({ state: 'hidden' });
+  });
+
+  test('go with the dataset when that is removed', async () => {
+    await id('tab-button-scene').click();
+    await id('dataset-remove').click();
+    await id('confirm-yes').click();
+    await id('dataset').getByText('None.').waitFor();
+    await page.waitForFunction(() => /Virtual views/.test(document.querySelector('[data-testid=view-select]').textContent));
+    assert.equal((await desk.client.get(`/v1/scenes/${desk.scene}`)).json().dataset, null);
+    assert.equal(await id('photo-toggle').isVisible(), false);
+    assert.deepEqual(complaints, []);
+  });
+});
+
+describe('by fingers, on a phone', () => {
+  const phone = { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true };
+  let desk, page, id, hand, complaints, touch;
+  before(async () => {
+    desk = await makeDesk(room);
+    await ballMoved(desk);
+    ({ page, id, hand, complaints } = await openDesk(desk, phone));
+    const session = await page.context().newCDPSession(page);
+    touch = async (...places) => {
+      const send = (type, points) => session.send('Input.dispatchTouchEvent', { type, touchPoints: points.map(([x, y]) => ({ x, y })) });
+      await send('touchStart', [places[0]]);
+      for (const place of places.slice(1)) await send('touchMove', [place]);
+      await send('touchEnd', []);
+    };
+  });
+  after(async () => {
+    await page?.context().close();
+    await desk?.service.stop();
+  });
+  const check = async (state) => {
+    await hand.shot(`phone-${state}`);
+    assert.deepEqual(await violations(page), [], state);
+    assert.deepEqual(await tooSmall(page), [], state);
+  };
+
+  test('the line between two versions is moved, and the rest of the picture turns', async () => {
+    await id('compare-mode').selectOption('slider');
+    await compared(page, 'slider');
+    const box = await id('view').boundingBox();
+    const middle = [box.x + box.width / 2, box.y + 0.8 * box.height];
+    await touch(middle, ...[0.6, 0.7, 0.8].map((part) => [box.x + part * box.width, middle[1]]));
+    assert.ok(Math.abs(Number(await id('compare-split').inputValue()) - 80) < 4, await id('compare-split').inputValue());
+    await check('slider');
+    await touch([box.x + 60, middle[1]], [box.x + 80, middle[1]], [box.x + 120, middle[1]]);
+    await page.waitForFunction(() => document.querySelector('[data-testid=view-select]').value === '');
+    await hand.shown(1);
+    await id('compare-mode').selectOption('difference');
+    await compared(page, 'difference');
+    await check('difference');
+    await id('compare-mode').selectOption('');
+  });
+
+  test('what is healed is painted', async () => {
+    await id('hand-heal').tap();
+    await id('select-tool-brush').tap();
+    const box = await id('view').boundingBox();
+    await touch([box.x + 150, box.y + 0.7 * box.height], [box.x + 170, box.y + 0.7 * box.height], [box.x + 200, box.y + 0.7 * box.height]);
+    await hand.count();
+    await check('heal');
+    await id('undo').click();  // a tap right after a stroke that quick is taken by the browser to stop a fling
+    await id('no-selection').waitFor();
+    await id('hand-thing').tap();
+  });
+
+  test('versions are named and deleted, and an edit is looked at step by step', async () => {
+    await id('tab-button-scene').tap();
+    await id('version-1-name').tap();
+    await id('ask-input').fill('by thumb');
+    await id('ask-ok').tap();
+    await id('version-1').getByText('by thumb').waitFor();
+    await check('versions');
+    await id('tab-button-edits').tap();
+    await id('thumb-1-0').tap();
+    await page.waitForFunction(() => document.querySelector('[data-testid=scrub-picture]').naturalWidth > 0);
+    await check('steps');
+    await page.getByRole('button', { name: 'Close' }).tap();
+    await id('tab-button-scene').tap();
+    await id('version-1-delete').tap();
+    await id('confirm-yes').tap();
+    await hand.shown(0);
+    assert.deepEqual(complaints, []);
+  });
+});

@@ -1,0 +1,127 @@
+// Measures the page on the fox, in Debian's chromium, and writes docs/page-latency.md:
+//   - from a move of the mouse to the new picture, while a part of about 30,000 Gaussians is dragged;
+//   - interactive renders (orbiting, in the page's own sizes) while an edit runs.
+// Wants the machine to itself. The figures are of this machine: the file says which.
+//
+//   node tests/service/page_latency.mjs [--moves 100] [--renders 300] [--out docs/page-latency.md]
+import { writeFile } from 'node:fs/promises';
+import os from 'node:os';
+import path from 'node:path';
+import { parseArgs } from 'node:util';
+import { handOn, launch, openPage } from './support/browser.mjs';
+import { root, Service, temporaryFolder } from './support/program.mjs';
+import { datasetZip, fox } from './support/scenes.mjs';
+
+const { values } = parseArgs({ options: { moves: { type: 'string', default: '100' }, renders: { type: 'string', default: '300' }, out: { type: 'string', default: path.join(root, 'docs/page-latency.md') } } });
+const [moves, renders] = [Number(values.moves), Number(values.renders)];
+const wanted = 30_000;
+
+const capture = fox();
+if (capture.absent) throw new Error(capture.absent);
+const load = os.loadavg()[0];
+
+const quantile = (times, q) => [...times].sort((a, b) => a - b)[Math.min(times.length - 1, Math.floor(q * times.length))];
+const row = (what, times) => `| ${what} | ${times.length} | ${quantile(times, 0.5).toFixed(0)} | ${quantile(times, 0.95).toFixed(0)} | ${Math.max(...times).toFixed(0)} |`;
+
+const service = await Service.start();
+const browser = await launch();
+try {
+  const { client } = service;
+  const scene = (await client.upload(capture.ply, { name: 'fox' })).id;
+  await client.putDataset(scene, await datasetZip(capture.folder));
+
+  // The part: a sphere about the fox's head that holds about as many as wanted.
+  const [{ source }] = capture.drags.ear_up.handles;
+  const held = async (radius) => (await client.post(`/v1/scenes/${scene}/versions/0/select`, { selection: [{ sphere: { center: source, radius } }] })).json().count;
+  let [low, high] = [0.01, 100];
+  for (let i = 0; i < 30; ++i) {
+    const middle = Math.sqrt(low * high);
+    if (await held(middle) < wanted) low = middle; else high = middle;
+  }
+  const selection = [{ sphere: { center: source, radius: high } }];
+  const count = await held(high);
+
+  const { page, id } = await openPage(browser, service, { viewport: { width: 1366, height: 768 } });
+  const hand = handOn({ page, id });
+  await id(`scene-${scene}`).getByTestId('scene-open').click();
+  await hand.shown(0);
+  const request = path.join(temporaryFolder(), 'part.json');
+  await writeFile(request, JSON.stringify({ handles: [{ source }], selection }));
+  await id('import-file').setInputFiles(request);
+  await id('auto-repair').uncheck();
+  await hand.count();
+  const at = await hand.onScreen(source);
+
+  // One move, its picture, the next move: what the hand waits for.
+  await page.evaluate(() => {
+    const view = document.querySelector('[data-testid=view]');
+    window.latencies = [];
+    let moved = null;
+    let version = null;
+    addEventListener('pointermove', () => (moved ??= performance.now()), true);
+    view.addEventListener('shown', ({ detail }) => {
+      if (moved === null || detail.version === version || !/^p/.test(detail.version)) return;
+      version = detail.version;
+      // It is on the screen with the next frame.
+      const since = moved;
+      requestAnimationFrame(() => {
+        window.latencies.push(performance.now() - since);
+        moved = null;
+      });
+    });
+  });
+  await page.mouse.move(...at);
+  await page.mouse.down();
+  for (let i = 1; i <= moves; ++i) {
+    await page.evaluate(() => { window.seen = window.latencies.length; });
+    await page.mouse.move(at[0] + 6 + 40 * Math.sin(i / 8), at[1] - 20 * Math.sin(i / 13) - 6);
+    await page.waitForFunction(() => window.latencies.length > window.seen, null, { polling: 4 });
+  }
+  await page.mouse.up();
+  const drags = (await page.evaluate(() => window.latencies)).slice(5);  // the first ones find out what the later ones know
+  await page.keyboard.press('Escape');
+  await id('thing-drop').click();
+
+  // Renders while an edit runs: as many as the page asks for while it is orbited.
+  const times = [];
+  page.on('requestfinished', (asked) => {
+    if (!/\/render$/.test(asked.url())) return;
+    const { requestStart, responseEnd } = asked.timing();
+    times.push(responseEnd - requestStart);
+  });
+  const edit = () => client.submit({ scene, version: 0, preset: 'draft', handles: capture.drags.ear_up.handles, params: { intervals: 8 } });
+  let running = (await edit()).id;
+  await client.until(running, ({ state }) => state === 'running');
+  const box = await id('view').boundingBox();
+  const [x, y] = [box.x + 0.9 * box.width, box.y + 0.1 * box.height];
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  times.length = 0;
+  for (let i = 0; times.length < renders; ++i) {
+    await page.mouse.move(x - 60 - 60 * Math.sin(i / 20), y + 20 * Math.sin(i / 15));
+    if (i % 20 === 0 && (await client.edit(running)).ended) {
+      running = (await edit()).id;
+      await client.until(running, ({ state }) => state === 'running');
+    }
+  }
+  await page.mouse.up();
+  await client.post(`/v1/edits/${running}/cancel`);
+
+  const text = `# How soon the page answers
+
+Made by \`node tests/service/page_latency.mjs\` on ${os.cpus().length} cores of ${os.cpus()[0].model.trim()} (load average before: ${load.toFixed(1)}), chromium ${browser.version()} on the same machine,
+a window of 1366x768. The fox: 62,298 Gaussians. Milliseconds.
+
+| what | times | median | 95 % | longest |
+| --- | ---: | ---: | ---: | ---: |
+${row(`from a move of the mouse to the new picture, dragging ${count.toLocaleString('en-US')} Gaussians`, drags)}
+${row('an interactive render, as the page waits for it, while an edit (`draft`) runs', times)}
+
+The aims are a median below 100 ms for the first, and 95 % below 250 ms for the second.
+`;
+  await writeFile(values.out, text);
+  console.log(text);
+} finally {
+  await browser.close();
+  await service.stop();
+}
