@@ -54,7 +54,7 @@ export function buildCompare(editor) {
     options: WAYS,
     changed: (value) => store.set({ contrast: value || null }),
   });
-  byId("tools").lastElementChild.before(ways.element);
+  byId("tools").append(h("span", { class: "spacer" }), ways.element);
 
   let shown = null; // The job of the picture on the screen.
   let made = null; // {key, share} of what is on the canvas.

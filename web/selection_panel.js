@@ -76,12 +76,8 @@ export function buildTools(editor) {
   );
   const undo = iconButton("↶", "undo", "Undo (Ctrl + Z)", () => editor.undo());
   const redo = iconButton("↷", "redo", "Redo (Ctrl + Shift + Z)", () => editor.redo());
-  byId("tools").append(
-    hand.element,
-    tools,
-    h("span", { class: "spacer" }),
-    h("div", { class: "row tight" }, undo, redo),
-  );
+  byId("tools").append(hand.element, tools);
+  byId("toolbar").append(h("div", { class: "row undo" }, undo, redo));
 
   const shown = ["healing", "selectMode", "thingMode", "selectTool", "selectOp", "clickKind", "nextThing", "selectDepth", "brushRadius"];
   const undone = ["version", "handles", "selection", "region", "mode", "preset", "params", "crumbs", "heal"];
