@@ -7,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "engine/edit/annealing.h"
 #include "engine/edit/handles.h"
 #include "engine/edit/views.h"
 #include "engine/render/forward.h"
@@ -107,6 +108,8 @@ Workload workload_of(std::size_t gaussians, const Request& request, bool correct
   work.corrections = request.params.annealing_steps;
   work.iterations = request.params.iterations;
   work.corrected = corrected;
+  work.first_tuning = first_tuning_steps, work.later_tuning = later_tuning_steps;
+  work.mean_strength = (request.params.strength_initial + request.params.strength_final) / 2;
   work.vacates = departure_of(request) == Mode::move;
   return work;
 }
