@@ -6,9 +6,6 @@
 
 namespace engine::edit {
 
-/// Steps of training of a repainter before the first interval, and before each later one. Source: section 4.1.
-constexpr int first_tuning_steps = 200, later_tuning_steps = 50;
-
 /// S(a), a = 1..A: from params.strength_initial to params.strength_final, as params.annealing says.
 [[nodiscard]] double strength_of(const Params& params, int a);
 

@@ -132,8 +132,8 @@ class Maker {
     const RepaintTime& repaint = work_.repaint_time;
     if (work_.repainted && a == 1)
       add(Stage::tune, u,
-          (u == 1 ? work_.first_tuning : work_.later_tuning) *
-              std::max(repaint.training_step, least_training_step_seconds));
+          slow((u == 1 ? work_.first_tuning : work_.later_tuning) *
+               std::max(repaint.training_step, least_training_step_seconds)));
     // In a move each view is looked at without the part as well: to find the one that shows most of the hole, and to
     // fill it. Footprints say what was vacated, and which of it is filled already.
     const double filled = work_.vacates ? 2 * (look_frames * frame() + slow(surface_seconds)) + 5 * footprint(pixels_) +
@@ -141,7 +141,7 @@ class Maker {
                                         : 0;
     add(Stage::correct, u, views_ * (look_frames * frame() + filled));
     if (work_.repainted)
-      add(Stage::repaint, u, views_ * std::max(repaint.of_picture(work_.mean_strength), least_picture_seconds));
+      add(Stage::repaint, u, slow(views_ * std::max(repaint.of_picture(work_.mean_strength), least_picture_seconds)));
     if (a == work_.corrections) add_pictures(u, Shows::given);
   }
 

@@ -55,7 +55,7 @@ struct FrameTime {
   [[nodiscard]] double of(std::size_t pixels) const { return gaussians + pixel * double(pixels); }
 };
 
-/// Time that a repainter takes on this machine, seconds.
+/// Time that a repainter takes where a plan's figures were measured, seconds.
 struct RepaintTime {
   double training_step = 0;  ///< Of fine-tuning.
   double picture = 0;        ///< Of one picture, whatever its strength.

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "engine/core/rows.h"
-#include "engine/edit/annealing.h"
 #include "engine/edit/handles.h"
 #include "engine/edit/masks.h"
 #include "engine/edit/messages.h"
@@ -173,7 +172,7 @@ Result<void> tune(State& state, Edit& edit, std::span<const scene::Mask> masks, 
     history.push_back({.view = v, .picture = correct::as_bytes(edit.repair->unedited(v))});
   history.insert(history.end(), state.history.begin(), state.history.end());
   for (correct::HistoryPicture& picture : history) picture.box = scene::bounding_box(masks[picture.view]);
-  const int steps = u == 1 ? first_tuning_steps : later_tuning_steps;
+  const int steps = u == 1 ? edit.params().tuning_steps : edit.params().tuning_steps_later;
   auto tuned = edit.repainter->fine_tune(history, steps, edit.repair->tuning_seed(u),
                                          [&](double part) { return edit.progress.advance(part); });
   if (tuned) state.repainter = edit.repainter->state();

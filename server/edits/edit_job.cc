@@ -100,6 +100,7 @@ class Run {
     auto request = to_engine(asked_);
     if (!request) return propagate(request);
     request_ = std::move(*request);
+    if (auto all = available(request_.params, workshop_.models); !all) return all;
     const auto about = workshop_.scenes.find(scene_id());
     if (!about) return propagate(about);
     if (about->up) request_.up = *about->up;
@@ -156,7 +157,9 @@ class Run {
     auto outcome = attempt();
     // Its end has to be that of its time: another error it would only meet again, or hide.
     if (outcome || outcome.error().code != ErrorCode::cancelled) return outcome;
-    if (!has_outlived_ || context_.cancel_token().stop_requested()) return outcome;
+    if (context_.cancel_token().stop_requested()) return outcome;
+    if (is_cut_short_ && !has_outlived_) return attempt();
+    if (!has_outlived_) return outcome;
     if (context_.finished_intervals() == 0)
       return fail(ErrorCode::too_large,
                   "the edit has not finished an interval in " + whole_seconds(workshop_.outlived_seconds) +
@@ -177,6 +180,14 @@ class Run {
     out_of_time_.request_stop();
   }
 
+  /// Who stops an edit does not wait for hours until a diffusion model has finished an interval: what that has begun is
+  /// given up, and the edit ends with the interval before.
+  void look_for_a_stop() {
+    if (is_cut_short_ || !context_.stop_requested() || context_.finished_intervals() == 0) return;
+    is_cut_short_ = true;
+    out_of_time_.request_stop();
+  }
+
   Result<edit::Outcome> attempt() {
     out_of_time_ = {};
     const std::stop_callback cancelled(context_.cancel_token(), [this] { out_of_time_.request_stop(); });
@@ -185,6 +196,7 @@ class Run {
     observer.progress = [this](const edit::Progress& progress) {
       keeper_.advance(progress);
       look_at_the_time();
+      if (progress.stage == edit::Stage::tune || progress.stage == edit::Stage::repaint) look_for_a_stop();
     };
     observer.moment = [this](const edit::Moment& moment) { return pictures_->add(moment); };
     observer.pictured = std::size_t(std::max(0, workshop_.pictured_views));
@@ -194,10 +206,13 @@ class Run {
       return (context_.stop_requested() || has_outlived_) && last_interval_ >= context_.finished_intervals();
     };
     observer.stop = out_of_time_.get_token();
-    const auto corrector = make_corrector(asked_);
+    const auto toolbox = make_toolbox(asked_, request_.params, workshop_.models);
+    if (!toolbox) return propagate(toolbox);
+    edit::Tools tools = toolbox->tools();
+    if (tools.perceptual == nullptr) tools.perceptual = workshop_.perceptual;
     auto state = last_state();
     last_interval_ = state ? state->interval : 0;
-    return edit::run(*input_, cameras_, request_, {corrector.get(), workshop_.perceptual}, observer, std::move(state));
+    return edit::run(*input_, cameras_, request_, tools, observer, std::move(state));
   }
 
   /// What the rest should take, as far as anybody knows.
@@ -281,6 +296,7 @@ class Run {
   std::optional<IntervalPictures> pictures_;
   int last_interval_ = 0;  ///< That this run has finished or taken over.
   bool has_outlived_ = false;
+  bool is_cut_short_ = false;     ///< By a stop within an interval.
   std::stop_source out_of_time_;  ///< Fires with the context's token, too.
   bool stopped_early_ = false;
 
