@@ -73,9 +73,13 @@ after(async () => {
 
 const submit = async (params = {}, more = {}) =>
   (await service.client.submit({ ...request, scene: scene.id, ...more, params: { ...request.params, ...params } })).id;
+/// Networks compute with the machine's leftovers, as all edits do: beside other work an edit may take minutes.
+const patient = { timeout: 600_000 };
+const succeeded = (id) => service.client.succeeded(id, patient);
+const until = (id, reached) => service.client.until(id, reached, { every: 5, ...patient });
 const bytesOf = async (edit) => service.client.file(scene.id, edit.result_version);
 let truth;  // the bytes of `request`, undisturbed
-const undisturbed = async () => truth ??= await bytesOf(await service.client.succeeded(await submit()));
+const undisturbed = async () => truth ??= await bytesOf(await succeeded(await submit()));
 const again = async () => {
   await service.kill();
   await service.start();
@@ -107,7 +111,7 @@ test('an edit learns, repaints by falling strength and learns again from what it
   const id = await submit();
   const stages = new Set();
   await service.client.events(id, ({ edit }) => stages.add(`${edit.interval} ${edit.stage}`));
-  const edit = await service.client.succeeded(id);
+  const edit = await succeeded(id);
   for (const stage of ['1 tune', '1 repaint', '2 tune', '2 repaint']) assert.ok(stages.has(stage), `${stage} is not among ${[...stages]}`);
   assert.equal(edit.finished_intervals.length, 2);
   assert.equal(edit.request.prompt, 'a ball on a table');
@@ -120,7 +124,7 @@ test('an edit learns, repaints by falling strength and learns again from what it
 
 test('the same request gives the same bytes, and prompt, seed and training make a difference', { skip }, async () => {
   const short = { intervals: 1, annealing_steps: 1, tuning_steps: 3, views: 2 };
-  const made = async (params, more) => bytesOf(await service.client.succeeded(await submit({ ...short, ...params }, more)));
+  const made = async (params, more) => bytesOf(await succeeded(await submit({ ...short, ...params }, more)));
   const expected = await made();
   assert.deepEqual(await made(), expected);
   for (const [what, params, more] of [['seed', { seed: 1 }], ['training', { tuning_steps: 0 }], ['rank', { lora_rank: 1 }], ['prompt', {}, { prompt: 'a hat' }],
@@ -132,11 +136,11 @@ test('killed while it learns and while it paints, an edit ends with the same byt
   const expected = await undisturbed();
   const id = await submit();
   for (const [interval, stage] of [[1, 'tune'], [1, 'repaint'], [2, 'tune'], [2, 'repaint']]) {
-    await service.client.until(id, (edit) => edit.interval === interval && edit.stage === stage, { every: 5 });
+    await until(id, (edit) => edit.interval === interval && edit.stage === stage);
     await again();
     assert.equal((await service.client.edit(id)).finished_intervals.length, interval - 1, 'it goes on with the interval that was cut');
   }
-  assert.deepEqual(await bytesOf(await service.client.succeeded(id)), expected);
+  assert.deepEqual(await bytesOf(await succeeded(id)), expected);
 });
 
 test('cancelled while it learns or paints, an edit ends at once; stopped, with the interval before', { skip }, async () => {
@@ -144,14 +148,14 @@ test('cancelled while it learns or paints, an edit ends at once; stopped, with t
   const long = { tuning_steps: 20_000, tuning_steps_later: 20_000, sampling_steps: 500, strength_initial: 1, strength_final: 1 };
   for (const [params, stage] of [[long, 'tune'], [{ ...long, tuning_steps: 1 }, 'repaint']]) {
     const id = await submit(params, { allow_slow: true });
-    await service.client.until(id, (edit) => edit.stage === stage, { every: 5 });
+    await until(id, (edit) => edit.stage === stage);
     await service.client.request('POST', `/v1/edits/${id}/cancel`, { expect: 200 });
-    assert.equal((await service.client.ended(id)).state, 'cancelled', stage);
+    assert.equal((await service.client.ended(id, patient)).state, 'cancelled', stage);
   }
   const id = await submit({ tuning_steps: 2, tuning_steps_later: 20_000, annealing_steps: 1 }, { allow_slow: true });
-  await service.client.until(id, (edit) => edit.interval === 2 && edit.stage === 'tune', { every: 5 });
+  await until(id, (edit) => edit.interval === 2 && edit.stage === 'tune');
   await service.client.request('POST', `/v1/edits/${id}/stop`, { expect: 200 });
-  const edit = await service.client.succeeded(id);
+  const edit = await succeeded(id);
   assert.equal(edit.stopped_early, true);
   assert.equal(edit.finished_intervals.length, 1);
 });
@@ -167,14 +171,14 @@ test('what would take hours has to be allowed, and the estimate tells how long',
   assert.equal(refused.where, 'allow_slow');
   const { id } = await service.client.submit({ ...slow, allow_slow: true });
   await service.client.request('POST', `/v1/edits/${id}/cancel`, { expect: 200 });
-  assert.equal((await service.client.ended(id)).state, 'cancelled');
+  assert.equal((await service.client.ended(id, patient)).state, 'cancelled');
 });
 
 test('lpips compares what is optimised with what was painted', { skip }, async () => {
   const params = { intervals: 1, annealing_steps: 1, tuning_steps: 1, max_image_side: 48, views: 2, iterations: 2 };
-  const edit = await service.client.succeeded(await submit({ ...params, perceptual: 'lpips' }));
+  const edit = await succeeded(await submit({ ...params, perceptual: 'lpips' }));
   assert.equal(edit.request.params.perceptual, 'lpips');
   assert.ok(edit.finished_intervals[0].loss > 0);
-  const other = await service.client.succeeded(await submit(params));
+  const other = await succeeded(await submit(params));
   assert.notEqual(other.finished_intervals[0].loss, edit.finished_intervals[0].loss);
 });
