@@ -57,13 +57,15 @@ struct EditRequest {
   std::optional<std::string> scene;  ///< Id of a scene that a service holds.
   std::optional<int> version;        ///< Version of that scene, from 0 up.
   Mode mode = Mode::move;
-  std::optional<Preset> preset;        ///< None: standard.
-  std::optional<std::string> prompt;   ///< For a corrector that reads one.
-  std::vector<Handle> handles;         ///< 1 to max_handles
-  std::optional<Selection> selection;  ///< What moves. None: the handles' spheres.
-  std::optional<Selection> heal = {};  ///< What is made anew although it was seen.
-  std::optional<Attach> attach = {};   ///< What holds it. None: auto.
-  std::optional<Crumbs> crumbs = {};   ///< What becomes of what the selection has left out. None: move.
+  std::optional<Preset> preset;                     ///< None: standard.
+  std::optional<std::string> prompt;                ///< For a corrector that reads one.
+  std::optional<std::string> negative_prompt = {};  ///< The same: what should not be seen.
+  bool allow_slow = false;                          ///< A diffusion model may work for hours.
+  std::vector<Handle> handles;                      ///< 1 to max_handles
+  std::optional<Selection> selection;               ///< What moves. None: the handles' spheres.
+  std::optional<Selection> heal = {};               ///< What is made anew although it was seen.
+  std::optional<Attach> attach = {};                ///< What holds it. None: auto.
+  std::optional<Crumbs> crumbs = {};                ///< What becomes of what the selection has left out. None: move.
   std::optional<Region> region;
   Params params;
   bool operator==(const EditRequest&) const = default;

@@ -59,6 +59,8 @@ export const NOTHING_OPEN = {
   mode: "move",
   preset: "",
   prompt: null,
+  negative_prompt: null,
+  allow_slow: false, // A diffusion model may work for hours.
   attach: null,
   crumbs: null, // What becomes of what the selection has left out; null: it goes along.
   heal: [], // Operations: what a run makes anew.
@@ -82,14 +84,15 @@ export const NOTHING_OPEN = {
 /** What undo brings back, all at once: a drag is meant on a version, in a mode, with settings. */
 const PLACED_KEYS = [
   ...["version", "handles", "selection", "region", "mode", "preset", "prompt", "params", "heal", "attach", "crumbs"],
+  ...["negative_prompt", "allow_slow"],
 ];
 /** What goes from the screen when another version comes. */
 const OF_THE_VERSION = { comparing: false, compareWith: null, preview: null, problem: null, estimate: null };
 
 // What outlives a reload: as it is; and all, of which open() puts back what still fits the scene.
 const LASTING_KEYS = [
-  ...["region", "mode", "preset", "crumbs", "prompt", "params", "autoPreview", "layer", "tab", "constraint", "gizmo", "frame"],
-  ...["thingMode", "selectTool", "selectDepth", "brushRadius", "tinted", "draftOnRelease", "drafts"],
+  ...["region", "mode", "preset", "crumbs", "prompt", "negative_prompt", "allow_slow", "params", "autoPreview", "layer", "tab"],
+  ...["constraint", "gizmo", "frame", "thingMode", "selectTool", "selectDepth", "brushRadius", "tinted", "draftOnRelease", "drafts"],
 ];
 const STORED_KEYS = ["pose", "version", "handles", "selection", "viewName", ...LASTING_KEYS];
 
@@ -855,6 +858,8 @@ export class Editor {
       mode: request.mode ?? "move",
       preset: request.preset ?? "",
       prompt: request.prompt ?? null,
+      negative_prompt: request.negative_prompt ?? null,
+      allow_slow: request.allow_slow ?? false,
       region: request.region ?? null,
       params: request.params ?? {},
     });

@@ -29,6 +29,8 @@ export const STAGES = {
   relocate: "Relocating handles",
   observe: "Looking at what cameras have seen",
   correct: "Correcting",
+  tune: "Learning the scene",
+  repaint: "Repainting views",
   set_up: "Preparing views",
   optimise: "Optimising",
   pictures: "Rendering pictures",

@@ -51,6 +51,9 @@ function fieldFor(parameter, info, changed) {
   return null;
 }
 
+/** Can this service's edits be repainted by a diffusion model? */
+export const hasDiffusion = (info) => partsOf(info ?? {}, "corrector").some((p) => p.name === "sd" && p.available);
+
 /** All fields. changed(name, value) is called with null for what is left to the preset.
  *    returns  {element, update(info, params, preset), shows(name)} */
 export function paramFields(changed) {
@@ -58,7 +61,8 @@ export function paramFields(changed) {
   let fields = {};
   let known = null;
   const build = (info) => {
-    const entries = (info?.parameters ?? []).map((parameter) => [
+    const offered = (info?.parameters ?? []).filter(({ part }) => part !== "diffusion" || hasDiffusion(info));
+    const entries = offered.map((parameter) => [
       parameter,
       fieldFor(parameter, info, (value) => changed(parameter.name, value)),
     ]);

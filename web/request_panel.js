@@ -4,7 +4,7 @@ import { askChoice, say } from "./dialogs.js";
 import { attrs, button, h, problemPlace, problemText, row, showProblem, text } from "./dom.js";
 import { choice, labelled, pointField, segments, toggle } from "./fields.js";
 import { bytes, count, counted, duration, gaussians } from "./format.js";
-import { paramFields } from "./params.js";
+import { hasDiffusion, paramFields } from "./params.js";
 import { buildPresets, runPresets } from "./presets.js";
 import { changesScene, isStated, partOf, readRequests } from "./requests.js";
 import { whatMoves } from "./selection.js";
@@ -86,6 +86,22 @@ export function buildRequestPanel(editor) {
   crumbsField.title = "Small pieces of the part that the selection has left out";
   const params = paramFields(setParam);
   const also = h("p", { class: "note", hidden: true, testid: "other-params" });
+  const promptField = h("input", {
+    type: "text",
+    maxlength: 4096,
+    testid: "prompt",
+    "aria-label": "Prompt",
+    placeholder: "a photo of sks scene",
+    title: "What the scene shows: the diffusion model is trained and asked with it",
+  });
+  promptField.addEventListener("change", () => store.set({ prompt: promptField.value.trim() || null }));
+  const slow = toggle({
+    label: "It may take hours",
+    testid: "allow-slow",
+    title: "Without a graphics card a diffusion model works for hours: Estimate tells for how long",
+    changed: (on) => store.set({ allow_slow: on }),
+  });
+  const painted = h("div", { testid: "painted" }, labelled("Prompt", promptField), slow.element);
   const paramProblem = problemPlace("param-problem");
   const settings = h(
     "details",
@@ -94,6 +110,7 @@ export function buildRequestPanel(editor) {
     labelled("Preset", preset.element),
     crumbsField,
     params.element,
+    painted,
     regionOn.element,
     regionFields,
     regionProblem,
@@ -170,7 +187,7 @@ export function buildRequestPanel(editor) {
   store.watch(
     [
       ...["constraint", "mode", "region", "preset", "crumbs", "selection", "params", "autoPreview", "draftOnRelease"],
-      ...["info", "handles", "scene", "prompt"],
+      ...["info", "handles", "scene", "prompt", "allow_slow"],
     ],
     (state) => {
       constraint.update(state.constraint);
@@ -186,10 +203,13 @@ export function buildRequestPanel(editor) {
       crumbsField.hidden = state.selection.length === 0 || state.mode === "extend";
       crumbs.update(state.crumbs === "move" ? "" : (state.crumbs ?? ""));
       params.update(state.info, state.params, state.preset);
+      painted.hidden = !(state.params.corrector === "sd" && hasDiffusion(state.info));
+      promptField.value = state.prompt ?? "";
+      slow.update(state.allow_slow);
       auto.update(state.autoPreview);
       repair.update(state.draftOnRelease);
       const others = Object.keys(state.params).filter((name) => !params.shows(name));
-      if (state.prompt) others.push(`prompt “${state.prompt}”`);
+      if (state.prompt && painted.hidden) others.push(`prompt “${state.prompt}”`);
       also.hidden = others.length === 0;
       text(also, `Also set, by the imported request: ${others.join(", ")}`);
     },
@@ -199,7 +219,7 @@ export function buildRequestPanel(editor) {
   store.watch(
     [
       ...["handles", "selection", "previewing", "submitting", "problem", "preview", "estimate", "scene", "version"],
-      ...["region", "mode", "preset", "crumbs", "attach", "params", "prompt"],
+      ...["region", "mode", "preset", "crumbs", "attach", "params", "prompt", "allow_slow"],
     ],
     (state) => {
       const ready = state.scene !== null && isStated(state);
@@ -213,7 +233,7 @@ export function buildRequestPanel(editor) {
       const here = (...parts) => (state.problem && parts.includes(at.part) ? state.problem.error : null);
       showProblem(regionProblem, here("region"));
       showProblem(paramProblem, here("param", "mode", "preset", "crumbs"));
-      showProblem(problem, here("request", "handles", "prompt"));
+      showProblem(problem, here("request", "handles", "prompt", "negative_prompt", "allow_slow"));
       if (here("region") || here("param", "preset", "crumbs")) settings.open = true;
       if (here("handle") && !state.handles[at.index]) showProblem(problem, state.problem.error);
       answer.replaceChildren(...answers(editor, state));

@@ -16,6 +16,7 @@ export function requestOf(state) {
   // Where nothing moves, what is healed is removed: then all that a run does is to heal it.
   if (onlyHeals(state)) return requestOf({ ...state, mode: "remove", selection: state.heal });
   const { scene, version, mode, preset, prompt, handles, selection = [], heal = [], attach, crumbs, region, params } = state;
+  const { negative_prompt, allow_slow } = state;
   const goes = mode !== "remove"; // else targets stay on the screen, for when the mode changes back
   const given = Object.entries(params ?? {}).filter(
     ([, value]) => value !== null && value !== undefined && value !== "",
@@ -26,6 +27,8 @@ export function requestOf(state) {
     mode,
     ...(preset ? { preset } : {}),
     ...(prompt ? { prompt } : {}),
+    ...(negative_prompt ? { negative_prompt } : {}),
+    ...(allow_slow ? { allow_slow } : {}),
     handles: handles.map((handle) => ({
       source: handle.source,
       ...(goes && handle.target ? { target: handle.target } : {}),
@@ -84,7 +87,7 @@ export function partOf(where = "") {
   const param = /^params\.(\w+)/.exec(where);
   if (param) return { part: "param", name: param[1] };
   if (/^region\b/.test(where)) return { part: "region" };
-  if (/^(mode|preset|handles|prompt|crumbs)$/.test(where)) return { part: where };
+  if (/^(mode|preset|handles|prompt|negative_prompt|allow_slow|crumbs)$/.test(where)) return { part: where };
   return { part: "request" };
 }
 
@@ -168,7 +171,7 @@ function nameAmong(names, value, where) {
 }
 
 const FIELDS =
-  "scene version mode preset prompt handles selection heal attach crumbs region params".split(" ");
+  "scene version mode preset prompt negative_prompt allow_slow handles selection heal attach crumbs region params".split(" ");
 
 function readRequest(document, where) {
   known(document, FIELDS, where);
@@ -202,6 +205,8 @@ function readRequest(document, where) {
     mode,
     preset: document.preset ?? null,
     prompt: document.prompt ?? null,
+    negative_prompt: document.negative_prompt ?? null,
+    allow_slow: document.allow_slow ?? false,
     handles,
     selection,
     heal,
@@ -257,6 +262,8 @@ function readReleased(document, where) {
     mode: modeOf(document.mode ?? "move", at("mode")),
     preset: null,
     prompt: null,
+    negative_prompt: null,
+    allow_slow: false,
     handles,
     selection: [],
     heal: [],

@@ -1,5 +1,6 @@
-// What repairs the pictures of an edit: it replaces, inside each view's mask, what cannot be trusted.
-// Source: 3DGS-Drag (ICLR 2025), section 3.4, where a fine-tuned diffusion model does it.
+// What repairs the pictures of an edit: it completes them, inside each view's mask, where they cannot be trusted. What
+// repaints them whole is a Repainter (repainter.h).
+// Source: 3DGS-Drag (ICLR 2025), section 3.4, where a fine-tuned diffusion model repaints them.
 #pragma once
 
 #include <cstddef>

@@ -3,7 +3,6 @@
 #include <ATen/TensorOperators.h>
 #include <ATen/core/Tensor.h>
 #include <ATen/ops/conv2d.h>
-#include <ATen/ops/empty.h>
 #include <ATen/ops/linear.h>
 
 #include <algorithm>
@@ -11,23 +10,9 @@
 #include <string_view>
 
 #include "engine/core/rng.h"
+#include "engine/diffusion/numbers.h"
 
 namespace engine::diffusion {
-namespace {
-
-Tensor tensor_of(const weights::FloatTensor& values) {
-  Tensor tensor = at::empty(values.shape, at::kFloat);
-  std::ranges::copy(values.values, tensor.data_ptr<float>());
-  return tensor;
-}
-
-weights::FloatTensor values_of(const Tensor& tensor) {
-  const Tensor flat = tensor.detach().contiguous();
-  return {flat.sizes().vec(), {flat.data_ptr<float>(), flat.data_ptr<float>() + flat.numel()}};
-}
-
-}  // namespace
-
 struct Adapter::Pairs {
   struct Pair {
     Tensor down, up;

@@ -24,11 +24,13 @@ Tensor guided_noise(const Model& unet, const weights::UNetConfig& config, const 
 }
 
 Result<void> denoise(const Model& unet, const weights::UNetConfig& config, Scheduler& scheduler, Tensor& latents,
-                     const Tensor& contexts, double guidance, const NoiseSource& noise, const std::stop_token& stop) {
+                     const Tensor& contexts, double guidance, const NoiseSource& noise, const Advance& advance) {
   const auto count = std::size_t(latents.numel());
   std::vector<float> fresh(scheduler.takes_noise() ? count : 0);
+  std::size_t done = 0;
   for (const int timestep : scheduler.timesteps()) {
-    if (stop.stop_requested()) return fail(ErrorCode::cancelled, "the correction was cancelled");
+    if (advance)
+      if (auto going = advance(double(done++) / double(scheduler.timesteps().size())); !going) return going;
     const Tensor predicted = guided_noise(unet, config, latents, timestep, contexts, guidance).contiguous();
     if (!fresh.empty()) noise(fresh);
     scheduler.step({latents.data_ptr<float>(), count}, {predicted.data_ptr<float>(), count}, fresh);

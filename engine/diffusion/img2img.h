@@ -4,15 +4,17 @@
 
 #include <functional>
 #include <span>
-#include <stop_token>
 
 #include "engine/core/result.h"
+#include "engine/correct/repainter.h"
 #include "engine/diffusion/layers.h"
 #include "engine/diffusion/scheduler.h"
 #include "engine/diffusion/tensor.h"
 #include "engine/weights/networks.h"
 
 namespace engine::diffusion {
+
+using correct::Advance;
 
 /// The noise that is seen with the prompt, and `guidance` times as far from what is seen without it:
 /// e_u + g (e_t - e_u).
@@ -27,12 +29,11 @@ using NoiseSource = std::function<void(std::span<float>)>;
 /// All calls of a scheduler, beginning with latents at the noise of its first time step.
 ///   latents  [1, 4, h, w], float32 and contiguous; changed in place
 ///   noise    asked if the scheduler takes noise
-///   stop     asked before each call
-///   errors   cancelled; internal: latents are no longer finite, which a checkpoint's or an adapter's great numbers
-///   bring
-///            about
+///   advance  asked before each call; may be empty
+///   errors   those of `advance`; internal: latents are no longer finite, which a checkpoint's or an adapter's great
+///            numbers bring about
 [[nodiscard]] Result<void> denoise(const Model& unet, const weights::UNetConfig& config, Scheduler& scheduler,
                                    Tensor& latents, const Tensor& contexts, double guidance, const NoiseSource& noise,
-                                   const std::stop_token& stop);
+                                   const Advance& advance);
 
 }  // namespace engine::diffusion

@@ -16,8 +16,9 @@
 #include "engine/diffusion/autoencoder.h"
 #include "engine/diffusion/guard.h"
 #include "engine/diffusion/img2img.h"
+#include "engine/diffusion/networks.h"
+#include "engine/diffusion/pictures.h"
 #include "engine/diffusion/text_encoder.h"
-#include "engine/diffusion/tokenizer.h"
 #include "engine/weights/checkpoint.h"
 
 namespace engine::diffusion {
@@ -27,46 +28,19 @@ namespace {
 enum class Stream : std::uint64_t { latents, first_noise, later_noise };
 
 void fill_normal(std::span<float> values, std::uint64_t seed, Stream stream, std::uint64_t call = 0) {
-  Rng rng(seed, std::uint64_t(stream) + call);
-  for (float& value : values) value = rng.normal();
-}
-
-std::span<float> numbers_of(Tensor& tensor) { return {tensor.data_ptr<float>(), std::size_t(tensor.numel())}; }
-
-Tensor as_tensor(const scene::Image& picture) {
-  Tensor tensor = at::empty({1, picture.channels, picture.height, picture.width}, at::kFloat);
-  std::ranges::transform(picture.data, tensor.data_ptr<float>(), [](float value) { return 2 * value - 1; });
-  return tensor;
-}
-
-Result<scene::Image> as_picture(const Tensor& tensor) {
-  const Tensor flat = (tensor * 0.5 + 0.5).contiguous();
-  scene::Image picture(int(flat.size(3)), int(flat.size(2)), int(flat.size(1)));
-  std::copy_n(flat.data_ptr<float>(), picture.data.size(), picture.data.begin());
-  // Asked before clamping, which makes an infinity look like a colour, and lets NaN through.
-  if (first_not_finite(picture.data))
-    return fail(ErrorCode::internal, "what the autoencoder makes of the latents is not finite", "autoencoder");
-  for (float& value : picture.data) value = std::clamp(value, 0.0f, 1.0f);
-  return picture;
+  diffusion::fill_normal(values, Rng(seed, std::uint64_t(stream) + call));
 }
 
 }  // namespace
 
-struct StableDiffusion::Networks {
-  weights::Configs configs;
-  Tokenizer tokenizer;
-  Parameters unet, autoencoder, text_encoder;
-
-  /// [1, 77, width]
-  ///   name  of the option that the prompt is, for errors
-  [[nodiscard]] Result<Tensor> context_of(const std::string& prompt, const char* name, const Adapter* adapter) const {
-    auto pieces = tokenizer.encode(prompt, std::size_t(configs.text_encoder.positions));
-    if (!pieces) return fail(pieces.error().code, std::move(pieces.error().message), name);
-    Tensor numbers = at::empty({1, std::int64_t(pieces->size())}, at::kLong);
-    std::ranges::copy(*pieces, numbers.data_ptr<std::int64_t>());
-    return encode_text({text_encoder, adapter}, configs.text_encoder, numbers);
-  }
-};
+Result<Tensor> StableDiffusion::Networks::context_of(const std::string& prompt, const char* name,
+                                                     const Adapter* adapter) const {
+  auto pieces = tokenizer.encode(prompt, std::size_t(configs.text_encoder.positions));
+  if (!pieces) return fail(pieces.error().code, std::move(pieces.error().message), name);
+  Tensor numbers = at::empty({1, std::int64_t(pieces->size())}, at::kLong);
+  std::ranges::copy(*pieces, numbers.data_ptr<std::int64_t>());
+  return encode_text({text_encoder, adapter}, configs.text_encoder, numbers);
+}
 
 struct StableDiffusion::Adapters {
   std::optional<Adapter> unet, text_encoder;
@@ -123,7 +97,7 @@ Result<void> validate(const RepaintOptions& options, const weights::NoiseConfig&
 }
 
 Result<scene::Image> StableDiffusion::repaint(const scene::Image& picture, const RepaintOptions& options,
-                                              const std::stop_token& stop) const {
+                                              const Advance& advance) const {
   const weights::Configs& all = networks_->configs;
   const int multiple = side_multiple();
   if (picture.channels != 3 || picture.width < 1 || picture.height < 1 || picture.width % multiple != 0 ||
@@ -151,6 +125,10 @@ Result<scene::Image> StableDiffusion::repaint(const scene::Image& picture, const
     if (!positive) return propagate(positive);
 
     const Model autoencoder{networks_->autoencoder}, unet{networks_->unet, Adapters::pointer(adapters_->unet)};
+    // Encoding and decoding take about as long as a call of the UNet does.
+    const double calls = double(scheduler->timesteps().size()) + 2;
+    const auto after = [&](double done) { return advance ? advance(done / calls) : Result<void>{}; };
+    if (auto going = after(0); !going) return propagate(going);
     const Tensor moments = encode_moments(autoencoder, all.autoencoder, as_tensor(picture));
     Tensor noise = at::empty({1, all.autoencoder.latent_channels, moments.size(2), moments.size(3)}, at::kFloat);
     fill_normal(numbers_of(noise), options.seed, Stream::latents);
@@ -161,9 +139,10 @@ Result<scene::Image> StableDiffusion::repaint(const scene::Image& picture, const
     const NoiseSource later = [&](std::span<float> into) {
       fill_normal(into, options.seed, Stream::later_noise, call++);
     };
-    const auto done =
-        denoise(unet, all.unet, *scheduler, latents, at::cat({*negative, *positive}), options.guidance, later, stop);
+    const auto done = denoise(unet, all.unet, *scheduler, latents, at::cat({*negative, *positive}), options.guidance,
+                              later, [&](double part) { return after(1 + part * (calls - 2)); });
     if (!done) return propagate(done);
+    if (auto going = after(calls - 1); !going) return propagate(going);
     return as_picture(decode_latents(autoencoder, all.autoencoder, latents));
   });
 }

@@ -4,15 +4,17 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
-#include <stop_token>
 #include <string>
 
 #include "engine/core/result.h"
+#include "engine/correct/repainter.h"
 #include "engine/diffusion/scheduler.h"
 #include "engine/scene/image.h"
 #include "engine/weights/adapter_file.h"
 
 namespace engine::diffusion {
+
+using correct::Advance;
 
 /// Pixels of the largest picture that is repainted: 1024 x 1024, or as many. The autoencoder holds several tensors of
 /// 128 channels at that size, each of half a gigabyte.
@@ -49,17 +51,19 @@ class StableDiffusion {
   /// The picture as the prompt describes it; the less strength, the nearer to what it was. Without a step (little
   /// strength) it is given back as it is.
   ///   picture  [3], 0 to 1, sides multiples of side_multiple()
-  ///   stop     asked before each call of the UNet
+  ///   advance  asked before each call of a network; may be empty
   ///   returns  of the same size, within 0 to 1
-  ///   errors   invalid_argument (`where`: picture, a place in it that is not finite, or the name of an option);
-  ///   cancelled;
-  ///            too_large (more than max_repaint_pixels, which is said before anything is allocated; a prompt; memory);
-  ///            internal: what the networks make of it is not finite
+  ///   errors   invalid_argument (`where`: picture, a place in it that is not finite, or the name of an option); those
+  ///   of
+  ///            `advance`; too_large (more than max_repaint_pixels, which is said before anything is allocated; a
+  ///            prompt; memory); internal: what the networks make of it is not finite
   [[nodiscard]] Result<scene::Image> repaint(const scene::Image& picture, const RepaintOptions& options,
-                                             const std::stop_token& stop = {}) const;
+                                             const Advance& advance = {}) const;
+
+  struct Networks;  ///< networks.h: for this room.
+  [[nodiscard]] const Networks& networks() const { return *networks_; }
 
  private:
-  struct Networks;
   struct Adapters;
   std::shared_ptr<const Networks> networks_;
   std::shared_ptr<const Adapters> adapters_;

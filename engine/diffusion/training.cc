@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "engine/diffusion/guard.h"
+#include "engine/diffusion/numbers.h"
 #include "engine/diffusion/scheduler.h"
 #include "engine/diffusion/unet.h"
 
@@ -99,20 +100,49 @@ void AdamW::step() {
   }
 }
 
-Result<double> training_step(const Model& unet, const weights::Configs& configs, const NoisyBatch& batch,
-                             AdamW& optimiser) {
+AdamW::Moments AdamW::moments() const {
+  Moments moments{state_->steps, {}, {}};
+  for (const Tensor& mean : state_->mean) moments.mean.push_back(values_of(mean));
+  for (const Tensor& square : state_->square) moments.square.push_back(values_of(square));
+  return moments;
+}
+
+void AdamW::restore(const Moments& moments) {
+  assert(moments.mean.size() == state_->mean.size() && moments.square.size() == state_->square.size());
+  state_->steps = moments.steps;
+  for (std::size_t i = 0; i < state_->mean.size(); ++i) {
+    state_->mean[i] = tensor_of(moments.mean[i]);
+    state_->square[i] = tensor_of(moments.square[i]);
+  }
+}
+
+Result<double> add_gradient(const Model& unet, const weights::Configs& configs, const NoisyBatch& batch, double share) {
   return guarded("fine_tune", [&]() -> Result<double> {
     const at::AutoGradMode gradients(true);
-    optimiser.clear_gradients();
     const Tensor loss = denoising_loss(unet, configs, batch);
     const double value = loss.item<double>();
-    loss.backward();
-    // A poisoned gradient must not reach the adapter, which would carry it into every picture from then on.
-    if (!std::isfinite(value) || !std::isfinite(optimiser.gradient_norm()))
-      return fail(ErrorCode::internal, "the loss of fine-tuning, or its gradient, is not finite", "fine_tune");
-    optimiser.step();
+    (loss * share).backward();
     return value;
   });
+}
+
+Result<void> take_step(AdamW& optimiser, double loss) {
+  return guarded("fine_tune", [&]() -> Result<void> {
+    // A poisoned gradient must not reach the adapter, which would carry it into every picture from then on.
+    if (!std::isfinite(loss) || !std::isfinite(optimiser.gradient_norm()))
+      return fail(ErrorCode::internal, "the loss of fine-tuning, or its gradient, is not finite", "fine_tune");
+    optimiser.step();
+    return {};
+  });
+}
+
+Result<double> training_step(const Model& unet, const weights::Configs& configs, const NoisyBatch& batch,
+                             AdamW& optimiser) {
+  optimiser.clear_gradients();
+  const auto loss = add_gradient(unet, configs, batch, 1);
+  if (!loss) return loss;
+  if (auto stepped = take_step(optimiser, *loss); !stepped) return propagate(stepped);
+  return loss;
 }
 
 }  // namespace engine::diffusion

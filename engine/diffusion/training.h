@@ -25,7 +25,7 @@ struct NoisyBatch {
 [[nodiscard]] Tensor noisy_latents(const weights::NoiseConfig& noise, const NoisyBatch& batch);
 
 /// The mean squared difference between the noise and what the network takes for it; a single number, with a gradient.
-/// Throws what libtorch throws: training_step() turns it into an error.
+/// Throws what libtorch throws: add_gradient() turns it into an error.
 [[nodiscard]] Tensor denoising_loss(const Model& unet, const weights::Configs& configs, const NoisyBatch& batch);
 
 struct AdamWOptions {
@@ -51,10 +51,29 @@ class AdamW {
   [[nodiscard]] double gradient_norm() const;
   void step();  ///< A tensor without a gradient stays.
 
+  /// What the steps so far have left, beside the parameters.
+  struct Moments {
+    int steps = 0;
+    std::vector<weights::FloatTensor> mean, square;  ///< Of gradients, for each tensor, as they decay.
+  };
+  [[nodiscard]] Moments moments() const;
+  /// Goes on after those steps. Precondition: of as many tensors, in their shapes.
+  void restore(const Moments& moments);
+
  private:
   struct State;
   std::unique_ptr<State> state_;
 };
+
+/// Adds the gradient of `share` times the loss to those of the parameters: batches that do not fit into memory, or
+/// whose pictures are not of one size, are learned from one after the other.
+///   returns  the loss
+///   errors   too_large; internal
+[[nodiscard]] Result<double> add_gradient(const Model& unet, const weights::Configs& configs, const NoisyBatch& batch,
+                                          double share);
+/// A step by the gradients that were added, of losses whose sum is `loss`.
+///   errors   internal: the loss or a gradient is not finite, and nothing has changed
+[[nodiscard]] Result<void> take_step(AdamW& optimiser, double loss);
 
 /// One step: loss, gradients, and AdamW.
 ///   returns  the loss before the step

@@ -18,7 +18,7 @@ using working::Members;
 using working::Role;
 
 constexpr std::string_view magic = "SDCHKPNT";
-constexpr std::uint32_t version = 6;
+constexpr std::uint32_t version = 7;
 
 // Each part is written and read by a pair of functions that name the same fields in the same order.
 
@@ -58,6 +58,8 @@ void write(ByteWriter& out, const scene::Camera& camera);
 void read(ByteReader& in, scene::Camera& camera);
 void write(ByteWriter& out, const scene::Mask& mask);
 void read(ByteReader& in, scene::Mask& mask);
+void write(ByteWriter& out, const correct::HistoryPicture& picture);
+void read(ByteReader& in, correct::HistoryPicture& picture);
 
 /// A list of anything that takes at least four bytes.
 template <class T>
@@ -225,11 +227,27 @@ void read(ByteReader& in, Report& report) {
   read_list(in, report.times);
 }
 
+void write(ByteWriter& out, const correct::HistoryPicture& picture) {
+  out.write(std::int32_t(picture.interval)), out.write(std::uint64_t(picture.view));
+  out.write(std::int32_t(picture.picture.width)), out.write(std::int32_t(picture.picture.height));
+  out.write_all(std::span(picture.picture.data));
+}
+void read(ByteReader& in, correct::HistoryPicture& picture) {
+  picture.origin = correct::Origin::edited;  // no others are written down
+  picture.interval = in.read<std::int32_t>(), picture.view = std::size_t(in.read<std::uint64_t>());
+  const auto width = in.read<std::int32_t>(), height = in.read<std::int32_t>();
+  if (width < 0 || height < 0) return in.fail();
+  const auto pixels = std::uint64_t(width) * std::uint64_t(height);
+  if (!in.has(pixels, 3)) return in.fail();
+  picture.picture = {width, height, std::vector<std::uint8_t>(3 * std::size_t(pixels))};
+  in.read_all(std::span(picture.picture.data));
+}
+
 tl::unexpected<Error> damaged(const std::string& what) {
   return fail(ErrorCode::corrupt_data, "the checkpoint is damaged: " + what, "checkpoint");
 }
 
-/// What is written down of a state.
+/// What is written down of a state. Boxes of its history are those of the masks.
 struct Contents {
   State state;  ///< But for its scene.
   Members members;
@@ -264,6 +282,8 @@ Result<Contents> read_contents(std::span<const std::byte> bytes) {
   read_list(in, contents.state.views);
   read_list(in, contents.state.masks);
   read(in, contents.state.report);
+  read_list(in, contents.state.history);
+  read(in, contents.state.repainter);
   if (!in.ok() || in.remaining() != 0) return damaged("its parts do not fit together");
   return contents;
 }
@@ -280,6 +300,8 @@ std::string encode(const State& state) {
   write_list(out, state.views);
   write_list(out, state.masks);
   write(out, state.report);
+  write_list(out, state.history);
+  write(out, state.repainter);
   out.write(fnv1a(out.bytes()));
   return std::move(out).take();
 }

@@ -12,7 +12,7 @@
 namespace engine::edit {
 
 /// Magic, version, contents, checksum. Of the scene the rows of M alone: the frozen ones are the input's. Masks are
-/// packed, one bit a pixel.
+/// packed, one bit a pixel. Of the history the edited pictures alone: the others are the input's.
 [[nodiscard]] std::string encode(const State& state);
 
 /// The state that encode() was given, of an edit of this very scene by this very request.

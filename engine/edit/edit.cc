@@ -1,5 +1,6 @@
 #include "engine/edit/edit.h"
 
+#include <cassert>
 #include <chrono>
 #include <string>
 #include <utility>
@@ -21,10 +22,12 @@ using Clock = std::chrono::steady_clock;
 Result<void> correct_and_optimise(State& state, Edit& edit, int u) {
   const std::vector<scene::Mask> masks = masks_to_edit(state, edit);
   const int corrections = edit.params().annealing_steps;
+  if (auto tuned = tune(state, edit, masks, u); !tuned) return tuned;
   for (int a = 1; a <= corrections; ++a) {
     const repair::Round round{u, a, strength_of(edit.params(), a), u == state.report.resolved.intervals};
     auto corrected = correct(state, edit, masks, round);
     if (!corrected) return propagate(corrected);
+    if (auto repainted = repaint(state, edit, masks, round, corrected->pictures); !repainted) return repainted;
     if (a == corrections && edit.corrector != nullptr)
       if (auto shown = show(state, edit, u, "corrected", corrected->pictures); !shown) return shown;
     const auto loss = optimise(state, edit, masks, std::move(*corrected), round);
@@ -77,6 +80,8 @@ Result<State> next_interval(State state, Edit& edit) {
 /// Where the edit starts: from the state that it goes on from, or from steps 1, 2 and 5.
 Result<State> begin(Edit& edit, std::span<const scene::Camera> cameras, std::optional<State> from) {
   if (from) {
+    if (edit.repainter != nullptr)
+      if (auto restored = edit.repainter->restore(from->repainter); !restored) return propagate(restored);
     edit.progress.go_on_after(from->interval);
     if (auto going = edit.progress.enter(Stage::assign, from->interval); !going) return propagate(going);
     const auto taken = assign(edit.input, edit.request);
@@ -129,6 +134,8 @@ Result<void> validate_cameras(std::span<const scene::Camera> cameras) {
 Workload work_ahead(const scene::GaussianCloud& scene, const Request& request, const Tools& tools,
                     const Observer& observer, int finished) {
   Workload work = workload_of(scene.size(), request, tools.corrector != nullptr);
+  work.repainted = tools.repainter != nullptr;
+  work.repaint_time = tools.repaint_time;
   work.finished = finished;
   work.shown = bool(observer.moment);
   work.pictured = observer.pictured;
@@ -144,12 +151,14 @@ Result<Outcome> run(const scene::GaussianCloud& scene, std::span<const scene::Ca
   if (const auto valid = validate_cameras(cameras); !valid) return propagate(valid);
   if (from && !is_of(scene, request, *from))
     return fail(ErrorCode::invalid_argument, "the state is of another edit", "checkpoint");
+  assert(tools.repainter == nullptr || tools.corrector != nullptr);
   optim::MsSsimLoss ms_ssim;
   Edit edit{scene,
             request,
             observer,
             tools.perceptual != nullptr ? *tools.perceptual : ms_ssim,
             tools.corrector,
+            tools.repainter,
             ProgressMeter(observer, work_ahead(scene, request, tools, observer, from ? from->interval : 0),
                           from ? from->report.times : std::vector<StageTime>())};
   Result<State> state = begin(edit, cameras, std::move(from));

@@ -8,6 +8,7 @@
 
 #include "engine/core/result.h"
 #include "engine/correct/corrector.h"
+#include "engine/correct/repainter.h"
 #include "engine/edit/observer.h"
 #include "engine/edit/report.h"
 #include "engine/edit/request.h"
@@ -25,6 +26,10 @@ struct Tools {
   correct::Corrector* corrector =
       nullptr;  ///< Null: `none`, views should show what they show once the part is deformed.
   optim::PerceptualLoss* perceptual = nullptr;  ///< The loss inside masks; null: optim::MsSsimLoss.
+  /// Repaints the views once the corrector, which must be there, has completed what is behind the dragged part. Null:
+  /// the corrector corrects them. It is used by one edit, from its start, or from restore() where it goes on.
+  correct::Repainter* repainter = nullptr;
+  RepaintTime repaint_time = {};  ///< Of the repainter, where it is known: progress goes by it.
 };
 
 struct Outcome {

@@ -39,6 +39,8 @@ constexpr double set_up_frames = 1.3,
                  set_up_row_seconds = 1e-6;  // a view projected, and what is dragged laid over it, twice
 constexpr double iteration_seconds = 6.2e-4, iteration_row_seconds = 3.9e-7,
                  iteration_pixel_seconds = 1.3e-7;  // of the box
+// Of a repainter whose time nobody knows: that of the smallest one there is, so that its stages have some.
+constexpr double least_training_step_seconds = 0.05, least_picture_seconds = 0.1;
 constexpr double jpeg_pixel_seconds = 1.5e-8;
 constexpr double write_seconds = 2e-3;               // until a picture or a checkpoint is on disk
 constexpr double checkpoint_pixel_seconds = 1.1e-9;  // masks, packed
@@ -131,12 +133,19 @@ class Maker {
       add(Stage::observe, u,
           observe_frames * (double(work_.candidates) + witnesses + views_) * frame() +
               slow((row_seconds + (work_.vacates ? index_row_seconds : 0)) * n_));
+    const RepaintTime& repaint = work_.repaint_time;
+    if (work_.repainted && a == 1)
+      add(Stage::tune, u,
+          slow((u == 1 ? work_.first_tuning : work_.later_tuning) *
+               std::max(repaint.training_step, least_training_step_seconds)));
     // In a move each view is looked at without the part as well: to find the one that shows most of the hole, and to
     // fill it. Footprints say what was vacated, and which of it is filled already.
     const double filled = work_.vacates ? 2 * (look_frames * frame() + slow(surface_seconds)) + 5 * footprint(pixels_) +
                                               slow(fill_seconds * std::pow(box_, fill_power) + unseen_row_seconds * n_)
                                         : 0;
     add(Stage::correct, u, views_ * (look_frames * frame() + filled));
+    if (work_.repainted)
+      add(Stage::repaint, u, slow(views_ * std::max(repaint.of_picture(work_.mean_strength), least_picture_seconds)));
     if (a == work_.corrections) add_pictures(u, Shows::given);
   }
 

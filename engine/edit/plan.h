@@ -19,7 +19,9 @@ enum class Stage : std::uint8_t {
   deform,      ///< Steps 3 and 4: the deformation, its copies, and their extents.
   mask,        ///< Step 6: what the part covers in each view.
   observe,     ///< Before the first correction: what cameras have seen of the unedited scene.
-  correct,     ///< Step 7, and the seeds of step 4.
+  tune,        ///< Before the corrections of an interval: a repainter learns from the history of the edit.
+  correct,     ///< Step 7, and the seeds of step 4; of an edit that is repainted, what is completed before.
+  repaint,     ///< Step 7 by a repainter: all views.
   set_up,      ///< Before an optimisation: what of each view it keeps, and what it should show.
   optimise,    ///< Step 8.
   relocate,    ///< Step 9.
@@ -28,11 +30,13 @@ enum class Stage : std::uint8_t {
   finish,      ///< What has become of the input is put together.
 };
 constexpr auto names_of(Stage) {
-  return std::array{
-      Name{Stage::assign, "assign"},     Name{Stage::views, "views"},           Name{Stage::deform, "deform"},
-      Name{Stage::mask, "mask"},         Name{Stage::observe, "observe"},       Name{Stage::correct, "correct"},
-      Name{Stage::set_up, "set_up"},     Name{Stage::optimise, "optimise"},     Name{Stage::relocate, "relocate"},
-      Name{Stage::pictures, "pictures"}, Name{Stage::checkpoint, "checkpoint"}, Name{Stage::finish, "finish"}};
+  return std::array{Name{Stage::assign, "assign"},         Name{Stage::views, "views"},
+                    Name{Stage::deform, "deform"},         Name{Stage::mask, "mask"},
+                    Name{Stage::observe, "observe"},       Name{Stage::tune, "tune"},
+                    Name{Stage::correct, "correct"},       Name{Stage::repaint, "repaint"},
+                    Name{Stage::set_up, "set_up"},         Name{Stage::optimise, "optimise"},
+                    Name{Stage::relocate, "relocate"},     Name{Stage::pictures, "pictures"},
+                    Name{Stage::checkpoint, "checkpoint"}, Name{Stage::finish, "finish"}};
 }
 using engine::name_of;
 constexpr std::size_t stage_count = names<Stage>.size();
@@ -51,6 +55,15 @@ struct FrameTime {
   [[nodiscard]] double of(std::size_t pixels) const { return gaussians + pixel * double(pixels); }
 };
 
+/// Time that a repainter takes where a plan's figures were measured, seconds.
+struct RepaintTime {
+  double training_step = 0;  ///< Of fine-tuning.
+  double picture = 0;        ///< Of one picture, whatever its strength.
+  double full_strength = 0;  ///< Besides, of strength 1; less strength takes as much less.
+
+  [[nodiscard]] double of_picture(double strength) const { return picture + strength * full_strength; }
+};
+
 /// What the time of an edit depends on.
 struct Workload {
   std::size_t gaussians = 0;    ///< N, of the input.
@@ -61,6 +74,11 @@ struct Workload {
   int corrections = 1;          ///< A, of each interval.
   int iterations = 0;           ///< Of the optimisation, per correction.
   bool corrected = false;       ///< A corrector works on the views.
+  bool repainted = false;       ///< And a repainter after it.
+  RepaintTime repaint_time;     ///< If it is known.
+  int first_tuning = 0;         ///< Steps of training before the first interval,
+  int later_tuning = 0;         ///< and before each later one.
+  double mean_strength = 0.5;   ///< Of the corrections of an interval.
   bool vacates = true;          ///< The dragged part leaves its place, which is then filled: a move.
   std::size_t candidates = 0;   ///< C: cameras that are compared.
   bool virtual_views = false;   ///< They have to be found first.
@@ -85,8 +103,9 @@ struct PlannedStage {
 };
 
 /// All stages in the order in which run() enters them. Which stages there are depends on intervals, corrections,
-/// iterations, corrected, finished, shown and kept alone; the rest of the workload decides what they take. Where frames
-/// were not measured, those of a middling machine are taken: the stages are right to each other, not their sum.
+/// iterations, corrected, repainted, finished, shown and kept alone; the rest of the workload decides what they take.
+/// Where frames were not measured, those of a middling machine are taken: the stages are right to each other, not their
+/// sum.
 [[nodiscard]] std::vector<PlannedStage> plan_of(const Workload& work);
 
 /// Seconds that a plan takes, from its first stage to its last one.

@@ -1,9 +1,11 @@
 // Everything an edit has come to know, as a value.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "engine/core/vec.h"
+#include "engine/correct/repainter.h"
 #include "engine/edit/report.h"
 #include "engine/edit/request.h"
 #include "engine/scene/camera.h"
@@ -22,6 +24,10 @@ struct State {
   std::vector<scene::Camera> views;  ///< Chosen, best first, of the world.
   std::vector<scene::Mask> masks;    ///< Per view, in its size: what the part has covered so far, not dilated yet.
   Report report;                     ///< So far.
+  /// What a repainter has made of views, oldest first: with the views before the edit, which can be rendered again, it
+  /// is the history that it learns from. Of each interval the last correction.
+  std::vector<correct::HistoryPicture> history = {};
+  std::string repainter = {};  ///< What a repainter has learned (correct::Repainter::state()); empty without one.
 };
 
 /// Could an edit of this scene by this request be in this state? Precondition: validate(request).

@@ -33,6 +33,14 @@ repair::Repair make_repair(const State& state, const Edit& edit) {
           departure_of(edit.request),        edit.params().seed,        *edit.corrector};
 }
 
+/// Makes the repair, if there is none yet.
+Result<void> observe(const State& state, Edit& edit, int u) {
+  if (edit.repair) return {};
+  if (auto going = edit.progress.enter(Stage::observe, u); !going) return going;
+  edit.repair.emplace(make_repair(state, edit));
+  return {};
+}
+
 Uncovered uncovered_in(const scene::Camera& view, const repair::Uncovered& seen) {
   const double width = view.width, height = view.height, pixels = width * height;
   const scene::Rect& box = seen.open_box;
@@ -155,16 +163,30 @@ std::vector<scene::Mask> masks_to_edit(const State& state, const Edit& edit) {
   return masks;
 }
 
+Result<void> tune(State& state, Edit& edit, std::span<const scene::Mask> masks, int u) {
+  if (edit.repainter == nullptr) return {};
+  if (auto observed = observe(state, edit, u); !observed) return observed;
+  if (auto going = edit.progress.enter(Stage::tune, u); !going) return going;
+  std::vector<correct::HistoryPicture> history;
+  for (std::size_t v = 0; v < state.views.size(); ++v)
+    history.push_back({.view = v, .picture = correct::as_bytes(edit.repair->unedited(v))});
+  history.insert(history.end(), state.history.begin(), state.history.end());
+  for (correct::HistoryPicture& picture : history) picture.box = scene::bounding_box(masks[picture.view]);
+  const int steps = u == 1 ? edit.params().tuning_steps : edit.params().tuning_steps_later;
+  auto tuned = edit.repainter->fine_tune(history, steps, edit.repair->tuning_seed(u),
+                                         [&](double part) { return edit.progress.advance(part); });
+  if (tuned) state.repainter = edit.repainter->state();
+  return tuned;
+}
+
 Result<repair::Corrected> correct(State& state, Edit& edit, std::span<const scene::Mask> masks,
                                   const repair::Round& round) {
   if (edit.corrector == nullptr) return repair::Corrected{};
-  if (!edit.repair) {
-    if (auto going = edit.progress.enter(Stage::observe, round.interval); !going) return propagate(going);
-    edit.repair.emplace(make_repair(state, edit));
-  }
+  if (auto observed = observe(state, edit, round.interval); !observed) return propagate(observed);
   if (auto going = edit.progress.enter(Stage::correct, round.interval); !going) return propagate(going);
-  auto corrected =
-      edit.repair->correct(state.scene, masks, round, [&](double part) { return edit.progress.advance(part); });
+  const auto advance = [&](double part) { return edit.progress.advance(part); };
+  auto corrected = edit.repainter != nullptr ? edit.repair->complete(state.scene, masks, round, advance)
+                                             : edit.repair->correct(state.scene, masks, round, advance);
   if (!corrected) return corrected;
   state.report.seeds += corrected->seeds;
   state.report.uncovered.clear();
@@ -172,6 +194,19 @@ Result<repair::Corrected> correct(State& state, Edit& edit, std::span<const scen
     if (corrected->uncovered[v].pixels > 0)
       state.report.uncovered.push_back(uncovered_in(state.views[v], corrected->uncovered[v]));
   return corrected;
+}
+
+Result<void> repaint(State& state, Edit& edit, std::span<const scene::Mask> masks, const repair::Round& round,
+                     std::vector<scene::Image>& pictures) {
+  if (edit.repainter == nullptr) return {};
+  if (auto going = edit.progress.enter(Stage::repaint, round.interval); !going) return going;
+  auto repainted = edit.repair->repaint(pictures, masks, round, *edit.repainter,
+                                        [&](double part) { return edit.progress.advance(part); });
+  if (!repainted || round.correction < edit.params().annealing_steps) return repainted;
+  for (std::size_t v = 0; v < pictures.size(); ++v)
+    if (masks[v].area() > 0)
+      state.history.push_back({correct::Origin::edited, round.interval, v, correct::as_bytes(pictures[v])});
+  return {};
 }
 
 Result<double> optimise(State& state, Edit& edit, std::span<const scene::Mask> masks, repair::Corrected corrected,

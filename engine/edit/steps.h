@@ -9,6 +9,7 @@
 
 #include "engine/core/result.h"
 #include "engine/correct/corrector.h"
+#include "engine/correct/repainter.h"
 #include "engine/edit/drag.h"
 #include "engine/edit/observer.h"
 #include "engine/edit/progress.h"
@@ -31,6 +32,7 @@ struct Edit {
   const Observer& observer;
   optim::PerceptualLoss& perceptual;
   correct::Corrector* corrector;
+  correct::Repainter* repainter;
   ProgressMeter progress;
   Parts parts = {};                            ///< How what moves hangs on to what stays.
   Rows given_up = {};                          ///< Crumbs that go away, in the first interval.
@@ -68,11 +70,22 @@ struct Edit {
 /// The pixels of each view that corrections may change: the masks, dilated.
 [[nodiscard]] std::vector<scene::Mask> masks_to_edit(const State& state, const Edit& edit);
 
+/// Before step 7. Fine-tune: a repainter learns from the history of the edit, the views before it and what it has made
+/// of them in earlier intervals. Without one nothing happens.
+///   errors  those of the repainter
+[[nodiscard]] Result<void> tune(State& state, Edit& edit, std::span<const scene::Mask> masks, int u);
+
 /// Step 7. Correct: I_e of each view, and seeds where a surface goes on that nobody has seen. Without a corrector there
-/// are no pictures yet.
+/// are no pictures yet; with a repainter they show what is completed, for it to repaint.
 ///   errors  those of the corrector
 [[nodiscard]] Result<repair::Corrected> correct(State& state, Edit& edit, std::span<const scene::Mask> masks,
                                                 const repair::Round& round);
+
+/// Step 7 by a repainter: I_e of all views. Those of an interval's last correction join the history.
+///   pictures  of correct(), repainted in place
+///   errors    those of the repainter
+[[nodiscard]] Result<void> repaint(State& state, Edit& edit, std::span<const scene::Mask> masks,
+                                   const repair::Round& round, std::vector<scene::Image>& pictures);
 
 /// Step 8. Optimise: M towards the corrected views inside the masks, towards the unedited scene outside.
 ///   returns  the mean loss over the views of the last epoch

@@ -62,6 +62,18 @@ constexpr auto names_of(Corrector) {
   return std::array{Name{Corrector::none, "none"}, Name{Corrector::scene, "scene"}, Name{Corrector::sd, "sd"}};
 }
 
+/// How the diffusion model gets from noise to a picture.
+enum class Sampler {
+  ddim,
+  pndm,     ///< As Stable Diffusion 1.x was published with.
+  dpmpp2m,  ///< DPM-Solver++ of second order.
+  lcm       ///< Consistency, in 2 to 8 steps: for networks that were distilled to it.
+};
+constexpr auto names_of(Sampler) {
+  return std::array{Name{Sampler::ddim, "ddim"}, Name{Sampler::pndm, "pndm"}, Name{Sampler::dpmpp2m, "dpmpp2m"},
+                    Name{Sampler::lcm, "lcm"}};
+}
+
 /// The loss that compares pictures as people do.
 enum class Perceptual { msssim, lpips };
 constexpr auto names_of(Perceptual) {

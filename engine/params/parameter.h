@@ -16,11 +16,12 @@ enum class Part {
   motion,        ///< Where Gaussians go: what a preview shows.
   views,         ///< The pictures it looks through.
   correction,    ///< What the corrector makes of them.
+  diffusion,     ///< How the corrector `sd` does it; without effect on others.
   optimisation,  ///< How the Gaussians are brought to look like that.
 };
 constexpr auto names_of(Part) {
   return std::array{Name{Part::motion, "motion"}, Name{Part::views, "views"}, Name{Part::correction, "correction"},
-                    Name{Part::optimisation, "optimisation"}};
+                    Name{Part::diffusion, "diffusion"}, Name{Part::optimisation, "optimisation"}};
 }
 
 /// The values a parameter may have: of enumerations, booleans and seeds, all.

@@ -45,6 +45,12 @@ struct ParametersOf {
   Slot<bool> rotate_sh{};
   Slot<Background> background{};
   Slot<std::uint64_t> seed{};
+  Slot<double> guidance{};
+  Slot<Sampler> sampler{};
+  Slot<int> sampling_steps{};
+  Slot<int> lora_rank{};
+  Slot<int> tuning_steps{};
+  Slot<int> tuning_steps_later{};
   Slot<bool> local_mask{};
   Slot<bool> optimise_unmoved{};
   bool operator==(const ParametersOf&) const = default;
@@ -127,6 +133,24 @@ constexpr std::tuple table{
     Parameter{SPLATDRAG_FIELD(background), .part = Part::optimisation, .defaults = {.usual = Background::render},
               .meaning = "What pixels outside of the masks are held to: `render`, as the scene looked, or `photo`."},
     Parameter{SPLATDRAG_FIELD(seed), .part = Part::optimisation, .meaning = "Of everything that is left to chance."},
+    Parameter{SPLATDRAG_FIELD(guidance), .part = Part::diffusion, .range = {1, 100}, .defaults = {.usual = 7.5},
+              .noun = "the guidance",
+              .meaning = "How much more the prompt counts than the lack of it; 1 halves the time."},
+    Parameter{SPLATDRAG_FIELD(sampler), .part = Part::diffusion, .defaults = {.usual = Sampler::dpmpp2m},
+              .meaning =
+                  "How noise becomes a picture: `ddim`, `pndm`, `dpmpp2m` in 20 to 50 steps, `lcm` in 2 to 8 with "
+                  "networks that were distilled to it."},
+    Parameter{SPLATDRAG_FIELD(sampling_steps), .part = Part::diffusion, .range = {1, 500}, .defaults = {.usual = 20},
+              .noun = "the number of steps of a sampler",
+              .meaning = "Steps of the sampler at strength 1; less strength takes as many fewer."},
+    Parameter{SPLATDRAG_FIELD(lora_rank), .part = Part::diffusion, .range = {1, 256}, .defaults = {.usual = 4},
+              .noun = "the rank of the adapter", .meaning = "Rank of the adapter (LoRA) that is trained on the scene."},
+    Parameter{SPLATDRAG_FIELD(tuning_steps), .part = Part::diffusion, .range = {0, 100'000}, .defaults = {.usual = 200},
+              .noun = "the number of steps of training",
+              .meaning = "Steps of fine-tuning on the scene's pictures before the first interval."},
+    Parameter{SPLATDRAG_FIELD(tuning_steps_later), .part = Part::diffusion, .range = {0, 100'000},
+              .defaults = {.usual = 50}, .noun = "the number of steps of training",
+              .meaning = "Steps of fine-tuning before each later interval, on what earlier ones have made as well."},
     Parameter{SPLATDRAG_FIELD(local_mask), .part = Part::optimisation, .defaults = {.usual = true},
               .meaning = "False: the whole picture counts as edited, to measure what the mask is worth.",
               .on_wire = false},

@@ -7,9 +7,11 @@
 #include <string>
 #include <utility>
 
+#include "engine/core/finite.h"
 #include "engine/core/parallel.h"
 #include "engine/core/rng.h"
 #include "engine/core/rows.h"
+#include "engine/correct/pyramid.h"
 #include "engine/mask/mask.h"
 #include "engine/render/forward.h"
 #include "engine/repair/chart.h"
@@ -60,6 +62,8 @@ constexpr double closing_gap = 0.05;
 // What closes a place has the colour of what is around it, as a hint.
 constexpr float hint_of_closure = 0.5f;
 constexpr std::size_t most_examples = 6;  // of the buffer, for each view: its neighbours on either side
+// How long it takes to show a view again once all are completed, in units of what one takes to be completed. A choice.
+constexpr double shown_views = 0.25;
 
 /// While it lives, what a drawn-out part leaves along its way is as opaque as the part: it was only made half
 /// transparent so that the optimisation can choose, and a picture that shows it so is no picture of the scene.
@@ -101,10 +105,25 @@ std::string size_text(const scene::Image& picture) {
   return size_text(picture.width, picture.height, picture.channels);
 }
 
+/// What the repainter has made of a picture, within the mask; towards its rim it fades into what was there.
+void lay_in(const scene::Image& repainted, const scene::Mask& mask, scene::Image& picture) {
+  const std::vector<int> depth = correct::depth_within(mask);
+  // Masks are dilated by as much: what was deformed is repainted fully.
+  const auto rim = float(mask::dilation_radius(mask.height) + 1);
+  for (std::size_t i = 0; i < depth.size(); ++i) {
+    if (depth[i] == 0) continue;
+    const float share = std::min(float(depth[i]) / rim, 1.0f);
+    for (int c = 0; c < 3; ++c) {
+      float& shown = picture.plane(c)[i];
+      shown += share * (repainted.plane(c)[i] - shown);
+    }
+  }
+}
+
 }  // namespace
 
 /// What random choices are made for, in each view of each correction.
-enum class Repair::Purpose : std::uint32_t { surfaces, background, view, chart };
+enum class Repair::Purpose : std::uint32_t { surfaces, background, view, chart, repaint, tune };
 
 /// What a view shows now, without the rows that are hidden.
 struct Repair::ViewNow {
@@ -395,22 +414,27 @@ Result<Repair::Background> Repair::complete_background(WorkingScene& working, Ro
   return background;
 }
 
+Repair::ViewNow Repair::completed_view(const WorkingScene& working, const Rows& rows, const Background& background,
+                                       std::size_t v) {
+  ViewNow now = look(working, rows.gone, v);
+  if (rows.gone.empty()) return now;
+  const scene::Image share = working::footprint(working.cloud(), rows.moved, views_[v], workspace_);
+  for (std::size_t i = 0; i < share.data.size(); ++i) {
+    if (background.filled.data[i] == 0) continue;
+    // Seeds blur a little what they were made from, so the picture itself counts, but for what stands before it.
+    const float behind = std::clamp(1 - share.data[i] / covering, 0.0f, 1.0f);
+    for (int c = 0; c < 3; ++c) {
+      float& shown = now.color.plane(c)[i];
+      shown += behind * (background.picture.plane(c)[i] - shown);
+    }
+    if (behind > 0) now.trust.data[i] = 1;
+  }
+  return now;
+}
+
 Result<scene::Image> Repair::correct_view(const WorkingScene& working, const Rows& rows, const Background& background,
                                           const scene::Mask& mask, std::size_t v, const Round& round) {
-  ViewNow now = look(working, rows.gone, v);
-  if (!rows.gone.empty()) {
-    const scene::Image share = working::footprint(working.cloud(), rows.moved, views_[v], workspace_);
-    for (std::size_t i = 0; i < share.data.size(); ++i) {
-      if (background.filled.data[i] == 0) continue;
-      // Seeds blur a little what they were made from, so the picture itself counts, but for what stands before it.
-      const float behind = std::clamp(1 - share.data[i] / covering, 0.0f, 1.0f);
-      for (int c = 0; c < 3; ++c) {
-        float& shown = now.color.plane(c)[i];
-        shown += behind * (background.picture.plane(c)[i] - shown);
-      }
-      if (behind > 0) now.trust.data[i] = 1;
-    }
-  }
+  ViewNow now = completed_view(working, rows, background, v);
   for (float& trust : now.trust.data) trust = std::min(trust / half_seen, 1.0f);
   return ask_corrector(std::move(now.color), mask, std::move(now.trust), v, nearest_views(views_, v, most_examples),
                        round, Purpose::view);
@@ -418,6 +442,50 @@ Result<scene::Image> Repair::correct_view(const WorkingScene& working, const Row
 
 Result<Corrected> Repair::correct(WorkingScene& working, std::span<const scene::Mask> masks, const Round& round,
                                   const std::function<Result<void>(double)>& advance) {
+  return walk(working, masks, round, Pictures::corrected_in_turn, advance);
+}
+
+Result<Corrected> Repair::complete(WorkingScene& working, std::span<const scene::Mask> masks, const Round& round,
+                                   const std::function<Result<void>(double)>& advance) {
+  auto completed = walk(working, masks, round, Pictures::shown_at_the_end, advance);
+  if (completed) completed->trust.clear();
+  return completed;
+}
+
+Result<void> Repair::repaint(std::vector<scene::Image>& pictures, std::span<const scene::Mask> masks,
+                             const Round& round, correct::Repainter& repainter, const correct::Advance& advance) const {
+  std::vector<correct::RepaintTask> tasks;
+  std::vector<std::size_t> asked;
+  for (std::size_t v = 0; v < pictures.size(); ++v)
+    if (masks[v].area() > 0) tasks.push_back({pictures[v], masks[v]}), asked.push_back(v);
+  if (tasks.empty()) return {};
+  const auto repainted = repainter.repaint(tasks, round.strength, seed_for(Purpose::repaint, 0, round), advance);
+  if (!repainted) return propagate(repainted);
+  if (repainted->size() != tasks.size())
+    return fail(ErrorCode::internal,
+                "the repainter was given " + std::to_string(tasks.size()) + " pictures and gave back " +
+                    std::to_string(repainted->size()),
+                "repainter");
+  for (std::size_t k = 0; k < tasks.size(); ++k) {
+    const scene::Image& picture = (*repainted)[k];
+    const std::string due = size_text(tasks[k].picture), view = "view " + std::to_string(asked[k]);
+    if (size_text(picture) != due)
+      return fail(
+          ErrorCode::internal,
+          view + ": the repainter was to give back a picture of " + due + ", and gave one of " + size_text(picture),
+          "repainter");
+    if (first_not_finite(picture.data))
+      return fail(ErrorCode::internal, view + ": what the repainter made of it is not finite", "repainter");
+    lay_in(picture, masks[asked[k]], pictures[asked[k]]);
+  }
+  return {};
+}
+
+std::uint64_t Repair::tuning_seed(int interval) const { return seed_for(Purpose::tune, 0, {interval, 0, 0}); }
+
+Result<Corrected> Repair::walk(WorkingScene& working, std::span<const scene::Mask> masks, const Round& round,
+                               Pictures pictures, const std::function<Result<void>(double)>& advance) {
+  const bool in_turn = pictures == Pictures::corrected_in_turn;
   Corrected corrected;
   corrected.pictures.resize(views_.size());
   give_up_healed(working);
@@ -427,7 +495,8 @@ Result<Corrected> Repair::correct(WorkingScene& working, std::span<const scene::
   trust_ = trust_of_rows(working, observed_, mode_);
   const OpaqueTrail opaque(working, original_, mode_);
   const auto views = double(views_.size());
-  const double all = (open_.empty() ? 0 : closure_views) + (rows.gone.empty() ? 0 : telling_views * views) + views;
+  const double all = (open_.empty() ? 0 : closure_views) + (rows.gone.empty() ? 0 : telling_views * views) + views +
+                     (in_turn ? 0 : shown_views * views);
   double done = 0;  // in views
   const auto advance_by = [&](double more) { return advance(std::min((done += more) / all, 1.0)); };
   closure_.reset();
@@ -446,20 +515,27 @@ Result<Corrected> Repair::correct(WorkingScene& working, std::span<const scene::
   if (auto tuned = corrector_.fine_tune(buffer_, 0); !tuned) return propagate(tuned);
   const std::vector<std::size_t> order = outward(views_, telling->view);
   if (!rows.gone.empty()) corrected.uncovered.resize(views_.size());
-  for (std::size_t k = 0; k < order.size(); ++k) {
-    const std::size_t v = order[k];
-    Background background;
+  std::vector<Background> backgrounds(views_.size());
+  for (const std::size_t v : order) {
     if (!rows.gone.empty()) {
       auto completed = complete_background(working, rows, v, round);
       if (!completed) return propagate(completed);
-      background = std::move(*completed);
-      corrected.seeds += background.seeds;
-      corrected.uncovered[v] = background.uncovered;
+      backgrounds[v] = std::move(*completed);
+      corrected.seeds += backgrounds[v].seeds;
+      corrected.uncovered[v] = backgrounds[v].uncovered;
     }
-    auto picture = correct_view(working, rows, background, masks[v], v, round);
-    if (!picture) return propagate(picture);
-    corrected.pictures[v] = std::move(*picture);
+    if (in_turn) {
+      auto picture = correct_view(working, rows, backgrounds[v], masks[v], v, round);
+      if (!picture) return propagate(picture);
+      corrected.pictures[v] = std::move(*picture);
+      backgrounds[v] = {};
+    }
     if (auto going = advance_by(1); !going) return propagate(going);
+  }
+  for (std::size_t v = 0; v < views_.size() && !in_turn; ++v) {
+    corrected.pictures[v] = completed_view(working, rows, backgrounds[v], v).color;
+    backgrounds[v] = {};
+    if (auto going = advance_by(shown_views); !going) return propagate(going);
   }
   corrected.trust = std::move(trust_);  // seeds, trails and originals are what the optimisation is to change
   for (std::size_t i = 0; i < working.size(); ++i)

@@ -1,7 +1,8 @@
 // Step 7, correct, and what it needs: the walk over the views. They are corrected one after the other, outward from the
 // best one, and what the first ones decide of places that nobody has seen is put into the scene as new Gaussians
-// (step 4, seed), so that the next ones show it already.
-// Source: 3DGS-Drag (ICLR 2025), section 3.4, for the correction; the walk, trust and seeds are ours (ADR 9).
+// (step 4, seed), so that the next ones show it already. Where views are to be repainted, the walk does that alone, and
+// all of them are repainted at once after it.
+// Source: 3DGS-Drag (ICLR 2025), section 3.4, for the correction; the walk, trust and seeds are ours (ADRs 9 and 36).
 #pragma once
 
 #include <cstddef>
@@ -13,6 +14,7 @@
 
 #include "engine/core/result.h"
 #include "engine/correct/corrector.h"
+#include "engine/correct/repainter.h"
 #include "engine/neighbours/point_index.h"
 #include "engine/render/forward.h"
 #include "engine/repair/closure.h"
@@ -42,9 +44,10 @@ struct Uncovered {
 /// What the optimisation should reach.
 struct Corrected {
   std::vector<scene::Image> pictures;  ///< I_e of each view, in its size. Empty: there was no corrector.
-  std::vector<float> trust;            ///< [rows of the working scene] 0 to 1: the more, the slower a row may change.
-  std::size_t seeds = 0;               ///< Rows that the correction appended.
-  std::vector<Uncovered> uncovered;    ///< Of each view; empty in `extend`, where nothing leaves its place.
+  /// [rows of the working scene] 0 to 1: the more, the slower a row may change. Empty: all may as they are drawn.
+  std::vector<float> trust;
+  std::size_t seeds = 0;             ///< Rows that the correction appended.
+  std::vector<Uncovered> uncovered;  ///< Of each view; empty in `extend`, where nothing leaves its place.
 };
 
 /// Which correction it is.
@@ -77,6 +80,24 @@ class Repair {
   [[nodiscard]] Result<Corrected> correct(WorkingScene& working, std::span<const scene::Mask> masks, const Round& round,
                                           const std::function<Result<void>(double)>& advance);
 
+  /// The first half of a correction by a repainter: geometry is completed in every view, and only then the pictures are
+  /// made, which show it and are not corrected. No row is held by trust. Otherwise as correct().
+  [[nodiscard]] Result<Corrected> complete(WorkingScene& working, std::span<const scene::Mask> masks,
+                                           const Round& round, const std::function<Result<void>(double)>& advance);
+  /// The second half: all pictures are repainted in one call. Nothing outside a mask changes, and along its rim, as
+  /// wide as masks are dilated, the new picture fades into the old one.
+  ///   pictures  of complete()
+  ///   masks     the same; views without a set pixel stay as they are, and without any the repainter is not asked
+  ///   errors    those of the repainter and of `advance`; internal: it gave back something else than pictures of the
+  ///             views' sizes, or a number that is not finite
+  [[nodiscard]] Result<void> repaint(std::vector<scene::Image>& pictures, std::span<const scene::Mask> masks,
+                                     const Round& round, correct::Repainter& repainter,
+                                     const correct::Advance& advance) const;
+  /// Seed of what a repainter leaves to chance as it learns before this interval.
+  [[nodiscard]] std::uint64_t tuning_seed(int interval) const;
+  /// What view v showed before the edit. [3]
+  [[nodiscard]] const scene::Image& unedited(std::size_t v) const { return buffer_[v].picture; }
+
  private:
   struct ViewNow;
   enum class Purpose : std::uint32_t;
@@ -99,10 +120,21 @@ class Repair {
     ContinuedSurfaces surfaces;  ///< In it.
   };
 
+  /// What becomes of the pictures once what is behind the dragged part is completed.
+  enum class Pictures {
+    corrected_in_turn,  ///< Each is corrected before the next view is completed.
+    shown_at_the_end    ///< They are what the scene shows when all are completed.
+  };
+  /// correct() and complete().
+  [[nodiscard]] Result<Corrected> walk(WorkingScene& working, std::span<const scene::Mask> masks, const Round& round,
+                                       Pictures pictures, const std::function<Result<void>(double)>& advance);
   [[nodiscard]] Rows rows_of(const WorkingScene& working) const;
   /// Notes in each view what has been left so far, and keeps it from being learned from.
   void note_vacated(const WorkingScene& working, const Rows& rows, std::span<const scene::Mask> masks);
   [[nodiscard]] ViewNow look(const WorkingScene& working, std::span<const std::uint32_t> hidden, std::size_t v);
+  /// What view v shows now, what was filled in as it was filled in.
+  [[nodiscard]] ViewNow completed_view(const WorkingScene& working, const Rows& rows, const Background& background,
+                                       std::size_t v);
   /// I_e of view v: what it shows now, what was filled in as it was filled in, and the rest corrected as well.
   [[nodiscard]] Result<scene::Image> correct_view(const WorkingScene& working, const Rows& rows,
                                                   const Background& background, const scene::Mask& mask, std::size_t v,

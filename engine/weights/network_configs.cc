@@ -182,6 +182,7 @@ Result<UNetConfig> parse_unet_config(std::span<const std::byte> json, const std:
     config.context_width = whole(fields, "cross_attention_dim", 1, max_width, 1280);
     config.norm_groups = whole(fields, "norm_num_groups", 1, max_width, config.norm_groups);
     config.norm_eps = positive(fields, "norm_eps", config.norm_eps);
+    config.sample_side = whole(fields, "sample_size", 1, 1 << 10, config.sample_side);
     config.linear_projection =
         fields.has_value("use_linear_projection") && fields.at("use_linear_projection").boolean();
     // The field that is called a head's width has always been the number of heads; the right name came later.

@@ -29,6 +29,7 @@ struct UNetConfig {
   int norm_groups = 32;
   double norm_eps = 1e-5;
   bool linear_projection = false;  ///< Transformers project by matrices (2.x) or by 1 x 1 convolutions.
+  int sample_side = 64;            ///< Latents along a side of the pictures that it was trained on. No tensor tells.
 
   [[nodiscard]] int embedding_width() const { return 4 * channels.front(); }
 };

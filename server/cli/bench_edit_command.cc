@@ -135,7 +135,7 @@ Result<void> run_trips(const BenchOptions& options, const Machine& machine, Term
 Result<void> run(const BenchOptions& options, Terminal& terminal) {
   edit::Request any;
   apply(options, any);
-  if (auto all = edits::available(any.params); !all) return all;
+  if (auto all = edits::available(any.params, nullptr); !all) return all;
   if (auto made = make_folder(path(options.out) / "results"); !made) return made;
   return compute(options.compute, [&](const Machine& machine) -> Result<void> {
     if (options.captures.on) return run_captures(options, machine, terminal);

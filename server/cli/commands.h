@@ -11,6 +11,7 @@ void add_select_command(CLI::App& program, Action& action);
 void add_fit_command(CLI::App& program, Action& action);
 void add_render_command(CLI::App& program, Action& action);
 void add_info_command(CLI::App& program, Action& action);
+void add_models_command(CLI::App& program, Action& action);
 void add_convert_command(CLI::App& program, Action& action);
 void add_admin_command(CLI::App& program, Action& action);
 void add_bench_edit_command(CLI::App& program, Action& action);

@@ -26,6 +26,7 @@
 #include "server/cli/scene_writing.h"
 #include "server/edits/convert.h"
 #include "server/edits/convert_selection.h"
+#include "server/models/models.h"
 #include "server/pictures/picture_names.h"
 #include "server/pictures/pictures.h"
 
@@ -39,7 +40,7 @@ using engine::propagate;
 using std::filesystem::path;
 
 struct EditOptions {
-  std::string scene, dataset, request, name, out;
+  std::string scene, dataset, request, name, out, model_dir;
   int pictures = 3;
   ComputeOptions compute;
 };
@@ -74,10 +75,12 @@ struct BothRequests {
   edit::Request engine;
 };
 
-Result<BothRequests> load_request(const EditOptions& options) {
+Result<BothRequests> load_request(const EditOptions& options, const models::Models& models) {
   auto file = read_request(options.request, options.name);
   if (!file) return propagate(file);
   auto request = edits::to_engine(file->request);
+  if (request)
+    if (const auto all = edits::available(request->params, &models); !all) request = propagate(all);
   if (request && !file->request.selection)  // else it is whole only once that has been carried out
     if (const auto valid = edit::validate(*request); !valid) request = propagate(valid);
   if (!request) {
@@ -158,12 +161,13 @@ void summarise(std::ostream& out, const Destination& to, const EditReport& repor
 
 /// Carries the edit out and shows its progress to the user.
 Result<edit::Outcome> run_with_progress(const scene::GaussianCloud& input, const std::vector<scene::Camera>& cameras,
-                                        const BothRequests& request, Terminal& terminal) {
+                                        const BothRequests& request, const models::Models& models, Terminal& terminal) {
   ProgressDisplay display(terminal);
   edit::Observer observer;
   observer.progress = [&](const edit::Progress& progress) { display.show(progress); };
-  const auto corrector = edits::make_corrector(request.file.request);
-  return edit::run(input, cameras, request.engine, {.corrector = corrector.get()}, observer);
+  const auto toolbox = edits::make_toolbox(request.file.request, request.engine.params, &models);
+  if (!toolbox) return propagate(toolbox);
+  return edit::run(input, cameras, request.engine, toolbox->tools(), observer);
 }
 
 std::vector<std::string> all_warnings(std::vector<std::string> warnings, const edit::Report& report,
@@ -187,7 +191,8 @@ Result<void> write_results(const Destination& to, std::size_t pictured_views, co
 
 Result<void> run(const EditOptions& options, Terminal& terminal) {
   const Destination to = destination_of(options.out);
-  auto request = load_request(options);
+  const models::Models models(options.model_dir, options.compute.threads);
+  auto request = load_request(options, models);
   if (!request) return propagate(request);
   if (auto safe = keep_input_safe(options.scene, to.scene_file); !safe) return safe;
   if (auto made = make_folder(to.folder); !made) return made;
@@ -199,7 +204,7 @@ Result<void> run(const EditOptions& options, Terminal& terminal) {
     if (!cameras) return propagate(cameras);
     const auto start = std::chrono::steady_clock::now();
     const auto selected = select_rows(input->cloud, *cameras, *request);
-    auto outcome = selected ? run_with_progress(input->cloud, *cameras, *request, terminal)
+    auto outcome = selected ? run_with_progress(input->cloud, *cameras, *request, models, terminal)
                             : Result<edit::Outcome>(propagate(selected));
     if (!outcome) {
       locate_in_file(outcome.error(), options, request->file);
@@ -248,6 +253,11 @@ void add_edit_command(CLI::App& program, Action& action) {
   command->add_option("--pictures", options->pictures, "Views to show before, after and with the mask")
       ->check(CLI::Range(0, 1000))
       ->type_name("N");
+  command
+      ->add_option("--model-dir", options->model_dir,
+                   "Folder of pre-trained networks, for the corrector sd and the loss lpips")
+      ->check(CLI::ExistingDirectory)
+      ->type_name("DIR");
   add_compute_options(*command, options->compute);
   command->footer(engine::params::listing());
   command->callback([options, &action] { action = [options](Terminal& terminal) { return run(*options, terminal); }; });

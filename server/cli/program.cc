@@ -50,6 +50,7 @@ void describe(CLI::App& program, Action& action) {
   add_fit_command(program, action);
   add_render_command(program, action);
   add_info_command(program, action);
+  add_models_command(program, action);
   add_convert_command(program, action);
   add_demo_scene_command(program, action);
   add_admin_command(program, action);

@@ -122,6 +122,11 @@ void add_store_options(CLI::App& command, ServeOptions& options) {
   command.add_option("--scene-root", options.scenes.scene_root, "Folder below which clients may open files by path")
       ->check(CLI::ExistingDirectory)
       ->type_name("DIR");
+  command
+      .add_option("--model-dir", options.model_dir,
+                  "Folder of pre-trained networks, for the corrector sd and the loss lpips")
+      ->check(CLI::ExistingDirectory)
+      ->type_name("DIR");
   add_bytes(command, "--scene-memory", options.scenes.memory_bytes, "Memory for scenes and previews");
   options.edits.memory_bytes = edits::usual_edit_memory();
   add_bytes(command, "--edit-memory", options.edits.memory_bytes,

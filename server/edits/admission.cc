@@ -151,6 +151,17 @@ engine::Result<void> admit_time(const JobWorkload& work, const Params& params,
               "scene");
 }
 
+engine::Result<void> admit_slow(const JobWorkload& work, bool allowed) {
+  if (allowed || !work.edit.repainted) return {};
+  const double needed = estimated_seconds(work);
+  if (needed <= slow_seconds) return {};
+  return fail(ErrorCode::unprocessable,
+              "the diffusion model would work for about " + time_in_words(needed) +
+                  " on this machine: say \"allow_slow\": true to have it do so, or lower params.views, "
+                  "params.tuning_steps, params.sampling_steps or params.iterations",
+              "allow_slow");
+}
+
 engine::Result<void> admit(const JobWorkload& work, const Params& params,
                            std::span<const engine::scene::Camera> dataset, std::uint64_t limit) {
   const std::uint64_t needed = estimated_bytes(work);

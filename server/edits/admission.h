@@ -29,4 +29,14 @@ namespace server::edits {
 [[nodiscard]] engine::Result<void> admit_time(const JobWorkload& work, const engine::params::Params& params,
                                               std::span<const engine::scene::Camera> dataset, double limit);
 
+/// So long a diffusion model may work for an edit that does not say it may take longer. Seconds; a choice: who has no
+/// GPU does not expect more than an hour, and others wait for it.
+constexpr double slow_seconds = 3600;
+
+/// Holds the estimated time of an edit with a diffusion model against that.
+///   work     from workload_of() and add_repainter()
+///   allowed  it may take longer
+///   errors   unprocessable: it would take longer; the message says how long, and `where` is "allow_slow"
+[[nodiscard]] engine::Result<void> admit_slow(const JobWorkload& work, bool allowed);
+
 }  // namespace server::edits

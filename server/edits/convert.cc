@@ -39,24 +39,50 @@ bool uses_corrector(const edit::Params& params) {
   return params.iterations > 0 && params.corrector != proto::Corrector::none;
 }
 
-std::unique_ptr<engine::correct::Corrector> make_corrector(const proto::EditRequest& request) {
-  if (corrector_of(request) == proto::Corrector::scene) return std::make_unique<engine::correct::SceneCorrector>();
-  return nullptr;
+bool uses_diffusion(const edit::Params& params) {
+  return params.iterations > 0 && params.corrector == proto::Corrector::sd;
 }
 
-engine::Result<void> available(const edit::Params& params) {
-  const auto unsupported = [](const char* message, const char* where) {
+edit::Tools Toolbox::tools() const { return {corrector.get(), perceptual.get(), repainter.get(), repaint_time}; }
+
+edit::RepaintTime repaint_time_of(const models::RepainterCost& cost) {
+  return {cost.training_step, cost.picture, cost.full_strength};
+}
+
+engine::Result<Toolbox> make_toolbox(const proto::EditRequest& request, const edit::Params& params,
+                                     const models::Models* models) {
+  if (auto all = available(params, models); !all) return engine::propagate(all);
+  Toolbox box;
+  // What a diffusion model repaints is completed by patches before.
+  if (params.corrector != proto::Corrector::none) box.corrector = std::make_unique<engine::correct::SceneCorrector>();
+  if (uses_diffusion(params)) {
+    auto repainter = models->repainter(params, {request.prompt.value_or(""), request.negative_prompt.value_or("")});
+    if (!repainter) return engine::propagate(repainter);
+    box.repainter = std::move(*repainter);
+    box.repaint_time = repaint_time_of(models->cost(params));
+  }
+  if (params.perceptual == proto::Perceptual::lpips && params.iterations > 0) {
+    auto loss = models->lpips();
+    if (!loss) return engine::propagate(loss);
+    box.perceptual = std::move(*loss);
+  }
+  return box;
+}
+
+engine::Result<void> available(const edit::Params& params, const models::Models* models) {
+  const auto unsupported = [](const std::string& message, const char* where) {
     return engine::fail(engine::ErrorCode::unsupported, message, where);
   };
-  if (params.corrector == proto::Corrector::sd)
-    return unsupported("this build has no corrector \"sd\"; available: \"scene\", which is the default, and \"none\"",
+  const models::Models none;
+  const models::Models& there_are = models != nullptr ? *models : none;
+  if (params.corrector == proto::Corrector::sd && !there_are.no_sd().empty())
+    return unsupported("there is no corrector \"sd\" here: " + there_are.no_sd() +
+                           "; available: \"scene\", which is the default, and \"none\"",
                        "params.corrector");
-  if (params.perceptual == proto::Perceptual::lpips)
-    return unsupported("this build has no perceptual loss \"lpips\"; available: \"msssim\", which is the default",
+  if (params.perceptual == proto::Perceptual::lpips && !there_are.no_lpips().empty())
+    return unsupported("there is no perceptual loss \"lpips\" here: " + there_are.no_lpips() +
+                           "; available: \"msssim\", which is the default",
                        "params.perceptual");
-  if (params.background == proto::Background::photo)
-    return unsupported("this build does not hold the background to photos; available: \"render\", which is the default",
-                       "params.background");
   return {};
 }
 
@@ -79,7 +105,11 @@ engine::Result<edit::Request> to_engine(const proto::EditRequest& request) {
   out.crumbs = request.crumbs.value_or(edit::Crumbs::move);
   if (request.region) out.region = {to_vec(request.region->center), to_vec(request.region->size)};
   out.params = filled_in(request.params, preset_of(request), out, request.selection.has_value());
-  if (auto all = available(out.params); !all) return engine::propagate(all);
+  if (out.params.background == proto::Background::photo)
+    return engine::fail(
+        engine::ErrorCode::unsupported,
+        "this build does not hold the background to photos; available: \"render\", which is the default",
+        "params.background");
   return out;
 }
 
@@ -88,6 +118,10 @@ proto::EditRequest resolved(const proto::EditRequest& request, const edit::Param
   proto::EditRequest out = request;
   out.preset = preset_of(request);
   out.params = engine::params::as_given(used);
+  if (!uses_diffusion(used))
+    engine::params::for_each_parameter([&](const auto& parameter) {
+      if (parameter.part == engine::params::Part::diffusion) (out.params.*parameter.given).reset();
+    });
   for (std::size_t h = 0; h < std::min(out.handles.size(), handles.size()); ++h)
     if (handles[h].radius > 0) out.handles[h].radius = handles[h].radius;
   return out;
@@ -111,15 +145,18 @@ std::vector<proto::Uncovered> to_uncovered(const std::vector<edit::Uncovered>& v
 
 std::vector<std::string> fields_without_effect(const proto::EditRequest& request) {
   std::vector<std::string> fields;
-  if (request.prompt) fields.emplace_back("prompt");  // no corrector of this build reads it
+  const edit::Params params = engine::params::filled_in(request.params, preset_of(request));
+  const bool paints = uses_diffusion(params), corrects = uses_corrector(params);
+  if (!paints && request.prompt) fields.emplace_back("prompt");
+  if (!paints && request.negative_prompt) fields.emplace_back("negative_prompt");
   if (request.attach && request.mode == proto::Mode::remove) fields.emplace_back("attach");  // nothing of it stays
-  if (uses_corrector(engine::params::filled_in(request.params, preset_of(request)))) return fields;
-  if (request.heal) fields.emplace_back("heal");
+  if (!corrects && request.heal) fields.emplace_back("heal");
   proto::Params given = request.params;
   if (given.corrector == proto::Corrector::none) given.corrector.reset();  // that was its effect
   engine::params::for_each_parameter([&](const auto& parameter) {
-    if (parameter.part == engine::params::Part::correction && given.*parameter.given)
-      fields.push_back("params." + std::string(parameter.name));
+    const bool is_idle = (parameter.part == engine::params::Part::correction && !corrects) ||
+                         (parameter.part == engine::params::Part::diffusion && !paints);
+    if (is_idle && given.*parameter.given) fields.push_back("params." + std::string(parameter.name));
   });
   return fields;
 }

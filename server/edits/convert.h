@@ -8,10 +8,14 @@
 
 #include "engine/core/result.h"
 #include "engine/correct/corrector.h"
+#include "engine/correct/repainter.h"
+#include "engine/edit/edit.h"
 #include "engine/edit/report.h"
 #include "engine/edit/request.h"
+#include "engine/optim/perceptual.h"
 #include "proto/edit_request.h"
 #include "proto/edit_status.h"
+#include "server/models/models.h"
 
 namespace server::edits {
 
@@ -32,20 +36,41 @@ namespace server::edits {
 /// Does this edit use a corrector? A corrector works for the optimisation only.
 [[nodiscard]] bool uses_corrector(const engine::edit::Params& params);
 
-/// A new corrector of the kind that the request names; null: `none`. Precondition: to_engine(request) succeeds.
-[[nodiscard]] std::unique_ptr<engine::correct::Corrector> make_corrector(const proto::EditRequest& request);
+/// Is that a diffusion model?
+[[nodiscard]] bool uses_diffusion(const engine::edit::Params& params);
 
-/// Does this build have the corrector, the perceptual loss and the background that these parameters name?
-///   errors  unsupported: no (`where` is "params.corrector", say)
-[[nodiscard]] engine::Result<void> available(const engine::edit::Params& params);
+/// What one edit works with, by its request.
+struct Toolbox {
+  std::unique_ptr<engine::correct::Corrector> corrector;      ///< Null: `none`.
+  std::unique_ptr<engine::correct::Repainter> repainter;      ///< Null: the corrector corrects.
+  std::unique_ptr<engine::optim::PerceptualLoss> perceptual;  ///< Null: the engine's own.
+  engine::edit::RepaintTime repaint_time = {};
+
+  [[nodiscard]] engine::edit::Tools tools() const;
+};
+
+/// Makes what the request names.
+///   params  of to_engine(request)
+///   models  null: there are none
+///   errors  as available(); those of Models, where a model cannot be used after all
+[[nodiscard]] engine::Result<Toolbox> make_toolbox(const proto::EditRequest& request,
+                                                   const engine::edit::Params& params, const models::Models* models);
+
+/// How long a repainter takes, for plans.
+[[nodiscard]] engine::edit::RepaintTime repaint_time_of(const models::RepainterCost& cost);
+
+/// Are the corrector and the perceptual loss that these parameters name to be had?
+///   models  null: there are none
+///   errors  unsupported: no (`where` is "params.corrector", say), and what it takes
+[[nodiscard]] engine::Result<void> available(const engine::edit::Params& params, const models::Models* models);
 
 /// The engine's request, with what was left open filled in from the preset. Of a selection it says nothing yet, and
-/// radii that are left to one are 0: see hand_over().
-///   errors  as available()
+/// radii that are left to one are 0: see hand_over(). Whether models that it names are there says available().
+///   errors  unsupported: a background that this build has not
 [[nodiscard]] engine::Result<engine::edit::Request> to_engine(const proto::EditRequest& request);
 
 /// The request as it was carried out: `request` with every parameter that the edit used filled in, and the radius of
-/// every handle.
+/// every handle. Parameters of a diffusion model are there if it uses one.
 ///   handles  those used, if they are known; a radius of 0 is not
 [[nodiscard]] proto::EditRequest resolved(const proto::EditRequest& request, const engine::edit::Params& used,
                                           const std::vector<engine::edit::Handle>& handles = {});

@@ -100,6 +100,7 @@ class Run {
     auto request = to_engine(asked_);
     if (!request) return propagate(request);
     request_ = std::move(*request);
+    if (auto all = available(request_.params, workshop_.models); !all) return all;
     const auto about = workshop_.scenes.find(scene_id());
     if (!about) return propagate(about);
     if (about->up) request_.up = *about->up;
@@ -205,10 +206,13 @@ class Run {
       return (context_.stop_requested() || has_outlived_) && last_interval_ >= context_.finished_intervals();
     };
     observer.stop = out_of_time_.get_token();
-    const auto corrector = make_corrector(asked_);
+    const auto toolbox = make_toolbox(asked_, request_.params, workshop_.models);
+    if (!toolbox) return propagate(toolbox);
+    edit::Tools tools = toolbox->tools();
+    if (tools.perceptual == nullptr) tools.perceptual = workshop_.perceptual;
     auto state = last_state();
     last_interval_ = state ? state->interval : 0;
-    return edit::run(*input_, cameras_, request_, {corrector.get(), workshop_.perceptual}, observer, std::move(state));
+    return edit::run(*input_, cameras_, request_, tools, observer, std::move(state));
   }
 
   /// What the rest should take, as far as anybody knows.

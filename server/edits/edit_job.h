@@ -11,6 +11,7 @@
 #include "engine/optim/perceptual.h"
 #include "proto/edit_status.h"
 #include "server/edits/named_locks.h"
+#include "server/models/models.h"
 #include "server/scenes/scene_store.h"
 
 namespace server::edits {
@@ -21,15 +22,17 @@ struct Workshop {
   engine::WorkArena& arena;
   /// An edit locks its id alone while it publishes its result; whoever cancels it shares the lock.
   NamedLocks& results;
-  spdlog::logger* logger = nullptr;                     ///< May be null.
-  int pictured_views = 4;                               ///< Of each interval.
-  engine::optim::PerceptualLoss* perceptual = nullptr;  ///< As in engine::edit::run().
+  spdlog::logger* logger = nullptr;  ///< May be null.
+  int pictured_views = 4;            ///< Of each interval.
+  /// The loss inside masks of edits that name no network; null: the engine's own.
+  engine::optim::PerceptualLoss* perceptual = nullptr;
   /// Is told how long an edit took that has made its version, by stages. Empty: nobody is.
   std::function<void(const std::vector<proto::StageSeconds>&)> timed = {};
   /// Seconds of work, those of earlier runs included, after which an edit ends: with the intervals it has finished, as
   /// if it had been asked to stop, and a warning; without any it has failed. Others wait for it, and its estimate was
   /// far off. 0: never.
   double outlived_seconds = 0;
+  const models::Models* models = nullptr;  ///< Null: there are none.
 };
 
 /// The version of a scene that an edit has made; nothing if it has not made one.

@@ -118,9 +118,11 @@ Result<std::vector<std::string>> heal_rows(Selections& selections, const proto::
   return hand_over_healed((*made)->selected, request);
 }
 
-Result<Checked> check(scenes::SceneStore& scenes, Selections& selections, const proto::EditRequest& asked) {
+Result<Checked> check(scenes::SceneStore& scenes, Selections& selections, const models::Models* models,
+                      const proto::EditRequest& asked) {
   auto request = to_engine(asked);
   if (!request) return propagate(request);
+  if (auto all = available(request->params, models); !all) return propagate(all);
   if (!asked.selection)  // else the request is whole only once that has been carried out
     if (const auto valid = edit::validate(*request); !valid) return propagate(valid);
   auto version = scenes.load(*asked.scene, std::to_string(*asked.version));
@@ -164,15 +166,16 @@ struct EditService::Impl {
     queue = std::move(opened->queue);
     for (const engine::Error& finding : queue->findings())
       if (options.logger != nullptr) options.logger->log(spdlog::level::warn, finding.message);
-    worker.emplace(*queue, [workshop = Workshop{scenes, arena, results, options.logger, options.pictured_views,
-                                                options.perceptual, options.timed, outlived * options.longest_seconds}](
-                               jobs::JobContext& context) { return carry_out(context, workshop); });
+    worker.emplace(
+        *queue, [workshop = Workshop{scenes, arena, results, options.logger, options.pictured_views, options.perceptual,
+                                     options.timed, outlived * options.longest_seconds, options.models}](
+                    jobs::JobContext& context) { return carry_out(context, workshop); });
     return {};
   }
 
   /// A request that can be carried out here, and what will be: errors as submit().
   Result<Admitted> admitted(const proto::EditRequest& asked) {
-    auto checked = check(scenes, selections, asked);
+    auto checked = check(scenes, selections, options.models, asked);
     if (!checked) return propagate(checked);
     const auto dataset = scenes.dataset(*asked.scene);
     if (!dataset) return propagate(dataset);
@@ -180,7 +183,10 @@ struct EditService::Impl {
     const auto cameras = cameras_of(dataset->get());
     const auto& [request, version, preview, warnings] = out.checked;
     const bool corrected = uses_corrector(request.params);
+    std::optional<models::RepainterCost> repainter;
+    if (uses_diffusion(request.params)) repainter = options.models->cost(request.params);
     out.work = memory_workload_of(version.cloud, request, preview, cameras, corrected, options.pictured_views);
+    add_repainter(out.work, repainter);
     // Before frames are rendered to see how long they take.
     if (auto fits = admit(out.work, request.params, cameras, options.memory_bytes); !fits) return propagate(fits);
     const auto info = scenes.find(*asked.scene);
@@ -195,6 +201,7 @@ struct EditService::Impl {
       if (!share) return propagate(share);
       out.work = workload_of(version.cloud, request_there, preview, cameras, corrected, options.pictured_views,
                              *asked.scene, speeds);
+      add_repainter(out.work, repainter);
     }
     out.seconds = estimated_seconds(out.work);
     if (auto fits = admit_time(out.work, request.params, cameras, options.longest_seconds); !fits)
@@ -261,6 +268,7 @@ Result<EditService::Submission> EditService::submit(const proto::EditRequest& re
   const auto hold = impl_->scenes_in_use.lock_shared(*asked->scene);
   const auto admitted = impl_->admitted(*asked);
   if (!admitted) return propagate(admitted);
+  if (auto fits = admit_slow(admitted->work, asked->allow_slow); !fits) return propagate(fits);
   job.expected = in_milliseconds(admitted->seconds);
   const auto submission = impl_->queue->submit(job);
   if (!submission) return propagate(submission);
@@ -284,6 +292,7 @@ Result<proto::EditEstimate> EditService::estimate(const proto::EditRequest& requ
   estimate.memory_bytes = estimated_bytes(work);
   estimate.request = checked.resolved_for(*asked);
   estimate.warnings = checked.warnings(*asked);
+  if (const auto slow = admit_slow(work, asked->allow_slow); !slow) estimate.warnings.push_back(slow.error().message);
   return estimate;
 }
 
@@ -291,7 +300,7 @@ Result<proto::Preview> EditService::preview(const proto::EditRequest& request) {
   const auto start = steady_clock::now();
   const auto asked = canonical(request);
   if (!asked) return propagate(asked);
-  const auto checked = check(impl_->scenes, impl_->selections, *asked);
+  const auto checked = check(impl_->scenes, impl_->selections, impl_->options.models, *asked);
   if (!checked) return propagate(checked);
   const edit::PreviewOutcome& outcome = checked->preview;
   const auto added = impl_->scenes.add_preview(*asked->scene, *asked->version, outcome.overlay);

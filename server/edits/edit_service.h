@@ -23,6 +23,7 @@
 #include "proto/edit_request.h"
 #include "proto/edit_status.h"
 #include "server/edits/selections.h"
+#include "server/models/models.h"
 #include "server/scenes/scene_store.h"
 
 namespace server::edits {
@@ -47,10 +48,11 @@ struct ServiceOptions {
   /// Lends what looking at a scene takes before an edit of it is accepted; outlives the service. Null: nobody counts
   /// it.
   engine::MemoryBudget* memory = nullptr;
-  /// The loss inside masks; outlives the service. Null: the engine's own.
+  /// The loss inside masks of edits that name no network; outlives the service. Null: the engine's own.
   engine::optim::PerceptualLoss* perceptual = nullptr;
   /// Where previews find what their selection selects; outlives the service. Null: it keeps its own.
   Selections* selections = nullptr;
+  const models::Models* models = nullptr;  ///< Outlives the service. Null: there are none.
 };
 
 /// Safe to call from any thread.
@@ -71,11 +73,12 @@ class EditService {
   /// Accepts an edit: on disk when this returns. The scene, its version and every field are checked first, and each
   /// handle is held against the scene; a selection is carried out.
   ///   errors  invalid_argument, not_found (`where` "scene", "version"; a view of a selection), unprocessable (a handle
-  ///           without Gaussians, an empty selection; a key used for another request), unsupported, busy (the
-  ///           queue is full: looked at first), unavailable (others are being measured for too long); those of admit(),
-  ///           admit_time() and MemoryBudget::take()
+  ///           without Gaussians, an empty selection; a key used for another request), unsupported (a model that is not
+  ///           there), busy (the queue is full: looked at first), unavailable (others are being measured for too long);
+  ///           those of admit(), admit_time(), admit_slow() and MemoryBudget::take()
   [[nodiscard]] Result<Submission> submit(const proto::EditRequest& request, const std::string& idempotency_key);
-  /// What submit() would do, and what it would cost. Errors as submit(), but for busy: it takes no place in the queue.
+  /// What submit() would do, and what it would cost. Errors as submit(), but for busy, since it takes no
+  /// place in the queue, and those of admit_slow(), which become a warning.
   [[nodiscard]] Result<proto::EditEstimate> estimate(const proto::EditRequest& request);
   /// The deformation alone, at once. Errors as submit().
   [[nodiscard]] Result<proto::Preview> preview(const proto::EditRequest& request);

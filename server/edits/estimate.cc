@@ -8,6 +8,7 @@
 #include "engine/edit/optimise.h"
 #include "engine/edit/views.h"
 #include "engine/edit/workload.h"
+#include "server/edits/convert.h"
 
 namespace server::edits {
 namespace {
@@ -24,6 +25,7 @@ constexpr double load_seconds = 1e-3, publish_seconds = 6e-3, flatten_row_second
 
 constexpr std::size_t frame_row_bytes = 200, frame_pixel_bytes = 32, trained_pixel_bytes = 36, frozen_row_bytes = 24;
 constexpr std::size_t corrected_pixel_bytes = 36, corrected_row_bytes = 100;
+constexpr std::size_t repainted_pixel_bytes = 52, history_pixel_bytes = 6;
 
 /// Some of the cameras that the edit would make for itself.
 std::vector<scene::Camera> some_virtual_cameras(const scene::GaussianCloud& cloud, edit::Request request) {
@@ -96,6 +98,13 @@ JobWorkload workload_of(const scene::LayeredCloud& version, const edit::Request&
   return work;
 }
 
+void add_repainter(JobWorkload& work, const std::optional<models::RepainterCost>& repainter) {
+  if (!repainter) return;
+  work.edit.repainted = true;
+  work.edit.repaint_time = repaint_time_of(*repainter);
+  work.model_bytes = repainter->bytes;
+}
+
 std::uint64_t measuring_bytes(const JobWorkload& work) {
   constexpr std::size_t most_pixels = std::size_t(most_measured_side) * most_measured_side;
   return work.edit.gaussians * frame_row_bytes + std::min(work.edit.view_pixels, most_pixels) * frame_pixel_bytes;
@@ -124,7 +133,10 @@ std::uint64_t estimated_bytes(const JobWorkload& work) {
                                       ? views * corrected_pixel_bytes * pixels +
                                             n * (work.row_bytes + corrected_row_bytes) + edit::witness_bytes(work.edit)
                                       : 0;
-  return rows * work.row_bytes + n * frame_row_bytes + (views + frame_pixel_bytes) * pixels + trained + corrected;
+  const std::uint64_t history = history_pixel_bytes * (std::uint64_t(work.edit.intervals) + 1);
+  const std::uint64_t repainted = work.edit.repainted ? views * (repainted_pixel_bytes + history) * pixels : 0;
+  return rows * work.row_bytes + n * frame_row_bytes + (views + frame_pixel_bytes) * pixels + trained + corrected +
+         repainted + work.model_bytes;
 }
 
 }  // namespace server::edits

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -14,15 +15,17 @@
 #include "engine/scene/camera.h"
 #include "engine/scene/overlay.h"
 #include "server/edits/speed_log.h"
+#include "server/models/models.h"
 
 namespace server::edits {
 
 /// What the cost of an edit as a job depends on.
 struct JobWorkload {
   engine::edit::Workload edit = {};
-  std::size_t row_bytes = 0;  ///< Of one Gaussian in memory.
-  bool layered = false;       ///< The version is an overlay: it is flattened first.
-  std::size_t copies = 0;     ///< Deformed copies in the result.
+  std::size_t row_bytes = 0;      ///< Of one Gaussian in memory.
+  bool layered = false;           ///< The version is an overlay: it is flattened first.
+  std::size_t copies = 0;         ///< Deformed copies in the result.
+  std::uint64_t model_bytes = 0;  ///< Of the networks that repaint, and of what they compute.
 };
 
 /// Those of a dataset, in its order; none without one.
@@ -51,6 +54,9 @@ struct JobWorkload {
                                       std::span<const engine::scene::Camera> dataset, bool corrected, int pictured,
                                       const std::string& scene, SpeedLog& log);
 
+/// Adds what a repainter takes, if there is one.
+void add_repainter(JobWorkload& work, const std::optional<models::RepainterCost>& repainter);
+
 /// Bytes that workload_of() takes for a while, about: those of one frame, as of estimated_bytes().
 ///   work  of this request; memory_workload_of() is enough
 [[nodiscard]] std::uint64_t measuring_bytes(const JobWorkload& work);
@@ -77,6 +83,9 @@ struct JobWorkload {
 ///   + V 30 pixels [corrected]                   of each view: the unedited scene and its depth, what was vacated and
 ///                                               must not be learned from, and what it was corrected to
 ///   + (row_bytes + 100) N [corrected]           the unedited scene, its trust, and a search tree of it
+///   + V (52 + 6 (T + 1)) pixels [repainted]     of each view: what was completed, is painted and was painted; the
+///                                               history, once more as it is written down
+///   + model_bytes                               networks
 [[nodiscard]] std::uint64_t estimated_bytes(const JobWorkload& work);
 
 }  // namespace server::edits

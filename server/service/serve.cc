@@ -16,6 +16,7 @@
 #include "proto/edit_request.h"
 #include "server/http/log.h"
 #include "server/http/metrics.h"
+#include "server/models/models.h"
 #include "server/service/readiness.h"
 #include "server/service/scene_views.h"
 #include "server/service/token.h"
@@ -28,15 +29,14 @@ using engine::Result;
 
 namespace {
 
-proto::ServiceInfo service_info(const ServeOptions& options) {
+proto::ServiceInfo service_info(const ServeOptions& options, const models::Models& models) {
   proto::ServiceInfo info;
   info.version = SPLATDRAG_VERSION;
   info.simd = options.simd;
   info.simd_available = engine::render::simd_targets();
   info.threads = options.threads_here;
-  info.correctors = {
-      {"none", true, ""}, {"scene", true, ""}, {"sd", false, "this version cannot load a diffusion model yet"}};
-  info.perceptual = {{"msssim", true, ""}, {"lpips", false, "this version has no network to compare pictures with"}};
+  info.correctors = {{"none", true, ""}, {"scene", true, ""}, {"sd", models.no_sd().empty(), models.no_sd()}};
+  info.perceptual = {{"msssim", true, ""}, {"lpips", models.no_lpips().empty(), models.no_lpips()}};
   for (const auto& format : engine::names<engine::io::SceneFormat>) info.read_formats.emplace_back(format.text);
   info.write_formats = info.read_formats;
   info.picture_formats = {"png", "jpeg", "exr"};
@@ -190,6 +190,11 @@ Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& lo
     http::log(logger, spdlog::level::err, "a scene cannot be used: " + damage.message, {{"where", damage.where}});
   for (const engine::Error& damage : (*scenes)->recovered())
     http::log(logger, spdlog::level::warn, damage.message, {{"where", damage.where}});
+  const models::Models models(options.model_dir, options.threads);
+  for (const models::Finding& finding : models.findings())
+    if (!options.model_dir.empty() && !finding.usable)
+      http::log(logger, spdlog::level::warn, "a model cannot be used: " + finding.message, {{"model", finding.name}});
+  options.edits.models = &models;
   http::Metrics metrics;
   options.edits.timed = [&metrics](const std::vector<proto::StageSeconds>& timings) { observe_edit(metrics, timings); };
   RenderService renders(options.renders);  // before edits are taken up, which give their thread a low priority
@@ -201,8 +206,9 @@ Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& lo
   http::AccessGuard guard(options.access);
   add_gauges(metrics, **scenes, **edits, renders, options.data_dir);
   Readiness readiness(options.data_dir, [&] { return (*edits)->trouble(); });
-  http::Router router = routes::all_routes({**scenes, **edits, selections, options.edit_limits, renders, views, guard,
-                                            metrics, service_info(options), [&] { return readiness.trouble(); }});
+  http::Router router =
+      routes::all_routes({**scenes, **edits, selections, options.edit_limits, renders, views, guard, metrics,
+                          service_info(options, models), [&] { return readiness.trouble(); }});
   auto server = http::HttpServer::start(options.http, std::move(router), guard, metrics, logger);
   if (!server) return propagate(server);
   out << "splatdrag " << SPLATDRAG_VERSION << " is listening on " << (*server)->url() << '\n' << std::flush;

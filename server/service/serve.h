@@ -25,6 +25,7 @@ struct ServeOptions {
   bool insecure = false;             ///< Lets other machines in without a token.
   int drain_seconds = 30;            ///< Time that a running edit gets to finish its interval.
   int unready_seconds = 0;           ///< Time between a signal to end and the end of taking requests.
+  std::filesystem::path model_dir;   ///< Of pre-trained networks (server/models/models.h). Empty: there are none.
   int preview_seconds = 600;         ///< Life of a preview that nobody looks at.
   http::ServerOptions http;
   http::AccessOptions access;

@@ -16,6 +16,7 @@
 #include "engine/edit/edit.h"
 #include "engine/edit/handles.h"
 #include "tests/engine/edit/samples.h"
+#include "tests/engine/edit/student.h"
 
 namespace engine::edit {
 namespace {
@@ -39,13 +40,13 @@ struct Case {
   const char* name;
   Mode mode = Mode::move;
   int intervals = 1, corrections = 1, iterations = 0;
-  bool corrected = false, shown = false, kept = false;
+  bool corrected = false, repainted = false, shown = false, kept = false;
 
   [[nodiscard]] Workload workload() const {
     Workload work;
     work.gaussians = 40, work.dragged = 10, work.candidates = 2, work.views = 2, work.view_pixels = 32 * 32;
     work.intervals = intervals, work.corrections = corrections, work.iterations = iterations;
-    work.corrected = corrected, work.vacates = mode == Mode::move;
+    work.corrected = corrected, work.repainted = repainted, work.vacates = mode == Mode::move;
     work.shown = shown, work.kept = kept;
     return work;
   }
@@ -75,6 +76,14 @@ const std::vector<Case> cases{
      .corrected = true,
      .shown = true,
      .kept = true},
+    {.name = "repainted",
+     .intervals = 2,
+     .corrections = 2,
+     .iterations = 3,
+     .corrected = true,
+     .repainted = true,
+     .shown = true,
+     .kept = true},
     {.name = "a corrector that has nothing to do", .intervals = 2, .corrected = true, .shown = true},
 };
 
@@ -95,6 +104,7 @@ struct Told {
     request.params.annealing_steps = c.corrections;
     request.params.iterations = c.iterations;
     Identity corrector;
+    Student student;
     Observer observer;
     observer.progress = [&](const Progress& at) { progress.push_back(at); };
     if (c.shown) observer.moment = [](const Moment&) { return Result<void>{}; };
@@ -107,7 +117,8 @@ struct Told {
     observer.keep = [&] { return ++asked == keep_after; };
     std::optional<State> state;
     if (from) state = decode(*from, scene, request).value();
-    const auto outcome = run(scene, cameras, request, {c.corrected ? &corrector : nullptr}, observer, std::move(state));
+    const Tools tools{.corrector = c.corrected ? &corrector : nullptr, .repainter = c.repainted ? &student : nullptr};
+    const auto outcome = run(scene, cameras, request, tools, observer, std::move(state));
     finished = outcome.has_value();
     stopped_early = finished && outcome->stopped_early;
   }
@@ -115,7 +126,8 @@ struct Told {
   /// The stages in the order in which they were entered. Those that tell how far they are do so many times; the others
   /// once, each time.
   [[nodiscard]] std::vector<Entry> entered() const {
-    const std::set<Stage> gradual{Stage::views, Stage::mask, Stage::correct, Stage::set_up, Stage::optimise};
+    const std::set<Stage> gradual{Stage::views,   Stage::mask,   Stage::tune,    Stage::correct,
+                                  Stage::repaint, Stage::set_up, Stage::optimise};
     std::vector<Entry> entries;
     for (std::size_t i = 0; i < progress.size(); ++i) {
       const Progress& now = progress[i];
@@ -175,8 +187,9 @@ void expect_follows(const Case& c, const std::vector<Entry>& entered, const std:
 TEST(Stages, HaveTheirNamesOnTheWire) {
   std::vector<std::string_view> names;
   for (std::size_t stage = 0; stage < stage_count; ++stage) names.push_back(name_of(Stage(stage)));
-  EXPECT_EQ(names, (std::vector<std::string_view>{"assign", "views", "deform", "mask", "observe", "correct", "set_up",
-                                                  "optimise", "relocate", "pictures", "checkpoint", "finish"}));
+  EXPECT_EQ(names,
+            (std::vector<std::string_view>{"assign", "views", "deform", "mask", "observe", "tune", "correct", "repaint",
+                                           "set_up", "optimise", "relocate", "pictures", "checkpoint", "finish"}));
   EXPECT_EQ(name_of(Stage::finish), "finish") << "the last one";
 }
 

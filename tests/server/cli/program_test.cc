@@ -41,7 +41,7 @@ TEST(Program, ListsExactlyTheSubcommandsThereAre) {
   EXPECT_EQ(run.status, 0);
   std::size_t listed = 0;
   for (const char* name :
-       {"serve", "edit", "select", "fit", "render", "info", "convert", "demo-scene", "admin", "bench-edit"}) {
+       {"serve", "edit", "select", "fit", "render", "info", "models", "convert", "demo-scene", "admin", "bench-edit"}) {
     EXPECT_NE(run.out.find("\n  " + std::string(name) + " "), std::string::npos) << name;
     ++listed;
   }
@@ -77,7 +77,7 @@ TEST(Program, SaysItsVersion) {
 
 TEST(Program, RefusesAWrongCommandLineInOneLine) {
   expect_error({}, 2,
-               "a subcommand is required: serve edit select fit render info convert demo-scene admin bench-edit");
+               "a subcommand is required: serve edit select fit render info models convert demo-scene admin bench-edit");
   expect_error({"bake"}, 2, "\"bake\" is no subcommand");
   expect_error({"serve"}, 2, "--data-dir is required");
   expect_error({"edit"}, 2, "--scene is required");

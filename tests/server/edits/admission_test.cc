@@ -159,5 +159,32 @@ TEST(AdmissionByTime, SaysSoWhereOneParameterAloneIsNotEnough) {
   EXPECT_EQ(none.error().where, "scene");
 }
 
+TEST(Admission, ADiffusionModelThatWorksForHoursHasToBeAllowed) {
+  Edit edit(50, 512);
+  edit.work.edit.first_tuning = 200;
+  EXPECT_TRUE(admit_slow(edit.work, false)) << "there is none";
+  add_repainter(edit.work, models::RepainterCost{0.1, 0.1, 1, gib});
+  EXPECT_TRUE(admit_slow(edit.work, false)) << "of a small one: " << estimated_seconds(edit.work) << " s";
+  add_repainter(edit.work, models::RepainterCost{85, 24, 336, gib});  // of 1.5 on one thread
+  const auto refused = admit_slow(edit.work, false);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::unprocessable);
+  EXPECT_EQ(refused.error().where, "allow_slow");
+  EXPECT_NE(refused.error().message.find("about 7 hours"), std::string::npos) << refused.error().message;
+  EXPECT_TRUE(admit_slow(edit.work, true));
+}
+
+TEST(Admission, CountsTheMemoryOfADiffusionModelAndOfTheHistory) {
+  Edit edit(50, 512);
+  const std::uint64_t without = estimated_bytes(edit.work);
+  add_repainter(edit.work, std::nullopt);
+  EXPECT_EQ(estimated_bytes(edit.work), without);
+  add_repainter(edit.work, models::RepainterCost{1, 1, 1, 5 * gib});
+  const std::uint64_t of_one_interval = estimated_bytes(edit.work);
+  EXPECT_GT(of_one_interval, without + 5 * gib);
+  edit.work.edit.intervals = 2;
+  EXPECT_GE(estimated_bytes(edit.work), of_one_interval + 50 * 6 * 512 * 512);
+}
+
 }  // namespace
 }  // namespace server::edits

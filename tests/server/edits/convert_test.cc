@@ -199,36 +199,42 @@ TEST(Convert, TheCorrectorIsTheGivenOneOrThatOfThePreset) {
     asked.preset = preset;
     const bool deforms_only = preset == proto::Preset::preview;
     EXPECT_EQ(corrector_of(asked), deforms_only ? proto::Corrector::none : proto::Corrector::scene);
-    EXPECT_EQ(make_corrector(asked) == nullptr, deforms_only);
+    const auto corrects = [&] {
+      return value(make_toolbox(asked, value(to_engine(asked)).params, nullptr)).corrector != nullptr;
+    };
+    EXPECT_EQ(corrects(), !deforms_only);
     for (const auto corrector : {proto::Corrector::none, proto::Corrector::scene}) {
       asked.params.corrector = corrector;
       EXPECT_TRUE(to_engine(asked));
       EXPECT_EQ(corrector_of(asked), corrector);
-      EXPECT_EQ(make_corrector(asked) == nullptr, corrector == proto::Corrector::none);
+      EXPECT_EQ(corrects(), corrector == proto::Corrector::scene);
     }
   }
 }
 
-TEST(Convert, RefusesTheCorrectorThisBuildHasNotAndNamesThoseItHas) {
+TEST(Convert, RefusesTheCorrectorWhoseModelIsNotThereAndNamesThoseThereAre) {
   proto::EditRequest asked = full_request();
   asked.params.corrector = proto::Corrector::sd;
   for (const auto preset : every_preset) {
     asked.preset = preset;
-    const auto request = to_engine(asked);
-    ASSERT_FALSE(request);
-    EXPECT_EQ(request.error().code, engine::ErrorCode::unsupported);
-    EXPECT_EQ(request.error().where, "params.corrector");
+    const edit::Params params = value(to_engine(asked)).params;
+    const auto there = available(params, nullptr);
+    ASSERT_FALSE(there);
+    EXPECT_EQ(there.error().code, engine::ErrorCode::unsupported);
+    EXPECT_EQ(there.error().where, "params.corrector");
     for (const char* name : {"no corrector \"sd\"", "available: \"scene\"", "\"none\""})
-      EXPECT_NE(request.error().message.find(name), std::string::npos) << request.error().message;
+      EXPECT_NE(there.error().message.find(name), std::string::npos) << there.error().message;
+    EXPECT_EQ(make_toolbox(asked, params, nullptr).error().message, there.error().message);
   }
 }
 
-TEST(Convert, RefusesALossOrABackgroundThisBuildHasNot) {
+TEST(Convert, RefusesALossWhoseModelIsNotThereAndABackgroundThisBuildHasNot) {
   proto::EditRequest asked = full_request();
   asked.params.perceptual = proto::Perceptual::lpips;
-  ASSERT_FALSE(to_engine(asked));
-  EXPECT_EQ(to_engine(asked).error().code, engine::ErrorCode::unsupported);
-  EXPECT_EQ(to_engine(asked).error().where, "params.perceptual");
+  const auto there = available(value(to_engine(asked)).params, nullptr);
+  ASSERT_FALSE(there);
+  EXPECT_EQ(there.error().code, engine::ErrorCode::unsupported);
+  EXPECT_EQ(there.error().where, "params.perceptual");
   asked.params.perceptual = proto::Perceptual::msssim;
   asked.params.background = proto::Background::photo;
   ASSERT_FALSE(to_engine(asked));
@@ -307,6 +313,13 @@ TEST(Convert, ListsFieldsThatHaveNoEffect) {
   asked.prompt = "a ball";
   EXPECT_EQ(fields_without_effect(asked), Fields{"prompt"});
   asked.prompt = std::nullopt;
+  proto::EditRequest painted = full_request();
+  painted.prompt = "a ball", painted.negative_prompt = "a hat";
+  painted.params.guidance = 1, painted.params.tuning_steps = 5;
+  EXPECT_EQ(fields_without_effect(painted),
+            (Fields{"prompt", "negative_prompt", "params.guidance", "params.tuning_steps"}));
+  painted.params.corrector = proto::Corrector::sd;
+  EXPECT_EQ(fields_without_effect(painted), Fields{}) << "which reads them";
   const Fields of_strength = {"params.strength_initial", "params.strength_final", "params.annealing"};
   asked.params.corrector = proto::Corrector::none;
   EXPECT_EQ(fields_without_effect(asked), of_strength) << "nothing corrects; that was asked for";
@@ -320,6 +333,16 @@ TEST(Convert, ListsFieldsThatHaveNoEffect) {
   Fields all = of_strength;
   all.push_back("params.corrector");
   EXPECT_EQ(fields_without_effect(asked), all) << "no optimisation would use what is corrected";
+}
+
+TEST(Convert, ParametersOfADiffusionModelAreResolvedWhereThereIsOne) {
+  proto::EditRequest asked = full_request();
+  const auto guidance = [&] { return resolved(asked, value(to_engine(asked)).params).params.guidance; };
+  EXPECT_EQ(guidance(), std::nullopt);
+  asked.params.corrector = proto::Corrector::sd;
+  EXPECT_EQ(guidance(), 7.5);
+  asked.params.iterations = 0;
+  EXPECT_EQ(guidance(), std::nullopt) << "it would have nothing to do";
 }
 
 TEST(Convert, HealingNeedsACorrectorAndARemovalHoldsNothing) {

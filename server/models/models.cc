@@ -1,0 +1,95 @@
+#include "server/models/models.h"
+
+#include <system_error>
+#include <utility>
+
+#include "engine/weights/checkpoint.h"
+
+namespace server::models {
+namespace {
+
+namespace fs = std::filesystem;
+namespace weights = engine::weights;
+
+constexpr const char* without_libtorch =
+    "this build has no libtorch: install libtorch-dev, libopenblas0-pthread and libutf8proc-dev and build again "
+    "(docs/stable-diffusion.md)";
+constexpr const char* advice = "; \"splatdrag models\" says which files go where";
+
+/// In "FILE:PLACE" of an error, so that who installs models finds it.
+std::string described(const engine::Error& error) {
+  return error.where.empty() ? error.message : error.where + ": " + error.message;
+}
+
+bool is_there(const fs::path& path) {
+  std::error_code unreachable;  // then it cannot be used either
+  return fs::exists(path, unreachable);
+}
+
+std::uint64_t bytes_below(const fs::path& path) {
+  std::error_code error;
+  if (fs::is_regular_file(path, error)) return fs::file_size(path, error);
+  std::uint64_t sum = 0;
+  for (fs::recursive_directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error)) {
+    std::error_code unreadable;
+    const std::uint64_t size = entry->is_regular_file(unreadable) ? entry->file_size(unreadable) : 0;
+    if (!unreadable) sum += size;
+  }
+  return sum;
+}
+
+Finding look_at_checkpoint(const fs::path& folder, const fs::path& checkpoint) {
+  if (checkpoint.empty())
+    return {"sd", false,
+            "no checkpoint: put a folder of Stable Diffusion 1.x or 2.x-base as diffusers writes it at " +
+                (folder / "stable-diffusion").string() + ", or one file at " +
+                (folder / "stable-diffusion.safetensors").string() + " with its tokenizer at " +
+                (folder / "tokenizer").string()};
+  const auto opened = weights::Checkpoint::open(checkpoint);
+  if (!opened) return {"sd", false, checkpoint.string() + ": " + described(opened.error())};
+  if (const auto whole = opened->check(); !whole)
+    return {"sd", false, checkpoint.string() + ": " + described(whole.error())};
+  for (const char* file : {"vocab.json", "merges.txt"})
+    if (!is_there(opened->tokenizer_folder() / file))
+      return {"sd", false, "no tokenizer: " + (opened->tokenizer_folder() / file).string() + " is missing"};
+  return {"sd", true, checkpoint.string()};
+}
+
+Finding look_at_lpips(const fs::path& folder) {
+  for (const auto& [name, what] :
+       {std::pair{"vgg16.safetensors", "VGG16 of torchvision"}, {"vgg_v0.1.safetensors", "LPIPS's own weights"}}) {
+    const fs::path file = folder / "lpips" / name;
+    if (!is_there(file)) return {"lpips", false, std::string("no ") + what + ": " + file.string() + " is missing"};
+    if (const auto opened = weights::TensorFile::open(file); !opened)
+      return {"lpips", false, file.string() + ": " + described(opened.error())};
+  }
+  return {"lpips", true, (folder / "lpips").string()};
+}
+
+}  // namespace
+
+Models::Models(fs::path folder, int threads)
+    : folder_(std::move(folder)), threads_(threads), loaded_(nothing_loaded()) {
+  if (folder_.empty()) {
+    for (const char* name : {"sd", "lpips"})
+      findings_.push_back({name, false, "no folder of models is named: give --model-dir"});
+  } else {
+    for (const char* name : {"stable-diffusion", "stable-diffusion.safetensors"})
+      if (checkpoint_.empty() && is_there(folder_ / name)) checkpoint_ = folder_ / name;
+    findings_ = {look_at_checkpoint(folder_, checkpoint_), look_at_lpips(folder_)};
+  }
+  if (findings_[0].usable) checkpoint_bytes_ = bytes_below(checkpoint_);
+  const auto why_not = [&](Finding& finding, const std::string& what) -> std::string {
+    if (!has_libtorch()) {
+      finding = {finding.name, false, without_libtorch + std::string(finding.usable ? "; its files are there" : "")};
+      return without_libtorch;
+    }
+    if (finding.usable) return {};
+    return folder_.empty() ? "no models are installed: the program is started without --model-dir" + std::string(advice)
+                           : what + advice;
+  };
+  no_sd_ = why_not(findings_[0], "no checkpoint of Stable Diffusion that can be used is installed");
+  no_lpips_ = why_not(findings_[1], "the networks of LPIPS are not installed");
+}
+
+}  // namespace server::models

@@ -1,0 +1,80 @@
+// Pre-trained networks below the model folder (--model-dir): which there are, and what edits use of them.
+//   DIR/stable-diffusion/              a checkpoint of Stable Diffusion 1.x or 2.x-base as diffusers writes it, or
+//   DIR/stable-diffusion.safetensors   one in the first authors' layout, with DIR/tokenizer/
+//   DIR/lpips/vgg16.safetensors        VGG16 of torchvision
+//   DIR/lpips/vgg_v0.1.safetensors     LPIPS's own weights
+// docs/stable-diffusion.md says where they come from.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/correct/repainter.h"
+#include "engine/optim/perceptual.h"
+#include "engine/params/params.h"
+
+namespace server::models {
+
+using engine::Result;
+
+/// What was found of one model.
+struct Finding {
+  std::string name;  ///< As a request names it: "sd", "lpips".
+  bool usable = false;
+  std::string message;  ///< Of a usable one: what it is. Else what is missing and where it goes; names folders.
+};
+
+/// What a repainter is asked for beside the parameters.
+struct Prompts {
+  std::string prompt;    ///< Empty: diffusion::default_prompt.
+  std::string negative;  ///< What should not be seen.
+};
+
+/// What a repainter takes on this machine as it usually is, seconds; guessed from the sizes of the networks.
+struct RepainterCost {
+  double training_step = 0, picture = 0, full_strength = 0;  ///< As in diffusion::RepainterSeconds.
+  std::uint64_t bytes = 0;                                   ///< Of its networks and of what they compute.
+};
+
+/// Looks at the folder once. Safe to use from several threads; what it makes is for one.
+class Models {
+ public:
+  ///   folder   empty: there is none
+  ///   threads  of libtorch; 0: as many as it takes by itself
+  explicit Models(std::filesystem::path folder = {}, int threads = 0);
+
+  /// Why an edit cannot have it, in words for clients: they name no folder of this machine. Empty: it can.
+  [[nodiscard]] const std::string& no_sd() const { return no_sd_; }
+  [[nodiscard]] const std::string& no_lpips() const { return no_lpips_; }
+  /// Each model, for who installs them. Opens checkpoints and looks at the shape of every tensor, but at no numbers.
+  [[nodiscard]] const std::vector<Finding>& findings() const { return findings_; }
+
+  /// The corrector `sd`. The networks are opened when they are first asked for, and shared from then on.
+  ///   params  guidance, sampler and the like
+  ///   errors  unsupported: no_sd(); those of StableDiffusion::open() and of diffusion::validate()
+  [[nodiscard]] Result<std::unique_ptr<engine::correct::Repainter>> repainter(const engine::params::Params& params,
+                                                                              const Prompts& prompts) const;
+  /// What that will take. Zero where there is none.
+  [[nodiscard]] RepainterCost cost(const engine::params::Params& params) const;
+  /// The loss `lpips`.
+  ///   errors  unsupported: no_lpips(); those of Lpips::open()
+  [[nodiscard]] Result<std::unique_ptr<engine::optim::PerceptualLoss>> lpips() const;
+
+ private:
+  struct Loaded;
+  [[nodiscard]] static bool has_libtorch();
+  [[nodiscard]] static std::shared_ptr<Loaded> nothing_loaded();
+
+  std::filesystem::path folder_, checkpoint_;
+  int threads_;
+  std::string no_sd_, no_lpips_;
+  std::vector<Finding> findings_;
+  std::uint64_t checkpoint_bytes_ = 0;
+  std::shared_ptr<Loaded> loaded_;  ///< Networks, once they are asked for.
+};
+
+}  // namespace server::models

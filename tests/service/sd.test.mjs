@@ -1,0 +1,184 @@
+// The corrector `sd` and the loss `lpips` over HTTP, by the tiny checkpoint of the reference vectors: fine-tuned, annealed, killed, stopped,
+// cancelled. Its weights are random, so nothing is said of what it paints.
+import assert from 'node:assert/strict';
+import { existsSync } from 'node:fs';
+import { copyFile, mkdir, symlink, writeFile } from 'node:fs/promises';
+import path from 'node:path';
+import { after, before, test } from 'node:test';
+import { summary } from './support/contract.mjs';
+import { environment, root, run, Service, temporaryFolder } from './support/program.mjs';
+import { datasetZip, demoScene } from './support/scenes.mjs';
+
+// Bytes are promised for a fixed number of libtorch's threads; on networks this small a second one only waits for the first.
+environment.OMP_NUM_THREADS = '1';
+
+const golden = process.env.SPLATDRAG_GOLDEN ?? path.join(root, '../shared/golden');
+const models = temporaryFolder();
+
+/// VGG16 in its own size, of a few numbers over and over: where values do not matter. As safetensors.
+const vgg16 = () => {
+  const widths = [[0, 3, 64], [2, 64, 64], [5, 64, 128], [7, 128, 128], [10, 128, 256], [12, 256, 256], [14, 256, 256], [17, 256, 512],
+    [19, 512, 512], [21, 512, 512], [24, 512, 512], [26, 512, 512], [28, 512, 512]];
+  const tensors = widths.flatMap(([place, from, to]) => [
+    { name: `features.${place}.weight`, shape: [to, from, 3, 3], scale: Math.sqrt(6 / (9 * from)) }, { name: `features.${place}.bias`, shape: [to], scale: 0.05 }]);
+  const header = {};
+  let offset = 0;
+  for (const { name, shape } of tensors) {
+    const bytes = 4 * shape.reduce((product, size) => product * size, 1);
+    header[name] = { dtype: 'F32', shape, data_offsets: [offset, offset += bytes] };
+  }
+  const text = JSON.stringify(header).padEnd(Math.ceil(JSON.stringify(header).length / 8) * 8);
+  const file = Buffer.alloc(8 + text.length + offset);
+  file.writeBigUInt64LE(BigInt(text.length));
+  file.write(text, 8);
+  const numbers = new Float32Array(file.buffer, file.byteOffset + 8 + text.length, offset / 4);
+  let at = 0, state = 1;
+  const few = Float32Array.from({ length: 1021 }, () => (state = (Math.imul(state, 1664525) + 1013904223) >>> 0) / 2 ** 31 - 1);
+  for (const { shape, scale } of tensors) {
+    const count = shape.reduce((product, size) => product * size, 1);
+    for (let i = 0; i < count; ++i) numbers[at + i] = scale * few[i % few.length];
+    at += count;
+  }
+  return file;
+};
+
+const bare = await Service.start();
+const info = (await bare.client.get('/v1/info')).json();
+const reasonOf = (list, name) => list.find((part) => part.name === name).reason;
+const skip = reasonOf(info.correctors, 'sd').includes('libtorch') ? `SKIPPED: ${reasonOf(info.correctors, 'sd')}`
+  : existsSync(golden) ? false : `SKIPPED: ${golden} is absent: the shared data is not on this machine`;
+if (skip) console.log(skip);
+
+let service, scene, request;
+before(async () => {
+  const demo = await demoScene({ gaussians: 4000, views: 5, size: '96x72', photos: false });
+  const bareScene = await bare.client.upload(demo.ply);
+  request = { scene: bareScene.id, ...demo.ball, prompt: 'a ball on a table',
+    params: { corrector: 'sd', intervals: 2, annealing_steps: 2, iterations: 3, views: 3, max_image_side: 64, tuning_steps: 6, tuning_steps_later: 6,
+      sampling_steps: 8, lora_rank: 2 } };
+  if (skip) return;
+  await symlink(path.join(golden, 'tiny_sd'), path.join(models, 'stable-diffusion'));
+  await mkdir(path.join(models, 'lpips'));
+  await writeFile(path.join(models, 'lpips/vgg16.safetensors'), vgg16());
+  await copyFile(path.join(golden, 'lpips_lin/vgg_v0.1.safetensors'), path.join(models, 'lpips/vgg_v0.1.safetensors'));
+  service = await Service.start({ args: ['--model-dir', models, '--threads', 1, '--edit-attempts', 1000, '--edit-time', '1000d', '--edit-memory', '64GiB'] });
+  scene = await service.client.upload(demo.ply, { name: 'repainted' });
+  await service.client.putDataset(scene.id, await datasetZip(demo.folder));
+});
+after(async () => {
+  console.log(summary());
+  await service?.stop();
+  await bare.stop();
+});
+
+const submit = async (params = {}, more = {}) =>
+  (await service.client.submit({ ...request, scene: scene.id, ...more, params: { ...request.params, ...params } })).id;
+/// Networks compute with the machine's leftovers, as all edits do: beside other work an edit may take minutes.
+const patient = { timeout: 600_000 };
+const succeeded = (id) => service.client.succeeded(id, patient);
+const until = (id, reached) => service.client.until(id, reached, { every: 5, ...patient });
+const bytesOf = async (edit) => service.client.file(scene.id, edit.result_version);
+let truth;  // the bytes of `request`, undisturbed
+const undisturbed = async () => truth ??= await bytesOf(await succeeded(await submit()));
+const again = async () => {
+  await service.kill();
+  await service.start();
+};
+
+test('without models, sd and lpips are refused with what it takes, and nothing else is', async () => {
+  for (const [name, list, params] of [['sd', info.correctors, { corrector: 'sd' }], ['lpips', info.perceptual, { perceptual: 'lpips' }]]) {
+    const part = list.find((one) => one.name === name);
+    assert.equal(part.available, false);
+    assert.match(part.reason, /--model-dir|libtorch-dev/);
+    const refused = await bare.client.request('POST', '/v1/edits', { json: { ...request, params: { iterations: 1, ...params } }, expect: [422, 501] });
+    assert.ok(refused.json().detail.includes(part.reason), refused.json().detail);
+    assert.match(refused.json().where, /^params\.(corrector|perceptual)$/);
+  }
+  const parameters = info.parameters.filter(({ part }) => part === 'diffusion').map(({ name }) => name);
+  assert.deepEqual(parameters, ['guidance', 'sampler', 'sampling_steps', 'lora_rank', 'tuning_steps', 'tuning_steps_later']);
+});
+
+test('models are listed with what is missing and where it goes', { skip }, async () => {
+  const { stdout } = await run('models', '--model-dir', models);
+  assert.match(stdout, /^sd: ready, .*\nlpips: ready, /);
+  const empty = temporaryFolder();
+  await assert.rejects(run('models', '--model-dir', empty), ({ stdout: text }) => text.includes(path.join(empty, 'stable-diffusion')) && text.includes('vgg16.safetensors'));
+  const { correctors, perceptual } = (await service.client.get('/v1/info')).json();
+  for (const [list, name] of [[correctors, 'sd'], [perceptual, 'lpips']]) assert.deepEqual(list.find((part) => part.name === name), { name, available: true, reason: null });
+});
+
+test('an edit learns, repaints by falling strength and learns again from what it made', { skip }, async () => {
+  const id = await submit();
+  const stages = new Set();
+  await service.client.events(id, ({ edit }) => stages.add(`${edit.interval} ${edit.stage}`));
+  const edit = await succeeded(id);
+  for (const stage of ['1 tune', '1 repaint', '2 tune', '2 repaint']) assert.ok(stages.has(stage), `${stage} is not among ${[...stages]}`);
+  assert.equal(edit.finished_intervals.length, 2);
+  assert.equal(edit.request.prompt, 'a ball on a table');
+  assert.equal(edit.request.params.sampler, 'dpmpp2m');
+  assert.equal(edit.request.params.tuning_steps, 6);
+  assert.deepEqual(edit.warnings.filter((warning) => warning.includes('without effect')), []);
+  for (const { renders } of edit.finished_intervals) assert.ok(renders[0].stages.corrected);
+  truth = await bytesOf(edit);
+});
+
+test('the same request gives the same bytes, and prompt, seed and training make a difference', { skip }, async () => {
+  const short = { intervals: 1, annealing_steps: 1, tuning_steps: 3, views: 2 };
+  const made = async (params, more) => bytesOf(await succeeded(await submit({ ...short, ...params }, more)));
+  const expected = await made();
+  assert.deepEqual(await made(), expected);
+  for (const [what, params, more] of [['seed', { seed: 1 }], ['training', { tuning_steps: 0 }], ['rank', { lora_rank: 1 }], ['prompt', {}, { prompt: 'a hat' }],
+    ['negative prompt', {}, { negative_prompt: 'a hat' }], ['guidance', { guidance: 1 }], ['sampler', { sampler: 'ddim' }], ['corrector', { corrector: 'scene' }]])
+    assert.notDeepEqual(await made(params, more), expected, what);
+});
+
+test('killed while it learns and while it paints, an edit ends with the same bytes', { skip }, async () => {
+  const expected = await undisturbed();
+  const id = await submit();
+  for (const [interval, stage] of [[1, 'tune'], [1, 'repaint'], [2, 'tune'], [2, 'repaint']]) {
+    await until(id, (edit) => edit.interval === interval && edit.stage === stage);
+    await again();
+    assert.equal((await service.client.edit(id)).finished_intervals.length, interval - 1, 'it goes on with the interval that was cut');
+  }
+  assert.deepEqual(await bytesOf(await succeeded(id)), expected);
+});
+
+test('cancelled while it learns or paints, an edit ends at once; stopped, with the interval before', { skip }, async () => {
+  // So long that no stage ends by itself while the test looks.
+  const long = { tuning_steps: 20_000, tuning_steps_later: 20_000, sampling_steps: 500, strength_initial: 1, strength_final: 1 };
+  for (const [params, stage] of [[long, 'tune'], [{ ...long, tuning_steps: 1 }, 'repaint']]) {
+    const id = await submit(params, { allow_slow: true });
+    await until(id, (edit) => edit.stage === stage);
+    await service.client.request('POST', `/v1/edits/${id}/cancel`, { expect: 200 });
+    assert.equal((await service.client.ended(id, patient)).state, 'cancelled', stage);
+  }
+  const id = await submit({ tuning_steps: 2, tuning_steps_later: 20_000, annealing_steps: 1 }, { allow_slow: true });
+  await until(id, (edit) => edit.interval === 2 && edit.stage === 'tune');
+  await service.client.request('POST', `/v1/edits/${id}/stop`, { expect: 200 });
+  const edit = await succeeded(id);
+  assert.equal(edit.stopped_early, true);
+  assert.equal(edit.finished_intervals.length, 1);
+});
+
+test('what would take hours has to be allowed, and the estimate tells how long', { skip }, async () => {
+  const slow = { ...request, scene: scene.id, params: { ...request.params, intervals: 20, tuning_steps: 100_000, tuning_steps_later: 100_000 } };
+  const estimate = (await service.client.post('/v1/edits', slow, { query: { validate_only: true } })).json();
+  assert.ok(estimate.estimate.seconds > 3600, `${estimate.estimate.seconds} s`);
+  assert.ok(estimate.warnings.some((warning) => warning.includes('allow_slow')), estimate.warnings);
+  const allowed = (await service.client.post('/v1/edits', { ...slow, allow_slow: true }, { query: { validate_only: true } })).json();
+  assert.deepEqual(allowed.warnings.filter((warning) => warning.includes('allow_slow')), []);
+  const refused = (await service.client.request('POST', '/v1/edits', { json: slow, expect: 422 })).json();
+  assert.equal(refused.where, 'allow_slow');
+  const { id } = await service.client.submit({ ...slow, allow_slow: true });
+  await service.client.request('POST', `/v1/edits/${id}/cancel`, { expect: 200 });
+  assert.equal((await service.client.ended(id, patient)).state, 'cancelled');
+});
+
+test('lpips compares what is optimised with what was painted', { skip }, async () => {
+  const params = { intervals: 1, annealing_steps: 1, tuning_steps: 1, max_image_side: 48, views: 2, iterations: 2 };
+  const edit = await succeeded(await submit({ ...params, perceptual: 'lpips' }));
+  assert.equal(edit.request.params.perceptual, 'lpips');
+  assert.ok(edit.finished_intervals[0].loss > 0);
+  const other = await succeeded(await submit(params));
+  assert.notEqual(other.finished_intervals[0].loss, edit.finished_intervals[0].loss);
+});
