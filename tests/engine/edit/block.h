@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/core/rng.h"
 #include "engine/edit/request.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/gaussian_cloud.h"
@@ -98,5 +99,32 @@ struct BlockScene {
     return points;
   }
 };
+
+/// Nothing but the block: behind it is a void.
+inline BlockScene without_floor() {
+  BlockScene block;
+  std::vector<std::uint8_t> keep(block.cloud.size(), 1);
+  std::fill_n(keep.begin(), block.floor_rows, std::uint8_t(0));
+  block.cloud = scene::select(block.cloud, keep);
+  block.floor_rows = 0;
+  return block;
+}
+
+/// The block before what lies far off at all depths, seen by one camera: nobody could tell what goes on behind it.
+inline BlockScene before_rubble() {
+  BlockScene block = without_floor();
+  block.cameras.resize(1);
+  const scene::Camera& camera = block.cameras[0];
+  Rng rng(0);
+  for (int i = -22; i <= 22; ++i)
+    for (int k = -22; k <= 22; ++k) {
+      const double z = double(rng.uniform(5, 9));
+      const DVec2 pixel = DVec2(32.0) + 2.0 * DVec2(i, k);
+      const DVec3 at =
+          camera.world_from_cam(z * DVec3((pixel.x - camera.cx) / camera.fx, (pixel.y - camera.cy) / camera.fy, 1));
+      if (!block.hides(at)) add_gaussian(block.cloud, Vec3(at), Vec3(0.02f * float(z)), 4, floor_color);
+    }
+  return block;
+}
 
 }  // namespace engine::edit

@@ -93,8 +93,7 @@ TEST(EditWithACorrector, RowsThatWereSeenStayTheInputs) {
 }
 
 TEST(EditWithACorrector, SaysHowMuchOfThePlaceCouldNotBeCompleted) {
-  BlockScene block;
-  const Outcome completed = run_with_scene_corrector(block);
+  const Outcome completed = run_with_scene_corrector(BlockScene());
   ASSERT_EQ(completed.report.uncovered.size(), completed.report.views.size());
   for (const Uncovered& view : completed.report.uncovered) {
     EXPECT_GT(view.area, 0.0) << view.view;
@@ -102,11 +101,7 @@ TEST(EditWithACorrector, SaysHowMuchOfThePlaceCouldNotBeCompleted) {
   }
   EXPECT_TRUE(completed.report.warnings.empty());
 
-  std::vector<std::uint8_t> keep(block.cloud.size(), 1);
-  std::fill_n(keep.begin(), block.floor_rows, std::uint8_t(0));  // behind the block is nothing
-  block.cloud = scene::select(block.cloud, keep);
-  block.floor_rows = 0;
-  const Outcome open = run_with_scene_corrector(block);
+  const Outcome open = run_with_scene_corrector(before_rubble());
   for (const Uncovered& view : open.report.uncovered) {
     EXPECT_GT(view.open, 0.5 * view.area) << view.view;
     EXPECT_GE(view.open_from.x, 0.0) << view.view;

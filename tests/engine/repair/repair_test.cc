@@ -8,7 +8,6 @@
 #include <set>
 #include <utility>
 
-#include "engine/core/rng.h"
 #include "engine/edit/masks.h"
 #include "engine/render/forward.h"
 #include "tests/engine/edit/block.h"
@@ -17,7 +16,8 @@
 namespace engine::repair {
 namespace {
 
-using edit::add_gaussian, edit::block_side, edit::BlockScene, edit::floor_color;
+using edit::add_gaussian, edit::before_rubble, edit::block_side, edit::BlockScene, edit::floor_color,
+    edit::without_floor;
 using working::Role;
 
 /// Notes what it is asked and gives back what it gets, or something else.
@@ -326,16 +326,6 @@ TEST(Repair, LeavesAPitOpenThatViewsHaveLookedInto) {
   EXPECT_LT(over_pit, 25u) << beside << " beside it";
 }
 
-/// Nothing but the block: behind it is a void.
-BlockScene without_floor() {
-  BlockScene block;
-  std::vector<std::uint8_t> keep(block.cloud.size(), 1);
-  std::fill_n(keep.begin(), block.floor_rows, std::uint8_t(0));
-  block.cloud = scene::select(block.cloud, keep);
-  block.floor_rows = 0;
-  return block;
-}
-
 TEST(Repair, ClearsTheVeilBeforeThePartOnlyWhereItStays) {
   BlockScene block;
   const auto first = std::uint32_t(block.cloud.size());
@@ -357,23 +347,6 @@ TEST(Repair, ClearsTheVeilBeforeThePartOnlyWhereItStays) {
       EXPECT_EQ(moved.working.role()[row], arrives ? Role::original : Role::frozen) << row;
   }
   EXPECT_EQ(left[1], left[0]) << "the veil was not the part's";
-}
-
-/// The block before what lies far off at all depths, seen by one camera: nobody could tell what goes on behind it.
-BlockScene before_rubble() {
-  BlockScene block = without_floor();
-  block.cameras.resize(1);
-  const scene::Camera& camera = block.cameras[0];
-  Rng rng(0);
-  for (int i = -22; i <= 22; ++i)
-    for (int k = -22; k <= 22; ++k) {
-      const double z = double(rng.uniform(5, 9));
-      const DVec2 pixel = DVec2(32.0) + 2.0 * DVec2(i, k);
-      const DVec3 at =
-          camera.world_from_cam(z * DVec3((pixel.x - camera.cx) / camera.fx, (pixel.y - camera.cy) / camera.fy, 1));
-      if (!block.hides(at)) add_gaussian(block.cloud, Vec3(at), Vec3(0.02f * float(z)), 4, floor_color);
-    }
-  return block;
 }
 
 TEST(Repair, TellsWhatIsLeftOpenAndWhere) {
