@@ -158,8 +158,8 @@ class Run {
     // Its end has to be one of those two: another error it would only meet again, or hide.
     if (outcome || outcome.error().code != ErrorCode::cancelled) return outcome;
     if (context_.cancel_token().stop_requested()) return outcome;
-    if (is_stopped_) return attempt();
-    if (!has_outlived_) return outcome;
+    if (given_up_ == GivenUp::stopped) return attempt();
+    if (given_up_ == GivenUp::no) return outcome;
     if (context_.finished_intervals() == 0)
       return fail(ErrorCode::too_large,
                   "the edit has not finished an interval in " + whole_seconds(workshop_.outlived_seconds) +
@@ -175,16 +175,16 @@ class Run {
   /// Who stops an edit wants what it has, not what it would have had: the interval in work is given up. The state of
   /// the last finished one is on disk.
   void look_whether_to_stop() {
-    if (is_stopped_ || !context_.stop_requested() || context_.finished_intervals() == 0) return;
-    is_stopped_ = true;
+    if (given_up_ != GivenUp::no || !context_.stop_requested() || context_.finished_intervals() == 0) return;
+    given_up_ = GivenUp::stopped;
     if (last_interval_ >= context_.finished_intervals()) out_of_time_.request_stop();
   }
 
   /// The edit asks this all the time, which costs no more than looking at a clock.
   void look_at_the_time() {
-    if (workshop_.outlived_seconds <= 0 || has_outlived_) return;
+    if (workshop_.outlived_seconds <= 0 || given_up_ != GivenUp::no) return;
     if (keeper_.seconds() < workshop_.outlived_seconds) return;
-    has_outlived_ = true;
+    given_up_ = GivenUp::outlived;
     out_of_time_.request_stop();
   }
 
@@ -203,7 +203,8 @@ class Run {
     observer.interval_done = [this](const edit::IntervalDone& done) { return finish_interval(done); };
     // A checkpoint that could not be used is made up for first: the record promises its interval.
     observer.keep = [this] {
-      return (context_.stop_requested() || has_outlived_) && last_interval_ >= context_.finished_intervals();
+      return (context_.stop_requested() || given_up_ == GivenUp::outlived) &&
+             last_interval_ >= context_.finished_intervals();
     };
     observer.stop = out_of_time_.get_token();
     const auto toolbox = make_toolbox(asked_, request_.params, workshop_.models);
@@ -294,9 +295,11 @@ class Run {
   std::vector<scene::Camera> cameras_;
   std::shared_ptr<const scene::GaussianCloud> input_;
   std::optional<IntervalPictures> pictures_;
-  int last_interval_ = 0;    ///< That this run has finished or taken over.
-  bool is_stopped_ = false;  ///< The rest of the edit has been given up, because somebody has stopped it.
-  bool has_outlived_ = false;
+  int last_interval_ = 0;  ///< That this run has finished or taken over.
+  /// Why the rest of the edit has been given up. Once it has been, no other reason counts: the attempt that makes what
+  /// there is must not be given up as well.
+  enum class GivenUp { no, stopped, outlived };
+  GivenUp given_up_ = GivenUp::no;
   std::stop_source out_of_time_;  ///< Ends an attempt; fires with the context's token, too.
   bool stopped_early_ = false;
 

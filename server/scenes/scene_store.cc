@@ -9,6 +9,7 @@
 #include "server/scenes/disk/bounded_cache.h"
 #include "server/scenes/disk/public_errors.h"
 #include "server/scenes/uploads/datasets.h"
+#include "server/scenes/uploads/scene_root.h"
 #include "server/scenes/uploads/uploads.h"
 #include "server/scenes/versions/previews.h"
 #include "server/scenes/versions/version_files.h"
@@ -153,6 +154,16 @@ Result<SceneInfo> SceneStore::remove_dataset(const std::string& id) {
 
 Result<std::shared_ptr<const engine::io::Dataset>> SceneStore::dataset(const std::string& id) {
   return impl_->with(id, [&](const Snapshot& at) { return impl_->datasets.get(at); });
+}
+
+Result<engine::scene::Image> SceneStore::load_photo(const engine::io::View& view, engine::MemoryBudget* memory) {
+  const StoreOptions& options = impl_->options;
+  const bool is_ours = lies_below(options.folder, view.photo) ||
+                       (!options.scene_root.empty() && lies_below(options.scene_root, view.photo));
+  if (!is_ours) return engine::fail(engine::ErrorCode::unavailable, "the photo is not where it was", "view");
+  auto photo = engine::io::load_photo(view, memory);
+  if (photo || photo.error().code == engine::ErrorCode::busy) return photo;
+  return engine::fail(photo.error().code, "the photo cannot be read", "view");
 }
 
 Result<SceneInfo> SceneStore::set_dataset_quality(const std::string& id, int dataset, std::optional<double> mean_db,

@@ -41,8 +41,9 @@ class SceneStream {
     while (sink_.open()) {
       const auto seen = service_.version();  // before the look: what happens in between ends the wait at once
       std::vector<std::string> news;
-      if (seen != looked_at_) news = look_at_edits();
-      looked_at_ = seen;
+      if (seen != looked_at_) {
+        if (auto found = look_at_edits()) news = *std::move(found), looked_at_ = seen;
+      }
       // An edit's version is there before the edit says so: told first, whoever hears of the end knows the version.
       if (!tell_scene()) return;
       for (const std::string& edit : news)
@@ -74,23 +75,29 @@ class SceneStream {
   }
 
   /// Edits that wait or run, and each once more when it has ended; also one that came and ended between two looks.
-  std::vector<std::string> look_at_edits() {
+  ///   errors  those of the store of edits; the next look tells what this one could not
+  Result<std::vector<std::string>> look_at_edits() {
     const auto active = service_.list({.scene = id_, .active_only = true, .limit = all_edits});
     const auto latest = service_.list({.scene = id_, .limit = latest_edits});
-    if (!active || !latest) return {};  // the store of edits may be back at the next look
+    if (!active) return propagate(active);
+    if (!latest) return propagate(latest);
     std::vector<std::string> news;
-    std::map<std::string, std::string> before;
-    std::swap(before, edits_);
+    std::map<std::string, std::string> now;
     for (const proto::EditStatus& edit : *active) {
-      std::string& now = edits_[edit.id] = proto::to_json(edit);
-      if (const auto known = before.find(edit.id); known == before.end() || known->second != now) news.push_back(now);
+      const std::string& status = now[edit.id] = proto::to_json(edit);
+      if (const auto known = edits_.find(edit.id); known == edits_.end() || known->second != status)
+        news.push_back(status);
     }
-    for (const auto& [id, told] : before)
-      if (!edits_.contains(id))
-        if (const auto ended = service_.find(id)) news.push_back(proto::to_json(*ended));
+    for (const auto& [id, told] : edits_) {
+      if (now.contains(id)) continue;
+      const auto ended = service_.find(id);
+      if (!ended && ended.error().code != engine::ErrorCode::not_found) return propagate(ended);
+      if (ended) news.push_back(proto::to_json(*ended));
+    }
     for (const proto::EditStatus& edit : *latest)
-      if (newest_ && came_before(*newest_, edit.id) && !edits_.contains(edit.id) && !before.contains(edit.id))
+      if (newest_ && came_before(*newest_, edit.id) && !now.contains(edit.id) && !edits_.contains(edit.id))
         news.push_back(proto::to_json(edit));
+    edits_ = std::move(now);
     newest_ = latest->empty() ? "" : latest->front().id;
     return news;
   }

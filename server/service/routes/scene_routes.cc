@@ -161,6 +161,7 @@ Result<Reply> put_dataset(const Call& call, const SceneRouteDependencies& depend
 /// A photo of the dataset, undistorted as its camera is, within max_side.
 Result<Reply> get_photo(const Call& call, const SceneRouteDependencies& dependencies) {
   const std::string view = call.query("view").value_or("");
+  if (view.empty()) return fail(ErrorCode::invalid_argument, "expected the name of a view of the dataset", "view");
   const int limit = dependencies.renders.options().max_side;
   const auto side = engine::number_in<int>(call.query("max_side").value_or(std::to_string(limit)));
   if (!side || *side < 1 || *side > limit)
@@ -175,7 +176,7 @@ Result<Reply> get_photo(const Call& call, const SceneRouteDependencies& dependen
   Result<std::vector<std::byte>> bytes;
   // Decoding takes as long as a picture: it waits for its turn among them.
   const auto done = dependencies.renders.run_in_turn([&] {
-    bytes = engine::io::load_photo(*found, dependencies.renders.options().memory)
+    bytes = dependencies.store.load_photo(*found, dependencies.renders.options().memory)
                 .and_then([&](engine::scene::Image photo) -> Result<engine::scene::Image> {
                   const auto camera = engine::scene::fit_within(found->camera, *side);
                   if (photo.width <= camera.width) return photo;
@@ -186,7 +187,7 @@ Result<Reply> get_photo(const Call& call, const SceneRouteDependencies& dependen
                 });
   });
   if (!done) return propagate(done);
-  if (!bytes) return fail(bytes.error().code, "the photo cannot be read: " + bytes.error().message, "view");
+  if (!bytes) return propagate(bytes);
   Reply reply;
   reply.media_type = "image/jpeg";
   reply.body.assign(reinterpret_cast<const char*>(bytes->data()), bytes->size());

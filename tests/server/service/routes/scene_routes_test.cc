@@ -226,8 +226,22 @@ TEST_F(SceneRoutes, ShowAPhotoOfTheDatasetAndTakeTheDatasetAway) {
     EXPECT_NEAR(image->data[0], 0.5f, 0.02f);
   }
   EXPECT_EQ(shown("none.png", "64").error().where, "view");
+  EXPECT_EQ(shown("", "64").error().code, ErrorCode::invalid_argument);
   EXPECT_EQ(shown(view, "0").error().where, "max_side");
   EXPECT_EQ(shown(view, "100000").error().where, "max_side");
+
+  // Somebody puts a link to a picture elsewhere in the photo's place, or takes it away.
+  const std::filesystem::path file = store->dataset(id).value()->views[0].photo;
+  support::write_file(temp.path() / "secret.png", png(photo));
+  std::filesystem::remove(file);
+  for (const bool is_link : {true, false}) {
+    SCOPED_TRACE(is_link);
+    is_link ? std::filesystem::create_symlink(temp.path() / "secret.png", file) : void(std::filesystem::remove(file));
+    const auto refused = shown(view, "64");
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().where, "view");
+    EXPECT_EQ(refused.error().message.find(temp.path().string()), std::string::npos) << refused.error().message;
+  }
 
   const auto gone = call("DELETE", "/v1/scenes/{id}/dataset", about(id));
   ASSERT_TRUE(gone) << gone.error().message;
