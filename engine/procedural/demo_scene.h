@@ -70,9 +70,9 @@ struct StillLife {
 /// evenly as n can be.
 [[nodiscard]] std::vector<scene::Camera> make_arc_cameras(int count, int width, int height);
 
-/// Precondition: validate(options) holds. The cloud's size is within 1 % of options.gaussians; with a ball_shift, what no
-/// camera has seen comes on top, and the drag of the ball leads back to its place. Same options, same
-/// bytes, for any number of threads.
+/// Precondition: validate(options) holds. The cloud's size is within 1 % of options.gaussians; with a ball_shift, what
+/// no camera has seen comes on top, and the drag of the ball leads back to its place. Same options, same bytes, for any
+/// number of threads.
 [[nodiscard]] DemoScene make_demo_scene(const DemoOptions& options = {});
 
 }  // namespace engine::procedural

@@ -52,9 +52,9 @@ struct Corrected {
 
 /// Which correction it is.
 struct Round {
-  int interval = 1;     ///< u, from 1.
-  int correction = 1;   ///< a, from 1.
-  double strength = 0;  ///< S(a), 0 to 1.
+  int interval = 1;      ///< u, from 1.
+  int correction = 1;    ///< a, from 1.
+  double strength = 0;   ///< S(a), 0 to 1.
   bool arrives = false;  ///< The interval is the last one: what moved stays where it is now.
 };
 

@@ -81,9 +81,10 @@ class SceneStore {
   [[nodiscard]] Result<SceneInfo> remove_dataset(const std::string& id);
   /// The dataset without its points; null without one.
   [[nodiscard]] Result<std::shared_ptr<const engine::io::Dataset>> dataset(const std::string& id);
-  /// A photo of a dataset, as io::load_photo() gives it. Somebody who may write below the scene root may have put a link
-  /// in its place: what leads out of the root, and of the store, is not shown.
-  ///   errors  unavailable: it is not there any more, or leads elsewhere; those of io::load_photo() without a message of
+  /// A photo of a dataset, as io::load_photo() gives it. Somebody who may write below the scene root may have put a
+  /// link in its place: what leads out of the root, and of the store, is not shown.
+  ///   errors  unavailable: it is not there any more, or leads elsewhere; those of io::load_photo() without a message
+  ///   of
   ///           this machine's
   [[nodiscard]] Result<engine::scene::Image> load_photo(const engine::io::View& view, engine::MemoryBudget* memory);
   /// Notes what a comparison of renders with photos found; nothing for figures, if no photo could be compared.

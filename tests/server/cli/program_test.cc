@@ -76,8 +76,8 @@ TEST(Program, SaysItsVersion) {
 }
 
 TEST(Program, RefusesAWrongCommandLineInOneLine) {
-  expect_error({}, 2,
-               "a subcommand is required: serve edit select fit render info models convert demo-scene admin bench-edit");
+  expect_error(
+      {}, 2, "a subcommand is required: serve edit select fit render info models convert demo-scene admin bench-edit");
   expect_error({"bake"}, 2, "\"bake\" is no subcommand");
   expect_error({"serve"}, 2, "--data-dir is required");
   expect_error({"edit"}, 2, "--scene is required");

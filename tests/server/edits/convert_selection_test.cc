@@ -150,8 +150,12 @@ TEST(SelectionToEngine, HoldsOnlySoManyPixelsOfMasks) {
 
 /// Five rows in a line, of which the middle three are selected.
 select::Selected three_in_a_line() {
-  return {
-      .rows = {0, 1, 1, 1, 0}, .count = 3, .bounds = {{1, 0, 0}, {3, 0.5f, 0}}, .centre = {2, 0, 0}, .border = {}, .warnings = {}};
+  return {.rows = {0, 1, 1, 1, 0},
+          .count = 3,
+          .bounds = {{1, 0, 0}, {3, 0.5f, 0}},
+          .centre = {2, 0, 0},
+          .border = {},
+          .warnings = {}};
 }
 
 TEST(HandOver, SaysTheRowsAndHowFarHandlesGrip) {
