@@ -186,6 +186,31 @@ describe('the view', () => {
     assert.ok(away[1] < 0 && Math.hypot(away[0], away[2]) < 1e-6, `from above: ${away}`);
   });
 
+  test('flies where it looks while keys are held, and a drag looks around', async () => {
+    const { camera: before } = await hand.looksFrom();
+    await id('fly').click();
+    assert.equal(await id('fly').getAttribute('aria-pressed'), 'true');
+    await page.keyboard.down('w');
+    await page.waitForTimeout(400);
+    await page.keyboard.up('w');
+    const { camera: ahead, box } = await hand.looksFrom();
+    const minus = (a, b) => a.map((x, i) => x - b[i]);
+    const forward = minus(before.target, before.eye);
+    const gone = minus(ahead.eye, before.eye);
+    const along = gone.reduce((sum, x, i) => sum + x * forward[i], 0) / Math.hypot(...forward);
+    assert.ok(along > 0.03 * Math.hypot(...forward) && Math.hypot(...gone) - along < 1e-6 * along, `${gone}`);
+    minus(ahead.target, before.target).forEach((x, i) => assert.ok(Math.abs(x - gone[i]) < 1e-9, 'the pivot comes along'));
+    await hand.drag([box.x + 300, box.y + 150], [box.x + 400, box.y + 150]);
+    const { camera: turned } = await hand.looksFrom();
+    assert.deepEqual(turned.eye, ahead.eye);
+    assert.ok(Math.hypot(...minus(turned.target, ahead.target)) > 0.1);
+    await hand.shot('hands-flying');
+    await page.keyboard.press('Escape');
+    assert.equal(await id('fly').getAttribute('aria-pressed'), 'false');
+    await page.keyboard.press('d');
+    assert.deepEqual((await hand.looksFrom()).camera.eye, ahead.eye);
+  });
+
   test('up is as the cameras were held, can be flipped, and told by three clicks on the table', async () => {
     const up = async () => (await service.client.get(`/v1/scenes/${scene.id}`)).json().up;
     const saved = () => page.waitForResponse((r) => r.request().method() === 'PATCH');
@@ -230,8 +255,13 @@ describe('the view', () => {
 });
 
 describe('shapes', () => {
-  /// The selection that is asked for when something is done.
-  const asked = async (act) => (await Promise.all([page.waitForResponse((r) => r.url().endsWith('/select')), act()]))[0].request().postDataJSON().selection;
+  /// The selection that is asked for when something is done: the first that `is` what is waited for. Answers to what was
+  /// done before may still be on their way.
+  const asked = async (act, is = () => true) => {
+    const selectionOf = (response) => response.request().postDataJSON().selection;
+    const [response] = await Promise.all([page.waitForResponse((r) => r.url().endsWith('/select') && is(selectionOf(r))), act()]);
+    return selectionOf(response);
+  };
   const settled = () => page.waitForFunction(() => {
     const { count, waits } = document.querySelector('[data-testid=selection-count]').dataset;
     return count !== undefined && waits === undefined;
@@ -252,7 +282,7 @@ describe('shapes', () => {
     assert.ok(await hand.count() > few);
     await hand.shot('hands-sphere');
     await id('gizmo-move-x').focus();
-    const [{ sphere: moved }] = await asked(() => page.keyboard.press('ArrowLeft'));
+    const [{ sphere: moved }] = await asked(() => page.keyboard.press('ArrowLeft'), ([step]) => step.sphere.center[0] !== sphere.center[0]);
     assert.ok(moved.center[0] < sphere.center[0] && moved.center[1] === sphere.center[1]);
     await page.keyboard.press('Control+z');
     await page.keyboard.press('Control+z');
@@ -272,7 +302,7 @@ describe('shapes', () => {
     await id('shape-minus-y').focus();
     await page.keyboard.press('ArrowUp');
     await id('shape-turn-y').fill('30');
-    const last = await asked(() => id('shape-turn-y').blur());
+    const last = await asked(() => id('shape-turn-y').blur(), (steps) => steps.at(-1).box.rotation !== undefined);
     assert.ok(Math.abs(last.at(-1).box.rotation[2] - Math.sin(Math.PI / 12)) < 1e-9);
     assert.ok(last.at(-1).box.size[1] > box.size[1]);
     await settled();
