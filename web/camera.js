@@ -192,15 +192,41 @@ export function ellipseOf(camera, { low, high }) {
   return { x: (left + right) / 2, y: (top + bottom) / 2, rx: (right - left) / 2, ry: (bottom - top) / 2 };
 }
 
+/** How far a camera may pitch, of `pitch` radians, before it looks straight along the up axis. */
+function allowedPitch(forward, up, pitch) {
+  const elevation = Math.acos(Math.min(1, Math.max(-1, dot(forward, up))));
+  return Math.min(Math.PI - POLE_MARGIN, Math.max(POLE_MARGIN, elevation + pitch)) - elevation;
+}
+
 /** Turns the camera about its target: `yaw` about the world's up axis, `pitch` about its own horizontal, radians.
  *  Positive values move the scene right and down, as a hand on it would. */
 export function orbited(pose, yaw, pitch, worldUp) {
   const up = unit(worldUp, DEFAULT_UP);
   const { right, forward } = axes(pose);
-  const elevation = Math.acos(Math.min(1, Math.max(-1, dot(forward, up))));
-  const allowed = Math.min(Math.PI - POLE_MARGIN, Math.max(POLE_MARGIN, elevation + pitch)) - elevation;
+  const allowed = allowedPitch(forward, up, pitch);
   const turn = (v) => turned(turned(v, right, -allowed), up, -yaw);
   return { ...pose, eye: add(pose.target, turn(sub(pose.eye, pose.target))), up: turn(pose.up) };
+}
+
+/** Turns the camera about itself. Positive values turn it left and up: the scene moves right and down, as a hand on it
+ *  would. */
+export function lookedAround(pose, yaw, pitch, worldUp) {
+  const up = unit(worldUp, DEFAULT_UP);
+  const { right, forward } = axes(pose);
+  const allowed = allowedPitch(forward, up, -pitch);
+  const turn = (v) => turned(turned(v, right, -allowed), up, yaw);
+  return { ...pose, target: add(pose.eye, turn(sub(pose.target, pose.eye))), up: turn(pose.up) };
+}
+
+/** Moves the camera, and its pivot with it, to its right, along the world's up and ahead: [right, up, ahead] in world
+ *  units. */
+export function flown(pose, [aside, upwards, ahead], worldUp) {
+  const { right, forward } = axes(pose);
+  const shift = [[right, aside], [unit(worldUp, DEFAULT_UP), upwards], [forward, ahead]].reduce(
+    (sum, [axis, by]) => addScaled(sum, axis, by),
+    [0, 0, 0],
+  );
+  return { ...pose, eye: add(pose.eye, shift), target: add(pose.target, shift) };
 }
 
 /** Moves the camera sideways so that what is at the target's depth follows a hand that moves by (dx, dy) pixels. */

@@ -113,6 +113,7 @@ export function showHelp({ letterKeys, setLetterKeys }) {
     ["Right drag, or Shift + drag", "move sideways"],
     ["Wheel, or + and −", "nearer, farther"],
     ["Double click, or F", "turn about the point under the pointer"],
+    ["T", "fly, and back: W, A, S, D and the arrow keys, E up, Q down, with Shift faster; a drag looks around"],
     ["Drag a handle's dot", "set where it goes; the arrow keys move it, too"],
     ["Wheel over a dot", "its radius"],
     ["Arrow keys", "orbit; with Shift: move sideways"],

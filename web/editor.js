@@ -46,6 +46,7 @@ export const NOTHING_OPEN = {
   comparing: false,
   contrast: null, // How two versions are compared beside each other: "slider", "blink", "difference".
   photoOn: false, // The dataset's photo lies over the picture.
+  flying: false, // Keys move the camera, and a drag looks around.
   compareWith: null, // A version; null: the one before.
   ...NOTHING_SELECTED,
   handles: [], // {id, source, normal, target, rotation, scale, radius, grip, group}; grip: the radius with a selection, or null

@@ -194,6 +194,7 @@ function listenToKeys() {
     "]": () => editor.stepView(1),
     r: () => editor.home(),
     f: () => viewer.focusHere(),
+    t: () => store.set({ flying: !store.state.flying }),
     p: () => editor.preview(),
     g: () => next(store, "gizmo"),
     w: () => next(store, "frame"),
@@ -207,6 +208,7 @@ function listenToKeys() {
     backspace: () => editor.state.selected !== null && editor.remove(editor.state.selected),
     escape: () =>
       viewer.giveUpDrag() ||
+      (store.state.flying && (store.set({ flying: false }), true)) ||
       (store.state.floorClicks && (store.set({ floorClicks: null }), true)) ||
       (editor.state.selectMode
         ? editor.selecting.use(null)
@@ -230,13 +232,18 @@ function listenToKeys() {
       return event.shiftKey ? editor.redo() : editor.undo();
     }
     if (event.ctrlKey || event.metaKey || event.altKey) return;
+    if (viewer.flyBy(event)) return;
     if (constraints[key]) return store.set({ constraint: constraints[key] });
     plain[key]?.();
   });
   document.addEventListener("keyup", (event) => {
     if (event.key.toLowerCase() === "b") store.set({ comparing: false });
+    viewer.endFlyingBy(event.key);
   });
-  window.addEventListener("blur", () => store.set({ comparing: false }));
+  window.addEventListener("blur", () => {
+    store.set({ comparing: false });
+    viewer.endFlyingBy(null);
+  });
 }
 
 /** A file dropped anywhere goes where it belongs: scenes to the list, a zip to the open scene, JSON to its handles. */

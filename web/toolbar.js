@@ -52,6 +52,8 @@ HINTS.floor = [
   "What is at right angles to them is up.",
   "Click: on the floor · Drag: orbit · Wheel: nearer · Esc: give up",
 ];
+/** What the pointer and the keys do while the camera flies, whatever the tool. */
+const FLYING = "W, A, S, D: fly · E, Q: up, down · Shift: faster · Drag: look around · Esc: end";
 HINTS.rectangle = HINTS.lasso.map((text) => text.replace("Draw around", "Draw a rectangle around"));
 
 export function buildToolbar(editor, viewer) {
@@ -107,9 +109,11 @@ export function buildToolbar(editor, viewer) {
     layer.element,
     h("div", { class: "row tight" }, compare, compareWith.element),
   );
+  const fly = iconButton("➤", "fly", "Fly (T)", () => store.set({ flying: !store.state.flying }));
   byId("view-tools").append(
     iconButton("⊕", "focus", "Turn about the point under the pointer (F); here: about the middle", () => viewer.focusHere()),
     iconButton("⌂", "reset-view", "Back to the start (R)", () => editor.home()),
+    fly,
   );
 
   const chip = h("span", { class: "chip", testid: "shown-chip" });
@@ -126,11 +130,12 @@ export function buildToolbar(editor, viewer) {
   const hint = h("strong", {});
   const hintMore = h("span", {});
   byId("hint").append(hint, hintMore);
-  store.watch(["selectMode", "selectTool", "thingMode", "floorClicks"], ({ floorClicks }) => {
+  store.watch(["selectMode", "selectTool", "thingMode", "floorClicks", "flying"], ({ floorClicks, flying }) => {
     const [lead, more, keys] = HINTS[viewer.tool];
     text(hint, lead + (floorClicks?.length ? `: ${3 - floorClicks.length} more` : ""));
     text(hintMore, more);
-    text(keysLine, keys);
+    text(keysLine, flying ? FLYING : keys);
+    attrs(fly, { "aria-pressed": String(flying) });
   });
 
   store.watch(

@@ -7,6 +7,8 @@ import {
   dollied,
   dragged,
   ellipseOf,
+  flown,
+  lookedAround,
   onTheWire,
   orbited,
   panned,
@@ -19,6 +21,7 @@ import {
 } from "./camera.js";
 import { ARROWS, attrs, byId, text } from "./dom.js";
 import { shownVersion } from "./editor.js";
+import { Flight } from "./fly.js";
 import { AdaptiveSide, FrameQueue, Recent, serverTime } from "./frames.js";
 import { HeldView } from "./held.js";
 import { Overlay } from "./overlay.js";
@@ -27,7 +30,7 @@ import { isShape } from "./selecting.js";
 import { clicksOf, listOf, proposalOf, thinned } from "./selection.js";
 import { lastShape, ShapeView } from "./shapes.js";
 import { clickFloor } from "./up.js";
-import { add, sub, unit } from "./vectors.js";
+import { add, distance, scale, sub, unit } from "./vectors.js";
 
 // All of these are choices, tried by hand.
 const MAX_SIDE = 1600; // Pixels of the longer side of a picture at rest: sharp enough on a large window.
@@ -71,6 +74,7 @@ export class Viewer {
   #stillTimer = null;
   #busyTimer = null;
   #thumbnailTimer = null;
+  #flight = new Flight((step) => this.#fly(step));
 
   constructor(editor) {
     this.#editor = editor;
@@ -486,7 +490,7 @@ export class Viewer {
           now.centre.x - gesture.centre.x,
           now.centre.y - gesture.centre.y,
         );
-        return dollied(moved, gesture.apart / now.apart, this.#nearest());
+        return this.#approached(moved, gesture.apart / now.apart);
       });
       Object.assign(gesture, now);
       return;
@@ -498,8 +502,10 @@ export class Viewer {
     this.#pointers.set(event.pointerId, to);
     if (gesture.drag) return gesture.drag.move(to.x, to.y);
     const [dx, dy] = [to.x - from.x, to.y - from.y];
-    if (gesture.kind === "orbit")
-      this.#turn((pose) => orbited(pose, dx * ORBIT_PER_PX, dy * ORBIT_PER_PX, this.#editor.worldUp));
+    if (gesture.kind === "orbit") {
+      const turned = this.#state.flying ? lookedAround : orbited;
+      this.#turn((pose) => turned(pose, dx * ORBIT_PER_PX, dy * ORBIT_PER_PX, this.#editor.worldUp));
+    }
     else this.#turn((pose) => panned({ ...pose, ...this.#size }, dx, dy));
   }
 
@@ -560,11 +566,40 @@ export class Viewer {
     return (this.#state.scene.radius || 1) * 1e-3;
   }
 
+  /** Comes nearer to the pivot; who flies takes the pivot along. */
+  #approached(pose, factor) {
+    if (!this.#state.flying) return dollied(pose, factor, this.#nearest());
+    return flown(pose, [0, 0, (1 - factor) * distance(pose.eye, pose.target)], this.#editor.worldUp);
+  }
+
+  #fly(step) {
+    if (!this.#state.flying || !this.#state.pose) return this.#flight.stop();
+    this.#turn((pose) => flown(pose, scale(step, distance(pose.eye, pose.target)), this.#editor.worldUp));
+  }
+
+  /** A key went down somewhere on the page. Returns whether it flies. */
+  flyBy(event) {
+    const key = event.key.toLowerCase();
+    // Arrow keys are those of whatever has the focus.
+    if (!this.#state.flying || (key.startsWith("arrow") && event.target !== this.#view)) return false;
+    const flies = this.#flight.press(key, event.shiftKey);
+    if (flies) event.preventDefault();
+    return flies;
+  }
+
+  /** A key was let go; null: all of them. */
+  endFlyingBy(key) {
+    if (key === null) this.#flight.stop();
+    else this.#flight.release(key.toLowerCase());
+  }
+
   #wheel(event) {
     event.preventDefault();
     if (!this.camera) return;
     const { x, y } = this.#place(event);
-    this.#turn((pose) => zoomedAt({ ...pose, ...this.#size }, x, y, wheelFactor(event), this.#nearest()));
+    const factor = wheelFactor(event);
+    if (this.#state.flying) this.#turn((pose) => this.#approached(pose, factor));
+    else this.#turn((pose) => zoomedAt({ ...pose, ...this.#size }, x, y, factor, this.#nearest()));
   }
 
   /** The wheel turned over a handle's dot: towards the user, a larger sphere. */
@@ -584,11 +619,12 @@ export class Viewer {
     if (event.ctrlKey || event.metaKey || event.target !== this.#view || !this.camera) return;
     if (event.altKey && event.key !== "Enter") return;
     const arrow = ARROWS[event.key];
+    if (arrow && this.#state.flying) return; // flyBy() sees them.
     if (arrow && event.shiftKey)
       this.#turn((pose) => panned({ ...pose, ...this.#size }, -30 * arrow[0], -30 * arrow[1]));
     else if (arrow) this.#turn((pose) => orbited(pose, 0.09 * arrow[0], 0.09 * arrow[1], this.#editor.worldUp));
-    else if (event.key === "+" || event.key === "=") this.#turn((pose) => dollied(pose, 0.9, this.#nearest()));
-    else if (event.key === "-" || event.key === "_") this.#turn((pose) => dollied(pose, 1 / 0.9, this.#nearest()));
+    else if (event.key === "+" || event.key === "=") this.#turn((pose) => this.#approached(pose, 0.9));
+    else if (event.key === "-" || event.key === "_") this.#turn((pose) => this.#approached(pose, 1 / 0.9));
     else if (event.key === "Enter") this.#click({ x: this.#size.width / 2, y: this.#size.height / 2 }, event.altKey);
     else return;
     // Only who works by keyboard needs to see where the middle is.

@@ -9,8 +9,10 @@ import {
   dragged,
   ellipseOf,
   firstPose,
+  flown,
   focal,
   isPose,
+  lookedAround,
   onLine,
   onTheWire,
   onViewPlane,
@@ -276,6 +278,35 @@ test("an orbit does not go over the pole", () => {
     assert.ok(Math.abs(dot(forward, [0, -1, 0])) < Math.cos((2 * Math.PI) / 180));
     assert.ok(dot(down, [0, -1, 0]) < 0, "still the right way up");
   }
+});
+
+test("looking around stays where it is, moves all that is seen with the hand, and does not go over the pole", () => {
+  const straight = { eye: [0, 0, -5], target: [0, 0, 0], up: [0, -1, 0], fov: 50, width: 400, height: 400 };
+  for (const point of [[0, 0, -4], [0, 0, 90]]) {
+    const before = project(straight, point);
+    const right = { ...straight, ...lookedAround(straight, 0.1, 0, [0, -1, 0]) };
+    assert.equal(right.eye, straight.eye);
+    near(distance(right.eye, right.target), 5);
+    assert.ok(project(right, point).x > before.x + 1);
+    const downwards = { ...straight, ...lookedAround(straight, 0, 0.1, [0, -1, 0]) };
+    assert.ok(project(downwards, point).y > before.y + 1);
+  }
+  for (const pitch of [0.7, -0.7]) {
+    let turned = { ...pose, up: [0, -1, 0] };
+    for (let i = 0; i < 50; ++i) turned = lookedAround(turned, 0, pitch, [0, -1, 0]);
+    const { forward, down } = axes(turned);
+    assert.ok(Math.abs(dot(forward, [0, -1, 0])) < Math.cos((2 * Math.PI) / 180));
+    assert.ok(dot(down, [0, -1, 0]) < 0, "still the right way up");
+  }
+});
+
+test("who flies goes aside, up and ahead, and takes the pivot along", () => {
+  const straight = { eye: [0, 0, -5], target: [0, 0, 0], up: [0, -1, 0], fov: 50 };
+  const gone = flown(straight, [1, 2, 3], [0, -2, 0]);
+  near(gone.eye, [1, -2, -2]);
+  near(gone.target, [1, -2, 3]);
+  // Up is the world's, wherever the camera looks.
+  near(sub(flown(pose, [0, 1, 0], [0, -1, 0]).eye, pose.eye), [0, -1, 0]);
 });
 
 test("panning by a pixel moves the target's surroundings by a pixel", () => {
