@@ -77,6 +77,29 @@ bool jpeg_is_complete(std::span<const std::byte> bytes) {
   return false;
 }
 
+/// A JPEG without what stands in it beside the picture, EXIF data and comments: of damaged ones the library reads what
+/// lies behind them in memory. The segments of JFIF and Adobe stay, which say what the channels are. Behind the start
+/// of the first scan, where the library looks for none, all is as it was.
+std::vector<std::byte> without_metadata(std::span<const std::byte> jpeg) {
+  constexpr std::size_t jfif = 0xffe0, adobe = 0xffee, last_application = 0xffef, comment = 0xfffe, scan = 0xffda;
+  std::vector<std::byte> out(jpeg.begin(), jpeg.begin() + 2);  // the start-of-image marker
+  std::size_t at = 2;
+  while (at + 4 <= jpeg.size()) {
+    const std::size_t marker = big_endian(jpeg, at, 2);
+    if (marker == 0xffff) {  // a fill byte
+      ++at;
+      continue;
+    }
+    const std::size_t end = at + 2 + big_endian(jpeg, at + 2, 2);
+    if (marker < 0xffc0 || marker == scan || end > jpeg.size()) break;
+    const bool is_metadata = marker == comment || (marker > jfif && marker <= last_application && marker != adobe);
+    if (!is_metadata) out.insert(out.end(), jpeg.begin() + std::ptrdiff_t(at), jpeg.begin() + std::ptrdiff_t(end));
+    at = end;
+  }
+  out.insert(out.end(), jpeg.begin() + std::ptrdiff_t(at), jpeg.end());
+  return out;
+}
+
 /// Do the chunks run to IEND? Without it the last rows may still decode.
 bool png_is_complete(std::span<const std::byte> bytes) {
   std::size_t at = 8;  // behind the signature
@@ -87,6 +110,8 @@ bool png_is_complete(std::span<const std::byte> bytes) {
   }
   return false;
 }
+
+bool is_jpeg(const std::optional<Format>& format) { return format && std::string_view(format->name) == "JPEG"; }
 
 bool is_complete(const Format& format, std::span<const std::byte> bytes) {
   const std::string_view name = format.name;
@@ -189,6 +214,8 @@ Result<Image> decode(std::span<const std::byte> bytes, const std::string& name, 
   const auto format = sniff(bytes);
   if (format && !is_complete(*format, bytes))
     return fail(ErrorCode::corrupt_data, "the picture ends before its last row: copy or download it again", name);
+  std::vector<std::byte> plain;
+  if (is_jpeg(format)) plain = without_metadata(bytes), bytes = plain;
   Filesystem::IOMemReader source(const_cast<std::byte*>(bytes.data()), bytes.size());  // reads; takes a void*
   auto opened = open_reader(bytes, source, name, options);
   if (!opened) return propagate(opened);
@@ -333,10 +360,20 @@ Result<PictureSize> picture_size(const std::filesystem::path& path, const ImageO
   const auto first_bytes = file->read_at(0, std::min<std::uint64_t>(file->size(), 12));
   if (!first_bytes) return propagate(first_bytes);
   try {
+    const auto size_by = [&](Filesystem::IOProxy& source) -> Result<PictureSize> {
+      const auto reader = open_reader(*first_bytes, source, file->name(), options);
+      if (!reader) return propagate(reader);
+      return PictureSize{(*reader)->spec().width, (*reader)->spec().height};
+    };
+    if (is_jpeg(sniff(*first_bytes))) {
+      const auto bytes = read_bytes(path, options.max_file_bytes);
+      if (!bytes) return propagate(bytes);
+      std::vector<std::byte> plain = without_metadata(*bytes);
+      Filesystem::IOMemReader source(plain.data(), plain.size());
+      return size_by(source);
+    }
     Filesystem::IOFile source(path.string(), Filesystem::IOProxy::Read);
-    const auto reader = open_reader(*first_bytes, source, file->name(), options);
-    if (!reader) return propagate(reader);
-    return PictureSize{(*reader)->spec().width, (*reader)->spec().height};
+    return size_by(source);
   } catch (const std::exception&) {
     return undecodable(file->name());
   }

@@ -473,7 +473,8 @@ TEST(DecodeImage, BelievesNoHeaderThatPromisesMoreThanItsBytesCanHold) {
         SCOPED_TRACE(std::to_string(compression) + " " + std::to_string(tile) + " " + std::to_string(width));
         const auto begin = std::chrono::steady_clock::now();
         const auto image = decode_image(promising_exr(width, width / 2, compression, tile, 1, 16384), "a.exr", {});
-        EXPECT_LT(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), 1);
+        // It took up to 8 s; refused, it takes some milliseconds, or one second under a sanitizer on a busy machine.
+        EXPECT_LT(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), 5);
         ASSERT_FALSE(image);
         EXPECT_EQ(image.error().code, ErrorCode::corrupt_data) << image.error().message;
       }
