@@ -5,6 +5,7 @@ import { parentOf, shownVersion } from "./editor.js";
 import { choice, segments } from "./fields.js";
 import { gaussians } from "./format.js";
 import { isStated } from "./requests.js";
+import { listOf } from "./selection.js";
 
 const LAYERS = [
   ["color", "Colour", "The scene"],
@@ -154,7 +155,7 @@ export function buildToolbar(editor, viewer) {
   store.watch(
     [
       ...["scene", "version", "views", "viewName", "viewsKind", "layer", "comparing", "compareWith", "preview"],
-      ...["handles", "selection", "mode", "selectMode", "thingMode", "floorClicks"],
+      ...["handles", "selection", "mode", "selectMode", "thingMode", "floorClicks", "heal", "healing"],
     ],
     (state) => {
       const { scene } = state;
@@ -194,7 +195,7 @@ export function buildToolbar(editor, viewer) {
       attrs(chip, { class: previewing ? "chip preview" : state.comparing ? "chip compare" : "chip" });
       back.hidden = !previewing;
       const begun = isStated(state) || scene.versions.length > 1;
-      byId("hint").hidden = !state.floorClicks && (state.selection.length > 0 || (!state.selectMode && begun));
+      byId("hint").hidden = !state.floorClicks && (listOf(state).length > 0 || (!state.selectMode && begun));
     },
   );
 }
