@@ -1,7 +1,7 @@
 // Questions, the token, and short messages.
 
 import * as api from "./api.js";
-import { byId, h, iconButton, problemPlace, showProblem } from "./dom.js";
+import { BY_TOUCH, byId, h, iconButton, problemPlace, showProblem } from "./dom.js";
 
 /** A short message at the foot of the page; read out by screen readers.
  *    kind    "good", "bad", or nothing
@@ -102,7 +102,9 @@ export function showHelp({ letterKeys, setLetterKeys }) {
     ["Tap", "take the thing under the finger, or what the tool does"],
     ["Drag a thing that is taken", "move it; let go, and it is repaired"],
     ["Drag beside it", "orbit"],
-    ["Two fingers", "move sideways, nearer, farther"],
+    ["Two fingers", "move sideways, nearer, farther; lift one, and the other orbits, whatever the tool"],
+    ["Lasso, Frame", "draw, or tap the corners; a lasso ends where it began"],
+    ["A tab at the foot", "opens the panel: all of it as numbers, edits, versions; ⌄ folds it away"],
     ["Tap twice", "turn about that point"],
     ["Hold to compare", "see it as it was before; beside it, a slider, blinking, the difference"],
   ];
@@ -124,6 +126,7 @@ export function showHelp({ letterKeys, setLetterKeys }) {
     ["E", "mark what a run heals"],
     ["O", "the dataset's photo over its camera's picture"],
     ["1 to 6", "select by clicks, brush, lasso, rectangle, sphere, box"],
+    ["Clicks, with lasso or frame", "its corners, for who does not draw; a lasso ends where it began"],
     ["Right click, or Alt", "selecting: what is not meant"],
     ["V, U, L, X, Y, Z, N", "drag in the view's plane, on surfaces, level, along an axis, along the normal"],
     ["G, W", "next part of the gizmo: move, turn, size; next of its axes: world, view, surface"],
@@ -138,7 +141,7 @@ export function showHelp({ letterKeys, setLetterKeys }) {
     ["Esc", "give a drag up; end selecting; let go"],
     ["?", "this help"],
   ];
-  const rows = matchMedia("(hover: none)").matches ? touch : keys;
+  const rows = BY_TOUCH ? touch : keys;
   const letters = h("input", { type: "checkbox", testid: "letter-keys", checked: letterKeys });
   letters.addEventListener("change", () => setLetterKeys(letters.checked));
   openDialog(

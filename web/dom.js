@@ -31,6 +31,9 @@ export const iconButton = (label, testid, title, onclick, more = {}) =>
 
 export const row = (...children) => h("div", { class: "row" }, ...children);
 
+/** Whether a finger is what points here: then there is no right button, no wheel, and seldom a key. */
+export const BY_TOUCH = globalThis.matchMedia?.("(hover: none)").matches ?? false;
+
 export const byId = (id) => document.getElementById(id);
 
 /** Sets attributes of an element; null removes one. */

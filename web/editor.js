@@ -80,6 +80,7 @@ export const NOTHING_OPEN = {
   answering: true, // Whether the service answers.
   gone: false, // Whether somebody has deleted the scene.
   tab: "drag",
+  sheet: false, // Where there is no room beside the picture, the panel is a sheet over its foot: whether that is open.
 };
 
 /** What undo brings back, all at once: a drag is meant on a version, in a mode, with settings. */

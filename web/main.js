@@ -154,7 +154,7 @@ function buildTabs() {
         id: `tab-button-${name}`,
         "aria-controls": `tab-${name}`,
         testid: `tab-button-${name}`,
-        onclick: () => store.set({ tab: name }),
+        onclick: () => store.set({ tab: name, sheet: true }),
         onkeydown: (event) => {
           const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
           if (!step) return;
@@ -169,6 +169,13 @@ function buildTabs() {
     ),
   );
   byId("tabs").append(...buttons);
+  byId("fold").addEventListener("click", () => store.set({ sheet: !store.state.sheet }));
+  store.watch(["sheet"], ({ sheet }) => {
+    byId("panel").classList.toggle("folded", !sheet);
+    const label = sheet ? "Fold the panel away" : "Open the panel";
+    attrs(byId("fold"), { "aria-expanded": String(sheet), "aria-label": label, title: label });
+    text(byId("fold"), sheet ? "⌄" : "⌃");
+  });
   store.watch(["tab"], ({ tab }) => {
     TABS.forEach(([name], i) => {
       attrs(buttons[i], { "aria-selected": String(name === tab), tabindex: name === tab ? "0" : "-1" });

@@ -74,6 +74,14 @@ export function buildTools(editor) {
     brushSize,
     depth.element,
   );
+  // The panel may be scrolled, or folded away: who selects looks at the picture.
+  const chip = h("span", { class: "chip", testid: "selected-chip", hidden: true });
+  byId("chips").append(chip);
+  store.watch(["selection", "heal", "healing", "selectMode", "selectionAnswer", "selectionWaits", "scene", "version"], (state) => {
+    const line = state.selectMode && listOf(state).length > 0 ? countLine(state) : "";
+    chip.hidden = line === "";
+    text(chip, line);
+  });
   const undo = iconButton("↶", "undo", "Undo (Ctrl + Z)", () => editor.undo());
   const redo = iconButton("↷", "redo", "Redo (Ctrl + Shift + Z)", () => editor.redo());
   byId("tools").append(hand.element, tools);

@@ -1,6 +1,6 @@
 // On the picture: what was taken hold of, how it is made more or less of, and what becomes of it once it is let go.
 
-import { attrs, button, byId, h, text } from "./dom.js";
+import { attrs, BY_TOUCH, button, byId, h, text } from "./dom.js";
 import { statusLine } from "./edits.js";
 import { duration, gaussians } from "./format.js";
 import { furtherBorders, proposalOf, sentence } from "./selection.js";
@@ -13,12 +13,19 @@ export function buildThingBar(editor) {
   const problem = h("span", { class: "thing-problem", role: "alert", hidden: true, testid: "thing-problem" });
   const less = press("\u2212 Less", "thing-less", "Only up to the next border within (,)", () => selecting.widen(-1));
   const more = press("+ More", "thing-more", "Up to the next border beyond (.)", () => selecting.widen(1));
-  const hold = press("By keys", "thing-hold", "A handle to move by arrow keys, or by numbers in the panel", () => {
+  const byKeys = () => {
     editor.holdThing();
     const { handles, selected } = store.state;
     const index = handles.findIndex((handle) => handle.id === selected);
     requestAnimationFrame(() => document.querySelector(`[data-testid=handle-${index}-target]`)?.focus());
-  });
+  };
+  const byNumbers = () => {
+    store.set({ tab: "drag", sheet: true });
+    document.querySelector("[data-testid=held]").scrollIntoView({ block: "start" });
+  };
+  const hold = BY_TOUCH
+    ? press("By numbers", "thing-hold", "Move, turn and size it by numbers", byNumbers)
+    : press("By keys", "thing-hold", "A handle to move by arrow keys, or by numbers in the panel", byKeys);
   const remove = press("Remove", "thing-remove", "Take it away for good, and complete what it hid", () =>
     editor.removeThing(),
   );

@@ -1,10 +1,11 @@
 // Above the picture: versions, views, layers, the comparison. On it: what it shows. Below it: what it took.
 
-import { attrs, button, byId, h, iconButton, text } from "./dom.js";
+import { attrs, BY_TOUCH, button, byId, h, iconButton, text } from "./dom.js";
 import { parentOf, shownVersion } from "./editor.js";
 import { choice, segments } from "./fields.js";
 import { gaussians } from "./format.js";
 import { isStated } from "./requests.js";
+import { listOf } from "./selection.js";
 
 const LAYERS = [
   ["color", "Colour", "The scene"],
@@ -36,8 +37,8 @@ const HINTS = {
   ],
   lasso: [
     "Draw around what you mean",
-    "Drag with the left button; with the right one you look around.",
-    "Drag: draw · Alt + drag: the opposite · Right drag: orbit · Wheel: nearer",
+    "Drag with the left button, or click its corners; with the right button you look around.",
+    "Drag, or click the corners: draw · Alt + drag: the opposite · Right drag: orbit · Wheel: nearer",
   ],
 };
 
@@ -52,6 +53,18 @@ HINTS.floor = [
   "What is at right angles to them is up.",
   "Click: on the floor · Drag: orbit · Wheel: nearer · Esc: give up",
 ];
+/** The same for fingers, where it is not: what to do first, and what else. */
+const TOUCH_HINTS = {
+  thing: ["Tap a thing, then drag it", HINTS.thing[1]],
+  handle: ["Tap the part you want to move", HINTS.handle[1]],
+  grow: ["Tap the thing you mean", "It is selected up to its border. With “− Not it”, tap what was taken along by mistake."],
+  brush: ["Paint over what you mean", "Two fingers move the view; lift one, and the other turns it."],
+  lasso: ["Draw around what you mean, or tap its corners", "A lasso ends where it began. Two fingers move the view."],
+  rectangle: ["Draw a rectangle, or tap two corners", "Two fingers move the view; lift one, and the other turns it."],
+  sphere: HINTS.sphere,
+  box: HINTS.box,
+  floor: ["Tap three places on the floor", HINTS.floor[1]],
+};
 /** What the pointer and the keys do while the camera flies, whatever the tool. */
 const FLYING = "W, A, S, D: fly · E, Q: up, down · Shift: faster · Drag: look around · Esc: end";
 HINTS.rectangle = HINTS.lasso.map((text) => text.replace("Draw around", "Draw a rectangle around"));
@@ -131,7 +144,8 @@ export function buildToolbar(editor, viewer) {
   const hintMore = h("span", {});
   byId("hint").append(hint, hintMore);
   store.watch(["selectMode", "selectTool", "thingMode", "floorClicks", "flying"], ({ floorClicks, flying }) => {
-    const [lead, more, keys] = HINTS[viewer.tool];
+    const keys = HINTS[viewer.tool][2];
+    const [lead, more] = (BY_TOUCH ? TOUCH_HINTS : HINTS)[viewer.tool];
     text(hint, lead + (floorClicks?.length ? `: ${3 - floorClicks.length} more` : ""));
     text(hintMore, more);
     text(keysLine, flying ? FLYING : keys);
@@ -141,7 +155,7 @@ export function buildToolbar(editor, viewer) {
   store.watch(
     [
       ...["scene", "version", "views", "viewName", "viewsKind", "layer", "comparing", "compareWith", "preview"],
-      ...["handles", "selection", "mode", "selectMode", "thingMode", "floorClicks"],
+      ...["handles", "selection", "mode", "selectMode", "thingMode", "floorClicks", "heal", "healing"],
     ],
     (state) => {
       const { scene } = state;
@@ -181,7 +195,7 @@ export function buildToolbar(editor, viewer) {
       attrs(chip, { class: previewing ? "chip preview" : state.comparing ? "chip compare" : "chip" });
       back.hidden = !previewing;
       const begun = isStated(state) || scene.versions.length > 1;
-      byId("hint").hidden = !state.floorClicks && (state.selection.length > 0 || (!state.selectMode && begun));
+      byId("hint").hidden = !state.floorClicks && (listOf(state).length > 0 || (!state.selectMode && begun));
     },
   );
 }

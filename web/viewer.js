@@ -40,6 +40,7 @@ const DOUBLE_CLICK_MS = 400; // A second click sooner than this, at the same pla
 const CLICK_PX = 4; // A pointer that moves less than this has clicked, not dragged.
 const ORBIT_PER_PX = 0.0055; // Radians: half a turn across 570 pixels.
 const THING_PX = 14; // A thing is taken hold of within this of its middle, however small it is.
+const CORNER_PX = 12; // A click this near to a corner is on it: a finger is no finer.
 const SKETCH_PX = 2; // A line that is drawn has a corner this often at most.
 const MAX_CACHED_PICTURES = 6; // Enough to go back and forth between two versions and three layers.
 const DRAWING = ["brush", "lasso", "rectangle", "sphere", "box"]; // With the left button.
@@ -70,6 +71,7 @@ export class Viewer {
   #gesture = null;
   #pointerAt = null;
   #clicked = { at: -Infinity, x: 0, y: 0 };
+  #corners = []; // [x, y] of a lasso or a rectangle that is clicked rather than drawn, so far.
   #movingUntil = 0;
   #stillTimer = null;
   #busyTimer = null;
@@ -111,6 +113,8 @@ export class Viewer {
       () => this.#drawOverlay(),
     );
     store.watch(["selectMode", "selectTool", "thingMode", "brushRadius", "floorClicks"], () => this.#toolChanged());
+    // Corners are of one picture.
+    store.watch(["pose", "scene", "version", "selectMode", "selectTool"], () => this.#dropCorners());
     new ResizeObserver(() => this.#resized()).observe(this.#view);
   }
 
@@ -432,23 +436,51 @@ export class Viewer {
     const show = () =>
       this.#overlay.sketch({
         tool,
-        points,
+        points: [...this.#corners, ...points],
         radius: isShape(tool) ? reach() : this.#state.brushRadius,
         subtracts: selecting.subtracts(other),
       });
     show();
     return {
       move: (toX, toY) => {
+        this.#corners = [];
         points = tool === "rectangle" || isShape(tool) ? [points[0], [toX, toY]] : thinned([...points, [toX, toY]], SKETCH_PX);
         show();
       },
       end: () => {
         this.#overlay.sketch(null);
         if (isShape(tool)) selecting.drawShape(tool, camera, { x, y }, reach(), unit(this.#editor.worldUp), other);
+        else if (tool !== "brush" && points.length === 1) this.#corner(points[0], other);
         else selecting.draw(tool, camera, points, other);
       },
       giveUp: () => this.#overlay.sketch(null),
     };
+  }
+
+  /** One more corner, clicked by who does not draw. A rectangle has two; a lasso ends where it began. */
+  #corner(place, other) {
+    const { tool, camera } = this;
+    const corners = this.#corners;
+    const isOn = (corner) => !!corner && Math.hypot(corner[0] - place[0], corner[1] - place[1]) < CORNER_PX;
+    const ends = tool === "rectangle" ? corners.length === 1 && !isOn(corners[0]) : corners.length > 2 && isOn(corners[0]);
+    if (ends) {
+      this.#dropCorners();
+      return this.#editor.selecting.draw(tool, camera, tool === "rectangle" ? [...corners, place] : corners, other);
+    }
+    if (!isOn(corners.at(-1))) this.#corners = [...corners, place];
+    this.#showCorners(place);
+  }
+
+  /** Shows the corners so far, and a line from the last to where the pointer is. */
+  #showCorners(place) {
+    const { tool } = this;
+    this.#overlay.sketch({ tool, points: [...this.#corners, place], subtracts: this.#editor.selecting.subtracts(false) });
+  }
+
+  #dropCorners() {
+    if (this.#corners.length === 0) return;
+    this.#corners = [];
+    this.#overlay.sketch(null);
   }
 
   /** The pointer took hold of a handle's dot. */
@@ -477,6 +509,7 @@ export class Viewer {
     const to = this.#place(event);
     this.#pointerAt = to;
     if (this.tool === "brush" && event.pointerType !== "touch") this.#overlay.cursor(to, this.#state.brushRadius);
+    if (!this.#gesture && this.#corners.length > 0) this.#showCorners([to.x, to.y]);
     if (!this.#gesture) attrs(this.#view, { "data-over": this.tool === "thing" && this.#onThing(to) ? "thing" : null });
     const from = this.#pointers.get(event.pointerId);
     const gesture = this.#gesture;
@@ -657,6 +690,10 @@ export class Viewer {
 
   /** Gives up the drag under way, if there is one. */
   giveUpDrag() {
+    if (this.#corners.length > 0) {
+      this.#dropCorners();
+      return true;
+    }
     if (!this.#gesture?.drag) return false;
     this.#gesture.drag.giveUp();
     this.#gesture = null;

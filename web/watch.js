@@ -26,13 +26,18 @@ export function followScene({ silence = SILENCE_MS, again = AGAIN_MS, events, as
     end();
   };
 
-  /** Asks for all there is; an edit that ended while nobody listened is told so. */
+  let heard = new Set(); // What the stream has told of since it was last asked: "scene", ids of edits.
+
+  /** Asks for all there is; an edit that ended while nobody listened is told so. What the stream tells meanwhile is newer
+   *  than the answer. */
   async function catchUp() {
+    const meanwhile = (heard = new Set());
     try {
       const { scene, edits } = await ask();
       tell("onAnswering", true);
-      tell("onScene", scene);
-      for (const edit of [...edits].reverse()) tell("onEdit", edit);
+      if (meanwhile !== heard) return; // Asked once more: that answer is the newer one.
+      if (!meanwhile.has("scene")) tell("onScene", scene);
+      for (const edit of [...edits].reverse()) if (!meanwhile.has(edit.id)) tell("onEdit", edit);
     } catch (error) {
       if (error.status === 404) gone();
       else if (!error.status) tell("onAnswering", false);
@@ -63,11 +68,15 @@ export function followScene({ silence = SILENCE_MS, again = AGAIN_MS, events, as
           fn(JSON.parse(data));
         });
       on("scene", (scene) => {
+        heard.add("scene");
         tell("onScene", scene);
         if (first) catchUp();
         first = false;
       });
-      on("edit", (edit) => tell("onEdit", edit));
+      on("edit", (edit) => {
+        heard.add(edit.id);
+        tell("onEdit", edit);
+      });
       on("alive", () => {});
       on("gone", gone);
       // No stream left for us (429), a restart, a proxy that cuts long answers.

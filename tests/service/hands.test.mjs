@@ -113,6 +113,17 @@ describe('the gizmo', () => {
     assert.deepEqual((await numbers('shift')).map((x) => Number(x.toFixed(4))), [-0.4, 0, 0], 'about its middle: that is where it was');
   });
 
+  test('moves along the normal of the surface that was clicked on', async () => {
+    await take();
+    await id('frame-surface').click();
+    await id('gizmo-move-z').focus();
+    const { handles } = await previewOf(() => page.keyboard.press('ArrowRight'));
+    assert.deepEqual((await numbers('shift')).map((x) => Math.abs(x) > 1e-9), [false, false, true]);
+    const { camera } = await hand.looksFrom();
+    const away = shiftOf(handles[0]).reduce((sum, x, i) => sum + x * (camera.eye[i] - mug[i]), 0);
+    assert.ok(away > 0, 'its normal points at who sees it');
+  });
+
   test('sizes by its knob', async () => {
     await take();
     await id('gizmo-tool-size').click();
@@ -251,6 +262,51 @@ describe('the view', () => {
       assert.ok(x > box.x && x < box.x + box.width && y > box.y && y < box.y + box.height, `${corner} at ${[x, y]}`);
     }
     await service.client.delete(`/v1/scenes/${other.id}`);
+  });
+});
+
+describe('who does not draw', () => {
+  const steps = () => id('selection-steps').locator('li').allTextContents();
+  const click = async (...places) => {
+    for (const [x, y] of places) await page.mouse.click(x, y);
+  };
+
+  test('clicks the corners of a frame and of a lasso, and what both hold is kept', async () => {
+    const [x, y] = await hand.onScreen(mug);
+    await page.keyboard.press('s');
+    await id('select-tool-rectangle').click();
+    await click([x - 70, y - 70]);
+    await page.mouse.move(x, y);
+    await hand.shot('hands-corners');
+    await click([x + 70, y + 70]);
+    const framed = await hand.count();
+    await id('select-tool-lasso').click();
+    await id('select-op').selectOption('intersect');
+    const corners = [[x - 70, y - 70], [x + 70, y - 70], [x - 70, y + 70]];
+    await click(...corners);
+    assert.equal((await steps()).length, 1, 'a lasso ends where it began');
+    await click([x - 66, y - 67]);
+    await page.waitForFunction((n) => Number(document.querySelector('[data-testid=selection-count]').dataset.count) < n, framed);
+    const both = await hand.count();
+    assert.ok(both > 0.1 * framed, `${both} of ${framed}`);
+    await id('invert-selection').click();
+    await page.waitForFunction((n) => Number(document.querySelector('[data-testid=selection-count]').dataset.count) > n, framed);
+    const { gaussians } = (await service.client.get(`/v1/scenes/${scene.id}`)).json();
+    assert.equal(await hand.count(), gaussians - both);
+  });
+
+  test('gives corners up by Esc, or by turning the view', async () => {
+    const [x, y] = await hand.onScreen(mug);
+    await page.keyboard.press('s');
+    await id('select-tool-lasso').click();
+    for (const giveUp of ['Escape', 'ArrowLeft']) {
+      await click([x - 70, y - 70], [x + 70, y - 70]);
+      await id('sketch').and(page.locator('[d]')).waitFor({ state: 'attached' });
+      await page.keyboard.press(giveUp);
+      await id('sketch').and(page.locator('[d]')).waitFor({ state: 'detached' });
+    }
+    assert.deepEqual(await steps(), []);
+    assert.equal(await id('hand-select').getAttribute('aria-pressed'), 'true');
   });
 });
 

@@ -215,6 +215,49 @@ describe('by fingers, on a phone', () => {
     assert.deepEqual(await tooSmall(page), [], state);
   };
 
+  test('the picture stays, above a sheet that holds the tools', async () => {
+    const inSight = async (least) => {
+      const { y, height } = await id('view').boundingBox();
+      assert.ok(y >= 0 && y + height <= phone.viewport.height && height >= least, `${y} to ${y + height}`);
+      assert.equal(await page.evaluate(() => document.documentElement.scrollHeight), phone.viewport.height, 'nothing scrolls it away');
+    };
+    await inSight(600);
+    await check('folded');
+    assert.equal(await id('tab-drag').isVisible(), false);
+    for (const tab of ['edits', 'scene', 'drag']) {
+      await id(`tab-button-${tab}`).tap();
+      assert.ok(await id(`tab-${tab}`).isVisible());
+      await inSight(300);
+      await check(`sheet-${tab}`);
+    }
+    await id('settings').locator('summary').tap();
+    await id('region-on').scrollIntoViewIfNeeded();
+    await inSight(300);
+    await id('settings').locator('summary').tap();
+    await id('fold').tap();
+    await inSight(600);
+    await page.setViewportSize({ width: 844, height: 390 });
+    await page.waitForFunction(() => document.querySelector('[data-testid=view]').dataset.quality === 'full');
+    await check('on-its-side');
+    await page.setViewportSize(phone.viewport);
+    await hand.shown(1);
+  });
+
+  test('what is taken is moved by numbers', async () => {
+    const at = await hand.onScreen([1.3, -0.16, -0.6]);
+    await page.touchscreen.tap(...at);
+    await hand.count();
+    await id('thing-hold').tap();
+    assert.ok(await id('shift-x').isVisible());
+    await id('auto-repair').uncheck();
+    await id('shift-x').fill('-0.3');
+    await id('shift-x').blur();
+    await hand.state('moved');
+    await check('numbers');
+    await id('thing-drop').tap();
+    await id('fold').tap();
+  });
+
   test('the line between two versions is moved, and the rest of the picture turns', async () => {
     await id('compare-mode').selectOption('slider');
     await compared(page, 'slider');
@@ -238,9 +281,10 @@ describe('by fingers, on a phone', () => {
     const box = await id('view').boundingBox();
     await touch([box.x + 150, box.y + 0.7 * box.height], [box.x + 170, box.y + 0.7 * box.height], [box.x + 200, box.y + 0.7 * box.height]);
     await hand.count();
+    await id('selected-chip').getByText('selected').waitFor();
     await check('heal');
     await id('undo').click();  // a tap right after a stroke that quick is taken by the browser to stop a fling
-    await id('no-selection').waitFor();
+    await id('selected-chip').waitFor({ state: 'hidden' });
     await id('hand-thing').tap();
   });
 

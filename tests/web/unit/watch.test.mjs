@@ -73,6 +73,26 @@ test("an edit that ended while nobody listened is told of when the stream begins
   end();
 });
 
+test("an answer that was on its way while the stream told something newer does not take that back", async () => {
+  let answer;
+  const { said, streams, end } = following({ ask: () => new Promise((resolve) => (answer = resolve)) });
+  streams[0].send("scene", { name: "before" });
+  await settle();
+  streams[0].send("scene", { name: "renamed" });
+  streams[0].send("edit", { id: "e1", state: "succeeded" });
+  const edits = [
+    { id: "e2", state: "queued" },
+    { id: "e1", state: "running" },
+  ];
+  answer({ scene: { name: "before" }, edits });
+  await settle();
+  assert.deepEqual(
+    said.filter((text) => !text.startsWith("answers")),
+    ["scene before", "scene renamed", "e1 succeeded", "e2 queued"],
+  );
+  end();
+});
+
 test("without a stream it is asked, and a stream is tried again", async () => {
   const { said, streams, end } = following();
   streams[0].fail();
