@@ -192,29 +192,27 @@ export function ellipseOf(camera, { low, high }) {
   return { x: (left + right) / 2, y: (top + bottom) / 2, rx: (right - left) / 2, ry: (bottom - top) / 2 };
 }
 
-/** How far a camera may pitch, of `pitch` radians, before it looks straight along the up axis. */
-function allowedPitch(forward, up, pitch) {
+/** How directions turn when a camera is turned by `yaw` about the world's up axis and by `pitch` about its own horizontal,
+ *  radians, as far as it does not look straight along the up axis. */
+function turnOf(pose, yaw, pitch, worldUp) {
+  const up = unit(worldUp, DEFAULT_UP);
+  const { right, forward } = axes(pose);
   const elevation = Math.acos(Math.min(1, Math.max(-1, dot(forward, up))));
-  return Math.min(Math.PI - POLE_MARGIN, Math.max(POLE_MARGIN, elevation + pitch)) - elevation;
+  const allowed = Math.min(Math.PI - POLE_MARGIN, Math.max(POLE_MARGIN, elevation + pitch)) - elevation;
+  return (v) => turned(turned(v, right, -allowed), up, -yaw);
 }
 
 /** Turns the camera about its target: `yaw` about the world's up axis, `pitch` about its own horizontal, radians.
  *  Positive values move the scene right and down, as a hand on it would. */
 export function orbited(pose, yaw, pitch, worldUp) {
-  const up = unit(worldUp, DEFAULT_UP);
-  const { right, forward } = axes(pose);
-  const allowed = allowedPitch(forward, up, pitch);
-  const turn = (v) => turned(turned(v, right, -allowed), up, -yaw);
+  const turn = turnOf(pose, yaw, pitch, worldUp);
   return { ...pose, eye: add(pose.target, turn(sub(pose.eye, pose.target))), up: turn(pose.up) };
 }
 
 /** Turns the camera about itself. Positive values turn it left and up: the scene moves right and down, as a hand on it
  *  would. */
 export function lookedAround(pose, yaw, pitch, worldUp) {
-  const up = unit(worldUp, DEFAULT_UP);
-  const { right, forward } = axes(pose);
-  const allowed = allowedPitch(forward, up, -pitch);
-  const turn = (v) => turned(turned(v, right, -allowed), up, yaw);
+  const turn = turnOf(pose, -yaw, -pitch, worldUp);
   return { ...pose, target: add(pose.eye, turn(sub(pose.target, pose.eye))), up: turn(pose.up) };
 }
 

@@ -111,11 +111,10 @@ bool png_is_complete(std::span<const std::byte> bytes) {
   return false;
 }
 
-bool is_jpeg(const std::optional<Format>& format) { return format && std::string_view(format->name) == "JPEG"; }
+bool is_jpeg(const Format& format) { return std::string_view(format.name) == "JPEG"; }
 
 bool is_complete(const Format& format, std::span<const std::byte> bytes) {
-  const std::string_view name = format.name;
-  return name == "PNG" ? png_is_complete(bytes) : name != "JPEG" || jpeg_is_complete(bytes);
+  return std::string_view(format.name) == "PNG" ? png_is_complete(bytes) : !is_jpeg(format) || jpeg_is_complete(bytes);
 }
 
 /// What a library says of a damaged file is written for its programmers, and what of the file or of memory stands in it
@@ -215,7 +214,7 @@ Result<Image> decode(std::span<const std::byte> bytes, const std::string& name, 
   if (format && !is_complete(*format, bytes))
     return fail(ErrorCode::corrupt_data, "the picture ends before its last row: copy or download it again", name);
   std::vector<std::byte> plain;
-  if (is_jpeg(format)) plain = without_metadata(bytes), bytes = plain;
+  if (format && is_jpeg(*format)) plain = without_metadata(bytes), bytes = plain;
   Filesystem::IOMemReader source(const_cast<std::byte*>(bytes.data()), bytes.size());  // reads; takes a void*
   auto opened = open_reader(bytes, source, name, options);
   if (!opened) return propagate(opened);
@@ -365,7 +364,7 @@ Result<PictureSize> picture_size(const std::filesystem::path& path, const ImageO
       if (!reader) return propagate(reader);
       return PictureSize{(*reader)->spec().width, (*reader)->spec().height};
     };
-    if (is_jpeg(sniff(*first_bytes))) {
+    if (const auto format = sniff(*first_bytes); format && is_jpeg(*format)) {
       const auto bytes = read_bytes(path, options.max_file_bytes);
       if (!bytes) return propagate(bytes);
       std::vector<std::byte> plain = without_metadata(*bytes);

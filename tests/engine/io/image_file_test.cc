@@ -5,8 +5,8 @@
 
 #include <algorithm>
 #include <cctype>
-#include <chrono>
 #include <cmath>
+#include <ctime>
 #include <limits>
 #include <string>
 #include <string_view>
@@ -467,14 +467,18 @@ std::vector<std::byte> promising_exr(std::uint32_t width, std::uint32_t height, 
 
 // 16 KB with tiles of 8192x8192 took half a second; larger ones were reported to take 2 to 8.
 TEST(DecodeImage, BelievesNoHeaderThatPromisesMoreThanItsBytesCanHold) {
+#ifdef __SANITIZE_ADDRESS__
+  constexpr double most_seconds = 5;  // one of them goes into the sanitizer's own account of what the library allocates
+#else
+  constexpr double most_seconds = 1;
+#endif
   for (const int compression : {0, 3, 4, 9})
     for (const std::uint32_t tile : {0u, 8192u, 16384u, 0x40000000u})
       for (const std::uint32_t width : {16384u, 1448u}) {
         SCOPED_TRACE(std::to_string(compression) + " " + std::to_string(tile) + " " + std::to_string(width));
-        const auto begin = std::chrono::steady_clock::now();
+        const std::clock_t begin = std::clock();  // the processor's time: other work on the machine is none of it
         const auto image = decode_image(promising_exr(width, width / 2, compression, tile, 1, 16384), "a.exr", {});
-        // It took up to 8 s; refused, it takes some milliseconds, or one second under a sanitizer on a busy machine.
-        EXPECT_LT(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), 5);
+        EXPECT_LT(double(std::clock() - begin) / CLOCKS_PER_SEC, most_seconds);
         ASSERT_FALSE(image);
         EXPECT_EQ(image.error().code, ErrorCode::corrupt_data) << image.error().message;
       }
