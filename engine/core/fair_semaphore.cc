@@ -17,14 +17,13 @@ Result<FairSemaphore::Slot> FairSemaphore::acquire() {
 
 /// Stands in line until a slot is handed over, or for as long as patience lasts.
 bool FairSemaphore::wait_for_slot(std::unique_lock<std::mutex>& lock) {
-  using Clock = std::chrono::steady_clock;
-  const auto until = limits_.patience ? std::optional(Clock::now() + *limits_.patience) : std::nullopt;
   Waiter waiter;
   line_.push_back(&waiter);
+  const auto deadline = std::chrono::steady_clock::now() + limits_.patience.value_or(std::chrono::milliseconds::zero());
   while (!waiter.has_slot) {
-    if (!until) {
+    if (!limits_.patience) {
       waiter.served.wait(lock);
-    } else if (waiter.served.wait_until(lock, *until) == std::cv_status::timeout && !waiter.has_slot) {
+    } else if (waiter.served.wait_until(lock, deadline) == std::cv_status::timeout && !waiter.has_slot) {
       std::erase(line_, &waiter);
       return false;
     }
