@@ -16,9 +16,11 @@ namespace engine::deform {
 
 /// How a part hangs on to what stays.
 struct Contact {
-  std::size_t touches = 0;    ///< Rows next to a row that stays.
-  std::size_t grows_out = 0;  ///< Those of them where the surface goes on there.
-  double size = 0;            ///< Longest edge of the box around the part, world units.
+  std::size_t shown = 0;    ///< Rows of the part that show from outside.
+  std::size_t touches = 0;  ///< Those of them next to a row that stays.
+  std::size_t goes_on = 0;  ///< Those of these where the surface goes on there.
+  double firmness = 0;      ///< Of its weakest border, of what is usual within it (select::Contact).
+  double size = 0;          ///< Longest edge of the box around the part, world units.
 };
 
 /// How a group moves.

@@ -34,9 +34,8 @@ const T& Memory::find_or_make(std::list<Noted<T>>& known, Fits&& fits, Make&& ma
   return known.back().found;
 }
 
-const std::vector<select::Touch>& Memory::contact_of(const scene::LayeredCloud& scene,
-                                                     std::span<const std::uint32_t> part,
-                                                     std::span<const std::uint32_t> selected) {
+const select::Contact& Memory::contact_of(const scene::LayeredCloud& scene, std::span<const std::uint32_t> part,
+                                          std::span<const std::uint32_t> selected) {
   const auto fits = [&](const Contact& known) {
     return std::ranges::equal(known.part, part) && std::ranges::equal(known.selected, selected);
   };
@@ -44,7 +43,7 @@ const std::vector<select::Touch>& Memory::contact_of(const scene::LayeredCloud& 
     return Contact{
         {part.begin(), part.end()}, {selected.begin(), selected.end()}, select::contact_of(scene, part, selected)};
   };
-  return find_or_make(contacts_, fits, make, [](const Contact& known) { return known.part.size(); }).touches;
+  return find_or_make(contacts_, fits, make, [](const Contact& known) { return known.part.size(); }).contact;
 }
 
 const std::vector<std::uint32_t>& Memory::crumbs_of(const scene::LayeredCloud& scene,

@@ -18,9 +18,8 @@ namespace engine::edit {
 class Memory {
  public:
   /// select::contact_of()
-  [[nodiscard]] const std::vector<select::Touch>& contact_of(const scene::LayeredCloud& scene,
-                                                             std::span<const std::uint32_t> part,
-                                                             std::span<const std::uint32_t> selected);
+  [[nodiscard]] const select::Contact& contact_of(const scene::LayeredCloud& scene, std::span<const std::uint32_t> part,
+                                                  std::span<const std::uint32_t> selected);
   /// select::crumbs_of()
   [[nodiscard]] const std::vector<std::uint32_t>& crumbs_of(const scene::LayeredCloud& scene,
                                                             std::span<const std::uint32_t> selected);
@@ -40,7 +39,7 @@ class Memory {
   };
   struct Contact {
     std::vector<std::uint32_t> part, selected;
-    std::vector<select::Touch> touches;
+    select::Contact contact;
   };
   struct Crumbs {
     std::vector<std::uint32_t> selected, rows;

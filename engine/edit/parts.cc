@@ -47,7 +47,7 @@ void hold(const Array3& means, std::span<const std::uint32_t> rows, std::span<co
       return drag.anchor && glm::distance(DVec3(means.get(row)), drag.source) <= near;
     });
   };
-  const select::Touch holds = attachment.grows_out ? select::Touch::grows_out : select::Touch::stands;
+  const select::Touch holds = attachment.grows_out ? select::Touch::goes_on : select::Touch::stands;
   const std::size_t before = parts.rim.size();
   for (std::size_t k = 0; k < rows.size(); ++k)
     if (touches[k] >= holds && touches[k] != select::Touch::nothing && is_meant(rows[k])) parts.rim.push_back(rows[k]);
@@ -106,15 +106,19 @@ Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> 
       if (!drags[i].anchor && away > length) parts.astray.push_back({i, away});
     }
     if (own.empty()) continue;  // anchors alone, and none of them near: nothing moves
-    const std::vector<select::Touch>& touches = memory.contact_of(scene, rows, dragged);
-    const auto count = [&](select::Touch touch) { return std::size_t(std::ranges::count(touches, touch)); };
-    const std::size_t grows_out = count(select::Touch::grows_out);
-    deform::Attachment attachment =
-        deform::attach(drags, group, {grows_out + count(select::Touch::stands), grows_out, length}, request.attach,
-                       request.mode == Mode::extend);
-    if (request.mode == Mode::extend) draw_out(scene, rows, touches, own, request.attach, attachment, parts);
+    const select::Contact& contact = memory.contact_of(scene, rows, dragged);
+    const auto count = [&](select::Touch touch) { return std::size_t(std::ranges::count(contact.touches, touch)); };
+    const std::size_t goes_on = count(select::Touch::goes_on);
+    deform::Attachment attachment = deform::attach(drags, group,
+                                                   {.shown = contact.shown,
+                                                    .touches = goes_on + count(select::Touch::stands),
+                                                    .goes_on = goes_on,
+                                                    .firmness = contact.firmness,
+                                                    .size = length},
+                                                   request.attach, request.mode == Mode::extend);
+    if (request.mode == Mode::extend) draw_out(scene, rows, contact.touches, own, request.attach, attachment, parts);
     if (attachment.how == How::held || attachment.how == How::drawn_out)
-      hold(means, rows, touches, own, attachment, parts);
+      hold(means, rows, contact.touches, own, attachment, parts);
     parts.attachments.push_back(std::move(attachment));
   }
   std::sort(parts.rim.begin(), parts.rim.end());

@@ -15,17 +15,12 @@ constexpr std::size_t neighbours_joined = 8;  // the next ring of a surface
 // A surface goes on where neighbours across the border are this much as alike as those within usually are: those of a
 // cup and its table have 0.02 to 0.05, those of a cheek cut in two 0.3 to 1.
 constexpr float goes_on = 0.3f;
-// A part grows out of the rest where its weakest border is this firm, compared with its insides. Made-up captures of a
-// mug, a ball, a block, a board and a rod have 0.02 to 0.07, however widely they are selected; of a jaw and of a plant
-// cut through its stem 0.22 to 0.26. Real ones: a toy and a bow 0.03 and 0.04, a helmet in a hand 0.09, a doll on a
-// quilt 0.11; the neck of a guitar, the head of a man and his arm 0.13 to 0.16, a fox's head and ear 0.21 and 0.22.
-constexpr double grown = 0.12;
 
 }  // namespace
 
-std::vector<Touch> contact_of(const scene::LayeredCloud& scene, std::span<const std::uint32_t> part,
-                              std::span<const std::uint32_t> selected) {
-  std::vector<Touch> out(part.size(), Touch::nothing);
+Contact contact_of(const scene::LayeredCloud& scene, std::span<const std::uint32_t> part,
+                   std::span<const std::uint32_t> selected) {
+  Contact out{std::vector<Touch>(part.size(), Touch::nothing)};
   const Around around = look_around(scene, part, neighbours_joined, Which::exposed);
   const neighbours::NeighbourGraph& graph = around.graph;
   const std::vector<std::uint8_t> is_selected = marked(around, selected), is_part = marked(around, part);
@@ -48,11 +43,12 @@ std::vector<Touch> contact_of(const scene::LayeredCloud& scene, std::span<const 
     shown.push_back(std::uint32_t(k));
   }
   const float usual = within.empty() ? 0 : median(std::move(within));
-  const bool grows_out = usual > 0 && firmness(graph, around.alike, is_part) >= grown * double(usual);
+  out.shown = shown.size();
+  if (usual > 0) out.firmness = firmness(graph, around.alike, is_part) / double(usual);
   for (std::size_t i = 0; i < shown.size(); ++i)
-    out[shown[i]] = across[i] == none                           ? Touch::nothing
-                    : grows_out && across[i] >= goes_on * usual ? Touch::grows_out
-                                                                : Touch::stands;
+    out.touches[shown[i]] = across[i] == none                           ? Touch::nothing
+                            : usual > 0 && across[i] >= goes_on * usual ? Touch::goes_on
+                                                                        : Touch::stands;
   return out;
 }
 

@@ -10,7 +10,8 @@ namespace {
 
 using How = Attachment::How;
 
-const Contact nothing{0, 0, 2}, stands_there{100, 5, 2}, grows_there{100, 40, 2};
+const Contact nothing{1000, 0, 0, 0, 2}, stands_there{1000, 100, 5, 0.03, 2}, grows_there{1000, 100, 40, 0.2, 2},
+    hangs_there{1000, 100, 40, 0.1, 2};
 
 const std::vector<DVec3> corners{DVec3(0, 0, 0), DVec3(1, 0, 0), DVec3(0, 1, 0)};
 
@@ -34,6 +35,23 @@ TEST(Attach, ACupGoesAsItIsAndAnEarIsHeld) {
   EXPECT_EQ(how(one, nothing), How::one_piece);
   EXPECT_EQ(how(one, stands_there), How::one_piece);
   EXPECT_EQ(how(one, grows_there), How::held);
+}
+
+TEST(Attach, WhatHangsOnByLittleBendsWhereItIsNudgedAndGoesWhereItIsTaken) {
+  const auto shifted = [](double way) { return drags_of({DVec3(0.0)}, [=](DVec3 p) { return p + DVec3(way, 0, 0); }); };
+  EXPECT_EQ(how(shifted(0.3), hangs_there), How::held);
+  EXPECT_EQ(how(shifted(0.5), hangs_there), How::one_piece);
+  EXPECT_EQ(how(shifted(0.3), hangs_there, Attach::free), How::one_piece);
+  EXPECT_EQ(how(shifted(0.3), stands_there), How::one_piece) << "a cup that is pushed";
+  Contact helmet = hangs_there;
+  helmet.shown = 10'000;
+  EXPECT_EQ(how(shifted(0.3), helmet), How::one_piece) << "a tip of it touches a hand";
+  Contact shadowed = hangs_there;
+  shadowed.goes_on = 10;
+  EXPECT_EQ(how(shifted(0.3), shadowed), How::one_piece);
+  auto turning = shifted(0.3);
+  turning[0].turn = glm::angleAxis(0.5, DVec3(0, 0, 1));
+  EXPECT_EQ(how(turning, hangs_there), How::one_piece) << "a doll that is turned on its quilt";
 }
 
 TEST(Attach, WhatGoesFartherThanItIsLongIsTakenAway) {

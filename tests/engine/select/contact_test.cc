@@ -31,10 +31,12 @@ TEST(ContactOf, GrowsOutAcrossTheMiddleOfAWall) {
   scene::GaussianCloud cloud;
   add_sheet(cloud, {0, 0, 0}, 24, 0.1f, {0.5f, 0.4f, 0.3f});
   const auto rows = rows_where_x(cloud, 0);
-  const auto touches = contact_of(shared(cloud), rows, rows);
+  const auto [touches, shown, firmness] = contact_of(shared(cloud), rows, rows);
   ASSERT_EQ(touches.size(), rows.size());
-  EXPECT_GE(count(touches, Touch::grows_out), 24u);  // and two at the wall's ends, whose neighbours are farther away
-  EXPECT_LE(count(touches, Touch::grows_out), 26u);
+  EXPECT_EQ(shown, rows.size());
+  EXPECT_NEAR(firmness, 1, 0.2);
+  EXPECT_GE(count(touches, Touch::goes_on), 24u);  // and two at the wall's ends, whose neighbours are farther away
+  EXPECT_LE(count(touches, Touch::goes_on), 26u);
   EXPECT_EQ(count(touches, Touch::stands), 0u);
   for (std::size_t k = 0; k < rows.size(); ++k)
     EXPECT_TRUE(touches[k] == Touch::nothing || cloud.mean.get(rows[k]).x < 0.2f) << k;
@@ -45,19 +47,20 @@ TEST(ContactOf, StandsWhereTheRestLooksOtherwise) {
   add_sheet(cloud, {-1.2f, 0, 0}, 24, 0.1f, {0.9f, 0.9f, 0.9f});
   add_sheet(cloud, {1.2f, 0, 0}, 24, 0.1f, {0.1f, 0.2f, 0.5f});
   const auto rows = rows_where_x(cloud, 0);
-  const auto touches = contact_of(shared(cloud), rows, rows);
-  EXPECT_EQ(count(touches, Touch::grows_out), 0u);
+  const auto [touches, shown, firmness] = contact_of(shared(cloud), rows, rows);
+  EXPECT_EQ(count(touches, Touch::goes_on), 0u);
+  EXPECT_LT(firmness, 0.1);
   EXPECT_GE(count(touches, Touch::stands), 24u);
 }
 
-TEST(ContactOf, StandsWhereItsOwnBorderLiesWithinWhatIsSelected) {
+TEST(ContactOf, IsNoFirmerThanABorderWithinWhatIsSelected) {
   scene::GaussianCloud cloud;  // a thing, and what it lies on, of which a strip is selected with it
   add_sheet(cloud, {-1.2f, 0, 0}, 24, 0.1f, {0.9f, 0.9f, 0.9f});
   add_sheet(cloud, {1.2f, 0, 0}, 24, 0.1f, {0.1f, 0.2f, 0.5f});
   const auto rows = rows_where_x(cloud, -0.4f);
-  const auto touches = contact_of(shared(cloud), rows, rows);
-  EXPECT_EQ(count(touches, Touch::grows_out), 0u);
-  EXPECT_GE(count(touches, Touch::stands), 24u);
+  const auto [touches, shown, firmness] = contact_of(shared(cloud), rows, rows);
+  EXPECT_GE(count(touches, Touch::goes_on), 24u) << "what it lies on goes on";
+  EXPECT_LT(firmness, 0.1);
 }
 
 TEST(ContactOf, TouchesNothingAcrossAGapNorWhatIsSelectedToo) {
@@ -65,8 +68,8 @@ TEST(ContactOf, TouchesNothingAcrossAGapNorWhatIsSelectedToo) {
   add_sheet(cloud, {-3, 0, 0}, 24, 0.1f, {0.5f, 0.4f, 0.3f});
   add_sheet(cloud, {0, 0, 0}, 24, 0.1f, {0.5f, 0.4f, 0.3f});
   const auto right = rows_where_x(cloud, 0), both = rows_where_x(cloud, -1.5f);
-  EXPECT_EQ(count(contact_of(shared(cloud), both, both), Touch::nothing), both.size());
-  EXPECT_EQ(count(contact_of(shared(cloud), right, both), Touch::nothing), right.size());
+  EXPECT_EQ(count(contact_of(shared(cloud), both, both).touches, Touch::nothing), both.size());
+  EXPECT_EQ(count(contact_of(shared(cloud), right, both).touches, Touch::nothing), right.size());
 }
 
 TEST(ContactOf, DoesNotAskWhatNobodySeesWithinAThing) {
@@ -91,8 +94,9 @@ TEST(ContactOf, DoesNotAskWhatNobodySeesWithinAThing) {
   std::iota(rows.begin(), rows.end(), floor);
   for (std::uint32_t row = box; row < cloud.size(); ++row)
     if (cloud.mean.get(row).z < -0.8f) rows.push_back(row);
-  const auto touches = contact_of(shared(cloud), rows, rows);
-  EXPECT_EQ(count(touches, Touch::grows_out), 0u);
+  const auto [touches, shown, firmness] = contact_of(shared(cloud), rows, rows);
+  EXPECT_LT(firmness, 0.1);
+  EXPECT_LT(shown, rows.size());
   EXPECT_GT(count(touches, Touch::stands), 0u);
 }
 
@@ -100,7 +104,10 @@ TEST(ContactOf, OfRowsThatNothingShowsIsNone) {
   scene::GaussianCloud cloud = cloud_at({{0, 0, 0}, {0.1f, 0, 0}, {0.2f, 0, 0}});
   for (float& logit : cloud.opacity_logit) logit = -30;
   const std::vector<std::uint32_t> rows{0, 1};
-  EXPECT_EQ(contact_of(shared(cloud), rows, rows), std::vector<Touch>(2, Touch::nothing));
+  const Contact contact = contact_of(shared(cloud), rows, rows);
+  EXPECT_EQ(contact.touches, std::vector<Touch>(2, Touch::nothing));
+  EXPECT_EQ(contact.shown, 0u);
+  EXPECT_EQ(contact.firmness, 0);
 }
 
 TEST(ContactOf, StandsWhereNothingSaysHowAlikeItsRowsUsuallyAre) {
@@ -108,12 +115,14 @@ TEST(ContactOf, StandsWhereNothingSaysHowAlikeItsRowsUsuallyAre) {
   add_sheet(cloud, {0, 0, 0}, 12, 0.1f, {0.1f, 0.2f, 0.5f});
   add_at(cloud, {0, 0, -0.1f}, 4, std::log(0.05f), {0.9f, 0.9f, 0.9f});  // one row: it has no neighbour in its part
   const std::vector<std::uint32_t> rows{std::uint32_t(cloud.size() - 1)};
-  EXPECT_EQ(contact_of(shared(cloud), rows, rows), std::vector<Touch>{Touch::stands});
+  const Contact contact = contact_of(shared(cloud), rows, rows);
+  EXPECT_EQ(contact.touches, std::vector<Touch>{Touch::stands});
+  EXPECT_EQ(contact.firmness, 0);
 }
 
 TEST(ContactOf, OfASceneOfOneRowIsNone) {
   const auto touches =
-      contact_of(shared(cloud_at({{1, 2, 3}})), std::vector<std::uint32_t>{0}, std::vector<std::uint32_t>{0});
+      contact_of(shared(cloud_at({{1, 2, 3}})), std::vector<std::uint32_t>{0}, std::vector<std::uint32_t>{0}).touches;
   EXPECT_EQ(touches, std::vector<Touch>{Touch::nothing});
 }
 

@@ -50,7 +50,7 @@ Found find_beyond(const scene::GaussianCloud& cloud, float from, DVec3 pull = {1
   Found out;
   for (std::uint32_t row = 0; row < cloud.size(); ++row)
     if (cloud.mean.get(row).x > from) out.part.push_back(row);
-  out.repeat = find_repeat(scene, out.part, contact_of(scene, out.part, out.part), pull, limit);
+  out.repeat = find_repeat(scene, out.part, contact_of(scene, out.part, out.part).touches, pull, limit);
   return out;
 }
 
