@@ -127,7 +127,7 @@ export function buildToolbar(editor, viewer) {
     iconButton("⊕", "focus", "Turn about the point under the pointer (F); here: about the middle", () => viewer.focusHere()),
     iconButton("⌂", "reset-view", "Back to the start (R)", () => editor.home()),
     fly,
-    menu("✢", "turn-menu", "Turn and move the view by buttons", turnPad(viewer)),
+    menu("✢", "turn-menu", "Turn and move the view by buttons", ...turnPad(viewer)),
   );
 
   const chip = h("span", { class: "chip", testid: "shown-chip" });
@@ -177,8 +177,8 @@ export function buildToolbar(editor, viewer) {
       const before = state.preview ? state.version : parentOf(scene, state.version);
       compare.disabled = before === null && state.compareWith === null;
       compareWith.options([
-        ["", before === null ? "with before" : `with version ${before}`],
-        ...numbers.filter((n) => n !== before).map((n) => [String(n), `with version ${n}`]),
+        ["", before === null ? "before" : `version ${before}`],
+        ...numbers.filter((n) => n !== before).map((n) => [String(n), `version ${n}`]),
       ]);
       compareWith.update(state.compareWith === null ? "" : String(state.compareWith));
       compareWith.element.hidden = numbers.length < 2;
@@ -233,4 +233,4 @@ function turnPad(viewer) {
   ];
 }
 
-const named = (number) => [String(number), number === 0 ? "Version 0 (original)" : `Version ${number}`];
+const named = (number) => [String(number), `Version ${number}`];

@@ -55,6 +55,12 @@ describe('two versions in one picture', () => {
     await page.mouse.up();
     assert.ok(Math.abs(await split() - 25) < 3, `${await split()}`);
     assert.match(await id('compare-line').textContent(), /version 0 · right: version 1/);
+    await id('compare-place').fill('70');  // without a drag
+    await id('compare-place').blur();
+    assert.equal(await split(), 70);
+    assert.match(await clip(), /^inset\(0(px)? 30% 0(px)? 0(px)?\)$/);
+    await id('compare-place').fill('25');
+    await id('compare-place').blur();
     await hand.shot('compare-slider');
     assert.deepEqual(await violations(page), []);
     await page.mouse.move(box.x + 0.7 * box.width, box.y + 0.3 * box.height);
@@ -232,7 +238,7 @@ describe('a run', () => {
     await hand.state('moved');
     const long = async () => {
       await id('tab-button-drag').click();
-      await id('param-iterations').fill('400');
+      await id('param-iterations').fill('1000');
       await id('param-intervals').fill('20');
       await id('param-intervals').blur();
       await id('run').click();
@@ -240,10 +246,15 @@ describe('a run', () => {
     };
     await long();
     await id('interval-1').first().waitFor({ timeout: 120_000 });
-    await page.locator('[data-state=running] [data-testid=edit-stop]:enabled').click();
+    const [answer] = await Promise.all([
+      page.waitForResponse((r) => r.url().endsWith('/stop')),
+      page.locator('[data-state=running] [data-testid=edit-stop]:enabled').click(),
+    ]);
+    const { finished_intervals: finished } = await answer.json();
     await page.locator('[data-testid^="edit-e"][data-state=running], [data-testid^="edit-e"][data-state=stop_requested]').waitFor({ state: 'detached', timeout: 120_000 });
     const [stopped] = (await desk.client.get('/v1/edits')).json().edits;
     assert.deepEqual([stopped.state, stopped.stopped_early], ['succeeded', true]);
+    assert.equal(stopped.finished_intervals.length, finished.length, 'the one in work is given up, not waited for');
     await hand.shown(stopped.result_version);
     await id('tab-button-drag').click();
     await page.keyboard.press('Control+z');
