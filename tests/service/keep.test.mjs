@@ -114,6 +114,23 @@ describe('versions', () => {
     assert.deepEqual(complaints, []);
   });
 
+  test('scenes are named and deleted where they are listed', async () => {
+    await desk.client.upload(room.demo.ply, { name: 'another' });
+    await id('home-link').click();
+    const card = (name) => page.locator('[data-testid^=scene-s]').filter({ hasText: name });
+    await card('another').getByTestId('scene-rename').click();
+    await id('ask-input').fill('a copy');
+    await id('ask-ok').click();
+    await card('a copy').getByTestId('scene-delete').click();
+    await id('confirm-no').click();
+    await card('a copy').getByTestId('scene-delete').click();
+    await id('confirm-yes').click();
+    await card('a copy').waitFor({ state: 'detached' });
+    assert.deepEqual((await desk.client.get('/v1/scenes')).json().scenes.map(({ id: one }) => one), [desk.scene]);
+    await id(`scene-${desk.scene}`).getByTestId('scene-open').click();
+    await id('workspace').waitFor();
+  });
+
   test('a scene that somebody deletes is left', async () => {
     await desk.client.delete(`/v1/scenes/${desk.scene}`);
     await id('home').waitFor();
