@@ -103,6 +103,7 @@ describe('with a scene', () => {
       await id(`scene-${desk.scene}`).getByTestId('scene-open').click();
       await hand.shown(1);
       await check('loaded');
+      assert.deepEqual(await page.locator('h1:visible').allTextContents(), ['desk']);
       for (const menu of ['up-menu', 'turn-menu']) {
         await press(menu);
         await check(menu);
@@ -110,6 +111,9 @@ describe('with a scene', () => {
       }
       await press('help-button');
       await check('help');
+      const keys = (await id('help').locator('dt').allTextContents()).join(' ');
+      if (finger) assert.doesNotMatch(keys, /\(hold\)|Ctrl|Wheel/, 'what a phone has not');
+      else for (const key of ['T', 'F', 'B (hold)', 'C', 'O', 'E', 'G, W', 'P', 'R', 'D, H', '[ and ]', '. and ,', '1 to 6', 'Ctrl + Z']) assert.ok(keys.includes(key), key);
       await page.keyboard.press('Escape');
       await press('fly');
       await check('flying');

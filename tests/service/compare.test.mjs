@@ -337,6 +337,7 @@ describe('a request from a file', () => {
   });
 
   test('goes into one as it is, with its mode, anchors and groups, and comes back; what it would take is said', async () => {
+    await id('tab-button-drag').click();
     await id('region-on').uncheck();
     await id('clear-handles').click();
     await id('hand-handle').click();
