@@ -14,6 +14,7 @@ import {
   panned,
   pictureKey,
   pictureSize,
+  placedIn,
   project,
   samePose,
   unitsPerPixel,
@@ -256,7 +257,9 @@ export class Viewer {
     if (!this.#displayed) return;
     const context = this.#canvas.getContext("2d");
     context.imageSmoothingQuality = "high";
-    context.drawImage(this.#displayed.picture, 0, 0, this.#canvas.width, this.#canvas.height);
+    const { x, y, width, height } = placedIn(this.#displayed.picture, this.#canvas);
+    if (x > 0) context.clearRect(0, 0, this.#canvas.width, this.#canvas.height);
+    context.drawImage(this.#displayed.picture, x, y, width, height);
   }
 
   #failed(error, job) {
