@@ -27,9 +27,10 @@ export const tooSmall = (page) => page.evaluate(() => [...document.querySelector
 export const outOfSight = (page) => page.evaluate(() => {
   const found = document.body.innerText.includes('[object') ? ['an object stands for words'] : [];
   if (document.documentElement.scrollWidth > innerWidth) found.push(`the page is ${document.documentElement.scrollWidth} wide`);
-  if (document.querySelector('dialog[open], .menu[open]')) return found;
+  if (document.querySelector('dialog[open]')) return found;
   const name = (element) => element.dataset?.testid ?? element.outerHTML.slice(0, 60);
-  for (const element of document.querySelectorAll('#chips button, #view-tools button, #view-tools summary, #thing-bar button, #notes summary')) {
+  const what = document.querySelector('.menu[open]') ? '.menu[open] button' : '#chips button, #view-tools button, #view-tools summary, #thing-bar button, #notes summary';
+  for (const element of document.querySelectorAll(what)) {
     if (!element.checkVisibility()) continue;
     const { left, top, width, height } = element.getBoundingClientRect();
     const on = document.elementFromPoint(left + width / 2, top + height / 2);
