@@ -132,6 +132,7 @@ export class Editor {
   #placing = null;
   #nextId = 1;
   #lost = null; // {body, key} of a submission whose answer never came.
+  #deleting = new Set(); // Versions whose deletion was asked for here and is under way.
   #abandoned = new Set(); // Ids of edits that were begun and that nobody wants to hear of.
   #opened = 0;
   #lastView = null;
@@ -929,7 +930,7 @@ export class Editor {
     const dataset = ({ dataset: d }) => d && [d.kind, d.views, d.photos].join();
     this.store.set({ scene });
     // Somebody else has deleted what is looked at.
-    if (!scene.versions.some((v) => v.version === version)) this.#leave(before.versions.find((v) => v.version === version));
+    if (!scene.versions.some((v) => v.version === version)) this.#leave(before.versions.find((v) => v.version === version) ?? { version, parent: 0 });
     if (dataset(scene) !== dataset(before)) this.#loadViews(this.#opened);
   }
 
@@ -941,6 +942,7 @@ export class Editor {
     const wasDraft = this.state.edits.find(({ id }) => id === edit)?.request.preset === "draft";
     const better = wasDraft ? versions.findLast((v) => v.parent === parent && v.version > version)?.version : undefined;
     this.showVersion(isThere(parent) ? parent : versions.findLast((v) => v.version < version).version);
+    if (this.#deleting.has(version)) return; // Here, by a press, and the stream was the first to tell.
     if (better === undefined) return this.say(`Version ${version} has been deleted.`);
     this.say(`Version ${version} was a draft, and is gone: version ${better} has been made in its place.`, {
       seconds: 12,
@@ -1022,7 +1024,8 @@ export class Editor {
   async deleteVersion(version) {
     const { scene } = this.state;
     const parent = parentOf(scene, version);
-    await api.deleteVersion(scene.id, version);
+    this.#deleting.add(version);
+    await api.deleteVersion(scene.id, version).finally(() => this.#deleting.delete(version));
     if (this.state.scene?.id !== scene.id) return;
     if (this.state.version === version) this.showVersion(parent);
     this.keep(version);

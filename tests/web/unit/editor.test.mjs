@@ -699,6 +699,19 @@ test("a draft that another page has replaced leaves the screen for what it was m
   assert.match(said.at(-1), /Version 2 was a draft, and is gone: version 3 /);
 });
 
+test("who deletes a version is not told so by the stream that is the first to know", async () => {
+  const { versions } = scene();
+  const made = { version: 1, parent: 0 };
+  streams[0].send({ ...scene(), versions: [...versions, made] }, "scene");
+  editor.showVersion(1);
+  service["DELETE /v1/scenes/s000001/versions/1"] = () => {
+    streams[0].send(scene(), "scene");
+    return {};
+  };
+  await editor.deleteVersion(1);
+  assert.deepEqual([editor.state.version, said], [0, []]);
+});
+
 test("a version whose parent has gone with it leaves the screen for what is left", async () => {
   const { versions } = scene();
   streams[0].send({ ...scene(), versions: [...versions, { version: 1, parent: 0 }, { version: 2, parent: 1 }] }, "scene");
