@@ -352,6 +352,14 @@ export function isPose(value) {
   );
 }
 
+/** Where a picture lies on a canvas of another shape until there is one of that: {x, y, width, height}. Cameras keep their
+ *  vertical field of view, so that it is as high as the canvas. One that differs by rounding alone fills it. */
+export function placedIn(picture, { width, height }) {
+  const wide = (picture.width / picture.height) * height;
+  if (Math.abs(wide - width) < 0.01 * width) return { x: 0, y: 0, width, height };
+  return { x: (width - wide) / 2, y: 0, width: wide, height };
+}
+
 /** Width and height of a picture of that aspect whose longer side is `side`; whole pixels. */
 export function pictureSize(width, height, side) {
   const factor = Math.min(1, side / Math.max(width, height));

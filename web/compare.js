@@ -5,7 +5,7 @@ import * as api from "./api.js";
 import { onTheWire, pictureKey } from "./camera.js";
 import { attrs, byId, h, text } from "./dom.js";
 import { shownVersion } from "./editor.js";
-import { choice } from "./fields.js";
+import { choice, numberField } from "./fields.js";
 import { FrameQueue } from "./frames.js";
 import { share } from "./selection.js";
 
@@ -54,7 +54,18 @@ export function buildCompare(editor) {
     options: WAYS,
     changed: (value) => store.set({ contrast: value || null }),
   });
-  byId("tools").append(h("span", { class: "spacer" }), ways.element);
+  // For who does not drag (WCAG 2.5.7).
+  const place = numberField({
+    label: "Divider between the two versions, % from the left",
+    testid: "compare-place",
+    min: 0,
+    max: 100,
+    changed: (value) => {
+      split.value = value;
+      update();
+    },
+  });
+  byId("tools").append(h("span", { class: "spacer" }), place.element, ways.element);
 
   let shown = null; // The job of the picture on the screen.
   let made = null; // {key, share} of what is on the canvas.
@@ -107,7 +118,8 @@ export function buildCompare(editor) {
     ways.update(contrast ?? "");
     ways.element.hidden = selectMode; // The tools that select need the room, and show the version alone.
     canvas.hidden = !ready;
-    split.hidden = !ready || job.way !== "slider";
+    split.hidden = place.element.hidden = !ready || job.way !== "slider";
+    place.update(split.valueAsNumber);
     canvas.style.clipPath = split.hidden ? "" : `inset(0 ${100 - split.valueAsNumber}% 0 0)`;
     attrs(view, { "data-compared": ready ? job.way : null });
     blink(ready && job.way === "blink" ? job : null);

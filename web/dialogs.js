@@ -106,6 +106,7 @@ export function showHelp({ letterKeys, setLetterKeys }) {
     ["Lasso, Frame", "draw, or tap the corners; a lasso ends where it began"],
     ["A tab at the foot", "opens the panel: all of it as numbers, edits, versions; ⌄ folds it away"],
     ["Tap twice", "turn about that point"],
+    ["✢", "turn, move and come nearer by buttons"],
     ["Hold to compare", "see it as it was before; beside it, a slider, blinking, the difference"],
   ];
   const keys = [
@@ -118,7 +119,7 @@ export function showHelp({ letterKeys, setLetterKeys }) {
     ["T", "fly, and back: W, A, S, D and the arrow keys, E up, Q down, with Shift faster; a drag looks around"],
     ["Drag a handle's dot", "set where it goes; the arrow keys move it, too"],
     ["Wheel over a dot", "its radius"],
-    ["Arrow keys", "orbit; with Shift: move sideways"],
+    ["Arrow keys, or ✢", "orbit; with Shift: move sideways"],
     ["Enter", "click in the middle of the picture"],
     [". and ,", "more, less of the thing that is taken"],
     ["D, H", "drag things, place handles"],

@@ -132,6 +132,7 @@ export class Editor {
   #placing = null;
   #nextId = 1;
   #lost = null; // {body, key} of a submission whose answer never came.
+  #deleting = new Set(); // Versions whose deletion was asked for here and is under way.
   #abandoned = new Set(); // Ids of edits that were begun and that nobody wants to hear of.
   #opened = 0;
   #lastView = null;
@@ -257,6 +258,15 @@ export class Editor {
 
   setPose(pose) {
     this.store.set({ pose, viewName: null });
+  }
+
+  /** Keys move the camera, or do not any more. */
+  fly(on = !this.state.flying) {
+    this.store.set({ flying: on });
+  }
+
+  togglePhoto() {
+    this.store.set({ photoOn: !this.state.photoOn });
   }
 
   /** Width / height of the picture; told by the viewer. */
@@ -792,6 +802,14 @@ export class Editor {
     }
   }
 
+  /** What was dragged comes off what it is held by, as one piece; after a draft of it, by another draft. */
+  takeOff() {
+    const { drafted } = this.state;
+    if (drafted) this.undo();
+    this.settle({ attach: "free" });
+    if (drafted) this.runDraft();
+  }
+
   /** Ends the draft under way, which nobody waits for any more. */
   #giveUpDraft() {
     const { draft } = this.state;
@@ -912,11 +930,24 @@ export class Editor {
     const dataset = ({ dataset: d }) => d && [d.kind, d.views, d.photos].join();
     this.store.set({ scene });
     // Somebody else has deleted what is looked at.
-    if (!scene.versions.some((v) => v.version === version)) {
-      this.say(`Version ${version} has been deleted.`);
-      this.showVersion(scene.versions.findLast((v) => v.version < version).version);
-    }
+    if (!scene.versions.some((v) => v.version === version)) this.#leave(before.versions.find((v) => v.version === version) ?? { version, parent: 0 });
     if (dataset(scene) !== dataset(before)) this.#loadViews(this.#opened);
+  }
+
+  /** The version on the screen is gone, deleted elsewhere: what it was made from is shown, or what is left of that. A
+   *  draft went for a better result, which is offered. */
+  #leave({ version, parent, edit }) {
+    const { versions } = this.state.scene;
+    const isThere = (number) => versions.some((v) => v.version === number);
+    const wasDraft = this.state.edits.find(({ id }) => id === edit)?.request.preset === "draft";
+    const better = wasDraft ? versions.findLast((v) => v.parent === parent && v.version > version)?.version : undefined;
+    this.showVersion(isThere(parent) ? parent : versions.findLast((v) => v.version < version).version);
+    if (this.#deleting.has(version)) return; // Here, by a press, and the stream was the first to tell.
+    if (better === undefined) return this.say(`Version ${version} has been deleted.`);
+    this.say(`Version ${version} was a draft, and is gone: version ${better} has been made in its place.`, {
+      seconds: 12,
+      action: { label: "Show", run: () => this.showVersion(better) },
+    });
   }
 
   #editUpdated(edit) {
@@ -993,7 +1024,8 @@ export class Editor {
   async deleteVersion(version) {
     const { scene } = this.state;
     const parent = parentOf(scene, version);
-    await api.deleteVersion(scene.id, version);
+    this.#deleting.add(version);
+    await api.deleteVersion(scene.id, version).finally(() => this.#deleting.delete(version));
     if (this.state.scene?.id !== scene.id) return;
     if (this.state.version === version) this.showVersion(parent);
     this.keep(version);
@@ -1011,7 +1043,7 @@ export class Editor {
   #finish(edit) {
     // Removing is no habit: what is taken next is to be moved.
     const mode = this.state.mode === "remove" ? "move" : this.state.mode;
-    this.#place({ handles: [], selection: [], region: null, heal: [], mode, version: edit.result_version });
+    this.#place({ handles: [], selection: [], region: null, heal: [], attach: null, mode, version: edit.result_version });
     this.selecting.use(null);
   }
 

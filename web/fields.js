@@ -125,3 +125,18 @@ export function toggle({ label, testid, title, changed }) {
     update: (on) => (input.checked = on),
   };
 }
+
+/** A button with a small panel beside it. As menus do, it closes by a press anywhere else, and by Esc.
+ *  Returns the element, a <details>. */
+export function menu(sign, testid, title, ...content) {
+  const opener = h("summary", { testid, title, "aria-label": title }, sign);
+  const element = h("details", { class: "menu" }, opener, h("div", { class: "stack" }, content));
+  document.addEventListener("pointerdown", ({ target }) => element.contains(target) || (element.open = false), true);
+  element.addEventListener("keydown", (event) => {
+    if (event.key !== "Escape") return;
+    event.stopPropagation();
+    element.open = false;
+    opener.focus();
+  });
+  return element;
+}

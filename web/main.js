@@ -201,7 +201,7 @@ function listenToKeys() {
     "]": () => editor.stepView(1),
     r: () => editor.home(),
     f: () => viewer.focusHere(),
-    t: () => store.set({ flying: !store.state.flying }),
+    t: () => editor.fly(),
     p: () => editor.preview(),
     g: () => next(store, "gizmo"),
     w: () => next(store, "frame"),
@@ -215,7 +215,7 @@ function listenToKeys() {
     backspace: () => editor.state.selected !== null && editor.remove(editor.state.selected),
     escape: () =>
       viewer.giveUpDrag() ||
-      (store.state.flying && (store.set({ flying: false }), true)) ||
+      (store.state.flying && (editor.fly(false), true)) ||
       (store.state.floorClicks && (store.set({ floorClicks: null }), true)) ||
       (editor.state.selectMode
         ? editor.selecting.use(null)
@@ -224,7 +224,7 @@ function listenToKeys() {
           : editor.select(null)),
     b: () => store.set({ comparing: true }),
     c: () => store.set({ contrast: nextWay(store.state.contrast) }),
-    o: () => store.set({ photoOn: !store.state.photoOn }),
+    o: () => editor.togglePhoto(),
     e: () => editor.selecting.start(true),
   };
   document.addEventListener("keydown", (event) => {

@@ -39,7 +39,8 @@ export function buildNotes(editor, viewer) {
     details.hidden = all === 0;
     text(summary, refused ? "Refused" : all === 1 ? "1 note" : `${all} notes`);
     details.classList.toggle("bad", refused !== null);
-    if (refused && refused !== told) details.open = true; // Once: who closes it has read it.
+    // Once: who closes it has read it. What comes after a refusal is no more urgent than notes are.
+    if (refused !== told) details.open = refused !== null;
     told = refused;
     list.replaceChildren(...lines(editor, { notes, open, refused }));
     const view = viewOf(state);

@@ -19,9 +19,7 @@ export function buildPhoto(editor, viewer) {
   const img = h("img", { id: "photo", alt: "", hidden: true, testid: "photo" });
   const strength = h("input", { type: "range", min: 0, max: 100, value: 100, testid: "photo-strength" });
   attrs(strength, { "aria-label": "How much of the photo is seen", title: "How much of the photo is seen" });
-  const toggle = iconButton("▣", "photo-toggle", "The dataset's photo over the picture (O)", () =>
-    store.set({ photoOn: !store.state.photoOn }),
-  );
+  const toggle = iconButton("▣", "photo-toggle", "The dataset's photo over the picture (O)", () => editor.togglePhoto());
   const element = h("div", { class: "photo-tools" }, strength, toggle);
   byId("picture").after(img);
   byId("view-tools").append(element);

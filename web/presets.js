@@ -3,7 +3,7 @@
 import * as api from "./api.js";
 import { attrs, h, text } from "./dom.js";
 import { bytes, duration } from "./format.js";
-import { changesScene } from "./requests.js";
+import { changesScene, impossibleWith } from "./requests.js";
 
 const DELAY_MS = 500; // After the last change of the request: an estimate costs the service what a preview does.
 
@@ -54,6 +54,11 @@ export function buildPresets(editor) {
     known = { key: keyOf() };
     const mine = known;
     for (const { name } of buttons) {
+      const why = impossibleWith(name, request, store.state.info);
+      if (why) {
+        mine[name] = { error: { detail: why } };
+        continue;
+      }
       try {
         mine[name] = await api.estimateEdit({ ...request, preset: name }, signal);
       } catch (error) {
@@ -62,6 +67,7 @@ export function buildPresets(editor) {
       }
       show();
     }
+    show();
   };
 
   store.watch(["info"], ({ info }) => build(info));

@@ -94,12 +94,12 @@ export function buildRequestPanel(editor) {
     placeholder: "a photo of sks scene",
     title: "What the scene shows: the diffusion model is trained and asked with it",
   });
-  promptField.addEventListener("change", () => store.set({ prompt: promptField.value.trim() || null }));
+  promptField.addEventListener("change", () => editor.settle({ prompt: promptField.value.trim() || null }));
   const slow = toggle({
     label: "It may take hours",
     testid: "allow-slow",
     title: "Without a graphics card a diffusion model works for hours: Estimate tells for how long",
-    changed: (on) => store.set({ allow_slow: on }),
+    changed: (on) => editor.settle({ allow_slow: on }),
   });
   const painted = h("div", { testid: "painted" }, labelled("Prompt", promptField), slow.element);
   const paramProblem = problemPlace("param-problem");

@@ -183,7 +183,8 @@ export class Selecting {
     // What has been moved is not where the version has it: a click on it says nothing new.
     if (picked.moved) return;
     this.store.set({ tab: "drag", nextThing: false, clickedOn: picked.hit ? picked : null });
-    this.place({ selection: picked.hit ? thingAt(picked.point) : [], handles: [] });
+    // Whether the one before came off says nothing of this one.
+    this.place({ selection: picked.hit ? thingAt(picked.point) : [], handles: [], attach: null });
   }
 
   /** More of the proposed thing (1), or less (-1): the next border. */

@@ -29,6 +29,9 @@ export function buildThingBar(editor) {
   const remove = press("Remove", "thing-remove", "Take it away for good, and complete what it hid", () =>
     editor.removeThing(),
   );
+  const free = press("Comes off", "thing-free", "It is held by what it grows out of, and bends: let it go as one piece instead", () =>
+    editor.takeOff(),
+  );
   const repair = press("Repair", "thing-repair", "Run it as a draft", () => editor.runDraft(), {
     class: "small primary",
   });
@@ -44,12 +47,12 @@ export function buildThingBar(editor) {
     { class: "small primary" },
   );
   const undo = press("Undo", "thing-undo", "Back to before (Ctrl + Z)", () => editor.undo());
-  byId("thing-bar").append(line, problem, less, more, hold, remove, repair, drop, cancel, better, undo);
+  byId("thing-bar").append(line, problem, less, more, hold, remove, free, repair, drop, cancel, better, undo);
 
   store.watch(
     [
       ...["thingMode", "selectMode", "selection", "selectionAnswer", "selectionWaits", "handles", "dragging", "draft"],
-      ...["drafted", "edits", "problem", "version", "submitting", "draftOnRelease"],
+      ...["drafted", "edits", "problem", "version", "submitting", "draftOnRelease", "preview"],
     ],
     (state) => {
       const { selection, selectionAnswer: answer, selectionWaits, draft, drafted, dragging } = state;
@@ -64,6 +67,7 @@ export function buildThingBar(editor) {
         [more, idle && !moved && proposalOf(selection)],
         [hold, idle && !moved],
         [remove, idle && !moved],
+        [free, (idle && moved && isHeld(state.preview)) || (done && isHeld(draftOf(state)))],
         [repair, idle && moved],
         [drop, idle],
         [cancel, draft !== null],
@@ -88,6 +92,10 @@ export function buildThingBar(editor) {
   );
 }
 
+/** Does a preview, or an edit, say that what moved was held? */
+const isHeld = (told) => told?.parts?.[0]?.how === "held";
+const draftOf = ({ drafted, edits }) => edits.find(({ id }) => id === drafted?.edit);
+
 function lineOf({ selection, selectionAnswer: answer, selectionWaits, draft, drafted, edits, dragging, handles }) {
   if (draft) {
     const edit = edits.find((e) => e.id === draft.id);
@@ -98,7 +106,7 @@ function lineOf({ selection, selectionAnswer: answer, selectionWaits, draft, dra
     if (!drafted) return "";
     const better = edits.find((e) => e.id === drafted.better);
     if (better) return `Running it well: ${statusLine(better)}`;
-    const edit = edits.find((e) => e.id === drafted.edit);
+    const edit = draftOf({ drafted, edits });
     const seconds = edit?.started && edit?.ended ? (new Date(edit.ended) - new Date(edit.started)) / 1000 : null;
     return `Done, as a draft${seconds === null ? "" : ` in ${duration(seconds)}`}.`;
   }

@@ -2,7 +2,7 @@
 
 import { attrs, BY_TOUCH, button, byId, h, iconButton, text } from "./dom.js";
 import { parentOf, shownVersion } from "./editor.js";
-import { choice, segments } from "./fields.js";
+import { choice, menu, segments } from "./fields.js";
 import { gaussians } from "./format.js";
 import { isStated } from "./requests.js";
 import { listOf } from "./selection.js";
@@ -122,11 +122,12 @@ export function buildToolbar(editor, viewer) {
     layer.element,
     h("div", { class: "row tight" }, compare, compareWith.element),
   );
-  const fly = iconButton("➤", "fly", "Fly (T)", () => store.set({ flying: !store.state.flying }));
+  const fly = iconButton("➤", "fly", "Fly (T)", () => editor.fly());
   byId("view-tools").append(
     iconButton("⊕", "focus", "Turn about the point under the pointer (F); here: about the middle", () => viewer.focusHere()),
     iconButton("⌂", "reset-view", "Back to the start (R)", () => editor.home()),
     fly,
+    menu("✢", "turn-menu", "Turn and move the view by buttons", ...turnPad(viewer)),
   );
 
   const chip = h("span", { class: "chip", testid: "shown-chip" });
@@ -176,8 +177,8 @@ export function buildToolbar(editor, viewer) {
       const before = state.preview ? state.version : parentOf(scene, state.version);
       compare.disabled = before === null && state.compareWith === null;
       compareWith.options([
-        ["", before === null ? "with before" : `with version ${before}`],
-        ...numbers.filter((n) => n !== before).map((n) => [String(n), `with version ${n}`]),
+        ["", before === null ? "before" : `version ${before}`],
+        ...numbers.filter((n) => n !== before).map((n) => [String(n), `version ${n}`]),
       ]);
       compareWith.update(state.compareWith === null ? "" : String(state.compareWith));
       compareWith.element.hidden = numbers.length < 2;
@@ -200,4 +201,36 @@ export function buildToolbar(editor, viewer) {
   );
 }
 
-const named = (number) => [String(number), number === 0 ? "Version 0 (original)" : `Version ${number}`];
+/** For who does not drag, and for who has one finger: the view turned, moved sideways, and brought nearer, by presses. */
+function turnPad(viewer) {
+  let slides = false;
+  const way = segments({
+    label: "What the arrows do",
+    testid: "turn-way",
+    options: [
+      ["turn", "Turn"],
+      ["slide", "Move"],
+    ],
+    changed: (value) => {
+      slides = value === "slide";
+      way.update(value);
+    },
+  });
+  way.update("turn");
+  const press = (sign, title, fn) => iconButton(sign, `turn-${title.toLowerCase()}`, title, fn);
+  const arrow = (sign, title, to) => press(sign, title, () => viewer.step(to, slides));
+  const near = (sign, title, factor) => press(sign, title, () => viewer.approach(factor));
+  const blank = () => h("span", {});
+  return [
+    way.element,
+    h(
+      "div",
+      { class: "pad" },
+      ...[near("+", "Nearer", 0.8), arrow("↑", "Up", [0, -1]), near("−", "Farther", 1.25)],
+      ...[arrow("←", "Left", [-1, 0]), blank(), arrow("→", "Right", [1, 0])],
+      ...[blank(), arrow("↓", "Down", [0, 1])],
+    ),
+  ];
+}
+
+const named = (number) => [String(number), `Version ${number}`];

@@ -2,6 +2,7 @@
 
 import { axes, seenFrom, upOf } from "./camera.js";
 import { attrs, button, byId, h, problemText, s } from "./dom.js";
+import { menu } from "./fields.js";
 import { cross, dot, scale, sub, unit } from "./vectors.js";
 
 const ARM = 28; // Pixels from the middle of the axes to their ends.
@@ -40,38 +41,26 @@ export function buildUp(editor) {
       label,
       testid,
       async () => {
-        menu.open = false;
+        ways.open = false;
         await Promise.resolve(up()).catch((error) => editor.say(problemText(error), { kind: "bad" }));
       },
       { title },
     );
   const reset = choose("Default", "reset-up", "As the cameras of the dataset were held; without one, −y", () => editor.setUp(null));
-  const menu = h(
-    "details",
-    { class: "menu" },
-    h("summary", { testid: "up-menu", title: "Which way is up", "aria-label": "Which way is up" }, "↥"),
-    h(
-      "div",
-      { class: "stack" },
-      choose("Upside down: flip", "flip-up", "The opposite of what is up now", () => editor.setUp(scale(editor.worldUp, -1))),
-      choose("Click the floor", "floor-up", "Three clicks on a floor say what is up", () =>
-        store.set({ floorClicks: [], selectMode: false }),
-      ),
-      choose("As on the screen", "set-up", "The top of the picture is up: orbits turn about it. The scene's data stays as it is.", () =>
-        editor.setUp(upOf(store.state.pose)),
-      ),
-      reset,
+  const ways = menu(
+    "↥",
+    "up-menu",
+    "Which way is up",
+    choose("Upside down: flip", "flip-up", "The opposite of what is up now", () => editor.setUp(scale(editor.worldUp, -1))),
+    choose("Click the floor", "floor-up", "Three clicks on a floor say what is up", () =>
+      store.set({ floorClicks: [], selectMode: false }),
     ),
+    choose("As on the screen", "set-up", "The top of the picture is up: orbits turn about it. The scene's data stays as it is.", () =>
+      editor.setUp(upOf(store.state.pose)),
+    ),
+    reset,
   );
-  byId("view-tools").append(menu);
-  // As menus do: a press anywhere else, or Esc, closes it.
-  document.addEventListener("pointerdown", ({ target }) => menu.contains(target) || (menu.open = false), true);
-  menu.addEventListener("keydown", (event) => {
-    if (event.key !== "Escape") return;
-    event.stopPropagation();
-    menu.open = false;
-    menu.firstElementChild.focus();
-  });
+  byId("view-tools").append(ways);
 
   const ends = AXES.map(({ name, sign, direction }) => {
     const look = () => editor.setPose(seenFrom(store.state.pose, direction, editor.worldUp));

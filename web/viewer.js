@@ -14,6 +14,7 @@ import {
   panned,
   pictureKey,
   pictureSize,
+  placedIn,
   project,
   samePose,
   unitsPerPixel,
@@ -39,6 +40,8 @@ const PICTURES_AT_ONCE = 3; // While moving: what covers the way there and back 
 const DOUBLE_CLICK_MS = 400; // A second click sooner than this, at the same place, is no click of its own.
 const CLICK_PX = 4; // A pointer that moves less than this has clicked, not dragged.
 const ORBIT_PER_PX = 0.0055; // Radians: half a turn across 570 pixels.
+const TURN_STEP = 0.09; // Radians, of an arrow key or button.
+const SLIDE_PX = 30; // Pixels, of the same when it slides.
 const THING_PX = 14; // A thing is taken hold of within this of its middle, however small it is.
 const CORNER_PX = 12; // A click this near to a corner is on it: a finger is no finer.
 const SKETCH_PX = 2; // A line that is drawn has a corner this often at most.
@@ -254,7 +257,9 @@ export class Viewer {
     if (!this.#displayed) return;
     const context = this.#canvas.getContext("2d");
     context.imageSmoothingQuality = "high";
-    context.drawImage(this.#displayed.picture, 0, 0, this.#canvas.width, this.#canvas.height);
+    const { x, y, width, height } = placedIn(this.#displayed.picture, this.#canvas);
+    if (x > 0) context.clearRect(0, 0, this.#canvas.width, this.#canvas.height);
+    context.drawImage(this.#displayed.picture, x, y, width, height);
   }
 
   #failed(error, job) {
@@ -535,10 +540,8 @@ export class Viewer {
     this.#pointers.set(event.pointerId, to);
     if (gesture.drag) return gesture.drag.move(to.x, to.y);
     const [dx, dy] = [to.x - from.x, to.y - from.y];
-    if (gesture.kind === "orbit") {
-      const turned = this.#state.flying ? lookedAround : orbited;
-      this.#turn((pose) => turned(pose, dx * ORBIT_PER_PX, dy * ORBIT_PER_PX, this.#editor.worldUp));
-    }
+    if (gesture.kind === "orbit")
+      this.#turn((pose) => this.#turned()(pose, dx * ORBIT_PER_PX, dy * ORBIT_PER_PX, this.#editor.worldUp));
     else this.#turn((pose) => panned({ ...pose, ...this.#size }, dx, dy));
   }
 
@@ -593,6 +596,23 @@ export class Viewer {
     if (samePose(pose, next)) return;
     this.#movingUntil = performance.now() + STILL_AFTER_MS;
     this.#editor.setPose(next);
+  }
+
+  /** A step of a key or a button, [x, y] with y down: turns the view as a drag would, or slides it. */
+  step([x, y], slides = false) {
+    if (!this.#state.pose) return;
+    if (slides) this.#turn((pose) => panned({ ...pose, ...this.#size }, -SLIDE_PX * x, -SLIDE_PX * y));
+    else this.#turn((pose) => this.#turned()(pose, TURN_STEP * x, TURN_STEP * y, this.#editor.worldUp));
+  }
+
+  /** Nearer to what the view turns about (below 1), or farther. */
+  approach(factor) {
+    if (this.#state.pose) this.#turn((pose) => this.#approached(pose, factor));
+  }
+
+  /** What a drag beside everything does to the view. */
+  #turned() {
+    return this.#state.flying ? lookedAround : orbited;
   }
 
   #nearest() {
@@ -653,11 +673,9 @@ export class Viewer {
     if (event.altKey && event.key !== "Enter") return;
     const arrow = ARROWS[event.key];
     if (arrow && this.#state.flying) return; // flyBy() sees them.
-    if (arrow && event.shiftKey)
-      this.#turn((pose) => panned({ ...pose, ...this.#size }, -30 * arrow[0], -30 * arrow[1]));
-    else if (arrow) this.#turn((pose) => orbited(pose, 0.09 * arrow[0], 0.09 * arrow[1], this.#editor.worldUp));
-    else if (event.key === "+" || event.key === "=") this.#turn((pose) => this.#approached(pose, 0.9));
-    else if (event.key === "-" || event.key === "_") this.#turn((pose) => this.#approached(pose, 1 / 0.9));
+    if (arrow) this.step(arrow, event.shiftKey);
+    else if (event.key === "+" || event.key === "=") this.approach(0.9);
+    else if (event.key === "-" || event.key === "_") this.approach(1 / 0.9);
     else if (event.key === "Enter") this.#click({ x: this.#size.width / 2, y: this.#size.height / 2 }, event.altKey);
     else return;
     // Only who works by keyboard needs to see where the middle is.

@@ -69,8 +69,9 @@ void abandon(Job& job, int max_deaths) {
   job.died_at = job.place;
   if (max_deaths == 0 || job.deaths < max_deaths) return;
   job.state = JobState::failed;
+  const std::string deaths = job.deaths == 1 ? "" : " " + std::to_string(job.deaths) + " times in a row";
   job.error = Error{ErrorCode::internal,
-                    "the service ended " + std::to_string(job.deaths) + " times in a row while it was at this job" +
+                    "the service ended" + deaths + " while it was at this job" +
                         (job.place.empty() ? "" : " (" + job.place + ")") +
                         ", which is not taken up again: it may need more memory than there is",
                     job.id};

@@ -1,5 +1,6 @@
 // What is made of a drag, in a real browser: comparing, healing, running, and requests from files.
 import assert from 'node:assert/strict';
+import { readFile } from 'node:fs/promises';
 import path from 'node:path';
 import { after, before, describe, test } from 'node:test';
 import { ball, ballMoved, compared, makeDesk, makeRoom, openDesk, violations } from './support/desk.mjs';
@@ -36,6 +37,36 @@ describe('two versions in one picture', () => {
     await desk?.service.stop();
   });
 
+  test('are shown one alone while the button or B is held; layers show depth and what was changed', async () => {
+    const { x, y, width, height } = await id('compare').boundingBox();
+    await page.mouse.move(x + width / 2, y + height / 2);
+    await page.mouse.down();
+    await hand.shown(0);
+    await page.mouse.up();
+    await hand.shown(1);
+    await page.keyboard.down('b');
+    await hand.shown(0);
+    await page.keyboard.up('b');
+    await hand.shown(1);
+    const layer = async (name) => {
+      await id(`layer-${name}`).click();
+      await page.waitForFunction((wanted) => {
+        const { layer, quality } = document.querySelector('[data-testid=view]').dataset;
+        return layer === wanted && quality === 'full';
+      }, name);
+    };
+    const moved = await hand.onScreen(room.demo.ball.handles[0].target);
+    const box = await id('view').boundingBox();
+    const corner = [box.x + 0.95 * box.width, box.y + 0.05 * box.height];
+    await layer('mask');
+    assert.ok(apart(await colourAt(page, 'picture', moved), [255, 255, 255]) < 60, 'the ball has changed');
+    assert.ok(apart(await colourAt(page, 'picture', corner), [0, 0, 0]) < 20, 'the wall has not');
+    await layer('depth');
+    const [ball, wall] = [await colourAt(page, 'picture', moved), await colourAt(page, 'picture', corner)];
+    assert.ok(apart(ball, wall) > 20, `near ${ball}, far ${wall}`);
+    await layer('color');
+  });
+
   test('are on both sides of a line that is moved by keys and by the mouse', async () => {
     await id('compare-mode').selectOption('slider');
     await compared(page, 'slider');
@@ -55,6 +86,12 @@ describe('two versions in one picture', () => {
     await page.mouse.up();
     assert.ok(Math.abs(await split() - 25) < 3, `${await split()}`);
     assert.match(await id('compare-line').textContent(), /version 0 · right: version 1/);
+    await id('compare-place').fill('70');  // without a drag
+    await id('compare-place').blur();
+    assert.equal(await split(), 70);
+    assert.match(await clip(), /^inset\(0(px)? 30% 0(px)? 0(px)?\)$/);
+    await id('compare-place').fill('25');
+    await id('compare-place').blur();
     await hand.shot('compare-slider');
     assert.deepEqual(await violations(page), []);
     await page.mouse.move(box.x + 0.7 * box.width, box.y + 0.3 * box.height);
@@ -232,7 +269,7 @@ describe('a run', () => {
     await hand.state('moved');
     const long = async () => {
       await id('tab-button-drag').click();
-      await id('param-iterations').fill('400');
+      await id('param-iterations').fill('1000');
       await id('param-intervals').fill('20');
       await id('param-intervals').blur();
       await id('run').click();
@@ -240,10 +277,15 @@ describe('a run', () => {
     };
     await long();
     await id('interval-1').first().waitFor({ timeout: 120_000 });
-    await page.locator('[data-state=running] [data-testid=edit-stop]:enabled').click();
+    const [answer] = await Promise.all([
+      page.waitForResponse((r) => r.url().endsWith('/stop')),
+      page.locator('[data-state=running] [data-testid=edit-stop]:enabled').click(),
+    ]);
+    const { finished_intervals: finished } = await answer.json();
     await page.locator('[data-testid^="edit-e"][data-state=running], [data-testid^="edit-e"][data-state=stop_requested]').waitFor({ state: 'detached', timeout: 120_000 });
     const [stopped] = (await desk.client.get('/v1/edits')).json().edits;
     assert.deepEqual([stopped.state, stopped.stopped_early], ['succeeded', true]);
+    assert.equal(stopped.finished_intervals.length, finished.length, 'the one in work is given up, not waited for');
     await hand.shown(stopped.result_version);
     await id('tab-button-drag').click();
     await page.keyboard.press('Control+z');
@@ -292,5 +334,38 @@ describe('a request from a file', () => {
     assert.ok(await id('region-on').isChecked(), 'undo covers the box');
     await id('hand-thing').click();
     assert.deepEqual(complaints.filter((text) => !/status of 422/.test(text)), []);
+  });
+
+  test('goes into one as it is, with its mode, anchors and groups, and comes back; what it would take is said', async () => {
+    await id('tab-button-drag').click();
+    await id('region-on').uncheck();
+    await id('clear-handles').click();
+    await id('hand-handle').click();
+    const mug = [1.3, -0.16, -0.6];
+    await page.mouse.click(...await hand.onScreen(mug));
+    await id('handle-card-0').getByTestId('group').fill('1');
+    await id('handle-card-0').getByTestId('group').blur();
+    await page.mouse.click(...await hand.onScreen(ball));
+    await id('handle-card-1').getByTestId('group').fill('0');
+    await id('handle-card-1').getByTestId('group').blur();
+    await id('mode-extend').click();
+    const { x, y, width, height } = await id('handle-1-source').boundingBox();
+    const dot = [x + width / 2, y + height / 2];
+    await hand.drag(dot, [dot[0] + 90, dot[1] - 10]);
+    await previewed();
+    await id('estimate').click();
+    await id('estimate-answer').getByText(/about \d.* (ms|s|min) and .*B: \d+ interval/).waitFor();
+    const [download] = await Promise.all([page.waitForEvent('download'), id('export').click()]);
+    const file = await download.path();
+    const { mode, handles } = JSON.parse(await readFile(file, 'utf8'));
+    assert.equal(mode, 'extend');
+    assert.deepEqual(handles.map(({ target, group }) => [Boolean(target), group]), [[false, 1], [true, 0]]);
+    await id('clear-handles').click();
+    await id('mode-move').click();
+    await id('import-file').setInputFiles({ name: 'again.json', mimeType: 'application/json', buffer: await readFile(file) });
+    await id('handle-card-1').waitFor();
+    assert.equal(await id('mode-extend').getAttribute('aria-pressed'), 'true');
+    const [again] = await Promise.all([page.waitForEvent('download'), id('export').click()]);
+    assert.deepEqual(JSON.parse(await readFile(await again.path(), 'utf8')), JSON.parse(await readFile(file, 'utf8')));
   });
 });

@@ -3,8 +3,7 @@ import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import path from 'node:path';
 import { after, before, describe, test } from 'node:test';
-import { handOn, launch, openPage } from './support/browser.mjs';
-import { tooSmall, violations } from './support/desk.mjs';
+import { fingerOn, handOn, launch, openPage } from './support/browser.mjs';
 import { run, Service, temporaryFolder } from './support/program.mjs';
 import { datasetZip, demoScene } from './support/scenes.mjs';
 
@@ -298,50 +297,15 @@ describe('a thing of a small scene', () => {
     await page.context().close();
   });
 
-  for (const [name, options] of [
-    ['a desk', { viewport: { width: 1366, height: 768 } }],
-    ['a large screen', { viewport: { width: 1920, height: 1080 } }],
-    ['a phone', { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true }],
-  ])
-    test(`on ${name}, no state breaks the rules for access, and all that is pressed is large enough`, async () => {
-      const { page, id, hand, complaints } = await opened(options);
-      const press = (place) => (options.hasTouch ? page.touchscreen.tap(...place) : page.mouse.click(...place));
-      const check = async (state) => {
-        assert.deepEqual(await violations(page), [], state);
-        assert.deepEqual(await tooSmall(page), [], state);
-        await hand.shot(`${name.split(' ').at(-1)}-${state}`);
-      };
-      await check('opened');
-      await press(await hand.onScreen(mug));
-      await hand.count();
-      await check('taken');
-      for (const tab of ['edits', 'scene']) {
-        await id(`tab-button-${tab}`).click();
-        await check(tab);
-      }
-      await id('help-button').click();
-      await check('help');
-      await page.keyboard.press('Escape');
-      await id('hand-select').click();
-      await check('selecting');
-      await id('home-link').click();
-      await id('scenes').waitFor();
-      await check('home');
-      assert.deepEqual(complaints, []);
-      await page.context().close();
-    });
-
   test('is taken by a tap and moved by a finger', async () => {
     const { page, id, hand, complaints } = await opened({ viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
     const at = await hand.onScreen(mug);
     await page.touchscreen.tap(...at);
     const count = await hand.count();
-    const session = await page.context().newCDPSession(page);
-    const touch = (type, [x, y]) => session.send('Input.dispatchTouchEvent', { type, touchPoints: type === 'touchEnd' ? [] : [{ x, y }] });
-    await touch('touchStart', at);
-    for (let i = 1; i <= 8; ++i) await touch('touchMove', [at[0] - 8 * i, at[1]]);
+    const finger = await fingerOn(page);
+    await finger.drag(at, ...[1, 2, 3, 4, 5, 6, 7, 8].map((i) => [at[0] - 8 * i, at[1]]), { drop: false });
     await page.waitForFunction(() => /^p\d/.test(document.querySelector('[data-testid=view]').dataset.version));
-    await touch('touchEnd', at);
+    await finger.drop();
     await hand.state('done');
     const [edit] = (await service.client.get('/v1/edits')).json().edits;
     await hand.shown(edit.result_version);

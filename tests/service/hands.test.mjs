@@ -74,6 +74,14 @@ describe('the gizmo', () => {
     assert.deepEqual(await numbers('shift'), [0, 0, 0], 'one step');
   });
 
+  test('moves in a plane by its square', async () => {
+    await take();
+    const [x, y] = await middle('gizmo-move-zx');
+    const { handles } = await previewOf(() => hand.drag([x, y], [x - 60, y + 20]), (handle) => Math.hypot(...shiftOf(handle)) > 0.1);
+    const [along, up, ahead] = shiftOf(handles[0]);
+    assert.ok(Math.abs(up) < 1e-9 && Math.abs(along) > 1e-3 && Math.abs(ahead) > 1e-3, `${[along, up, ahead]}`);
+  });
+
   test('turns by a ring, and by arrow keys, in the frame that was chosen', async () => {
     await take();
     await page.keyboard.press('g');
@@ -105,6 +113,12 @@ describe('the gizmo', () => {
     assert.equal(attach, 'free');
     assert.deepEqual([handles[0].scale, handles[0].rotation.map((x) => Number(x.toFixed(6)))], [1.5, [0.707107, 0, 0.707107, 0]]);
     await id('attach-answer').getByText('Comes off').waitFor();
+    // And by the bar on the picture, for who does not look at the panel.
+    await id('attach-held').click();
+    await id('attach-answer').getByText('Held').waitFor();
+    await id('thing-free').click();
+    await id('attach-answer').getByText('Comes off').waitFor();
+    await id('thing-free').waitFor({ state: 'hidden' });
     await page.waitForFunction(() => /^p\d/.test(document.querySelector('[data-testid=view]').dataset.version));
     await hand.shot('hands-numbers');
     await type('turn-y', '0');
@@ -197,6 +211,62 @@ describe('the view', () => {
     assert.ok(away[1] < 0 && Math.hypot(away[0], away[2]) < 1e-6, `from above: ${away}`);
   });
 
+  test('is turned, moved aside and brought nearer by buttons alone', async () => {
+    const minus = (a, b) => a.map((x, i) => x - b[i]);
+    const away = ({ eye, target }) => Math.hypot(...minus(eye, target));
+    const press = async (name) => {
+      await id(`turn-${name}`).click();
+      return (await hand.looksFrom()).camera;
+    };
+    const { camera: start } = await hand.looksFrom();
+    await id('turn-menu').click();
+    const turned = await press('left');
+    assert.deepEqual(turned.target, start.target);
+    assert.ok(Math.hypot(...minus(turned.eye, start.eye)) > 0.05 * away(start) && Math.abs(away(turned) - away(start)) < 1e-9, 'about the same point');
+    const near = await press('nearer');
+    assert.ok(away(near) < 0.9 * away(turned), `${away(near)} of ${away(turned)}`);
+    await id('turn-way-slide').click();
+    const slid = await press('up');
+    assert.ok(minus(slid.eye, near.eye).every((x, i) => Math.abs(x - minus(slid.target, near.target)[i]) < 1e-9), 'aside, and not turned');
+    assert.ok(slid.eye[1] < near.eye[1], 'up: y points down');
+    await page.keyboard.press('Escape');
+    assert.equal(await id('turn-left').isVisible(), false);
+  });
+
+  test('several pictures are on their way at once while it moves, and over a slow network none is smaller for that', async () => {
+    const session = await page.context().newCDPSession(page);
+    const slow = (latency) => session.send('Network.emulateNetworkConditions', { offline: false, latency, downloadThroughput: -1, uploadThroughput: -1 });
+    let [underWay, most] = [0, 0];
+    const isPicture = (request) => request.url().endsWith('/render');
+    page.on('request', (request) => isPicture(request) && (most = Math.max(most, (underWay += 1))));
+    for (const name of ['requestfinished', 'requestfailed']) page.on(name, (request) => isPicture(request) && (underWay -= 1));
+    await page.evaluate(() => {
+      window.widths = [];
+      document.querySelector('[data-testid=view]').addEventListener('shown', ({ detail }) => window.widths.push(detail.size.width));
+    });
+    const box = await id('view').boundingBox();
+    const [x, y] = [box.x + 0.9 * box.width, box.y + 0.2 * box.height];
+    await page.mouse.move(x, y);
+    await page.mouse.down();
+    /// How wide pictures are once so many have come.
+    const settled = async (pictures) => {
+      await page.evaluate(() => (window.widths = []));
+      for (let i = 1; (await page.evaluate(() => window.widths.length)) < pictures; ++i) {
+        await page.mouse.move(x - 100 + 100 * Math.cos(i / 10), y);
+        await page.waitForTimeout(20);
+      }
+      return page.evaluate(() => window.widths.at(-1));
+    };
+    const near = await settled(10);
+    await slow(400);
+    most = 0;
+    const far = await settled(12);
+    await page.mouse.up();
+    await slow(0);
+    assert.ok(most >= 2 && most <= 3, `${most} at once`);
+    assert.ok(far >= 0.5 * near, `${far} pixels wide, and ${near} without the way there and back`);
+  });
+
   test('flies where it looks while keys are held, and a drag looks around', async () => {
     const { camera: before } = await hand.looksFrom();
     await id('fly').click();
@@ -262,6 +332,56 @@ describe('the view', () => {
       assert.ok(x > box.x && x < box.x + box.width && y > box.y && y < box.y + box.height, `${corner} at ${[x, y]}`);
     }
     await service.client.delete(`/v1/scenes/${other.id}`);
+  });
+});
+
+describe('who has no pointer', () => {
+  /** Goes on from element to element until one has the focus. */
+  const tabTo = async (name) => {
+    for (let i = 0; i < 120; ++i) {
+      await page.keyboard.press('Tab');
+      if (await page.evaluate((wanted) => document.activeElement?.dataset.testid === wanted, name)) return;
+    }
+    assert.fail(`${name} is not to be reached`);
+  };
+
+  test('takes a thing, moves it, has it repaired and goes back, by keys alone', async () => {
+    await page.keyboard.press('Escape');
+    await tabTo('view');
+    // The thing under the cross in the middle.
+    const box = await id('view').boundingBox();
+    const centre = [box.x + box.width / 2, box.y + box.height / 2];
+    for (let i = 0; i < 40; ++i) {
+      const at = await hand.onScreen(mug);
+      const [dx, dy] = [0, 1].map((k) => Math.round((at[k] - centre[k]) / 30));
+      if (dx === 0 && dy === 0) break;
+      for (let k = 0; k < Math.abs(dx); ++k) await page.keyboard.press(dx > 0 ? 'Shift+ArrowRight' : 'Shift+ArrowLeft');
+      for (let k = 0; k < Math.abs(dy); ++k) await page.keyboard.press(dy > 0 ? 'Shift+ArrowDown' : 'Shift+ArrowUp');
+    }
+    await page.keyboard.press('Enter');
+    const count = await hand.count();
+    await tabTo('thing-hold');
+    await page.keyboard.press('Enter');
+    await page.waitForFunction(() => document.activeElement.dataset.testid === 'handle-0-target');
+    for (let i = 0; i < 12; ++i) await page.keyboard.press('ArrowLeft');
+    await hand.state('moved');
+    await tabTo('thing-repair');
+    await page.keyboard.press('Enter');
+    await hand.state('done');
+    const [edit] = (await service.client.get('/v1/edits')).json().edits;
+    assert.deepEqual([edit.state, edit.handles[0].gaussians >= count], ['succeeded', true]);
+    await hand.shown(edit.result_version);
+    await page.keyboard.press('Control+z');
+    await hand.state('moved');
+    await tabTo('tab-button-drag');
+    await page.keyboard.press('ArrowRight');
+    await page.keyboard.press('ArrowRight');
+    await tabTo(`version-${edit.result_version}-delete`);
+    await page.keyboard.press('Enter');
+    await page.waitForFunction(() => document.activeElement.dataset.testid === 'confirm-no');
+    await page.keyboard.press('Tab');
+    await page.keyboard.press('Enter');
+    await id(`version-${edit.result_version}`).waitFor({ state: 'detached' });
   });
 });
 

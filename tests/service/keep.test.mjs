@@ -2,6 +2,7 @@
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import { after, before, describe, test } from 'node:test';
+import { fingerOn, openPage } from './support/browser.mjs';
 import { ball, ballMoved, compared, makeDesk, makeRoom, openDesk, tooSmall, violations } from './support/desk.mjs';
 
 let room;
@@ -38,7 +39,9 @@ describe('versions', () => {
     assert.deepEqual(levels, [['version-0', '1'], ['version-2', '2'], ['version-1', '2'], ['version-3', '3']]);
     await hand.shot('versions');
     assert.deepEqual(await violations(page), []);
-    for (const format of ['compressed_ply', 'original']) {
+    const { formats } = (await desk.client.get('/v1/info')).json();
+    assert.ok(formats.write.length > 4);
+    for (const format of [...formats.write, 'original']) {
       const [download] = await Promise.all([page.waitForEvent('download'), id(`download-3-${format}`).click()]);
       assert.deepEqual(await readFile(await download.path()), await desk.client.file(desk.scene, 3, format), format);
     }
@@ -62,11 +65,11 @@ describe('versions', () => {
     await other.id('confirm-yes').click();
     await id('version-3').waitFor({ state: 'detached' });
     await page.getByTestId('toast').getByText('Version 3 has been deleted').waitFor();
-    await hand.shown(2);
+    await hand.shown(0);  // what it was made from
     // An edit of the one is in the list of the other, and does not take its screen.
     const made = await ballMoved(desk, { version: 2, back: true });
     for (const one of [page, other.page]) await one.getByTestId('toast').getByText(`Version ${made} is ready, made elsewhere`).waitFor();
-    await hand.shown(2);
+    await hand.shown(0);
     assert.deepEqual(other.complaints, []);
     await other.page.context().close();
   });
@@ -90,14 +93,42 @@ describe('versions', () => {
       return shown;
     };
     const there = async () => (await desk.client.get(`/v1/scenes/${desk.scene}`)).json().versions.map(({ version }) => version);
-    const [first, second] = [await draft(90), await draft(110)];
+    const first = await draft(90);
+    const other = await openDesk(desk);
+    await other.hand.shown(first);
+    const second = await draft(110);
     await id(`version-${first}`).waitFor({ state: 'detached' });  // in the tree, whether that is seen or not
+    // Who was looking at it is told what became of it, and goes on.
+    const told = other.page.getByTestId('toast').filter({ hasText: `Version ${first} was a draft, and is gone: version ${second}` });
+    await told.waitFor();
+    await other.hand.shown(0);
+    await told.getByRole('button', { name: 'Show' }).click();
+    await other.hand.shown(second);
+    assert.deepEqual(other.complaints, []);
+    await other.page.context().close();
     assert.ok(!(await there()).includes(first) && (await there()).includes(second));
     await id('tab-button-scene').click();
     await id(`version-${second}-keep`).click();
     const third = await draft(130);
     assert.ok((await there()).includes(second) && (await there()).includes(third));
     assert.deepEqual(complaints, []);
+  });
+
+  test('scenes are named and deleted where they are listed', async () => {
+    await desk.client.upload(room.demo.ply, { name: 'another' });
+    await id('home-link').click();
+    const card = (name) => page.locator('[data-testid^=scene-s]').filter({ hasText: name });
+    await card('another').getByTestId('scene-rename').click();
+    await id('ask-input').fill('a copy');
+    await id('ask-ok').click();
+    await card('a copy').getByTestId('scene-delete').click();
+    await id('confirm-no').click();
+    await card('a copy').getByTestId('scene-delete').click();
+    await id('confirm-yes').click();
+    await card('a copy').waitFor({ state: 'detached' });
+    assert.deepEqual((await desk.client.get('/v1/scenes')).json().scenes.map(({ id: one }) => one), [desk.scene]);
+    await id(`scene-${desk.scene}`).getByTestId('scene-open').click();
+    await id('workspace').waitFor();
   });
 
   test('a scene that somebody deletes is left', async () => {
@@ -134,6 +165,36 @@ describe('a service that goes away', () => {
     await id(`scene-${other.id}`).waitFor();
     await page.context().close();
     await desk.service.stop();
+  });
+});
+
+describe('a scene that is opened', () => {
+  test('is on the screen before anything is known that the picture does not need', async (t) => {
+    const desk = await makeDesk(room);
+    t.after(() => desk.service.stop());
+    await ballMoved(desk);
+    const { page, id, complaints } = await openPage(room.browser, desk.service);
+    await id(`scene-${desk.scene}`).waitFor();
+    // Scene, views, picture: whatever else is asked for does not come until that is there.
+    let picture;
+    const isThere = new Promise((resolve) => (picture = resolve));
+    const held = [];
+    await page.route(/\/v1\//, async (route) => {
+      const { pathname } = new URL(route.request().url());
+      if (!/\/v1\/scenes\/s\d+(\/views|\/versions\/\d+\/render)?$/.test(pathname)) {
+        held.push(pathname);
+        await isThere;
+      }
+      await route.continue();
+    });
+    await id(`scene-${desk.scene}`).getByTestId('scene-open').click();
+    await page.waitForFunction(() => document.querySelector('[data-testid=view]')?.dataset.version !== undefined);
+    assert.ok(held.includes('/v1/edits'), `${held}`);
+    picture();
+    await page.waitForFunction(() => document.querySelector('[data-testid=view]').dataset.quality === 'full');
+    await id('edits').locator('[data-state=succeeded]').waitFor({ state: 'attached' });
+    assert.deepEqual(complaints, []);
+    await page.context().close();
   });
 });
 
@@ -197,13 +258,7 @@ describe('by fingers, on a phone', () => {
     desk = await makeDesk(room);
     await ballMoved(desk);
     ({ page, id, hand, complaints } = await openDesk(desk, phone));
-    const session = await page.context().newCDPSession(page);
-    touch = async (...places) => {
-      const send = (type, points) => session.send('Input.dispatchTouchEvent', { type, touchPoints: points.map(([x, y]) => ({ x, y })) });
-      await send('touchStart', [places[0]]);
-      for (const place of places.slice(1)) await send('touchMove', [place]);
-      await send('touchEnd', []);
-    };
+    touch = (await fingerOn(page)).drag;
   });
   after(async () => {
     await page?.context().close();
@@ -305,5 +360,62 @@ describe('by fingers, on a phone', () => {
     await id('confirm-yes').tap();
     await hand.shown(0);
     assert.deepEqual(complaints, []);
+  });
+});
+
+describe('by fingers, on a tablet', () => {
+  test('a thing is looked at, pulled by the gizmo, selected by corners, and repaired', async (t) => {
+    const desk = await makeDesk(room);
+    t.after(() => desk.service.stop());
+    const { page, id, hand, complaints } = await openDesk(desk, { viewport: { width: 820, height: 1180 }, hasTouch: true, isMobile: true });
+    const finger = await fingerOn(page);
+    const middle = async (name) => {
+      const { x, y, width, height } = await id(name).boundingBox();
+      return [x + width / 2, y + height / 2];
+    };
+    // Two fingers that part bring it nearer.
+    const away = async () => {
+      const { camera } = await hand.looksFrom();
+      return Math.hypot(...camera.eye.map((x, i) => x - camera.target[i]));
+    };
+    const far = await away();
+    const box = await id('view').boundingBox();
+    const [cx, cy] = [box.x + box.width / 2, box.y + 0.3 * box.height];
+    await finger.together([0, 10, 20, 30].map((d) => [cx - 60 - d, cy]), [0, 10, 20, 30].map((d) => [cx + 60 + d, cy]));
+    await page.waitForFunction(() => document.querySelector('[data-testid=view-select]').value === '');
+    assert.ok(await away() < 0.9 * far, `${await away()} of ${far}`);
+    await id('reset-view').tap();
+    await hand.shown(0);
+
+    await id('auto-repair').evaluate((box) => box.click());  // in the folded sheet
+    await page.touchscreen.tap(...await hand.onScreen(ball));
+    const whole = await hand.count();
+    const [x, y] = await middle('gizmo-move-x');
+    await finger.drag([x + 8, y], [x + 30, y], [x + 60, y], [x + 90, y]);
+    await hand.state('moved');
+    await hand.shot('tablet-gizmo');
+    await id('thing-repair').click();  // see above: a tap right after a quick drag
+    await hand.state('done');
+    const [edit] = (await desk.client.get('/v1/edits')).json().edits;
+    const [{ source, target }] = edit.request.handles;
+    assert.ok(edit.handles[0].gaussians >= whole && target[0] - source[0] > 0.1 && Math.abs(target[1] - source[1]) < 1e-9, `${source} to ${target}`);
+    await id('thing-undo').tap();
+    await hand.state('moved');
+    await id('thing-drop').tap();
+
+    await id('hand-select').tap();
+    await id('select-tool-rectangle').tap();
+    const [bx, by] = await hand.onScreen(ball);
+    await page.touchscreen.tap(bx - 60, by - 60);
+    await page.touchscreen.tap(bx + 60, by + 60);
+    const framed = await hand.count();
+    await id('select-op').selectOption('subtract');
+    await id('select-tool-brush').tap();
+    await finger.drag([bx - 30, by], [bx, by], [bx + 30, by]);
+    await page.waitForFunction((n) => Number(document.querySelector('[data-testid=selection-count]').dataset.count) < n, framed);
+    await hand.count();
+    assert.deepEqual(await violations(page), []);
+    assert.deepEqual(complaints, []);
+    await page.context().close();
   });
 });

@@ -131,6 +131,13 @@ TEST(JobDeaths, ThreeAtOnePlaceAreEnough) {
       << job.error->message;
 }
 
+TEST(JobDeaths, OneIsSaidInTheSingular) {
+  const Job job = after_death(job_in(JobState::queued, false, 0), {"load"}, 1);
+  ASSERT_TRUE(job.error);
+  EXPECT_TRUE(job.error->message.starts_with("the service ended while it was at this job (load)"))
+      << job.error->message;
+}
+
 TEST(JobDeaths, CountOnlyInARowAtTheSamePlace) {
   Job job = job_in(JobState::queued, false, 0);
   for (int round = 0; round < 5; ++round) {

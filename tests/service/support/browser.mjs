@@ -41,6 +41,30 @@ export const openPage = async (browser, service, { viewport = { width: 1280, hei
   return { page, complaints, id: (name) => page.getByTestId(name) };
 };
 
+/// Fingers on a page.
+export const fingerOn = async (page) => {
+  const session = await page.context().newCDPSession(page);
+  const send = (type, points) => session.send('Input.dispatchTouchEvent', { type, touchPoints: points.map(([x, y], id) => ({ x, y, id })) });
+  const drop = () => send('touchEnd', []);
+  return {
+    drop,
+    /// One goes down at the first place, along the others, and up.
+    ///   last  may be {drop: false}: it stays down
+    drag: async (...places) => {
+      const { drop: lifts = true } = Array.isArray(places.at(-1)) ? {} : places.pop();
+      await send('touchStart', [places[0]]);
+      for (const place of places.slice(1)) await send('touchMove', [place]);
+      if (lifts) await drop();
+    },
+    /// Several, each along its own places.
+    together: async (...ways) => {
+      await send('touchStart', ways.map(([first]) => first));
+      for (let i = 1; i < ways[0].length; ++i) await send('touchMove', ways.map((way) => way[i]));
+      await drop();
+    },
+  };
+};
+
 /// The hand on the picture of an open page.
 export const handOn = ({ page, id }) => {
   const state = (wanted, timeout = 120_000) => page.waitForFunction((name) => {
@@ -82,6 +106,17 @@ export const handOn = ({ page, id }) => {
       await page.mouse.down();
       await page.mouse.move(...to, { steps: 12 });
       if (drop) await page.mouse.up();
+    },
+    /// The mouse, as fingerOn() has a finger.
+    mouse: {
+      drop: () => page.mouse.up(),
+      drag: async (...places) => {
+        const { drop: lifts = true } = Array.isArray(places.at(-1)) ? {} : places.pop();
+        await page.mouse.move(...places[0]);
+        await page.mouse.down();
+        for (const place of places.slice(1)) await page.mouse.move(...place, { steps: 4 });
+        if (lifts) await page.mouse.up();
+      },
     },
     shot: (name) => shots && page.screenshot({ path: path.join(shots, `${name}.png`) }),
   };

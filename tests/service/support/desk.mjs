@@ -9,9 +9,9 @@ const axeSource = readFileSync(createRequire(import.meta.url).resolve('axe-core/
 
 /// What axe-core finds against WCAG 2.2 A and AA in the state that a page is in: [rule: elements].
 export const violations = async (page) => {
-  await page.evaluate(axeSource);
+  if (!(await page.evaluate(() => 'axe' in window))) await page.evaluate(axeSource);
   const found = await page.evaluate(() => window.axe.run(document, {
-    runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa'],
+    runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa'], resultTypes: ['violations'],
   }));
   return found.violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ target }) => target).join(', ')}`);
 };
@@ -22,12 +22,29 @@ export const tooSmall = (page) => page.evaluate(() => [...document.querySelector
   .filter(({ box }) => box.width > 0 && (box.height < 24 || box.width < 24 || box.right > innerWidth + 1))
   .map(({ element, box }) => `${element.dataset.testid ?? element.outerHTML.slice(0, 80)}: ${box.width}x${box.height} at ${box.left}`));
 
+/// What lies over the page's edges, so that it would have to be scrolled sideways; and what is on the picture and covers
+/// something else there that can be pressed.
+export const outOfSight = (page) => page.evaluate(() => {
+  const found = document.body.innerText.includes('[object') ? ['an object stands for words'] : [];
+  if (document.documentElement.scrollWidth > innerWidth) found.push(`the page is ${document.documentElement.scrollWidth} wide`);
+  if (document.querySelector('dialog[open]')) return found;
+  const name = (element) => element.dataset?.testid ?? element.outerHTML.slice(0, 60);
+  const what = document.querySelector('.menu[open]') ? '.menu[open] button' : '#chips button, #view-tools button, #view-tools summary, #thing-bar button, #notes summary';
+  for (const element of document.querySelectorAll(what)) {
+    if (!element.checkVisibility()) continue;
+    const { left, top, width, height } = element.getBoundingClientRect();
+    const on = document.elementFromPoint(left + width / 2, top + height / 2);
+    if (!on || !element.contains(on)) found.push(`${name(element)} lies under ${on ? name(on) : 'nothing that is seen'}`);
+  }
+  return found;
+});
+
 /// The middle of the demo scene's ball, world units.
 export const ball = [-0.28, -0.21, -0.62];
 
 /// A browser, and a small demo scene with photos: {browser, demo, zip}. `close()` ends it.
-export const makeRoom = async () => {
-  const [browser, demo] = await Promise.all([launch(), demoScene({ gaussians: 20_000, views: 16, size: '400x300' })]);
+export const makeRoom = async ({ gaussians = 20_000 } = {}) => {
+  const [browser, demo] = await Promise.all([launch(), demoScene({ gaussians, views: 16, size: '400x300' })]);
   return { browser, demo, zip: await datasetZip(demo.folder), close: () => browser.close() };
 };
 

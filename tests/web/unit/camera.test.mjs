@@ -20,6 +20,7 @@ import {
   panned,
   pictureKey,
   pictureSize,
+  placedIn,
   pivotedAt,
   poseOfView,
   project,
@@ -406,6 +407,14 @@ test("poses are the same only if every number is", () => {
 
 test("the wire has the contract's names", () => {
   assert.deepEqual(Object.keys(onTheWire(camera)).sort(), ["eye", "fov_y_deg", "height", "target", "up", "width"]);
+});
+
+test("a picture keeps its shape on a canvas of another one, as high as that", () => {
+  const canvas = { width: 400, height: 300 };
+  assert.deepEqual(placedIn({ width: 160, height: 120 }, canvas), { x: 0, y: 0, ...canvas });
+  assert.deepEqual(placedIn({ width: 161, height: 120 }, canvas), { x: 0, y: 0, ...canvas }, "rounding");
+  assert.deepEqual(placedIn({ width: 120, height: 120 }, canvas), { x: 50, y: 0, width: 300, height: 300 });
+  assert.deepEqual(placedIn({ width: 240, height: 120 }, canvas), { x: -100, y: 0, width: 600, height: 300 });
 });
 
 test("pictures are made smaller, never larger, and keep their shape", () => {

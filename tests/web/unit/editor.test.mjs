@@ -283,6 +283,35 @@ test("a thing that is dragged and let go is repaired as a draft, and its result 
   assert.deepEqual(asked[1].handles, asked[0].handles);
 });
 
+test("what a draft has bent comes off by one press, and the next thing is judged anew", async () => {
+  const asked = [];
+  service["POST /v1/edits"] = (body) => (asked.push(body), edit({ id: `e00000${asked.length}` }));
+  await take();
+  dragBy(30);
+  await settle();
+  versionComes();
+  streams[0].send(edit({ state: "succeeded", progress: 1, result_version: 1, request: asked[0] }));
+  await settle();
+  editor.takeOff();
+  await settle();
+  assert.deepEqual([asked.length, asked[0].attach, asked[1].attach], [2, undefined, "free"]);
+  assert.deepEqual([asked[1].version, asked[1].handles], [0, asked[0].handles], "the same drag of the same version");
+  editor.letGo();
+  await take();
+  assert.equal(editor.state.attach, null);
+});
+
+test("what only was dragged comes off without being repaired unasked", async () => {
+  await take();
+  editor.store.set({ draftOnRelease: false });
+  dragBy(30);
+  editor.takeOff();
+  await settle();
+  assert.deepEqual([editor.request().attach, editor.state.draft], ["free", null]);
+  editor.undo();
+  assert.equal(editor.request().attach, undefined);
+});
+
 test("what is held is moved on, turned and sized about its centre, each as one step of undo", async () => {
   await take();
   const { pivot, bounds } = editor.held;
@@ -657,6 +686,38 @@ test("a version that somebody else deletes leaves the screen", async () => {
   streams[0].send(scene(), "scene");
   assert.equal(editor.state.version, 0);
   assert.deepEqual(said, ["Version 1 has been deleted."]);
+});
+
+test("a draft that another page has replaced leaves the screen for what it was made from, and says what is there instead", async () => {
+  const version = (number, parent) => ({ version: number, parent, edit: `e00000${number}` });
+  streams[0].send(edit({ id: "e000002", state: "succeeded", result_version: 2, request: { handles: [], preset: "draft" } }));
+  const { versions } = scene();
+  streams[0].send({ ...scene(), versions: [...versions, version(1, 0), version(2, 0)] }, "scene");
+  editor.showVersion(2);
+  streams[0].send({ ...scene(), versions: [...versions, version(1, 0), version(3, 0)] }, "scene");
+  assert.equal(editor.state.version, 0);
+  assert.match(said.at(-1), /Version 2 was a draft, and is gone: version 3 /);
+});
+
+test("who deletes a version is not told so by the stream that is the first to know", async () => {
+  const { versions } = scene();
+  const made = { version: 1, parent: 0 };
+  streams[0].send({ ...scene(), versions: [...versions, made] }, "scene");
+  editor.showVersion(1);
+  service["DELETE /v1/scenes/s000001/versions/1"] = () => {
+    streams[0].send(scene(), "scene");
+    return {};
+  };
+  await editor.deleteVersion(1);
+  assert.deepEqual([editor.state.version, said], [0, []]);
+});
+
+test("a version whose parent has gone with it leaves the screen for what is left", async () => {
+  const { versions } = scene();
+  streams[0].send({ ...scene(), versions: [...versions, { version: 1, parent: 0 }, { version: 2, parent: 1 }] }, "scene");
+  editor.showVersion(2);
+  streams[0].send(scene(), "scene");
+  assert.equal(editor.state.version, 0);
 });
 
 test("an edit that ends before its submission is answered is one of ours", async () => {

@@ -4,6 +4,7 @@ import { test } from "node:test";
 
 import {
   changesScene,
+  impossibleWith,
   ImportError,
   isStated,
   labelOf,
@@ -215,6 +216,19 @@ test("a preview is stale when what it shows has changed, and only then", () => {
   assert.notEqual(key({}), key({ params: { unheard_of: 1 } }), "it might be of the motion");
   assert.notEqual(key({}), key({ handles: [{ ...base.handles[0], radius: 2 }] }));
   assert.notEqual(key({}), key({ selection: [{ invert: true }] }));
+});
+
+test("a preset that cannot turn things is not asked what it would take", () => {
+  const info = { parameters: [{ name: "interpolation", defaults: { draft: "rigid", paper: "paper" } }] };
+  const request = (patch = {}, params = {}) => ({ handles: [{ source: [0, 0, 0], ...patch }], params });
+  const turned = { rotation: [0, 1, 0, 0] };
+  assert.equal(impossibleWith("paper", request(), info), null);
+  assert.equal(impossibleWith("draft", request(turned), info), null);
+  assert.match(impossibleWith("paper", request(turned), info), /“paper”/);
+  assert.match(impossibleWith("paper", request({ scale: 2 }), info), /turn or size/);
+  assert.match(impossibleWith("paper", { ...request(), attach: "held" }, info), /turn or size/);
+  assert.equal(impossibleWith("paper", request(turned, { interpolation: "arap" }), info), null);
+  assert.match(impossibleWith("draft", request(turned, { interpolation: "smooth" }), info), /“smooth”/);
 });
 
 test("a parameter is named for people, and its default is that of the preset", () => {

@@ -125,4 +125,6 @@ test("what was uploaded has the name that the user knows", () => {
   assert.equal(named("upload"), "chair.ply");
   assert.equal(named("uploads"), "uploads");
   assert.equal(named(undefined), "");
+  const { detail } = namedAs("chair.ply", { detail: "upload (19 bytes) is no scene" });
+  assert.equal(detail, "chair.ply (19 bytes) is no scene");
 });

@@ -314,21 +314,28 @@ TEST_F(RenderRoutes, SelectAndSayWhat) {
 }
 
 TEST_F(RenderRoutes, SayWhetherAWholeHasBordersFartherOutAndIn) {
-  const std::string id = add_wall();
+  // A red square within a green one on the wall: two borders, and none beyond.
+  scenes::GaussianCloud cloud = GaussianWall::cloud();
+  for (std::size_t row = 0; row < cloud.size(); ++row) {
+    const auto mean = cloud.mean.get(row);
+    const float away = std::max(std::abs(mean.x), std::abs(mean.y));
+    const std::size_t colour = away < 0.35f ? 0 : away < 0.65f ? 1 : 2;
+    for (std::size_t c = 0; c < 3; ++c) cloud.sh[row * 3 + c] = c == colour ? 1.5f : -1.5f;
+  }
+  write(temp.path() / "target.ply", cloud);
+  const auto added = store->add_upload(temp.path() / "target.ply", "target.ply", "");
+  ASSERT_TRUE(added) << added.error().message;
   const auto border = [&](const std::string& wider) {
-    const auto reply = call("POST", select_path, with_body(id, R"({"selection": [{"grow": {"inside": [[0, 0, 0]],
+    const auto reply = call("POST", select_path, with_body(added->id, R"({"selection": [{"grow": {"inside": [[0, 0, 0]],
       "whole": true, "wider": )" + wider + "}}]}"));
     return json::parse(reply->body)["border"];
   };
   const json out = border("64"), in = border("-64");
   EXPECT_FALSE(out["more"].get<bool>()) << "that it asked for more than there are was told";
   EXPECT_FALSE(in["less"].get<bool>());
-  EXPECT_GE(out["wider"].get<int>(), 0);
-  EXPECT_LE(in["wider"].get<int>(), 0);
-  if (out["wider"] != in["wider"]) {
-    EXPECT_TRUE(out["less"].get<bool>());
-    EXPECT_TRUE(in["more"].get<bool>());
-  }
+  EXPECT_LT(in["wider"].get<int>(), out["wider"].get<int>()) << out << in;
+  EXPECT_TRUE(out["less"].get<bool>()) << out << in;
+  EXPECT_TRUE(in["more"].get<bool>()) << out << in;
 }
 
 TEST_F(RenderRoutes, SelectByWhatACameraShows) {
