@@ -8,6 +8,8 @@
 #include <limits>
 #include <numeric>
 
+#include "engine/core/median.h"
+
 namespace engine::select {
 namespace {
 
@@ -31,14 +33,38 @@ constexpr double nearly_as_weak = 1.5;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
+/// A graph as borders see it.
+struct Terrain {
+  const neighbours::NeighbourGraph& graph;
+  std::span<const float> weight;
+  std::vector<double> root;  ///< [n] Of a node's spacing by the usual one; an edge is as wide as its ends in the mean.
+
+  /// What an edge adds to a border across it.
+  [[nodiscard]] double border(std::uint32_t node, std::uint32_t edge) const {
+    return double(weight[edge]) * root[node] * root[graph.to[edge]];
+  }
+  /// What it adds to what a piece holds.
+  [[nodiscard]] double volume(std::uint32_t node, std::uint32_t edge) const {
+    return border(node, edge) * root[node] * root[graph.to[edge]];
+  }
+};
+
+Terrain terrain_of(const neighbours::NeighbourGraph& graph, std::span<const float> weight, bool by_size) {
+  Terrain out{graph, weight, std::vector<double>(graph.size(), 1.0)};
+  const double usual = by_size && graph.size() > 0 ? double(median(graph.spacing)) : 0.0;
+  if (!(usual > 0)) return out;  // most are at one place
+  for (std::size_t node = 0; node < graph.size(); ++node)
+    out.root[node] = std::sqrt(double(graph.spacing[node]) / usual);
+  return out;
+}
+
 /// Pieces of a graph whose nodes come one by one, and what the borders of those that clicks are on cost.
 class GrowingPieces {
  public:
   ///   clicked  nodes; one that is clicked twice counts twice
-  GrowingPieces(const neighbours::NeighbourGraph& graph, std::span<const float> weight,
-                std::span<const std::uint32_t> clicked)
-      : graph_(graph), weight_(weight), pieces_(graph.size()), is_in_(graph.size(), 0), of_(graph.size()) {
-    for (const float one : weight) all_ += double(one);
+  GrowingPieces(const Terrain& terrain, std::span<const std::uint32_t> clicked)
+      : terrain_(terrain), pieces_(terrain.graph.size()), is_in_(terrain.graph.size(), 0), of_(terrain.graph.size()) {
+    for (std::uint32_t node = 0; node < terrain.graph.size(); ++node) all_ += volume_of(node);
     for (const std::uint32_t node : clicked) ++of_[node].clicks;
     clicks_to_come_ = clicked.size();
   }
@@ -48,11 +74,12 @@ class GrowingPieces {
     Piece joined = of_[node];
     if (joined.clicks) ++pieces_clicked_;
     clicks_to_come_ -= joined.clicks;
-    for (std::uint32_t edge = graph_.begin[node]; edge < graph_.begin[node + 1]; ++edge)
-      joined.volume += double(weight_[edge]);
-    joined.leaving = joined.volume;
-    for (std::uint32_t edge = graph_.begin[node]; edge < graph_.begin[node + 1]; ++edge) {
-      const std::uint32_t other = graph_.to[edge];
+    const neighbours::NeighbourGraph& graph = terrain_.graph;
+    joined.volume = volume_of(node);
+    for (std::uint32_t edge = graph.begin[node]; edge < graph.begin[node + 1]; ++edge)
+      joined.leaving += terrain_.border(node, edge);
+    for (std::uint32_t edge = graph.begin[node]; edge < graph.begin[node + 1]; ++edge) {
+      const std::uint32_t other = graph.to[edge];
       if (is_in_[other] == 0) continue;
       if (const std::uint32_t piece = pieces_.of(other); piece != pieces_.of(node)) {
         sum_ -= border_ratio(of_[piece]);
@@ -60,7 +87,7 @@ class GrowingPieces {
         joined.leaving += of_[piece].leaving, joined.volume += of_[piece].volume, joined.clicks += of_[piece].clicks;
         pieces_.join(node, piece);
       }
-      joined.leaving -= 2 * double(weight_[edge]);
+      joined.leaving -= 2 * terrain_.border(node, edge);
     }
     of_[pieces_.of(node)] = joined;
     sum_ += border_ratio(joined);
@@ -74,9 +101,16 @@ class GrowingPieces {
 
  private:
   struct Piece {
-    double leaving = 0, volume = 0;  ///< Weights of the edges that leave it; of all edges, both ways.
+    double leaving = 0;  ///< Terrain::border() of the edges that leave it.
+    double volume = 0;   ///< Terrain::volume() of all edges, both ways.
     std::size_t clicks = 0;
   };
+  [[nodiscard]] double volume_of(std::uint32_t node) const {
+    double sum = 0;
+    for (std::uint32_t edge = terrain_.graph.begin[node]; edge < terrain_.graph.begin[node + 1]; ++edge)
+      sum += terrain_.volume(node, edge);
+    return sum;
+  }
   /// What leaves a piece by the root of what it holds: for a piece of a surface, the same at any size if its border is
   /// as good as elsewhere on the surface.
   [[nodiscard]] double border_ratio(const Piece& piece) const {
@@ -85,8 +119,7 @@ class GrowingPieces {
     return lesser > 0 ? double(piece.clicks) * (least_border + std::max(piece.leaving, 0.0)) / std::sqrt(lesser) : 0.0;
   }
 
-  const neighbours::NeighbourGraph& graph_;
-  std::span<const float> weight_;
+  const Terrain& terrain_;
   neighbours::Pieces pieces_;
   std::vector<std::uint8_t> is_in_;
   std::vector<Piece> of_;  ///< By the node that neighbours::Pieces names a piece by; before, a node's clicks.
@@ -95,11 +128,11 @@ class GrowingPieces {
 };
 
 /// [n + 1] After so many nodes of the order, what the borders of the pieces that clicks are on cost.
-std::vector<double> border_costs(const neighbours::NeighbourGraph& graph, std::span<const float> weight,
-                                 std::span<const std::uint32_t> order, std::span<const std::uint32_t> clicked) {
+std::vector<double> border_costs(const Terrain& terrain, std::span<const std::uint32_t> order,
+                                 std::span<const std::uint32_t> clicked) {
   std::vector<double> out(order.size() + 1, clicked.empty() ? 0.0 : infinity);
   if (clicked.empty()) return out;
-  GrowingPieces pieces(graph, weight, clicked);
+  GrowingPieces pieces(terrain, clicked);
   for (std::size_t i = 0; i < order.size(); ++i) {
     pieces.take(order[i]);
     out[i + 1] = pieces.cost();
@@ -166,8 +199,9 @@ NaturalBorder natural_border(const neighbours::NeighbourGraph& graph, std::span<
   const std::size_t n = graph.size();
   const std::vector<std::uint32_t> order = by_potential(potential, given);
   const std::vector<std::uint32_t> backwards(order.rbegin(), order.rend());
-  const std::vector<double> inside = border_costs(graph, weight, order, clicked.inside);
-  const std::vector<double> outside = border_costs(graph, weight, backwards, clicked.outside);
+  const Terrain terrain = terrain_of(graph, weight, choice.whole || choice.beyond);
+  const std::vector<double> inside = border_costs(terrain, order, clicked.inside);
+  const std::vector<double> outside = border_costs(terrain, backwards, clicked.outside);
   const double preference = clicked.outside.empty() ? 0.0 : halfway;
   std::vector<Level> levels;
   for (std::size_t taken = 1; taken < n && given[order[taken - 1]] != Given::outside; ++taken) {

@@ -13,8 +13,9 @@ namespace engine::select {
 
 /// For each edge how much the two Gaussians overlap (Bhattacharyya coefficient: distance, normals and extents in one),
 /// times exp(-e), where e sums the squared difference of their colours, up to a limit, and the angle between their
-/// normals, where they are flat. Colours are those of SH band 0, evened out over neighbours that overlap and look
-/// alike: single Gaussians of a trained scene differ from what they show together. The same both ways.
+/// normals, where they are flat, and less if either hardly shows. Colours are those of SH band 0, evened out over
+/// neighbours that overlap and look alike: single Gaussians of a trained scene differ from what they show together. The
+/// same both ways.
 ///   rows     [n] of the cloud, one per node
 ///   returns  [edges], in [0, 1]
 [[nodiscard]] std::vector<float> similarity_of_edges(const scene::GaussianCloud& cloud,

@@ -91,6 +91,25 @@ TEST(NaturalBorder, OfTheWholeIsTheOneFarthestOutOfThoseNearlyAsWeak) {
       << "what is joined to more than itself is no whole";
 }
 
+TEST(NaturalBorder, OfTheWholeCountsNodesByTheirSize) {
+  // A thing of two halves before a wall of few nodes, which are six times as wide: it is no smaller for that.
+  WeightedGraph strips = strip({24, 0.2f}, {49, 0.2f});
+  EXPECT_EQ(inside(strips, {{10}, {1190}}, {.whole = true}), numbers(0, 500)) << "of nodes alike, the wall is small";
+  std::fill(strips.graph.spacing.begin() + 1000, strips.graph.spacing.end(), 6.0f);
+  EXPECT_EQ(inside(strips, {{10}, {1190}}, {.whole = true}), numbers(0, 1000));
+  EXPECT_EQ(inside(strips, {{10}, {1190}}), numbers(0, 500)) << "where more than one click tells, numbers do";
+}
+
+TEST(NaturalBorder, OfTheWholeIsANumberWhereNodesAreAtOnePlaceOrFarApart) {
+  for (const float spacing : {0.0f, 1e-38f, 1e18f}) {
+    WeightedGraph strips = three_strips(0.05f, 0.06f);
+    std::fill(strips.graph.spacing.begin() + 300, strips.graph.spacing.end(), spacing);
+    const auto found = inside(strips, {{10}, {1190}}, {.whole = true});
+    EXPECT_GE(found.size(), 1u) << spacing;
+    EXPECT_LT(found.size(), 1200u) << spacing;
+  }
+}
+
 TEST(NaturalBorder, CanBeTakenFartherOutAndIn) {
   const WeightedGraph strips = three_strips(0.05f, 0.4f);
   int wider = 0;

@@ -43,6 +43,17 @@ TEST(Similarity, FallsWithDistanceColorNormalAndSize) {
   less([](scene::GaussianCloud& c) { c.log_scale.set(1, c.log_scale.get(1) + Vec3(3.0f)); });
 }
 
+TEST(Similarity, FallsWhereOneHardlyShows) {
+  const auto logit = [](float opacity) { return std::log(opacity / (1 - opacity)); };
+  const float same = similarity_after([](scene::GaussianCloud&) {});
+  EXPECT_EQ(similarity_after([&](scene::GaussianCloud& c) { c.opacity_logit[1] = logit(0.06f); }), same);
+  const float haze = similarity_after([&](scene::GaussianCloud& c) { c.opacity_logit[1] = logit(0.005f); });
+  EXPECT_NEAR(haze / same, 0.1f, 1e-3f);
+  const float both =
+      similarity_after([&](scene::GaussianCloud& c) { c.opacity_logit[0] = c.opacity_logit[1] = logit(0.005f); });
+  EXPECT_NEAR(both / same, 0.01f, 1e-3f);
+}
+
 TEST(Similarity, IsANumberAtTheExtremes) {
   for (const float log_scale : {-1e30f, -100.0f, 100.0f, 1e30f})
     for (const float place : {0.0f, 1e-30f, 1e30f}) {
