@@ -54,6 +54,17 @@ TEST(Attach, WhatHangsOnByLittleBendsWhereItIsNudgedAndGoesWhereItIsTaken) {
   EXPECT_EQ(how(turning, hangs_there), How::one_piece) << "a doll that is turned on its quilt";
 }
 
+TEST(Attach, WhatTouchesByLittleIsHeldByAFirmBorderOnly) {
+  const auto one = drags_of({DVec3(0.0)}, [](DVec3 p) { return p + DVec3(0.3, 0, 0); });
+  Contact ball = grows_there;
+  ball.shown = 10'000, ball.firmness = 0.13;
+  EXPECT_EQ(how(one, ball), How::one_piece);
+  ball.firmness = 0.19;
+  EXPECT_EQ(how(one, ball), How::held) << "a fox's head on its neck";
+  ball.shown = 1'000, ball.firmness = 0.13;
+  EXPECT_EQ(how(one, ball), How::held);
+}
+
 TEST(Attach, WhatGoesFartherThanItIsLongIsTakenAway) {
   const auto one = drags_of({DVec3(0.0)}, [](DVec3 p) { return p + DVec3(2.5, 0, 0); });
   EXPECT_EQ(how(one, grows_there), How::one_piece);
