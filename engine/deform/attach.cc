@@ -16,14 +16,14 @@ constexpr double tolerance = 0.05, tolerance_in_a_row = 0.03;
 constexpr double grown = 0.2;
 // A part grows out of the rest where its weakest border is this firm. Made-up captures of a mug, a ball, a block, a
 // board and a rod have 0.02 to 0.07, however widely they are selected; of a jaw and of a plant cut through its stem
-// 0.22 to 0.26. Real ones: a toy and a bow 0.03 and 0.04, a helmet in a hand 0.09, a doll on a quilt 0.11; the neck of
-// a guitar, the head of a man and his arm 0.13 to 0.16, a fox's head and ear 0.21 and 0.22.
+// 0.22 to 0.26. Real ones: a toy, a bow and a knot 0 to 0.04, a rider's jacket 0.12, a fox's head and neck, a guitar's
+// body and neck 0.18 to 0.19, the fox's head 0.26 (docs/adr/0031-what-holds-a-part-is-its-weakest-border.md).
 constexpr double firm = 0.12;
-// Where it touches with little of what shows, it takes more: a ball of 150,000 Gaussians' demo scene stands on its book
-// with 0.012 of it, at 0.13; the same share holds a fox's head at 0.26, the neck of a guitar at 0.19.
+// Where it touches with little of what shows, it takes more: the ball of the demo scene stands on its book with 0.012
+// to 0.020 of it, at 0.11 to 0.13; with 0.014 the guitar's neck is held at 0.19.
 constexpr double little = 0.02, firm_by_little = 0.16;
-// It hangs on by less: a doll's head by its neck, a sleeve, at 0.08 to 0.09. Whether somebody who takes it means to
-// bend it or to take it away, the way says: a nudge bends. Balls and cups have 0.07 at most.
+// It hangs on by less: a doll's head by its neck, a sleeve, at 0.08 to 0.09; the ball among 20,000 Gaussians has 0.07.
+// Whether somebody who takes it means to bend it or to take it away, the way says: a nudge bends.
 constexpr double hanging = 0.075;
 constexpr double nudge = 0.2;  // of its size
 
@@ -45,10 +45,9 @@ bool goes_on(const Contact& contact, double firmness) {
 
 bool touches_by_little(const Contact& contact) { return double(contact.touches) < little * double(contact.shown); }
 
-/// Is a part that hangs on by little shifted by little?
+/// Is a part shifted by little?
 bool is_nudged(std::span<const Drag> drags, int group, const Contact& contact) {
-  const bool hangs = !touches_by_little(contact) && goes_on(contact, hanging);
-  const std::optional<DVec3> pull = hangs ? pull_of(drags, group) : std::nullopt;
+  const std::optional<DVec3> pull = pull_of(drags, group);
   return pull && glm::length(*pull) < nudge * contact.size;
 }
 
@@ -104,9 +103,10 @@ Attachment attach(std::span<const Drag> drags, int group, const Contact& contact
   const bool is_one_piece = motion.has_value(), scales = is_one_piece && motion->scale != 1;
   const bool touches = contact.touches > 0;
   const bool grows_out = goes_on(contact, touches_by_little(contact) ? firm_by_little : firm);
+  const bool hangs = !touches_by_little(contact) && goes_on(contact, hanging);
   if (asked == Attach::held)
     return {
-        group, touches ? How::held : How::free, false, grows_out,
+        group, touches ? How::held : How::free, false, grows_out || hangs,
         touches ? "the request asks for it" : "the request asks for it to be held, but it touches nothing that stays"};
   if (asked == Attach::free)
     return {group, is_one_piece ? How::one_piece : How::free, scales, grows_out, "the request asks for it to be free"};
@@ -118,7 +118,7 @@ Attachment attach(std::span<const Drag> drags, int group, const Contact& contact
   if (is_one_piece && grows_out && places.longest > contact.size)
     return {group, How::one_piece, scales, grows_out, "it goes farther than it is long (attach \"held\" keeps it)"};
   if (grows_out) return {group, How::held, false, grows_out, "its surface goes on into what stays"};
-  if (is_nudged(drags, group, contact))
+  if (hangs && is_nudged(drags, group, contact))
     return {group, How::held, false, true, "it hangs on to what stays, and is nudged"};
   if (is_one_piece)
     return {group, How::one_piece, scales, grows_out,

@@ -36,14 +36,14 @@ const T& Memory::find_or_make(std::list<Noted<T>>& known, Fits&& fits, Make&& ma
 
 const select::Contact& Memory::contact_of(const scene::LayeredCloud& scene, std::span<const std::uint32_t> part,
                                           std::span<const std::uint32_t> selected) {
-  const auto fits = [&](const Contact& known) {
+  const auto fits = [&](const KnownContact& known) {
     return std::ranges::equal(known.part, part) && std::ranges::equal(known.selected, selected);
   };
   const auto make = [&] {
-    return Contact{
+    return KnownContact{
         {part.begin(), part.end()}, {selected.begin(), selected.end()}, select::contact_of(scene, part, selected)};
   };
-  return find_or_make(contacts_, fits, make, [](const Contact& known) { return known.part.size(); }).contact;
+  return find_or_make(contacts_, fits, make, [](const KnownContact& known) { return known.part.size(); }).contact;
 }
 
 const std::vector<std::uint32_t>& Memory::crumbs_of(const scene::LayeredCloud& scene,

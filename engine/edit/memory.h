@@ -37,7 +37,7 @@ class Memory {
     T found;
     double seconds = 0;
   };
-  struct Contact {
+  struct KnownContact {
     std::vector<std::uint32_t> part, selected;
     select::Contact contact;
   };
@@ -48,9 +48,9 @@ class Memory {
   template <class T, class Fits, class Make, class RowsOf>
   const T& find_or_make(std::list<Noted<T>>& known, Fits&& fits, Make&& make, RowsOf&& rows_of);
 
-  std::list<Noted<Crumbs>> crumbs_;        ///< The one used last is last.
-  std::list<Noted<Contact>> contacts_;     ///< The same.
-  std::list<Noted<deform::Body>> bodies_;  ///< The same.
+  std::list<Noted<Crumbs>> crumbs_;          ///< The one used last is last.
+  std::list<Noted<KnownContact>> contacts_;  ///< The same.
+  std::list<Noted<deform::Body>> bodies_;    ///< The same.
   double saved_seconds_ = 0;
 };
 

@@ -17,6 +17,7 @@ enum class Touch : std::uint8_t {
   goes_on   ///< The surface goes on there: an ear on a head, a rim of table that is selected with a cup.
 };
 
+/// How a part meets what is not selected.
 struct Contact {
   std::vector<Touch> touches;  ///< [part]
   std::size_t shown = 0;       ///< How many rows of the part show from outside (exposed.h).

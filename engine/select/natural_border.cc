@@ -33,11 +33,15 @@ constexpr double nearly_as_weak = 1.5;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
+// Of the usual spacing, and the most of it, that a node counts for: one whose neighbours are all at its place would
+// have no border at all, and be a thing of its own; one far off would be more than all the rest.
+constexpr double least_spacing = 0.01, most_spacing = 100.0;
+
 /// A graph as borders see it.
 struct Terrain {
   const neighbours::NeighbourGraph& graph;
   std::span<const float> weight;
-  std::vector<double> root;  ///< [n] Of a node's spacing by the usual one; an edge is as wide as its ends in the mean.
+  std::vector<double> root;  ///< [n] Of a node's spacing by the usual one; an edge is as wide as its ends' product.
 
   /// What an edge adds to a border across it.
   [[nodiscard]] double border(std::uint32_t node, std::uint32_t edge) const {
@@ -54,7 +58,7 @@ Terrain terrain_of(const neighbours::NeighbourGraph& graph, std::span<const floa
   const double usual = by_size && graph.size() > 0 ? double(median(graph.spacing)) : 0.0;
   if (!(usual > 0)) return out;  // most are at one place
   for (std::size_t node = 0; node < graph.size(); ++node)
-    out.root[node] = std::sqrt(double(graph.spacing[node]) / usual);
+    out.root[node] = std::sqrt(std::clamp(double(graph.spacing[node]) / usual, least_spacing, most_spacing));
   return out;
 }
 

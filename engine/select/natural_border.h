@@ -40,11 +40,11 @@ struct NaturalBorder {
 /// that leave a piece, and a few more, by the root of that of all its nodes' edges or of all others', whichever is
 /// less. On a surface, a border grows as the root of what it encloses: so neither large pieces are preferred nor small
 /// ones, as they are by conductance, which divides by the weight itself. For the whole, and beyond, nodes count by
-/// their size: an edge by its width, the mean of its ends' spacings, for a border, and by the square of it for what is
-/// enclosed, as on a surface: a wall's few large Gaussians are much, and their long border is no short one. Where there
-/// are clicks on both sides, levels near one half are preferred a little: it decides where nothing else does. Where
-/// nothing is given for the outside, all that can be reached is inside. Farther out and in there are other borders:
-/// levels that are joined more weakly than any that enclose somewhat more or less.
+/// their size: an edge by its width, the geometric mean of its ends' spacings, for a border, and by the square of it
+/// for what is enclosed, as on a surface: a wall's few large Gaussians are much, and their long border is no short one.
+/// Where there are clicks on both sides, levels near one half are preferred a little: it decides where nothing else
+/// does. Where nothing is given for the outside, all that can be reached is inside. Farther out and in there are other
+/// borders: levels that are joined more weakly than any that enclose somewhat more or less.
 ///   weight     [edges] 0 or more, the same both ways
 ///   potential  [nodes] of random_walk()
 ///   given      [nodes]; clicked nodes are given for their side

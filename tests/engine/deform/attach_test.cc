@@ -43,6 +43,9 @@ TEST(Attach, WhatHangsOnByLittleBendsWhereItIsNudgedAndGoesWhereItIsTaken) {
   EXPECT_EQ(how(shifted(0.5), hangs_there), How::one_piece);
   EXPECT_EQ(how(shifted(0.3), hangs_there, Attach::free), How::one_piece);
   EXPECT_EQ(how(shifted(0.3), stands_there), How::one_piece) << "a cup that is pushed";
+  EXPECT_TRUE(attach(shifted(0.3), 0, hangs_there, Attach::automatic).grows_out);
+  EXPECT_TRUE(attach(shifted(0.3), 0, hangs_there, Attach::held).grows_out)
+      << "held by the same rows if it is asked for";
   Contact helmet = hangs_there;
   helmet.shown = 10'000;
   EXPECT_EQ(how(shifted(0.3), helmet), How::one_piece) << "a tip of it touches a hand";

@@ -100,6 +100,17 @@ TEST(NaturalBorder, OfTheWholeCountsNodesByTheirSize) {
   EXPECT_EQ(inside(strips, {{10}, {1190}}), numbers(0, 500)) << "where more than one click tells, numbers do";
 }
 
+TEST(NaturalBorder, OfTheWholeIsNoCrumbOfNodesAtOnePlace) {
+  for (const float spacing : {0.0f, 1e-38f, 1e18f}) {
+    WeightedGraph strips = three_strips(0.05f, 0.06f);
+    std::fill_n(strips.graph.spacing.begin(), 21, spacing);  // around the click
+    EXPECT_EQ(inside(strips, {{10}, {1190}}, {.whole = true}).size() % 200, 0u) << spacing;
+    strips = three_strips(0.05f, 0.06f);
+    std::fill_n(strips.graph.spacing.begin() + 1100, 21, spacing);  // far off
+    EXPECT_EQ(inside(strips, {{10}, {1190}}, {.whole = true}), numbers(0, 400)) << spacing;
+  }
+}
+
 TEST(NaturalBorder, OfTheWholeIsANumberWhereNodesAreAtOnePlaceOrFarApart) {
   for (const float spacing : {0.0f, 1e-38f, 1e18f}) {
     WeightedGraph strips = three_strips(0.05f, 0.06f);

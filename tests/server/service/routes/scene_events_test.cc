@@ -65,7 +65,7 @@ TEST_F(SceneEventsTest, TellTheSceneAndEachChangeOfItOnce) {
     if (data["name"] == "ball") value(store->patch(scene, {.name = "marble", .up = {}}));
     return true;
   };
-  listen(listener);
+  ASSERT_NO_FATAL_FAILURE(listen(listener));
   std::vector<std::string> names;
   for (const auto& [event, data] : listener.events)
     if (event == "scene") names.push_back(data["name"]);
@@ -80,7 +80,7 @@ TEST_F(SceneEventsTest, TellAnEditToItsEndAndTheVersionBeforeIt) {
     if (edit.empty()) edit = submit(edits::move_ball(scene));
     return event != "edit" || !has_ended(data);
   };
-  listen(listener);
+  ASSERT_NO_FATAL_FAILURE(listen(listener));
   EXPECT_EQ(listener.events.back().second["state"], "succeeded");
   EXPECT_EQ(listener.events.back().second["id"], edit);
   std::size_t versions = 0;
@@ -97,7 +97,7 @@ TEST_F(SceneEventsTest, TellAnEditThatComesAndEndsBetweenTwoLooks) {
     if (edit.empty()) wait_for_end(*service, edit = submit(edits::move_ball(scene)));
     return event != "edit";
   };
-  listen(listener);
+  ASSERT_NO_FATAL_FAILURE(listen(listener));
   EXPECT_EQ(listener.events.back().second["id"], edit) << "and not the one that had ended before";
   EXPECT_EQ(listener.events.back().second["state"], "succeeded");
 }
@@ -110,7 +110,7 @@ TEST_F(SceneEventsTest, TellOfAnEditThatOthersCancelAndOfASceneThatGoes) {
     if (event == "edit" && data["state"] == "cancelled") value(store->remove(scene));
     return true;
   };
-  listen(listener);
+  ASSERT_NO_FATAL_FAILURE(listen(listener));
   EXPECT_EQ(listener.events.back().first, "gone");
   FakeCall call;
   call.in_path = {{"id", scene}};
