@@ -75,7 +75,9 @@ export const NOTHING_OPEN = {
   draftOnRelease: true, // A thing that was dragged is repaired as a draft as soon as it is let go.
   draft: null, // {id, body} of the draft that is under way: id null until the service has it, and what it was made of.
   drafts: [], // {version, base} of drafts that nobody has said to keep.
-  drafted: null, // {version, base, request}: what the last draft made, of which version, of which request.
+  // {version, base, request, placed, edit, better}: what the last draft made, of which version, of which request, and of
+  // what was placed; the ids of its edit, and of the one that runs the same well, if that was asked for.
+  drafted: null,
   edits: [],
   answering: true, // Whether the service answers.
   gone: false, // Whether somebody has deleted the scene.
@@ -805,9 +807,13 @@ export class Editor {
   /** What was dragged comes off what it is held by, as one piece; after a draft of it, by another draft. */
   takeOff() {
     const { drafted } = this.state;
-    if (drafted) this.undo();
-    this.settle({ attach: "free" });
-    if (drafted) this.runDraft();
+    if (!drafted) return this.settle({ attach: "free" });
+    const { placed, base, better } = drafted;
+    if (!this.#isThere(placed)) return this.say(`Version ${base}, which the draft was made of, has been deleted.`);
+    // It would be of what is bent, and take the screen.
+    if (better) this.#abandon(better);
+    this.#place({ ...placed, attach: "free" });
+    this.runDraft();
   }
 
   /** Ends the draft under way, which nobody waits for any more. */
@@ -976,15 +982,17 @@ export class Editor {
       if (isDraft && this.state.draft?.id === edit.id) this.store.set({ draft: null });
       return this.say(`The result is version ${edit.result_version}, but: ${error.message}`, { kind: "bad" });
     }
-    if (opening !== this.#opened) return;
+    if (opening !== this.#opened || this.#abandoned.has(edit.id)) return;
     const say = (text, action) => this.say(text, { kind: "good", seconds: 10, action });
     if (isDraft) {
       // Given up while the scene was on its way, it does not take the screen from what is done there now.
       if (this.state.draft?.id !== edit.id) return;
+      const placed = this.#present();
       this.#finish(edit);
-      const done = { version: edit.result_version, base: edit.version, request: edit.request, edit: edit.id };
-      this.store.set({ draft: null, drafted: done, drafts: [...this.state.drafts, { version: done.version, base: done.base }] });
-      return this.#dropDrafts(done);
+      const [made, base] = [edit.result_version, edit.version];
+      const drafted = { version: made, base, request: edit.request, placed, edit: edit.id };
+      this.store.set({ draft: null, drafted, drafts: [...this.state.drafts, { version: made, base }] });
+      return this.#dropDrafts(drafted);
     }
     const { drafted, version, dragging } = this.state;
     if (drafted?.better === edit.id && version === drafted.version) {

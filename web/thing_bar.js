@@ -80,7 +80,8 @@ export function buildThingBar(editor) {
       // With a handle, Esc leaves the handle only.
       attrs(drop, { title: `Nothing is taken any more${state.handles.length ? "" : " (Esc)"}` });
       more.disabled = selectionWaits || !borders.more;
-      better.disabled = state.submitting;
+      // What is being asked for is not to be called off yet.
+      free.disabled = better.disabled = state.submitting;
       text(line, lineOf(state));
       const refused = taken ? (answer?.error && sentence(answer.error.detail)) || state.problem?.error.detail : null;
       problem.hidden = !refused;

@@ -301,6 +301,62 @@ test("what a draft has bent comes off by one press, and the next thing is judged
   assert.equal(editor.state.attach, null);
 });
 
+test("what comes off after a draft was dragged as it was, whatever has been set since; one step undoes it", async () => {
+  const asked = [];
+  service["POST /v1/edits"] = (body) => (asked.push(body), edit({ id: `e00000${asked.length}` }));
+  await take();
+  dragBy(30);
+  await settle();
+  versionComes();
+  streams[0].send(edit({ state: "succeeded", progress: 1, result_version: 1, request: asked[0] }));
+  await settle();
+  editor.settle({ preset: "standard" });
+  editor.settle({ mode: "extend" });
+  await settle();
+  editor.takeOff();
+  await settle();
+  assert.deepEqual(asked[1], { ...asked[0], attach: "free" }, "the same drag of the same version");
+  assert.equal(editor.state.draft.id, "e000002");
+  cancels("e000002");
+  editor.undo();
+  assert.deepEqual([editor.state.version, editor.state.mode, editor.state.preset], [1, "extend", "standard"]);
+});
+
+test("what is being run well is given up when it comes off", async () => {
+  const asked = [];
+  service["POST /v1/edits"] = (body) => (asked.push(body), edit({ id: `e00000${asked.length}` }));
+  const cancelled = cancels("e000002");
+  await take();
+  dragBy(30);
+  await settle();
+  versionComes();
+  streams[0].send(edit({ state: "succeeded", progress: 1, result_version: 1, request: asked[0] }));
+  await settle();
+  await editor.runBetter();
+  // It has ended, and the scene with its result is on its way.
+  streams[0].send(edit({ id: "e000002", state: "succeeded", progress: 1, result_version: 2, request: asked[1] }));
+  editor.takeOff();
+  await settle();
+  assert.deepEqual([cancelled, asked.length, asked[2].attach], [["e000002"], 3, "free"]);
+  assert.deepEqual([editor.state.version, editor.state.draft.id, editor.state.handles.length], [0, "e000003", 1]);
+});
+
+test("what was drafted on a version that is gone stays as it is, and that is said", async () => {
+  const asked = [];
+  service["POST /v1/edits"] = (body) => (asked.push(body), edit());
+  await take();
+  dragBy(30);
+  await settle();
+  versionComes();
+  streams[0].send(edit({ state: "succeeded", progress: 1, result_version: 1, request: asked[0] }));
+  await settle();
+  editor.store.set({ scene: { ...scene(), versions: [{ version: 1, parent: null }] } });
+  editor.takeOff();
+  await settle();
+  assert.deepEqual([editor.state.version, asked.length], [1, 1]);
+  assert.match(said.at(-1), /^Version 0, .* deleted\.$/);
+});
+
 test("what only was dragged comes off without being repaired unasked", async () => {
   await take();
   editor.store.set({ draftOnRelease: false });
