@@ -75,10 +75,11 @@ export const NOTHING_OPEN = {
   draftOnRelease: true, // A thing that was dragged is repaired as a draft as soon as it is let go.
   draft: null, // {id, body} of the draft that is under way: id null until the service has it, and what it was made of.
   drafts: [], // {version, base} of drafts that nobody has said to keep.
-  // {version, base, request, placed, edit, better}: what the last draft made, of which version, of which request, and of
+  // {version, base, request, placed, edit, better}: what the last draft made, of which version, of which request, of
   // what was placed; the ids of its edit, and of the one that runs the same well, if that was asked for.
   drafted: null,
   edits: [],
+  asked: null, // Id of the last edit that was asked for from the panel.
   answering: true, // Whether the service answers.
   gone: false, // Whether somebody has deleted the scene.
   tab: "drag",
@@ -776,7 +777,7 @@ export class Editor {
     this.store.set({ submitting: true });
     try {
       const edit = await this.#submit(request);
-      this.store.set({ edits: merged(this.state.edits, edit), tab: "edits", problem: null });
+      this.store.set({ edits: merged(this.state.edits, edit), asked: edit.id, tab: "edits", problem: null });
     } catch (error) {
       this.store.set({ problem: { error, key: JSON.stringify(request), from: "run" } });
     }
@@ -936,23 +937,24 @@ export class Editor {
     const dataset = ({ dataset: d }) => d && [d.kind, d.views, d.photos].join();
     this.store.set({ scene });
     // Somebody else has deleted what is looked at.
-    if (!scene.versions.some((v) => v.version === version)) this.#leave(before.versions.find((v) => v.version === version) ?? { version, parent: 0 });
+    const isShown = (v) => v.version === version;
+    if (!scene.versions.some(isShown)) this.#leave(before.versions.find(isShown) ?? { version, parent: 0 });
     if (dataset(scene) !== dataset(before)) this.#loadViews(this.#opened);
   }
 
   /** The version on the screen is gone, deleted elsewhere: what it was made from is shown, or what is left of that. A
-   *  draft went for a better result, which is offered. */
+   *  draft mostly went for a newer result, which is offered. */
   #leave({ version, parent, edit }) {
     const { versions } = this.state.scene;
-    const isThere = (number) => versions.some((v) => v.version === number);
     const wasDraft = this.state.edits.find(({ id }) => id === edit)?.request.preset === "draft";
-    const better = wasDraft ? versions.findLast((v) => v.parent === parent && v.version > version)?.version : undefined;
-    this.showVersion(isThere(parent) ? parent : versions.findLast((v) => v.version < version).version);
+    const newer = wasDraft ? versions.findLast((v) => v.parent === parent && v.version > version)?.version : undefined;
+    const left = this.#isThere({ version: parent }) ? parent : versions.findLast((v) => v.version < version).version;
+    this.showVersion(left);
     if (this.#deleting.has(version)) return; // Here, by a press, and the stream was the first to tell.
-    if (better === undefined) return this.say(`Version ${version} has been deleted.`);
-    this.say(`Version ${version} was a draft, and is gone: version ${better} has been made in its place.`, {
+    if (newer === undefined) return this.say(`Version ${version} has been deleted.`);
+    this.say(`Version ${version} was a draft, and is gone: version ${newer} is newer.`, {
       seconds: 12,
-      action: { label: "Show", run: () => this.showVersion(better) },
+      action: { label: "Show", run: () => this.#isThere({ version: newer }) && this.showVersion(newer) },
     });
   }
 
