@@ -282,5 +282,6 @@ export function impossibleWith(preset, { params = {}, handles, attach }, info) {
   // What is moved as one piece is an elastic body, where it is selected.
   if (!interpolation || interpolation === "arap" || (interpolation === "rigid" && !params.interpolation)) return null;
   if (turns) return `It moves things, and does not turn or size them: its interpolation is “${interpolation}”.`;
-  return attach ? `What holds a part can be chosen only with the interpolation “arap”, not with “${interpolation}”.` : null;
+  if (!attach) return null;
+  return `What holds a part can be chosen only with the interpolation “arap”, not with “${interpolation}”.`;
 }

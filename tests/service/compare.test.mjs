@@ -277,7 +277,8 @@ describe('a run', () => {
     };
     await long();
     // Of the one that runs: the run before has one, too.
-    await page.locator('[data-testid^="edit-e"][data-state=running]').getByTestId('interval-1').waitFor({ timeout: 120_000 });
+    const running = page.locator('[data-testid^="edit-e"][data-state=running]');
+    await running.getByTestId('interval-1').waitFor({ timeout: 120_000 });
     const [answer] = await Promise.all([
       page.waitForResponse((r) => r.url().endsWith('/stop')),
       page.locator('[data-state=running] [data-testid=edit-stop]:enabled').click(),

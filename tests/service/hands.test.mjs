@@ -351,8 +351,9 @@ describe('who has no pointer', () => {
   test('takes a thing, moves it, has it repaired and goes back, by keys alone', async (t) => {
     t.after(async () => {
       // As it was, for those that come next, whatever happens here.
-      const { versions } = (await service.client.get(`/v1/scenes/${scene.id}`)).json();
-      for (const { version } of versions.slice(1)) await service.client.delete(`/v1/scenes/${scene.id}/versions/${version}`);
+      const at = `/v1/scenes/${scene.id}`;
+      const { versions } = (await service.client.get(at)).json();
+      for (const { version } of versions.slice(1)) await service.client.delete(`${at}/versions/${version}`);
     });
     await page.keyboard.press('Escape');
     await tabTo('view');

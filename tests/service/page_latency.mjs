@@ -201,7 +201,8 @@ try {
   const text = `# How soon the page answers
 
 Made by \`node tests/service/page_latency.mjs ${given}\`
-on ${os.cpus().length} cores of ${os.cpus()[0].model.trim()} (load average before: ${load.toFixed(1)}), chromium ${browser.version()} on the same machine,
+on ${os.cpus().length} cores of ${os.cpus()[0].model.trim()} (load average before: ${load.toFixed(1)}),
+chromium ${browser.version()} on the same machine,
 a window of 1366x768. The fox: 62,298 Gaussians. Milliseconds.
 
 | what | times | median | 95 % | longest |
