@@ -75,8 +75,11 @@ export const NOTHING_OPEN = {
   draftOnRelease: true, // A thing that was dragged is repaired as a draft as soon as it is let go.
   draft: null, // {id, body} of the draft that is under way: id null until the service has it, and what it was made of.
   drafts: [], // {version, base} of drafts that nobody has said to keep.
-  drafted: null, // {version, base, request}: what the last draft made, of which version, of which request.
+  // {version, base, request, placed, edit, better}: what the last draft made, of which version, of which request, of
+  // what was placed; the ids of its edit, and of the one that runs the same well, if that was asked for.
+  drafted: null,
   edits: [],
+  asked: null, // Id of the last edit that was asked for from the panel.
   answering: true, // Whether the service answers.
   gone: false, // Whether somebody has deleted the scene.
   tab: "drag",
@@ -774,7 +777,7 @@ export class Editor {
     this.store.set({ submitting: true });
     try {
       const edit = await this.#submit(request);
-      this.store.set({ edits: merged(this.state.edits, edit), tab: "edits", problem: null });
+      this.store.set({ edits: merged(this.state.edits, edit), asked: edit.id, tab: "edits", problem: null });
     } catch (error) {
       this.store.set({ problem: { error, key: JSON.stringify(request), from: "run" } });
     }
@@ -805,9 +808,13 @@ export class Editor {
   /** What was dragged comes off what it is held by, as one piece; after a draft of it, by another draft. */
   takeOff() {
     const { drafted } = this.state;
-    if (drafted) this.undo();
-    this.settle({ attach: "free" });
-    if (drafted) this.runDraft();
+    if (!drafted) return this.settle({ attach: "free" });
+    const { placed, base, better } = drafted;
+    if (!this.#isThere(placed)) return this.say(`Version ${base}, which the draft was made of, has been deleted.`);
+    // It would be of what is bent, and take the screen.
+    if (better) this.#abandon(better);
+    this.#place({ ...placed, attach: "free" });
+    this.runDraft();
   }
 
   /** Ends the draft under way, which nobody waits for any more. */
@@ -930,23 +937,24 @@ export class Editor {
     const dataset = ({ dataset: d }) => d && [d.kind, d.views, d.photos].join();
     this.store.set({ scene });
     // Somebody else has deleted what is looked at.
-    if (!scene.versions.some((v) => v.version === version)) this.#leave(before.versions.find((v) => v.version === version) ?? { version, parent: 0 });
+    const isShown = (v) => v.version === version;
+    if (!scene.versions.some(isShown)) this.#leave(before.versions.find(isShown) ?? { version, parent: 0 });
     if (dataset(scene) !== dataset(before)) this.#loadViews(this.#opened);
   }
 
   /** The version on the screen is gone, deleted elsewhere: what it was made from is shown, or what is left of that. A
-   *  draft went for a better result, which is offered. */
+   *  draft mostly went for a newer result, which is offered. */
   #leave({ version, parent, edit }) {
     const { versions } = this.state.scene;
-    const isThere = (number) => versions.some((v) => v.version === number);
     const wasDraft = this.state.edits.find(({ id }) => id === edit)?.request.preset === "draft";
-    const better = wasDraft ? versions.findLast((v) => v.parent === parent && v.version > version)?.version : undefined;
-    this.showVersion(isThere(parent) ? parent : versions.findLast((v) => v.version < version).version);
+    const newer = wasDraft ? versions.findLast((v) => v.parent === parent && v.version > version)?.version : undefined;
+    const left = this.#isThere({ version: parent }) ? parent : versions.findLast((v) => v.version < version).version;
+    this.showVersion(left);
     if (this.#deleting.has(version)) return; // Here, by a press, and the stream was the first to tell.
-    if (better === undefined) return this.say(`Version ${version} has been deleted.`);
-    this.say(`Version ${version} was a draft, and is gone: version ${better} has been made in its place.`, {
+    if (newer === undefined) return this.say(`Version ${version} has been deleted.`);
+    this.say(`Version ${version} was a draft, and is gone: version ${newer} is newer.`, {
       seconds: 12,
-      action: { label: "Show", run: () => this.showVersion(better) },
+      action: { label: "Show", run: () => this.#isThere({ version: newer }) && this.showVersion(newer) },
     });
   }
 
@@ -976,15 +984,17 @@ export class Editor {
       if (isDraft && this.state.draft?.id === edit.id) this.store.set({ draft: null });
       return this.say(`The result is version ${edit.result_version}, but: ${error.message}`, { kind: "bad" });
     }
-    if (opening !== this.#opened) return;
+    if (opening !== this.#opened || this.#abandoned.has(edit.id)) return;
     const say = (text, action) => this.say(text, { kind: "good", seconds: 10, action });
     if (isDraft) {
       // Given up while the scene was on its way, it does not take the screen from what is done there now.
       if (this.state.draft?.id !== edit.id) return;
+      const placed = this.#present();
       this.#finish(edit);
-      const done = { version: edit.result_version, base: edit.version, request: edit.request, edit: edit.id };
-      this.store.set({ draft: null, drafted: done, drafts: [...this.state.drafts, { version: done.version, base: done.base }] });
-      return this.#dropDrafts(done);
+      const [made, base] = [edit.result_version, edit.version];
+      const drafted = { version: made, base, request: edit.request, placed, edit: edit.id };
+      this.store.set({ draft: null, drafted, drafts: [...this.state.drafts, { version: made, base }] });
+      return this.#dropDrafts(drafted);
     }
     const { drafted, version, dragging } = this.state;
     if (drafted?.better === edit.id && version === drafted.version) {

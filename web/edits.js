@@ -74,14 +74,13 @@ export function buildEdits(editor) {
     (edit) => edit.id,
     (edit) => card(editor, edit.id),
   );
-  let newest = null;
   editor.store.watch(["edits", "version", "scene"], ({ edits }) => {
     empty.hidden = edits.length > 0;
     update(edits);
-    // Who has just asked for one wants to see it, however far down the list was read.
-    const isNew = newest !== null && edits[0] && edits[0].id > newest;
-    newest = edits[0]?.id ?? "";
-    if (isNew) requestAnimationFrame(() => list.scrollIntoView({ block: "start" }));
+  });
+  // Who has just asked for one wants to see it, however far down the list was read.
+  editor.store.watch(["asked"], ({ asked }) => {
+    if (asked) requestAnimationFrame(() => list.scrollIntoView({ block: "start" }));
   });
   return h("section", {}, h("h2", {}, "Edits"), empty, list);
 }

@@ -31,6 +31,7 @@ export function buildNotes(editor, viewer) {
   byId("view").append(mark);
 
   let told = null;
+  let wasOpen = false; // Before something was refused.
   const update = () => {
     const { state } = store;
     if (!state.scene) return (details.hidden = mark.hidden = true);
@@ -39,8 +40,9 @@ export function buildNotes(editor, viewer) {
     details.hidden = all === 0;
     text(summary, refused ? "Refused" : all === 1 ? "1 note" : `${all} notes`);
     details.classList.toggle("bad", refused !== null);
-    // Once: who closes it has read it. What comes after a refusal is no more urgent than notes are.
-    if (refused !== told) details.open = refused !== null;
+    // Once: who closes it has read it. After a refusal it is open to those who had it open, and have not closed it.
+    if (refused && !told) wasOpen = details.open;
+    if (refused !== told) details.open = refused !== null || (wasOpen && details.open);
     told = refused;
     list.replaceChildren(...lines(editor, { notes, open, refused }));
     const view = viewOf(state);

@@ -276,10 +276,12 @@ function readReleased(document, where) {
 
 /** Why a preset cannot carry a request out, as far as that is known without asking; null: it may. */
 export function impossibleWith(preset, { params = {}, handles, attach }, info) {
-  const turns = attach || handles.some(({ rotation, scale }) => rotation || scale);
+  const turns = handles.some(({ rotation, scale }) => rotation || scale);
   const parameter = info?.parameters?.find(({ name }) => name === "interpolation");
   const interpolation = params.interpolation ?? parameter?.defaults[preset];
   // What is moved as one piece is an elastic body, where it is selected.
-  if (!turns || !interpolation || interpolation === "arap" || (interpolation === "rigid" && !params.interpolation)) return null;
-  return `It moves things, and does not turn or size them: its interpolation is “${interpolation}”.`;
+  if (!interpolation || interpolation === "arap" || (interpolation === "rigid" && !params.interpolation)) return null;
+  if (turns) return `It moves things, and does not turn or size them: its interpolation is “${interpolation}”.`;
+  if (!attach) return null;
+  return `What holds a part can be chosen only with the interpolation “arap”, not with “${interpolation}”.`;
 }

@@ -29,9 +29,13 @@ export function buildThingBar(editor) {
   const remove = press("Remove", "thing-remove", "Take it away for good, and complete what it hid", () =>
     editor.removeThing(),
   );
-  const free = press("Comes off", "thing-free", "It is held by what it grows out of, and bends: let it go as one piece instead", () =>
-    editor.takeOff(),
-  );
+  const letOff = () => {
+    editor.takeOff();
+    // The button is gone by that: who pressed it by a key goes on from what comes next.
+    requestAnimationFrame(() => free.hidden && (repair.hidden ? byId("view") : repair).focus());
+  };
+  const bends = "It is held by what it grows out of, and bends: let it go as one piece instead";
+  const free = press("Comes off", "thing-free", bends, letOff);
   const repair = press("Repair", "thing-repair", "Run it as a draft", () => editor.runDraft(), {
     class: "small primary",
   });
@@ -52,7 +56,7 @@ export function buildThingBar(editor) {
   store.watch(
     [
       ...["thingMode", "selectMode", "selection", "selectionAnswer", "selectionWaits", "handles", "dragging", "draft"],
-      ...["drafted", "edits", "problem", "version", "submitting", "draftOnRelease", "preview"],
+      ...["drafted", "edits", "problem", "version", "submitting", "draftOnRelease", "preview", "attach"],
     ],
     (state) => {
       const { selection, selectionAnswer: answer, selectionWaits, draft, drafted, dragging } = state;
@@ -67,7 +71,7 @@ export function buildThingBar(editor) {
         [more, idle && !moved && proposalOf(selection)],
         [hold, idle && !moved],
         [remove, idle && !moved],
-        [free, (idle && moved && isHeld(state.preview)) || (done && isHeld(draftOf(state)))],
+        [free, (idle && moved && state.attach !== "free" && isHeld(state.preview)) || (done && isHeld(draftOf(state)))],
         [repair, idle && moved],
         [drop, idle],
         [cancel, draft !== null],
@@ -80,7 +84,8 @@ export function buildThingBar(editor) {
       // With a handle, Esc leaves the handle only.
       attrs(drop, { title: `Nothing is taken any more${state.handles.length ? "" : " (Esc)"}` });
       more.disabled = selectionWaits || !borders.more;
-      better.disabled = state.submitting;
+      // What is being asked for is not to be called off yet.
+      free.disabled = better.disabled = state.submitting;
       text(line, lineOf(state));
       const refused = taken ? (answer?.error && sentence(answer.error.detail)) || state.problem?.error.detail : null;
       problem.hidden = !refused;

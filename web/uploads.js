@@ -44,7 +44,7 @@ export async function showUpload(place, file, send, done) {
 
 /** An error of the service about what was uploaded, by the name that the user knows: it has no name for the service. */
 export function namedAs(name, { detail, message, where = "" }) {
-  const named = (text) => text.replace(/^upload(?=[:/[ ]|$)/, name);
+  const named = (text) => text.replace(/^upload(?=[:/[ ]|$)/, () => name);
   return { detail: named(detail || message), where: named(where) };
 }
 

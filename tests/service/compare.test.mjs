@@ -276,7 +276,9 @@ describe('a run', () => {
       await page.locator('[data-testid^="edit-e"][data-state=running]').waitFor();
     };
     await long();
-    await id('interval-1').first().waitFor({ timeout: 120_000 });
+    // Of the one that runs: the run before has one, too.
+    const running = page.locator('[data-testid^="edit-e"][data-state=running]');
+    await running.getByTestId('interval-1').waitFor({ timeout: 120_000 });
     const [answer] = await Promise.all([
       page.waitForResponse((r) => r.url().endsWith('/stop')),
       page.locator('[data-state=running] [data-testid=edit-stop]:enabled').click(),

@@ -16,6 +16,7 @@ import { datasetZip, fox } from './support/scenes.mjs';
 
 const { values } = parseArgs({ options: { moves: { type: 'string', default: '100' }, renders: { type: 'string', default: '300' }, times: { type: 'string', default: '10' }, out: { type: 'string', default: path.join(root, 'docs/page-latency.md') } } });
 const [moves, renders, again] = [Number(values.moves), Number(values.renders), Number(values.times)];
+const given = `--moves ${moves} --renders ${renders} --times ${again}`;
 const wanted = 30_000;
 
 const capture = fox();
@@ -199,7 +200,9 @@ try {
 
   const text = `# How soon the page answers
 
-Made by \`node tests/service/page_latency.mjs\` on ${os.cpus().length} cores of ${os.cpus()[0].model.trim()} (load average before: ${load.toFixed(1)}), chromium ${browser.version()} on the same machine,
+Made by \`node tests/service/page_latency.mjs ${given}\`
+on ${os.cpus().length} cores of ${os.cpus()[0].model.trim()} (load average before: ${load.toFixed(1)}),
+chromium ${browser.version()} on the same machine,
 a window of 1366x768. The fox: 62,298 Gaussians. Milliseconds.
 
 | what | times | median | 95 % | longest |

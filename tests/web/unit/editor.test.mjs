@@ -15,6 +15,7 @@ let streams;
 let editor;
 let storage;
 let said;
+let offered; // By what was said.
 
 const scene = () => ({
   id: "s000001",
@@ -29,12 +30,15 @@ const scene = () => ({
 
 function open(items = storage) {
   const store = new Store({ ...NOTHING_OPEN, info: null });
-  editor = new Editor(store, new SceneMemory(items), (message) => said.push(message));
+  editor = new Editor(store, new SceneMemory(items), (message, { action } = {}) => {
+    said.push(message);
+    offered.push(action);
+  });
   return editor.open("s000001");
 }
 
 beforeEach(async () => {
-  said = [];
+  [said, offered] = [[], []];
   streams = [];
   storage = memoryStorage();
   service = {
@@ -299,6 +303,62 @@ test("what a draft has bent comes off by one press, and the next thing is judged
   editor.letGo();
   await take();
   assert.equal(editor.state.attach, null);
+});
+
+test("what comes off after a draft was dragged as it was, whatever has been set since: one step of undo", async () => {
+  const asked = [];
+  service["POST /v1/edits"] = (body) => (asked.push(body), edit({ id: `e00000${asked.length}` }));
+  await take();
+  dragBy(30);
+  await settle();
+  versionComes();
+  streams[0].send(edit({ state: "succeeded", progress: 1, result_version: 1, request: asked[0] }));
+  await settle();
+  editor.settle({ preset: "standard" });
+  editor.settle({ mode: "extend" });
+  await settle();
+  editor.takeOff();
+  await settle();
+  assert.deepEqual(asked[1], { ...asked[0], attach: "free" }, "the same drag of the same version");
+  assert.equal(editor.state.draft.id, "e000002");
+  cancels("e000002");
+  editor.undo();
+  assert.deepEqual([editor.state.version, editor.state.mode, editor.state.preset], [1, "extend", "standard"]);
+});
+
+test("what is being run well is given up when it comes off", async () => {
+  const asked = [];
+  service["POST /v1/edits"] = (body) => (asked.push(body), edit({ id: `e00000${asked.length}` }));
+  const cancelled = cancels("e000002");
+  await take();
+  dragBy(30);
+  await settle();
+  versionComes();
+  streams[0].send(edit({ state: "succeeded", progress: 1, result_version: 1, request: asked[0] }));
+  await settle();
+  await editor.runBetter();
+  // It has ended, and the scene with its result is on its way.
+  streams[0].send(edit({ id: "e000002", state: "succeeded", progress: 1, result_version: 2, request: asked[1] }));
+  editor.takeOff();
+  await settle();
+  assert.deepEqual([cancelled, asked.length, asked[2].attach], [["e000002"], 3, "free"]);
+  assert.deepEqual([editor.state.version, editor.state.draft.id, editor.state.handles.length], [0, "e000003", 1]);
+});
+
+test("what was drafted on a version that is gone stays as it is, and that is said", async () => {
+  const asked = [];
+  service["POST /v1/edits"] = (body) => (asked.push(body), edit());
+  await take();
+  dragBy(30);
+  await settle();
+  versionComes();
+  streams[0].send(edit({ state: "succeeded", progress: 1, result_version: 1, request: asked[0] }));
+  await settle();
+  editor.store.set({ scene: { ...scene(), versions: [{ version: 1, parent: null }] } });
+  editor.takeOff();
+  await settle();
+  assert.deepEqual([editor.state.version, asked.length], [1, 1]);
+  assert.match(said.at(-1), /^Version 0, .* deleted\.$/);
 });
 
 test("what only was dragged comes off without being repaired unasked", async () => {
@@ -679,6 +739,16 @@ test("one stream tells of the scene and of all its edits, also of those made els
   assert.deepEqual(said, ["Version 1 is ready, made elsewhere."]);
 });
 
+test("the last edit that was asked for from the panel is known, whatever is made elsewhere", async () => {
+  service["POST /v1/edits"] = () => edit();
+  assert.equal(editor.state.asked, null);
+  await editor.place(CAMERA, 200, 150);
+  await editor.run();
+  streams[0].send(edit({ id: "e000007" }));
+  await settle();
+  assert.deepEqual([editor.state.edits[0].id, editor.state.asked, editor.state.tab], ["e000007", "e000001", "edits"]);
+});
+
 test("a version that somebody else deletes leaves the screen", async () => {
   const versions = [...scene().versions, { version: 1, parent: 0 }];
   streams[0].send({ ...scene(), versions }, "scene");
@@ -696,7 +766,10 @@ test("a draft that another page has replaced leaves the screen for what it was m
   editor.showVersion(2);
   streams[0].send({ ...scene(), versions: [...versions, version(1, 0), version(3, 0)] }, "scene");
   assert.equal(editor.state.version, 0);
-  assert.match(said.at(-1), /Version 2 was a draft, and is gone: version 3 /);
+  assert.match(said.at(-1), /Version 2 was a draft, and is gone: version 3 is newer\.$/);
+  streams[0].send({ ...scene(), versions: [...versions, version(1, 0)] }, "scene");
+  offered.at(-1).run();
+  assert.equal(editor.state.version, 0, "nor is what was offered there any more");
 });
 
 test("who deletes a version is not told so by the stream that is the first to know", async () => {

@@ -226,7 +226,9 @@ test("a preset that cannot turn things is not asked what it would take", () => {
   assert.equal(impossibleWith("draft", request(turned), info), null);
   assert.match(impossibleWith("paper", request(turned), info), /“paper”/);
   assert.match(impossibleWith("paper", request({ scale: 2 }), info), /turn or size/);
-  assert.match(impossibleWith("paper", { ...request(), attach: "held" }, info), /turn or size/);
+  assert.match(impossibleWith("paper", { ...request(), attach: "held" }, info), /^What holds a part .* “paper”/);
+  assert.match(impossibleWith("paper", { ...request(turned), attach: "held" }, info), /turn or size/);
+  assert.equal(impossibleWith("draft", { ...request(), attach: "held" }, info), null);
   assert.equal(impossibleWith("paper", request(turned, { interpolation: "arap" }), info), null);
   assert.match(impossibleWith("draft", request(turned, { interpolation: "smooth" }), info), /“smooth”/);
 });

@@ -127,4 +127,5 @@ test("what was uploaded has the name that the user knows", () => {
   assert.equal(named(undefined), "");
   const { detail } = namedAs("chair.ply", { detail: "upload (19 bytes) is no scene" });
   assert.equal(detail, "chair.ply (19 bytes) is no scene");
+  assert.equal(namedAs("a$&b.ply", { detail: "upload: no" }).detail, "a$&b.ply: no", "whatever is in that name");
 });
