@@ -287,7 +287,8 @@ test("a thing that is dragged and let go is repaired as a draft, and its result 
   assert.deepEqual(asked[1].handles, asked[0].handles);
 });
 
-test("what a draft has bent comes off by one press, and the next thing is judged anew", async () => {
+/** A thing was dragged, let go and repaired as a draft, which is version 1. Returns what is asked of the service. */
+async function drafted() {
   const asked = [];
   service["POST /v1/edits"] = (body) => (asked.push(body), edit({ id: `e00000${asked.length}` }));
   await take();
@@ -296,6 +297,11 @@ test("what a draft has bent comes off by one press, and the next thing is judged
   versionComes();
   streams[0].send(edit({ state: "succeeded", progress: 1, result_version: 1, request: asked[0] }));
   await settle();
+  return asked;
+}
+
+test("what a draft has bent comes off by one press, and the next thing is judged anew", async () => {
+  const asked = await drafted();
   editor.takeOff();
   await settle();
   assert.deepEqual([asked.length, asked[0].attach, asked[1].attach], [2, undefined, "free"]);
@@ -306,14 +312,7 @@ test("what a draft has bent comes off by one press, and the next thing is judged
 });
 
 test("what comes off after a draft was dragged as it was, whatever has been set since: one step of undo", async () => {
-  const asked = [];
-  service["POST /v1/edits"] = (body) => (asked.push(body), edit({ id: `e00000${asked.length}` }));
-  await take();
-  dragBy(30);
-  await settle();
-  versionComes();
-  streams[0].send(edit({ state: "succeeded", progress: 1, result_version: 1, request: asked[0] }));
-  await settle();
+  const asked = await drafted();
   editor.settle({ preset: "standard" });
   editor.settle({ mode: "extend" });
   await settle();
@@ -327,15 +326,8 @@ test("what comes off after a draft was dragged as it was, whatever has been set 
 });
 
 test("what is being run well is given up when it comes off", async () => {
-  const asked = [];
-  service["POST /v1/edits"] = (body) => (asked.push(body), edit({ id: `e00000${asked.length}` }));
+  const asked = await drafted();
   const cancelled = cancels("e000002");
-  await take();
-  dragBy(30);
-  await settle();
-  versionComes();
-  streams[0].send(edit({ state: "succeeded", progress: 1, result_version: 1, request: asked[0] }));
-  await settle();
   await editor.runBetter();
   // It has ended, and the scene with its result is on its way.
   streams[0].send(edit({ id: "e000002", state: "succeeded", progress: 1, result_version: 2, request: asked[1] }));
@@ -346,14 +338,7 @@ test("what is being run well is given up when it comes off", async () => {
 });
 
 test("what was drafted on a version that is gone stays as it is, and that is said", async () => {
-  const asked = [];
-  service["POST /v1/edits"] = (body) => (asked.push(body), edit());
-  await take();
-  dragBy(30);
-  await settle();
-  versionComes();
-  streams[0].send(edit({ state: "succeeded", progress: 1, result_version: 1, request: asked[0] }));
-  await settle();
+  const asked = await drafted();
   editor.store.set({ scene: { ...scene(), versions: [{ version: 1, parent: null }] } });
   editor.takeOff();
   await settle();
