@@ -31,6 +31,9 @@ constexpr double apart = 1.15;
 // costs 1.01 to 1.26 of its cheapest stripes. With 2 a click on the mug takes all that is around it.
 constexpr double nearly_as_weak = 1.5;
 
+// Of a sum over all edges.
+constexpr double rounding = 1e-9;
+
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 // Of the usual spacing, and the most of it, that a node counts for: one whose neighbours are all at its place would
@@ -119,7 +122,9 @@ class GrowingPieces {
   /// as good as elsewhere on the surface.
   [[nodiscard]] double border_ratio(const Piece& piece) const {
     if (piece.clicks == 0) return 0;
-    const double lesser = std::min(piece.volume, all_ - piece.volume);
+    const double others = all_ - piece.volume;
+    // A piece that is everything, but for rounding, is a thing that stands alone.
+    const double lesser = others > rounding * all_ ? std::min(piece.volume, others) : piece.volume;
     return lesser > 0 ? double(piece.clicks) * (least_border + std::max(piece.leaving, 0.0)) / std::sqrt(lesser) : 0.0;
   }
 
@@ -206,11 +211,11 @@ NaturalBorder natural_border(const neighbours::NeighbourGraph& graph, std::span<
   const Terrain terrain = terrain_of(graph, weight, choice.whole || choice.beyond);
   const std::vector<double> inside = border_costs(terrain, order, clicked.inside);
   const std::vector<double> outside = border_costs(terrain, backwards, clicked.outside);
-  const double preference = clicked.outside.empty() ? 0.0 : halfway;
+  const double preference = choice.leaks || !clicked.outside.empty() ? halfway : 0.0;
   std::vector<Level> levels;
-  for (std::size_t taken = 1; taken < n && given[order[taken - 1]] != Given::outside; ++taken) {
-    const double last = potential[order[taken - 1]], next = potential[order[taken]];
-    if (last == next) continue;  // both or neither
+  for (std::size_t taken = 1; taken <= n && given[order[taken - 1]] != Given::outside; ++taken) {
+    const double last = potential[order[taken - 1]], next = taken < n ? potential[order[taken]] : 0.0;
+    if (last == next || (taken == n && !choice.leaks)) continue;  // both or neither; or nobody knows of an outside
     const double cost = (inside[taken] + outside[n - taken]) * (1 + preference * squared_log_odds(0.5 * (last + next)));
     if (cost < infinity) levels.push_back({taken, cost});
   }

@@ -24,6 +24,8 @@ struct BorderChoice {
   /// Counted from what is given for the inside, of which there is some: 0 is just that, and 1 the first border that
   /// encloses somewhat more. `whole` has no meaning then, nor has `wider` below 0.
   bool beyond = false;
+  /// The walk leaked: its potentials say what is outside without a click there.
+  bool leaks = false;
 };
 
 /// A border, and what is within.
@@ -42,9 +44,9 @@ struct NaturalBorder {
 /// ones, as they are by conductance, which divides by the weight itself. For the whole, and beyond, nodes count by
 /// their size: an edge by its width, the geometric mean of its ends' spacings, for a border, and by the square of it
 /// for what is enclosed, as on a surface: a wall's few large Gaussians are much, and their long border is no short one.
-/// Where there are clicks on both sides, levels near one half are preferred a little: it decides where nothing else
-/// does. Where nothing is given for the outside, all that can be reached is inside. Farther out and in there are other
-/// borders: levels that are joined more weakly than any that enclose somewhat more or less.
+/// Where there are clicks on both sides, or the walk leaked, levels near one half are preferred a little: it decides
+/// where nothing else does. Where nothing is given for the outside, all that can be reached is inside. Farther out and
+/// in there are other borders: levels that are joined more weakly than any that enclose somewhat more or less.
 ///   weight     [edges] 0 or more, the same both ways
 ///   potential  [nodes] of random_walk()
 ///   given      [nodes]; clicked nodes are given for their side

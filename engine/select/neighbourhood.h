@@ -109,6 +109,11 @@ class Neighbourhood {
   std::uint32_t claim(const scene::GaussianCloud& cloud, DVec3 point, Given side,
                       std::map<std::uint32_t, Claim>& claims) const;
   [[nodiscard]] NaturalBorder border_of(const Seeds& seeds, const BorderChoice& choice) const;
+  [[nodiscard]] DVec3 place_of(std::uint32_t node) const;  ///< Relative to the middle.
+  /// How likely a walk ends outside at each node: the farther it is from all clicks, by the square. Who clicks several
+  /// times does so all over the thing, so that it extends about as far as the clicks do: as `n` values that are drawn
+  /// evenly lie by (n - 1) / (n + 1) of the range apart. Empty where all clicks are at one place.
+  [[nodiscard]] std::vector<float> leak_beyond(std::span<const std::uint32_t> clicked) const;
   /// Of the whole: grown from the clicks, and again with clicks at far ends of what was found. What is under a thing,
   /// or behind, hangs together with those rather than with what was clicked on. The largest counts that has not taken
   /// another thing.

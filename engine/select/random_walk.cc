@@ -31,6 +31,7 @@ constexpr auto nobody = std::numeric_limits<std::uint32_t>::max();
 struct Network {
   std::span<const std::uint32_t> begin, to;  ///< As those of neighbours::NeighbourGraph.
   std::span<const float> weight;
+  std::span<const float> leak;  ///< [nodes] Weight of an edge to the outside.
   std::span<const Given> given;
   [[nodiscard]] std::size_t size() const { return given.size(); }
 };
@@ -38,12 +39,12 @@ struct Network {
 /// A graph of merged nodes.
 struct Coarser {
   std::vector<std::uint32_t> begin, to;
-  std::vector<float> weight;
+  std::vector<float> weight, leak;
   std::vector<Given> given;
   std::vector<std::uint32_t> merged;  ///< [nodes of the finer graph] the node it is part of
   /// Those that node i is made of: members[first[i]] to members[first[i + 1]].
   std::vector<std::uint32_t> first, members;
-  [[nodiscard]] Network network() const { return {begin, to, weight, given}; }
+  [[nodiscard]] Network network() const { return {begin, to, weight, leak, given}; }
 };
 
 /// Merges each free node with the free neighbour it is joined to most strongly, if that one is not merged yet, and all
@@ -93,6 +94,7 @@ std::optional<Coarser> halved(const Network& fine) {
   if (double(count) > least_reduction * double(fine.size())) return std::nullopt;
   list_members(count, out);
   out.given.resize(count);
+  out.leak.assign(count, 0.0f);
   out.begin.push_back(0);
   std::vector<std::uint32_t> listed(count, nobody);  // where the edge to a node stands, if it is of the current one
   for (std::uint32_t node = 0; node < count; ++node) {
@@ -100,6 +102,7 @@ std::optional<Coarser> halved(const Network& fine) {
     for (std::uint32_t i = out.first[node]; i < out.first[node + 1]; ++i) {
       const std::uint32_t member = out.members[i];
       out.given[node] = fine.given[member];
+      out.leak[node] += fine.leak[member];
       for (std::uint32_t edge = fine.begin[member]; edge < fine.begin[member + 1]; ++edge) {
         const std::uint32_t other = out.merged[fine.to[edge]];
         if (other == node) continue;
@@ -151,7 +154,7 @@ struct Level {
       each->assign(of.size(), 0.0);
     parallel_for(of.size(), grain, [&](std::size_t begin, std::size_t end) {
       for (std::size_t node = begin; node < end; ++node) {
-        double degree = 0;
+        double degree = double(of.leak[node]);
         for (std::uint32_t edge = of.begin[node]; edge < of.begin[node + 1]; ++edge) degree += double(of.weight[edge]);
         if (of.given[node] == Given::no && degree > 0) inverse[node] = 1 / degree;
       }
@@ -277,8 +280,10 @@ class Solver {
 }  // namespace
 
 std::vector<double> random_walk(const neighbours::NeighbourGraph& graph, std::span<const float> weight,
-                                std::span<const Given> given) {
-  std::vector<double> x = Solver({graph.begin, graph.to, weight, given}).solve();
+                                std::span<const Given> given, std::span<const float> leak) {
+  std::vector<float> all(leak.begin(), leak.end());
+  all.resize(graph.size(), 0.0f);
+  std::vector<double> x = Solver({graph.begin, graph.to, weight, all, given}).solve();
   for (double& value : x) value = std::clamp(value, 0.0, 1.0);  // of rounding and of steps not taken
   return x;
 }

@@ -22,11 +22,12 @@ inline constexpr float least_weight = 1e-3f;
 /// At each node the walk takes one of its edges, each as likely as it has weight.
 ///   weight   [edges] 0 or more, the same both ways
 ///   given    [nodes]
+///   leak     [nodes] 0 or more: the weight of an edge more of each node, by which a walk ends outside. Empty: none
 ///   returns  [nodes] 0 to 1, to about four digits. The same bytes for any number of threads.
 /// Source: Grady 2006, "Random walks for image segmentation", section III: the combinatorial Dirichlet problem. Solved
 /// by conjugate gradients, preconditioned by graphs of merged nodes (Notay 2010, "An aggregation-based algebraic
 /// multigrid method"), in about as many steps for any graph.
 [[nodiscard]] std::vector<double> random_walk(const neighbours::NeighbourGraph& graph, std::span<const float> weight,
-                                              std::span<const Given> given);
+                                              std::span<const Given> given, std::span<const float> leak = {});
 
 }  // namespace engine::select

@@ -82,6 +82,18 @@ TEST(Grow, TakesSeveralPiecesThatAreClickedOn) {
   EXPECT_EQ(grown(cloud, {{{0, 0, 0}}, {{4, 0, 0}}, {}}), numbers(0, 100));
 }
 
+TEST(Grow, ClicksAtOnePlaceSayNothingOfHowLargeAThingIs) {
+  const scene::GaussianCloud cloud = two_colors({0.1f, 0.1f, 0.8f});
+  const DVec3 click(-1.2, 0.3, 0);
+  EXPECT_EQ(grown(cloud, {{click, click}, {}, 5.0}), grown(cloud, {{click}, {}, 5.0}));
+}
+
+TEST(Grow, TakesAllWhereNothingElseIs) {
+  scene::GaussianCloud cloud;
+  add_sheet(cloud, {0, 0, 0}, 20, 0.1f, Vec3(0.5f));
+  EXPECT_EQ(grown(cloud, {{{-0.2, 0, 0}, {0.2, 0, 0}}, {}, 20.0}), numbers(0, 400));
+}
+
 TEST(Grow, StandsRowsAtOnePlaceAndFewRows) {
   scene::GaussianCloud same;
   for (int i = 0; i < 50; ++i) add_at(same, {1, 2, 3});

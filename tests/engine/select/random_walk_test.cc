@@ -48,6 +48,13 @@ TEST(RandomWalk, StandsWhatIsGivenForNobodyAndWhatIsAlone) {
   EXPECT_TRUE(random_walk({.begin = {0}, .to = {}, .back = {}, .length = {}, .spacing = {}}, {}, {}).empty());
 }
 
+TEST(RandomWalk, ALeakIsAnEdgeToTheOutside) {
+  WeightedGraph leaking = graph_of(4, chain(0, 4));
+  const std::vector<Given> given{Given::inside, Given::no, Given::no, Given::no};
+  const std::vector<double> x = random_walk(leaking.graph, leaking.weight, given, std::vector<float>{0, 0, 0, 1});
+  for (std::size_t node = 0; node < 4; ++node) EXPECT_NEAR(x[node], 1 - 0.25 * double(node), 1e-4);
+}
+
 TEST(RandomWalk, StandsEdgesWithoutWeight) {
   const std::vector<double> x = walk(graph_of(3, {{0, 1, 0}, {1, 2, 0}}), {0}, {2});
   EXPECT_EQ(x, (std::vector<double>{1, 0, 0}));
@@ -59,6 +66,28 @@ WeightedGraph rough_grid(std::uint32_t side) {
   Rng rng(5);
   for (WeightedEdge& edge : edges) edge.weight = float(std::pow(10.0, -3.0 * double(rng.uniform())));
   return graph_of(std::size_t(side) * side, edges);
+}
+
+TEST(RandomWalk, LeaksAreMergedWithTheirNodes) {
+  constexpr std::uint32_t side = 60;
+  const WeightedGraph on = rough_grid(side);
+  std::vector<WeightedEdge> edges;
+  for (std::uint32_t node = 0; node < side * side; ++node)
+    for (std::uint32_t edge = on.graph.begin[node]; edge < on.graph.begin[node + 1]; ++edge)
+      if (node < on.graph.to[edge]) edges.push_back({node, on.graph.to[edge], on.weight[edge]});
+  std::vector<float> leak(side * side);
+  for (std::uint32_t node = 0; node < leak.size(); ++node) {
+    leak[node] = 1e-4f * float(node % side);
+    edges.push_back({node, side * side, leak[node]});
+  }
+  std::vector<Given> given(leak.size(), Given::no);
+  given[side * side / 2] = Given::inside;
+  const std::vector<double> leaking = random_walk(on.graph, on.weight, given, leak);
+  given.push_back(Given::outside);
+  const WeightedGraph explicitly = graph_of(side * side + 1, edges);
+  const std::vector<double> x = random_walk(explicitly.graph, explicitly.weight, given);
+  for (std::size_t node = 0; node < leak.size(); ++node) ASSERT_NEAR(leaking[node], x[node], 1e-3) << node;
+  EXPECT_LT(*std::ranges::min_element(leaking), 0.9) << "they count";
 }
 
 TEST(RandomWalk, IsTheMeanOfItsNeighboursOnALargeGraph) {
