@@ -159,6 +159,7 @@ Result<Neighbourhood::Seeds> Neighbourhood::seeds_of(const scene::GaussianCloud&
   };
   std::erase_if(seeds.clicked.inside, belongs_to(Given::inside));
   std::erase_if(seeds.clicked.outside, belongs_to(Given::outside));
+  seeds.by_hand = seeds.clicked.inside.size();
   if (seeds.clicked.inside.empty())
     return fail(ErrorCode::unprocessable, "all Gaussians around the inside points are nearer to outside ones",
                 "inside[0]");
@@ -213,8 +214,9 @@ Result<Grown> Neighbourhood::grow_beyond(const scene::GaussianCloud& cloud, cons
 }
 
 NaturalBorder Neighbourhood::border_of(const Seeds& seeds, const BorderChoice& choice) const {
-  const bool by_several = !choice.whole && !choice.beyond && seeds.clicked.outside.size() < clicks_around;
-  const std::vector<float> leak = by_several ? leak_beyond(seeds.clicked.inside) : std::vector<float>{};
+  const bool leaks = !choice.beyond && seeds.clicked.outside.size() < clicks_around;
+  const std::vector<float> leak =
+      leaks ? leak_beyond(std::span(seeds.clicked.inside).first(seeds.by_hand)) : std::vector<float>{};
   BorderChoice chosen = choice;
   chosen.leaks = !leak.empty();
   const std::vector<double> potential = random_walk(graph_, weight_, seeds.given, leak);

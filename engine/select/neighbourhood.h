@@ -99,6 +99,7 @@ class Neighbourhood {
   struct Seeds {
     std::vector<Given> given;  ///< [nodes]
     ClickedNodes clicked;      ///< The node that each point is on, where no point of the other side has it.
+    std::size_t by_hand = 0;   ///< So many of those inside, the first ones, are of points; the others of far ends.
   };
   struct FarEnds {
     std::vector<double> squared;  ///< [n] Distance of each node from the nearest of so many clicks.

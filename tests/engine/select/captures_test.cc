@@ -35,6 +35,11 @@ TEST(GrowOnTheFox, TakesWhatTheClicksSpan) {
   const std::size_t head = grown(file, {{snout, ear_tip, ear_foot}, {}, {}});
   EXPECT_GT(head, 7000u);
   EXPECT_LT(head, 13000u) << "the head, not its neck and board (24,000)";
+  Grow whole{{snout, ear_tip, ear_foot}, {}, {}};
+  whole.whole = true;
+  const std::size_t whole_head = grown(file, whole);
+  EXPECT_GT(whole_head, 7000u);
+  EXPECT_LT(whole_head, 13000u) << "no more of it for a page, which means the whole (46,000)";
 }
 
 TEST(GrowOnTheDoll, LeavesTheBedThatItSitsOn) {
