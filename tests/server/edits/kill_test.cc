@@ -2,16 +2,13 @@
 // removed is there whole or gone.
 //
 // Everything that starts threads happens in children: the process that forks has only one.
-#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <spdlog/spdlog.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <chrono>
 #include <csignal>
 #include <filesystem>
-#include <functional>
 #include <string>
 #include <thread>
 
@@ -20,6 +17,7 @@
 #include "engine/jobs/sqlite_store.h"
 #include "server/edits/convert.h"
 #include "tests/server/edits/service_support.h"
+#include "tests/support/child.h"
 
 namespace server::edits {
 namespace {
@@ -30,56 +28,14 @@ using namespace std::chrono_literals;
 constexpr const char* first_edit = "e000001";
 constexpr const char* first_scene = "s000001";
 
-/// A child process, and a pipe on which it says something.
-class Child {
- public:
-  explicit Child(const std::function<void(const Child&)>& body) {
-    if (::pipe2(pipe_, O_CLOEXEC) != 0) throw std::runtime_error("no pipe");
-    process_ = ::fork();
-    if (process_ == 0) ::_exit(run(body));
-    ::close(pipe_[1]);
-  }
-  ~Child() { ::close(pipe_[0]); }
-  Child(const Child&) = delete;
-  Child& operator=(const Child&) = delete;
-
-  /// In the child.
-  void say(char word) const {
-    if (::write(pipe_[1], &word, 1) != 1) ::_exit(3);
-  }
-  /// In the parent: what the child has said next; 0 if it has ended.
-  [[nodiscard]] char hear() const {
-    char word = 0;
-    return ::read(pipe_[0], &word, 1) == 1 ? word : char(0);
-  }
-  void kill() const { ::kill(process_, SIGKILL); }
-  /// Whether it ended by itself, without complaint.
-  [[nodiscard]] bool ended_well() const {
-    int status = 0;
-    ::waitpid(process_, &status, 0);
-    return WIFEXITED(status) && WEXITSTATUS(status) == 0;
-  }
-
- private:
-  int run(const std::function<void(const Child&)>& body) const {
-    try {
-      spdlog::set_level(spdlog::level::warn);
-      body(*this);
-      return 0;
-    } catch (const std::exception& e) {
-      std::fprintf(stderr, "child: %s\n", e.what());
-      return 1;
-    }
-  }
-
-  int pipe_[2];
-  pid_t process_;
-};
+using support::Child;
 
 /// The data folder as a service that has just started sees it.
 struct Opened {
   explicit Opened(const fs::path& data)
-      : store(open_scenes(data)), service(open_service(*store, data, 32, /*attempts=*/0)), folder(data) {}
+      : store(open_scenes(data)), service(open_service(*store, data, 32, /*attempts=*/0)), folder(data) {
+    spdlog::set_level(spdlog::level::warn);
+  }
   void expect(bool condition, const char* what) const {
     if (!condition) throw std::runtime_error(what);
   }
