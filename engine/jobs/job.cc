@@ -61,6 +61,25 @@ std::optional<JobState> next_state(const Job& job, Event event) {
   }
 }
 
+/// Is this brought about by the worker that holds the job?
+bool is_of_worker(Event event) {
+  switch (event) {
+    case Event::report:
+    case Event::finish_interval:
+    case Event::succeed:
+    case Event::fail:
+    case Event::release:
+    case Event::make_way:
+      return true;
+    case Event::claim:
+    case Event::stop:
+    case Event::cancel:
+    case Event::abandon:
+      return false;
+  }
+  return false;
+}
+
 /// The process that held the job has died. Its claim goes; who has died too often at the same place is not tried again.
 void abandon(Job& job, int max_deaths) {
   job.claimed = false;
@@ -104,7 +123,22 @@ Time turn_of(const Job& job) {
   return job.created + stretch * (job.expected - negligible);
 }
 
+Result<void> check_claim(const Job& job, std::int64_t claim) {
+  if (job.claimed && job.claim_number == claim) return {};
+  if (job.claim_number != claim)
+    return fail(ErrorCode::conflict,
+                job.id + " has been taken over (claim " + std::to_string(job.claim_number) + " came after claim " +
+                    std::to_string(claim) + "): nothing that was made of it under the old claim counts",
+                job.id);
+  return fail(ErrorCode::conflict,
+              job.id + " is " + std::string(to_string(job.state)) + " and held by no worker: claim " +
+                  std::to_string(claim) + " is over",
+              job.id);
+}
+
 Result<Job> transition(Job job, const Change& change, Time now) {
+  if (is_of_worker(change.event) && job.claimed)
+    if (auto holds = check_claim(job, change.claim); !holds) return propagate(holds);
   const auto next = next_state(job, change.event);
   if (!next) return fail(ErrorCode::conflict, refusal(job, change.event), job.id);
   const bool was_final = is_final(job.state);
@@ -113,6 +147,7 @@ Result<Job> transition(Job job, const Change& change, Time now) {
   switch (change.event) {
     case Event::claim:
       job.claimed = true;
+      ++job.claim_number;
       job.place.clear();
       if (!job.started) job.started = now;
       break;

@@ -43,13 +43,14 @@ struct Job {
   std::string idempotency_key;            ///< "": none.
   std::chrono::milliseconds expected{0};  ///< What the whole work should take, as it was handed in; 0: nobody knows.
   JobState state = JobState::queued;
-  bool claimed = false;        ///< A worker holds it.
-  bool stopped_early = false;  ///< Succeeded with fewer intervals than asked for.
-  int finished_intervals = 0;  ///< The last of them has its checkpoint on disk.
-  int queue_position = 0;      ///< 1 for the next job of those that wait, 0 for one that does not wait.
-  std::string progress;        ///< The progress that was published last.
-  std::string place;           ///< What its worker was about to do last; "": nothing it would have said.
-  std::string died_at;         ///< The place at which a process last died that held the job.
+  bool claimed = false;           ///< A worker holds it.
+  std::int64_t claim_number = 0;  ///< Of its last claim; counts up with each. Tells a worker from those before it.
+  bool stopped_early = false;     ///< Succeeded with fewer intervals than asked for.
+  int finished_intervals = 0;     ///< The last of them has its checkpoint on disk.
+  int queue_position = 0;         ///< 1 for the next job of those that wait, 0 for one that does not wait.
+  std::string progress;           ///< The progress that was published last.
+  std::string place;              ///< What its worker was about to do last; "": nothing it would have said.
+  std::string died_at;            ///< The place at which a process last died that held the job.
   int deaths = 0;              ///< How many did so one after the other at this place, no interval finished in between.
   std::string result;          ///< Result of a job that succeeded. Empty in a list.
   std::optional<Error> error;  ///< Why the job failed; none unless `state` is failed.
@@ -77,13 +78,14 @@ inline constexpr std::chrono::milliseconds negligible{500};
 [[nodiscard]] Time turn_of(const Job& job);
 
 /// What can happen to a job. Its worker brings about all but `stop`, `cancel` and `abandon`: whoever finds it claimed
-/// by a process that is no more does that.
+/// by a worker that is no more, or whose claim has run out, does that.
 enum class Event { claim, report, finish_interval, stop, cancel, succeed, fail, release, make_way, abandon };
 inline constexpr int event_count = 10;
 
 /// An event with its data; fields that do not belong to the event are ignored.
 struct Change {
   Event event = Event::report;
+  std::int64_t claim = 0;  ///< What a worker brings about after `claim` carries the number that it was given then.
   std::optional<std::string> progress = {};  ///< With any event: the record's new progress.
   std::optional<std::string> place = {};     ///< report: the record's new place.
   int interval = 0;            ///< finish_interval: number of the interval, larger than any before; the first is 1.
@@ -93,9 +95,14 @@ struct Change {
   int max_deaths = 0;          ///< abandon: the job fails when its `deaths` come to so many; 0: never.
 };
 
+/// Whether the claim of this number holds the job.
+///   errors  conflict: the job has ended, was given back, or has been taken over by another; `where` is the id
+[[nodiscard]] Result<void> check_claim(const Job& job, std::int64_t claim);
+
 /// The record after the change. Every store calls this function, so the rules are the same everywhere.
-///   errors  conflict: not in this state (`where` is the id; the message says what to do instead), invalid_argument:
-///           finish_interval with a number that does not count up
+///   errors  conflict: not in this state (`where` is the id; the message says what to do instead), or by a worker that
+///           does not hold the job any more: nothing it says counts; invalid_argument: finish_interval with a number
+///           that does not count up
 [[nodiscard]] Result<Job> transition(Job job, const Change& change, Time now);
 
 }  // namespace engine::jobs

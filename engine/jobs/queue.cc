@@ -22,7 +22,7 @@ void remove_files(const fs::path& folder) {
 
 }  // namespace
 
-Queue::~Queue() = default;
+Queue::~Queue() { store_.watch({}); }
 
 Result<std::unique_ptr<Queue>> Queue::open(Store& store, const QueueOptions& options) {
   if (auto made = create_folder(options.folder); !made) return propagate(made);
@@ -30,6 +30,7 @@ Result<std::unique_ptr<Queue>> Queue::open(Store& store, const QueueOptions& opt
   if (!findings) return propagate(findings);
   std::unique_ptr<Queue> queue(new Queue(store, options));
   queue->findings_ = std::move(*findings);
+  store.watch([changed = queue.get()] { changed->bump_revision(); });
   return queue;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <mutex>
 #include <optional>
 #include <stop_token>
@@ -13,8 +14,26 @@ namespace engine::jobs {
 
 /// A claimed job. Safe to use from any thread.
 struct Queue::RunningJob {
-  std::stop_source interrupt;      ///< Fires when the job is cancelled, or the worker has no time left.
+  explicit RunningJob(const Job& job) : id(job.id), claim(job.claim_number) {}
+
+  const std::string id;
+  const std::int64_t claim;
+  std::stop_source interrupt;      ///< Fires when the job is cancelled or lost, or the worker has no time left.
   std::atomic<bool> stop = false;  ///< Set when the job is to end and keep its last finished interval.
+  std::atomic<bool> lost = false;  ///< Set when another has taken the job over, or has ended it.
+
+  /// What the record says now, others may have asked for.
+  void heed(JobState state) {
+    if (state == JobState::cancel_requested) interrupt.request_stop();
+    if (state == JobState::stop_requested) stop = true;
+  }
+  /// An error of the store about this claim: is it over?
+  bool is_over(const Error& error) {
+    if (error.code != ErrorCode::conflict && error.code != ErrorCode::not_found) return false;
+    lost = true;
+    interrupt.request_stop();
+    return true;
+  }
 
   void set_progress(std::string text) {
     const std::lock_guard lock(mutex_);

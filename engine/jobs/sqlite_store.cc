@@ -3,11 +3,8 @@
 #include <sqlite3.h>
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <exception>
-#include <iterator>
-#include <map>
 #include <mutex>
 #include <span>
 #include <string_view>
@@ -18,11 +15,12 @@
 #include "engine/core/checksum.h"
 #include "engine/core/file_descriptor.h"
 #include "engine/jobs/durable_file.h"
+#include "engine/jobs/store_rules.h"
 
 namespace engine::jobs {
 namespace {
 
-constexpr int schema_number = 4;  // of the tables below; user_version in the file
+constexpr int schema_number = 5;  // of the tables below; user_version in the file
 constexpr const char* schema = R"(
   CREATE TABLE jobs (
     number INTEGER PRIMARY KEY AUTOINCREMENT,  -- AUTOINCREMENT: a removed job's number is never given away again
@@ -54,22 +52,23 @@ constexpr const char* counts_deaths = R"(
   PRAGMA user_version = 2;
 )";
 
-/// A row in the order of its checksum, which is the last of its columns. SQLite's own checks see damage to its pages
-/// and indices, but not to what they hold.
-constexpr std::string_view summed_columns =
-    "number, lane, payload, idempotency_key, state, claimed, stopped_early, finished_intervals, progress, result, "
-    "error_code, error_message, error_where, created, started, ended, place, died_at, deaths, expected";
-/// The same in schema 3.
-constexpr std::string_view once_summed_columns =
-    "number, lane, payload, idempotency_key, state, claimed, stopped_early, finished_intervals, progress, result, "
-    "error_code, error_message, error_where, created, started, ended, place, died_at, deaths";
 /// From schema 2 to 3.
 constexpr const char* adds_checksums = "ALTER TABLE jobs ADD COLUMN checksum INTEGER NOT NULL DEFAULT 0;";
 /// From schema 3 to 4: how long jobs take, milliseconds.
-constexpr const char* adds_expected = R"(
-  ALTER TABLE jobs ADD COLUMN expected INTEGER NOT NULL DEFAULT 0;
-  PRAGMA user_version = 4;
-)";
+constexpr const char* adds_expected = "ALTER TABLE jobs ADD COLUMN expected INTEGER NOT NULL DEFAULT 0;";
+/// From schema 4 to 5.
+constexpr const char* adds_claim_numbers = "ALTER TABLE jobs ADD COLUMN claim_number INTEGER NOT NULL DEFAULT 0;";
+
+/// A row in the order of its checksum, which is the last of its columns. SQLite's own checks see damage to its pages
+/// and indices, but not to what they hold.
+std::string summed_columns(int schema_of_row = schema_number) {
+  std::string columns =
+      "number, lane, payload, idempotency_key, state, claimed, stopped_early, finished_intervals, progress, result, "
+      "error_code, error_message, error_where, created, started, ended, place, died_at, deaths";
+  if (schema_of_row > 3) columns += ", expected";
+  if (schema_of_row > 4) columns += ", claim_number";
+  return columns;
+}
 
 /// turn_of() in SQL.
 ///   job  the table, or another name of it
@@ -107,21 +106,12 @@ void row_checksum(sqlite3_context* context, int count, sqlite3_value** values) {
   sqlite3_result_int64(context, std::int64_t(fnv1a(all.bytes())));
 }
 
-std::string checksum_of_row(std::string_view columns = summed_columns) {
-  return "row_checksum(" + std::string(columns) + ")";
+std::string checksum_of_row(int schema_of_row = schema_number) {
+  return "row_checksum(" + summed_columns(schema_of_row) + ")";
 }
 
 /// SQLite's result codes become an Error here, travel as an exception to guarded() and leave this file as a Result.
-struct Failure : std::exception {
-  explicit Failure(Error e) : error(std::move(e)) {}
-  Error error;
-};
-
-/// In the order of ErrorCode. Names, because the numbers of an enum may change between versions and the file stays.
-constexpr std::array<std::string_view, 12> code_names = {
-    "invalid_argument", "unprocessable", "not_found", "conflict",  "corrupt_data", "unsupported",
-    "too_large",        "no_space",      "busy",      "cancelled", "unavailable",  "internal"};
-static_assert(std::size_t(ErrorCode::internal) + 1 == code_names.size());
+using Failure = StoreFailure;
 
 class Database {
  public:
@@ -261,23 +251,14 @@ class Transaction {
   Database& database_;
 };
 
-[[noreturn]] void no_such_job(const std::string& id) {
-  throw Failure({ErrorCode::not_found, "there is no job \"" + id + "\"; ended ones are removed after a while", id});
-}
-
-std::int64_t known_number(const std::string& id) {
-  const auto number = number_of(id);
-  if (!number) no_such_job(id);
-  return *number;
-}
-
 /// What read() reads. A list has neither the long texts nor the row held against its checksum, which is over them, too.
 std::string select(bool whole) {
   const std::string payload = whole ? "payload" : "''", result = whole ? "result" : "''";
   const std::string is_sound = whole ? "checksum IS " + checksum_of_row() : "1";
   return "SELECT number, lane, " + payload +
          ", idempotency_key, state, claimed, stopped_early, finished_intervals, progress, " + result +
-         ", error_code, error_message, error_where, created, started, ended, place, died_at, deaths, expected, " +
+         ", error_code, error_message, error_where, created, started, ended, place, died_at, deaths, expected, "
+         "claim_number, " +
          is_sound + " FROM jobs ";
 }
 
@@ -289,7 +270,7 @@ std::optional<Time> time_at(const Statement& row, int column) {
 Job read(const Database& database, const Statement& row) {
   Job job;
   job.id = id_of(row.integer(0));
-  if (row.integer(20) == 0) database.corrupt("the record of job " + job.id);
+  if (row.integer(21) == 0) database.corrupt("the record of job " + job.id);
   job.lane = row.text(1);
   job.payload = row.text(2);
   job.idempotency_key = row.text(3);
@@ -302,9 +283,9 @@ Job read(const Database& database, const Statement& row) {
   job.progress = row.text(8);
   job.result = row.text(9);
   if (!row.is_null(10)) {
-    const auto code = std::find(code_names.begin(), code_names.end(), row.text(10));
-    if (code == code_names.end()) database.corrupt("job " + job.id + " has error code \"" + row.text(10) + "\"");
-    job.error = Error{ErrorCode(std::distance(code_names.begin(), code)), row.text(11), row.text(12)};
+    const auto code = parse_code(row.text(10));
+    if (!code) database.corrupt("job " + job.id + " has error code \"" + row.text(10) + "\"");
+    job.error = Error{*code, row.text(11), row.text(12)};
   }
   job.created = time_at(row, 13).value_or(Time{});
   job.started = time_at(row, 14);
@@ -313,34 +294,24 @@ Job read(const Database& database, const Statement& row) {
   job.died_at = row.text(17);
   job.deaths = int(row.integer(18));
   job.expected = std::chrono::milliseconds(row.integer(19));
+  job.claim_number = row.integer(20);
   return job;
 }
 
-/// The jobs that wait, in the order of their turns, by number: 1 for the next one.
-std::map<std::int64_t, int> places_in_queue(Database& database) {
-  struct Waiting {
-    std::int64_t turn, number;
-  };
-  std::vector<Waiting> waiting;
-  std::map<std::string, std::int64_t> last_turn;  // by lane: its jobs come in order, whatever each of them takes
+std::vector<ActiveJob> active_jobs(Database& database) {
+  std::vector<ActiveJob> active;
   Statement row(database, "SELECT number, lane, state, " + turn_in_sql("jobs") +
                               " FROM jobs WHERE ended IS NULL ORDER BY number");
-  while (row.step()) {
-    std::int64_t& turn = last_turn.try_emplace(row.text(1), row.integer(3)).first->second;
-    turn = std::max(turn, row.integer(3));
-    if (row.text(2) == to_string(JobState::queued)) waiting.push_back({turn, row.integer(0)});
-  }
-  std::ranges::stable_sort(waiting, {}, &Waiting::turn);
-  std::map<std::int64_t, int> places;
-  for (const Waiting& job : waiting) places.emplace(job.number, int(places.size()) + 1);
-  return places;
+  while (row.step())
+    active.push_back({row.integer(0), row.text(1), row.text(2) == to_string(JobState::queued), row.integer(3)});
+  return active;
 }
 
 /// What read() leaves out.
 void find_places(Database& database, std::span<Job> jobs) {
   const auto waits = [](const Job& job) { return job.state == JobState::queued; };
   if (std::ranges::none_of(jobs, waits)) return;
-  const auto places = places_in_queue(database);
+  const auto places = places_in_queue(active_jobs(database));
   for (Job& job : jobs)
     if (const auto place = places.find(number_of(job.id).value_or(0)); waits(job) && place != places.end())
       job.queue_position = place->second;
@@ -371,17 +342,17 @@ void seal(Database& database, std::int64_t number) {
 void write_in(Database& database, const Job& job) {
   std::optional<std::string_view> code, message, where;
   if (job.error) {
-    code = code_names[std::size_t(job.error->code)];
+    code = code_name(job.error->code);
     message = job.error->message;
     where = job.error->where;
   }
   Statement(database,
             "UPDATE jobs SET state = ?2, claimed = ?3, stopped_early = ?4, finished_intervals = ?5, progress = ?6, "
             "result = ?7, error_code = ?8, error_message = ?9, error_where = ?10, started = ?11, ended = ?12, "
-            "place = ?13, died_at = ?14, deaths = ?15 WHERE number = ?1",
+            "place = ?13, died_at = ?14, deaths = ?15, claim_number = max(claim_number, ?16) WHERE number = ?1",
             known_number(job.id), to_string(job.state), std::int64_t(job.claimed), std::int64_t(job.stopped_early),
             std::int64_t(job.finished_intervals), job.progress, job.result, code, message, where, job.started,
-            job.ended, job.place, job.died_at, std::int64_t(job.deaths))
+            job.ended, job.place, job.died_at, std::int64_t(job.deaths), job.claim_number)
       .run();
   seal(database, known_number(job.id));
 }
@@ -400,12 +371,8 @@ std::string text_of(Database& database, std::string_view sql) {
 }
 
 void check_room_in(Database& database, std::size_t max_queued) {
-  const std::string waiting = text_of(database, "SELECT count(*) FROM jobs WHERE ended IS NULL AND state = 'queued'");
-  if (std::stoull(waiting) < max_queued) return;
-  throw Failure({ErrorCode::busy,
-                 "the queue is full: " + waiting + " jobs wait, its limit (max_queued) is " +
-                     std::to_string(max_queued) + "; try again later",
-                 "max_queued"});
+  check_room(std::stoull(text_of(database, "SELECT count(*) FROM jobs WHERE ended IS NULL AND state = 'queued'")),
+             max_queued);
 }
 
 std::vector<std::string> ids(Statement&& rows) {
@@ -422,9 +389,9 @@ void skip_numbers(Database& database, std::int64_t used) {
 }
 
 /// Names a row that does not have its checksum.
-void check_rows(Database& database, std::string_view columns = summed_columns) {
+void check_rows(Database& database, int schema_of_rows = schema_number) {
   for (const std::string& id : ids(Statement(
-           database, "SELECT number FROM jobs WHERE checksum IS NOT " + checksum_of_row(columns) + " LIMIT 1")))
+           database, "SELECT number FROM jobs WHERE checksum IS NOT " + checksum_of_row(schema_of_rows) + " LIMIT 1")))
     database.corrupt("the record of job " + id);
 }
 
@@ -439,15 +406,17 @@ void bring_up_to_date(Database& database, int found_schema) {
   const auto has = [&](const std::string& column) {
     return text_of(database, "SELECT count(*) FROM pragma_table_info('jobs') WHERE name = '" + column + "'") != "0";
   };
-  if ((found_schema < 3 && has("checksum")) || (found_schema < 4 && has("expected")))
+  if ((found_schema < 3 && has("checksum")) || (found_schema < 4 && has("expected")) ||
+      (found_schema < 5 && has("claim_number")))
     database.corrupt("the number of its schema");
+  if (found_schema == schema_number) return;
   if (found_schema < 2) database.execute(counts_deaths);
   if (found_schema < 3) database.execute(adds_checksums);
-  if (found_schema == 3) check_rows(database, once_summed_columns);  // before they are sealed anew
-  if (found_schema < 4) {
-    database.execute(adds_expected);
-    Statement(database, "UPDATE jobs SET checksum = " + checksum_of_row()).run();
-  }
+  if (found_schema >= 3) check_rows(database, found_schema);  // before they are sealed anew
+  if (found_schema < 4) database.execute(adds_expected);
+  database.execute(adds_claim_numbers);
+  database.execute(("PRAGMA user_version = " + std::to_string(schema_number)).c_str());
+  Statement(database, "UPDATE jobs SET checksum = " + checksum_of_row()).run();
 }
 
 /// SQLite's own check, of indices, too, and ours of what the rows hold.
@@ -550,14 +519,7 @@ Result<Submission> SqliteStore::submit(const NewJob& job, std::size_t max_queued
     std::optional<std::string_view> key;
     if (!job.idempotency_key.empty()) {
       key = job.idempotency_key;
-      if (auto earlier = find_key_in(database, job.idempotency_key)) {
-        if (earlier->payload != job.payload || earlier->lane != job.lane)
-          throw Failure({ErrorCode::unprocessable,
-                         "this idempotency key came with another request before, job " + earlier->id +
-                             ": use a new key for a new request",
-                         "idempotency_key"});
-        return {.job = std::move(*earlier), .created = false};
-      }
+      if (auto earlier = find_key_in(database, job.idempotency_key)) return same_submission(std::move(*earlier), job);
     }
     check_room_in(database, max_queued);
     Statement(database,
@@ -585,8 +547,7 @@ Result<void> SqliteStore::restore(const Job& job) {
     std::optional<std::string_view> key;
     if (!job.idempotency_key.empty()) {
       key = job.idempotency_key;
-      if (const auto other = find_key_in(database, job.idempotency_key); other && other->id != job.id)
-        throw Failure({ErrorCode::conflict, other->id + " has the idempotency key of " + job.id, job.id});
+      check_owner_of_key(find_key_in(database, job.idempotency_key), job);
     }
     const std::int64_t number = known_number(job.id);
     Statement(database,
@@ -641,6 +602,15 @@ Result<std::optional<Job>> SqliteStore::claim() {
   });
 }
 
+Result<JobState> SqliteStore::renew(const std::string& id, std::int64_t claim) {
+  return guarded([&] {
+    const std::lock_guard lock(impl_->mutex);
+    const Job job = find_in(impl_->database, id);
+    if (auto holds = check_claim(job, claim); !holds) throw Failure(holds.error());
+    return job.state;
+  });
+}
+
 Result<bool> SqliteStore::should_make_way(const std::string& id, std::chrono::milliseconds left) {
   return guarded([&] {
     const std::lock_guard lock(impl_->mutex);
@@ -661,10 +631,7 @@ Result<Job> SqliteStore::apply(const std::string& id, const Change& change) {
 
 Result<void> SqliteStore::remove(const std::string& id) {
   return impl_->transact([&] {
-    const Job job = find_in(impl_->database, id);
-    if (!is_final(job.state))
-      throw Failure({ErrorCode::conflict,
-                     id + " is " + std::string(to_string(job.state)) + ": cancel it and wait for its end first", id});
+    check_has_ended(find_in(impl_->database, id));
     Statement(impl_->database, "DELETE FROM jobs WHERE number = ?1", known_number(id)).run();
   });
 }

@@ -42,10 +42,13 @@ class SqliteStore final : public Store {
   [[nodiscard]] Result<std::optional<Job>> find_key(const std::string& idempotency_key) override;
   [[nodiscard]] Result<std::vector<Job>> list(const Filter& filter) override;
   [[nodiscard]] Result<std::optional<Job>> claim() override;
+  [[nodiscard]] std::optional<std::chrono::milliseconds> lease() const override { return std::nullopt; }
+  [[nodiscard]] Result<JobState> renew(const std::string& id, std::int64_t claim) override;
   [[nodiscard]] Result<bool> should_make_way(const std::string& id, std::chrono::milliseconds left) override;
   [[nodiscard]] Result<Job> apply(const std::string& id, const Change& change) override;
   [[nodiscard]] Result<void> remove(const std::string& id) override;
   [[nodiscard]] Result<std::vector<std::string>> expire(const Retention& retention) override;
+  void watch(std::function<void()>) override {}  // nobody else has the file
 
  private:
   struct Impl;

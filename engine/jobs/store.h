@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
@@ -46,7 +47,8 @@ struct Retention {
 /// Keeps job records. Every function is safe to call from any thread, is one transaction (all of it or nothing), and is
 /// on disk when it returns: a power cut or kill -9 afterwards undoes nothing.
 ///   errors of all  no_space: the disk is full; nothing was changed, and the store works again once there is space
-///                  unavailable: the storage is held by somebody else or cannot be reached
+///                  unavailable: the storage is held by somebody else or cannot be reached. Where it lies elsewhere and
+///                  the answer was lost on the way, what was asked for may have been done all the same
 ///                  corrupt_data: the storage is damaged; `where` names it
 ///                  not_found: no job has this id
 class Store {
@@ -77,8 +79,15 @@ class Store {
   [[nodiscard]] virtual Result<std::vector<Job>> list(const Filter& filter) = 0;
   /// Gives the job that can run and comes first to the caller; nothing if none can. A job can run if nobody holds it
   /// and no older one of its lane has yet to end. One that was running when its worker went away comes first: it has
-  /// not made way. Then comes the one whose turn (turn_of()) is earliest.
+  /// not made way. Then comes the one whose turn (turn_of()) is earliest. Its `claim_number` is the caller's: with it
+  /// go renew() and what apply() is to change.
   [[nodiscard]] virtual Result<std::optional<Job>> claim() = 0;
+  /// How long a claim lasts that is not renewed; then others may take the job over. Nothing: as long as the process.
+  [[nodiscard]] virtual std::optional<std::chrono::milliseconds> lease() const = 0;
+  /// Has a claim last for a whole lease from now on. Waits for none of the other functions.
+  ///   returns  the job's state, which others may have changed
+  ///   errors   those of check_claim()
+  [[nodiscard]] virtual Result<JobState> renew(const std::string& id, std::int64_t claim) = 0;
   /// Whether this job, which runs, should make way: the one that claim() would give out now has an earlier turn, and is
   /// only to end or takes at most half of `left`. One that is not much shorter would only delay this one.
   ///   left  what the rest of the job should take
@@ -93,6 +102,9 @@ class Store {
   /// Removes the records that `retention` does not keep.
   ///   returns  the ids removed
   [[nodiscard]] virtual Result<std::vector<std::string>> expire(const Retention& retention) = 0;
+  /// From now on `news` is called, by a thread of the store, when others may have changed something: a hint, which may
+  /// come late, too often, or not at all. An empty function ends that: it is not called any more when this returns.
+  virtual void watch(std::function<void()> news) = 0;
 };
 
 }  // namespace engine::jobs

@@ -1,5 +1,6 @@
 #include "engine/jobs/worker.h"
 
+#include <algorithm>
 #include <exception>
 #include <system_error>
 #include <utility>
@@ -33,13 +34,11 @@ void remove_files(const fs::path& folder, std::string_view prefix) {
 
 }  // namespace
 
-JobContext::JobContext(Queue& queue, Job job, Queue::RunningJob& running, const std::atomic<bool>& draining,
-                       const WorkerOptions& options)
-    : queue_(queue),
+JobContext::JobContext(Worker& worker, Job job, Queue::RunningJob& running)
+    : worker_(worker),
+      queue_(worker.queue_),
       job_(std::move(job)),
       running_(running),
-      draining_(draining),
-      options_(options),
       last_write_(steady_clock::now().time_since_epoch().count()) {}
 
 fs::path JobContext::folder() const { return queue_.folder_of(job_.id); }
@@ -53,18 +52,20 @@ Result<std::string> JobContext::load_checkpoint() const { return read_bytes(chec
 Result<void> JobContext::save_checkpoint(int interval, std::string_view bytes,
                                          std::optional<std::chrono::milliseconds> left) {
   const int previous = job_.finished_intervals;
-  const Change change{.event = Event::finish_interval, .progress = running_.progress(), .interval = interval};
+  const Change change{
+      .event = Event::finish_interval, .claim = running_.claim, .progress = running_.progress(), .interval = interval};
   // The number is checked before the file is written: a wrong one must not overwrite the checkpoint that the record
   // speaks of.
   if (auto allowed = transition(job_, change, {}); !allowed) return propagate(allowed);
+  if (auto held = confirm_claim(); !held) return held;
   if (auto made = create_folder(folder()); !made) return made;
   if (auto written = write_durably(checkpoint_file(interval), bytes); !written) return written;
-  if (auto recorded = queue_.store_.apply(job_.id, change); !recorded) return propagate(recorded);
+  if (auto recorded = record_interval(change); !recorded) return recorded;
   job_.finished_intervals = interval;
   std::error_code ignored;
   fs::remove(checkpoint_file(previous), ignored);
   queue_.bump_revision();
-  if (running_.interrupt.stop_requested() || draining_)
+  if (running_.interrupt.stop_requested() || worker_.draining_)
     return fail(ErrorCode::cancelled, job_.id + " was interrupted after interval " + std::to_string(interval), job_.id);
   // A store that cannot say so now is met where it matters, at the next checkpoint.
   makes_way_ = left && queue_.store_.should_make_way(job_.id, *left).value_or(false);
@@ -73,11 +74,61 @@ Result<void> JobContext::save_checkpoint(int interval, std::string_view bytes,
   return {};
 }
 
+tl::unexpected<Error> JobContext::taken_over() const {
+  return fail(ErrorCode::cancelled, job_.id + " has been taken over by another worker", job_.id);
+}
+
+bool JobContext::waits_after(const Error& error) {
+  if (error.code != ErrorCode::unavailable) return false;
+  const auto last_revision = queue_.revision();
+  worker_.set_trouble(error);
+  if (worker_.draining_ || running_.interrupt.stop_requested()) return false;
+  queue_.wait_for_change(last_revision, worker_.options_.retry_period);
+  return true;
+}
+
+Result<void> JobContext::confirm_claim() {
+  for (;;) {
+    const auto renewed = queue_.store_.renew(job_.id, running_.claim);
+    if (renewed) {
+      worker_.store_has_answered();
+      running_.heed(*renewed);
+      return {};
+    }
+    if (running_.is_over(renewed.error())) return taken_over();
+    if (waits_after(renewed.error())) continue;
+    if (renewed.error().code != ErrorCode::unavailable) return propagate(renewed);
+    return fail(ErrorCode::cancelled, job_.id + " was interrupted while the job store could not be reached", job_.id);
+  }
+}
+
+Result<void> JobContext::write(Change change) {
+  change.claim = running_.claim;
+  const auto written = queue_.store_.apply(job_.id, change);
+  if (written) {
+    worker_.store_has_answered();
+    running_.heed(written->state);
+    return {};
+  }
+  if (running_.is_over(written.error())) return taken_over();
+  return propagate(written);
+}
+
+Result<void> JobContext::record_interval(const Change& change) {
+  for (;;) {
+    const auto written = write(change);
+    if (written || !waits_after(written.error())) return written;
+    // What had no answer may have been done.
+    const auto record = queue_.store_.find(job_.id);
+    if (record && record->claim_number == running_.claim && record->finished_intervals == change.interval) return {};
+  }
+}
+
 void JobContext::enter(const std::string& place) {
   if (place == job_.place) return;
   job_.place = place;
   // A disk that is full is met at the next checkpoint; until then a death counts for the place before.
-  (void)queue_.store_.apply(job_.id, {.event = Event::report, .progress = running_.progress(), .place = place});
+  (void)write({.event = Event::report, .progress = running_.progress(), .place = place});
 }
 
 void JobContext::publish_progress(std::string progress) {
@@ -85,10 +136,10 @@ void JobContext::publish_progress(std::string progress) {
   queue_.bump_revision();
   const auto now = steady_clock::now().time_since_epoch().count();
   auto last = last_write_.load();
-  if (steady_clock::duration(now - last) < options_.progress_period) return;
+  if (steady_clock::duration(now - last) < worker_.options_.progress_period) return;
   if (!last_write_.compare_exchange_strong(last, now)) return;  // another thread is just writing
   // Progress on disk is a comfort after a restart. A full disk shows where it matters, at the next checkpoint.
-  (void)queue_.store_.apply(job_.id, {.event = Event::report, .progress = std::move(progress)});
+  (void)write({.event = Event::report, .progress = std::move(progress)});
 }
 
 std::stop_token JobContext::cancel_token() const { return running_.interrupt.get_token(); }
@@ -96,10 +147,14 @@ std::stop_token JobContext::cancel_token() const { return running_.interrupt.get
 bool JobContext::stop_requested() const { return running_.stop; }
 
 Worker::Worker(Queue& queue, JobFunction function, const WorkerOptions& options)
-    : queue_(queue), function_(std::move(function)), options_(options), thread_([this] {
-        loop();
-        finished_.set_value();
-      }) {}
+    : queue_(queue), function_(std::move(function)), options_(options) {
+  // Both from here: a thread has the priority of the one that starts it, and a job may lower that of its own.
+  if (const auto lease = queue_.store_.lease()) keeper_ = std::thread([this, lease] { keep_claims(*lease); });
+  thread_ = std::thread([this] {
+    loop();
+    finished_.set_value();
+  });
+}
 
 Worker::~Worker() { drain(std::chrono::milliseconds(0)); }
 
@@ -113,6 +168,38 @@ void Worker::drain(std::chrono::milliseconds grace) {
     if (current_) current_->interrupt.request_stop();
   }
   thread_.join();
+  {
+    const std::lock_guard lock(mutex_);
+    has_ended_ = true;
+  }
+  ends_.notify_all();
+  if (keeper_.joinable()) keeper_.join();
+}
+
+bool Worker::wait_to_renew(std::chrono::milliseconds period) {
+  std::unique_lock lock(mutex_);
+  return !ends_.wait_for(lock, period, [this] { return has_ended_; });
+}
+
+void Worker::keep_claims(std::chrono::milliseconds lease) {
+  // Two may go wrong before a claim runs out.
+  const auto often = lease / 3;
+  for (auto period = often; wait_to_renew(period);) {
+    period = often;
+    const auto running = [this] {
+      const std::lock_guard lock(mutex_);
+      return current_;
+    }();
+    if (!running || running->lost) continue;
+    const auto renewed = queue_.store_.renew(running->id, running->claim);
+    if (renewed) {
+      store_has_answered();
+      running->heed(*renewed);
+    } else if (!running->is_over(renewed.error())) {
+      set_trouble(renewed.error());
+      period = std::min(often, options_.retry_period);
+    }
+  }
 }
 
 std::optional<Error> Worker::trouble() const {
@@ -125,6 +212,11 @@ void Worker::set_trouble(std::optional<Error> error) {
   trouble_ = std::move(error);
 }
 
+void Worker::store_has_answered() {
+  const std::lock_guard lock(mutex_);
+  if (trouble_ && trouble_->code == ErrorCode::unavailable) trouble_.reset();
+}
+
 void Worker::set_current(std::shared_ptr<Queue::RunningJob> running) {
   const std::lock_guard lock(mutex_);
   if (running && out_of_time_) running->interrupt.request_stop();
@@ -132,6 +224,7 @@ void Worker::set_current(std::shared_ptr<Queue::RunningJob> running) {
 }
 
 void Worker::loop() {
+  constexpr std::chrono::milliseconds alone = std::chrono::minutes(1);  // who hears of every change
   // The revision is read before the store is: a change in between then ends the wait at once.
   for (auto last_revision = queue_.revision(); !draining_; last_revision = queue_.revision()) {
     const auto expired = queue_.expire();
@@ -144,26 +237,25 @@ void Worker::loop() {
     if (job && *job) {
       run(**job);
     } else {
-      queue_.wait_for_change(last_revision, job ? std::chrono::minutes(1) : options_.retry_period);
+      const auto unless_woken = queue_.store_.lease() ? options_.poll_period : alone;
+      queue_.wait_for_change(last_revision, job ? unless_woken : options_.retry_period);
     }
   }
 }
 
 void Worker::run(const Job& job) {
-  const auto running = std::make_shared<Queue::RunningJob>();
+  const auto running = std::make_shared<Queue::RunningJob>(job);
   queue_.attach(job.id, running);
   set_current(running);
   // A stop or cancel between the claim and attach() has reached the record only.
   const auto record = queue_.store_.find(job.id);
-  const JobState state = record ? record->state : job.state;
-  if (state == JobState::cancel_requested) running->interrupt.request_stop();
-  if (state == JobState::stop_requested) running->stop = true;
+  running->heed(record ? record->state : job.state);
   queue_.bump_revision();
   remove_files(queue_.folder_of(job.id), temporary_prefix);  // left by an attempt that was killed while it wrote
 
-  JobContext context(queue_, job, *running, draining_, options_);
+  JobContext context(*this, job, *running);
   const auto outcome = call(context);
-  Change change{.event = Event::succeed, .progress = running->progress()};
+  Change change{.event = Event::succeed, .claim = running->claim, .progress = running->progress()};
   if (outcome) {
     change.result = outcome->text;
     change.stopped_early = outcome->stopped_early;
@@ -175,7 +267,7 @@ void Worker::run(const Job& job) {
     change.event = Event::fail;
     change.error = outcome.error();
   }
-  record_end(job.id, change);
+  record_end(*running, change);
   set_current(nullptr);
   queue_.detach(job.id);
   queue_.bump_revision();
@@ -196,7 +288,11 @@ Result<JobResult> Worker::call(JobContext& context) const {
 
 Result<void> Worker::try_to_record_end(const std::string& id, const Change& change) {
   const std::lock_guard lock(queue_.ends_mutex_);
-  const auto job = queue_.store_.apply(id, change);
+  auto job = queue_.store_.apply(id, change);
+  // It may have been recorded before, and only the answer been lost.
+  if (!job && job.error().code == ErrorCode::conflict)
+    if (auto known = queue_.store_.find(id); known && is_final(known->state) && known->claim_number == change.claim)
+      job = std::move(known);
   if (!job) return propagate(job);
   if (!is_final(job->state)) return {};
   queue_.note_end(*job);
@@ -209,17 +305,18 @@ Result<void> Worker::try_to_record_end(const std::string& id, const Change& chan
   return {};
 }
 
-void Worker::record_end(const std::string& id, const Change& change) {
-  for (;;) {
+void Worker::record_end(Queue::RunningJob& running, const Change& change) {
+  // Of a job that another has, neither the record nor the files are this worker's business.
+  while (!running.lost) {
     const auto last_revision = queue_.revision();
-    const auto recorded = try_to_record_end(id, change);
-    if (recorded) return;
+    const auto recorded = try_to_record_end(running.id, change);
+    if (recorded || running.is_over(recorded.error())) return;
     set_trouble(recorded.error());
     // A failed job's own files may be what took the last bytes.
     if (std::error_code ignored; change.event == Event::fail && recorded.error().code == ErrorCode::no_space &&
-                                 fs::remove_all(queue_.folder_of(id), ignored) > 0 && !ignored)
+                                 fs::remove_all(queue_.folder_of(running.id), ignored) > 0 && !ignored)
       continue;
-    // Whoever opens the store next finds the job claimed by nobody and takes it up at its last checkpoint.
+    // Whoever finds the job claimed by nobody takes it up at its last checkpoint.
     if (draining_ || !worth_retrying(recorded.error())) return;
     queue_.wait_for_change(last_revision, options_.retry_period);
   }

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <condition_variable>
 #include <filesystem>
 #include <functional>
 #include <future>
@@ -19,6 +20,7 @@
 namespace engine::jobs {
 
 class JobContext;
+class Worker;
 
 /// The result of a job function.
 struct JobResult {
@@ -33,10 +35,12 @@ struct JobResult {
 /// An exception that leaves it is a bug: the job ends as failed with ErrorCode::internal.
 using JobFunction = std::function<Result<JobResult>(JobContext&)>;
 
-/// Periods of a worker; both are choices.
+/// Periods of a worker; all are choices.
 struct WorkerOptions {
   std::chrono::milliseconds progress_period{1000};  ///< Shortest time between two writes of progress to disk.
   std::chrono::milliseconds retry_period{1000};     ///< Time to wait after an error of the store.
+  /// So often an idle worker looks at a store that others use, too, whether or not it has heard from them.
+  std::chrono::milliseconds poll_period{2000};
 };
 
 /// A running job as its function sees it. All of it may be called from any thread, except save_checkpoint(): by one
@@ -61,10 +65,16 @@ class JobContext {
   ///   interval  larger than finished_intervals()
   ///   left      what the rest should take, if that is known: a shorter job then goes first from here on
   ///   errors    cancelled: it was saved, but the job is to end here, for good or for a while (cancel, shutdown, a
-  ///             shorter job: return the error); invalid_argument: `interval` does not count up; no_space, unavailable:
-  ///             it was not saved
+  ///             shorter job: return the error), or it was not saved, as of confirm_claim(); invalid_argument:
+  ///             `interval` does not count up; no_space, unavailable: it was not saved
   [[nodiscard]] Result<void> save_checkpoint(int interval, std::string_view bytes,
                                              std::optional<std::chrono::milliseconds> left = std::nullopt);
+  /// Asks the store whether the job still is this worker's. To be called before something of it becomes visible outside
+  /// of its folder: a process that was halted for longer than its claim lasts goes on in the middle of its work, while
+  /// another does the same. A store that cannot be reached is waited for.
+  ///   errors  cancelled: another has taken the job over, or the worker ends before the store could be asked; those of
+  ///           Store
+  [[nodiscard]] Result<void> confirm_claim();
   /// Notes on disk what the job does next, so that a process that dies at it time and again is known to: call it where
   /// another kind of work begins, with a text that is the same in each attempt. Costs a write where the text is another
   /// than before. For the thread of save_checkpoint().
@@ -82,20 +92,28 @@ class JobContext {
 
  private:
   friend class Worker;
-  JobContext(Queue& queue, Job job, Queue::RunningJob& running, const std::atomic<bool>& draining,
-             const WorkerOptions& options);
+  JobContext(Worker& worker, Job job, Queue::RunningJob& running);
   [[nodiscard]] std::filesystem::path checkpoint_file(int interval) const;
+  /// Brings a change about, in the name of this claim, and heeds what others have asked for.
+  ///   errors  cancelled: the claim is over; those of Store
+  Result<void> write(Change change);
+  /// The same for the end of an interval, whose checkpoint is there; waits for a store that cannot be reached.
+  Result<void> record_interval(const Change& change);
+  /// After an error of the store. Whether to ask it again: it cannot be reached now, and there is time.
+  bool waits_after(const Error& error);
+  [[nodiscard]] tl::unexpected<Error> taken_over() const;
 
+  Worker& worker_;
   Queue& queue_;
   Job job_;
   Queue::RunningJob& running_;
-  const std::atomic<bool>& draining_;
-  const WorkerOptions options_;
   std::atomic<std::chrono::steady_clock::rep> last_write_;  ///< When progress last went to disk.
   bool makes_way_ = false;
 };
 
-/// Runs until drained. Several workers may share a queue.
+/// Runs until drained. Several workers may share a queue, and several queues in as many processes a store. Where claims
+/// of the store run out, a second thread renews that of the job in work: it computes nothing, and has the priority of
+/// whoever makes the worker, not that of jobs.
 class Worker {
  public:
   /// queue  outlives the worker
@@ -110,24 +128,32 @@ class Worker {
   [[nodiscard]] std::optional<Error> trouble() const;
 
  private:
+  friend class JobContext;
   void loop();
   void run(const Job& job);
   [[nodiscard]] Result<JobResult> call(JobContext& context) const;
-  void record_end(const std::string& id, const Change& change);
+  void record_end(Queue::RunningJob& running, const Change& change);
   /// Once: the record, then the note and the files beside it.
   [[nodiscard]] Result<void> try_to_record_end(const std::string& id, const Change& change);
+  void keep_claims(std::chrono::milliseconds lease);
+  /// Whether there is still something to renew when the period is over.
+  [[nodiscard]] bool wait_to_renew(std::chrono::milliseconds period);
   void set_trouble(std::optional<Error> error);
+  void store_has_answered();  ///< Ends the trouble of one that could not be reached.
   void set_current(std::shared_ptr<Queue::RunningJob> running);
 
   Queue& queue_;
   const JobFunction function_;
   const WorkerOptions options_;
   std::atomic<bool> draining_ = false;
-  mutable std::mutex mutex_;  ///< Guards the three below.
+  mutable std::mutex mutex_;  ///< Guards the four below.
   std::optional<Error> trouble_;
   std::shared_ptr<Queue::RunningJob> current_;
   bool out_of_time_ = false;
+  bool has_ended_ = false;  ///< Its last claim is over.
+  std::condition_variable ends_;
   std::promise<void> finished_;
+  std::thread keeper_;  ///< Runs where claims have to be renewed.
   std::thread thread_;
 };
 

@@ -265,6 +265,8 @@ class Run {
 
   Result<void> publish(const edit::Outcome& outcome) {
     keeper_.enter(JobStage::publish);
+    // A process that was halted for long may not know yet that another has the edit now.
+    if (auto held = context_.confirm_claim(); !held) return held;
     const auto hold = workshop_.results.lock(context_.id());
     // Asked once it can no longer be cancelled in between: a cancelled edit leaves no version.
     if (context_.cancel_token().stop_requested())

@@ -24,7 +24,11 @@ Job job_in(JobState state, bool claimed, int finished_intervals) {
 }
 
 Result<Job> after_event(const Job& job, Event event) {
-  Change change{.event = event, .interval = job.finished_intervals + 1, .result = "text", .stopped_early = true};
+  Change change{.event = event,
+                .claim = job.claim_number,
+                .interval = job.finished_intervals + 1,
+                .result = "text",
+                .stopped_early = true};
   change.error = {ErrorCode::unprocessable, "why", "where"};
   return transition(job, change, noon);
 }
@@ -104,11 +108,15 @@ TEST(JobStates, CancellingAgainChangesNothing) {
   EXPECT_EQ(again->ended, job.ended);
 }
 
+Job by_its_worker(const Job& job, Change change) {
+  change.claim = job.claim_number;
+  return *transition(job, change, noon);
+}
+
 /// The job after an attempt that comes as far as `places` and dies there.
 Job after_death(Job job, const std::vector<std::string>& places, int max_deaths = 3) {
   job = *transition(std::move(job), {.event = Event::claim}, noon);
-  for (const std::string& place : places)
-    job = *transition(std::move(job), {.event = Event::report, .place = place}, noon);
+  for (const std::string& place : places) job = by_its_worker(job, {.event = Event::report, .place = place});
   return *transition(std::move(job), {.event = Event::abandon, .max_deaths = max_deaths}, noon);
 }
 
@@ -152,8 +160,8 @@ TEST(JobDeaths, CountOnlyInARowAtTheSamePlace) {
 TEST(JobDeaths, AreForgottenWithAFinishedInterval) {
   Job job = after_death(after_death(job_in(JobState::queued, false, 0), {"work"}), {"work"});
   job = *transition(std::move(job), {.event = Event::claim}, noon);
-  job = *transition(std::move(job), {.event = Event::report, .place = "work"}, noon);
-  job = *transition(std::move(job), {.event = Event::finish_interval, .interval = 1}, noon);
+  job = by_its_worker(job, {.event = Event::report, .place = "work"});
+  job = by_its_worker(job, {.event = Event::finish_interval, .interval = 1});
   job = *transition(std::move(job), {.event = Event::abandon, .max_deaths = 3}, noon);
   EXPECT_EQ(job.state, JobState::running);
   EXPECT_EQ(job.deaths, 1);
@@ -169,8 +177,8 @@ TEST(JobDeaths, AShutdownIsNone) {
   Job job = after_death(after_death(job_in(JobState::queued, false, 0), {"work"}), {"work"});
   for (int i = 0; i < 5; ++i) {
     job = *transition(std::move(job), {.event = Event::claim}, noon);
-    job = *transition(std::move(job), {.event = Event::report, .place = "work"}, noon);
-    job = *transition(std::move(job), {.event = Event::release}, noon);
+    job = by_its_worker(job, {.event = Event::report, .place = "work"});
+    job = by_its_worker(job, {.event = Event::release});
   }
   EXPECT_EQ(job.state, JobState::running);
   EXPECT_EQ(job.deaths, 2);
@@ -217,6 +225,23 @@ TEST(JobStates, RefuseIntervalsThatDoNotCountUp) {
     EXPECT_EQ(result.error().code, ErrorCode::invalid_argument);
   }
   EXPECT_EQ(transition(job, {.event = Event::finish_interval, .interval = 5}, noon)->finished_intervals, 5);
+}
+
+TEST(JobClaims, AreCountedAndToldApart) {
+  Job job = job_in(JobState::queued, false, 0);
+  EXPECT_EQ(check_claim(job, 0).error().code, ErrorCode::conflict) << "nobody holds it";
+  job = *transition(std::move(job), {.event = Event::claim}, noon);
+  EXPECT_EQ(job.claim_number, 1);
+  EXPECT_TRUE(check_claim(job, 1));
+  job = *transition(std::move(job), {.event = Event::abandon}, noon);
+  EXPECT_FALSE(check_claim(job, 1));
+  job = *transition(std::move(job), {.event = Event::claim}, noon);
+  EXPECT_TRUE(check_claim(job, 2));
+  EXPECT_EQ(transition(job, {.event = Event::succeed, .claim = 1}, noon).error().message,
+            "e000007 has been taken over (claim 2 came after claim 1): nothing that was made of it under the old claim "
+            "counts");
+  EXPECT_EQ(transition(job, {.event = Event::stop}, noon).error().code, ErrorCode::conflict) << "no interval yet";
+  EXPECT_EQ(transition(job, {.event = Event::cancel}, noon)->state, JobState::cancel_requested) << "anybody may";
 }
 
 TEST(JobStates, SayWhatToDoInstead) {

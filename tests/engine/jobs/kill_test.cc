@@ -10,6 +10,7 @@
 #include "engine/core/rng.h"
 #include "engine/jobs/worker.h"
 #include "tests/engine/jobs/jobs_support.h"
+#include "tests/engine/jobs/store_kind.h"
 
 namespace engine::jobs {
 namespace {
@@ -50,10 +51,10 @@ Result<JobResult> count_intervals(JobContext& context) {
 }
 
 /// The process that is killed: accepts one job more, tells its id, works until all is done.
-int serve(const fs::path& folder, int round, int accepted) {
+int serve(StorePlace& place, const fs::path& folder, int round, int accepted) {
   try {
     // The one before may still be dying; its lock goes with it.
-    const auto store = value(SqliteStore::open({.folder = folder, .max_deaths = 0}));
+    const auto store = value(place.open({.max_deaths = 0}));
     const auto queue = open_queue(*store, folder);
     Worker worker(*queue, count_intervals, {.progress_period = std::chrono::milliseconds(5)});
     const std::string id =
@@ -68,10 +69,15 @@ int serve(const fs::path& folder, int round, int accepted) {
   }
 }
 
-TEST(Kill, LosesNoAcceptedJobAndChangesNoResult) {
+class Kill : public testing::TestWithParam<StoreKind> {};
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Kill);
+INSTANTIATE_TEST_SUITE_P(Each, Kill, testing::ValuesIn(store_kinds()));
+
+TEST_P(Kill, LosesNoAcceptedJobAndChangesNoResult) {
   const support::TempDir dir;
-  const auto reopened = [&] { return value(SqliteStore::open({.folder = dir.path(), .max_deaths = 0})); };
-  constexpr int intervals = 250;  // at 4 ms each: more than all rounds together give it
+  const auto place = GetParam().make_place(dir.path());
+  const auto reopened = [&] { return value(place->open({.max_deaths = 0})); };
+  constexpr int intervals = 600;  // at 4 ms each: more than all rounds together give it
   std::string long_job;
   {
     const auto store = reopened();
@@ -87,9 +93,9 @@ TEST(Kill, LosesNoAcceptedJobAndChangesNoResult) {
     SCOPED_TRACE(round);
     const pid_t child = ::fork();
     ASSERT_GE(child, 0);
-    if (child == 0) ::_exit(serve(dir.path(), round, accepted[1]));
+    if (child == 0) ::_exit(serve(*place, dir.path(), round, accepted[1]));
     if (round < kills) {
-      std::this_thread::sleep_for(std::chrono::microseconds(rng.below(60'000)));
+      std::this_thread::sleep_for(std::chrono::microseconds(rng.below(150'000)));
       ::kill(child, SIGKILL);
     }
     int status = 0;

@@ -15,6 +15,7 @@
 
 #include "engine/core/rng.h"
 #include "tests/engine/jobs/jobs_support.h"
+#include "tests/engine/jobs/store_kind.h"
 
 namespace engine::jobs {
 namespace {
@@ -36,7 +37,7 @@ class Gate {
 
 tl::unexpected<Error> interrupted() { return fail(ErrorCode::cancelled, "interrupted"); }
 
-class WorkerTest : public testing::Test {
+class WorkerTest : public testing::TestWithParam<StoreKind> {
  protected:
   std::string submit(const std::string& payload = "", const std::string& lane = "a") {
     return value(queue->submit({.lane = lane, .payload = payload})).job.id;
@@ -50,7 +51,7 @@ class WorkerTest : public testing::Test {
     worker.reset();
     queue.reset();
     store.reset();
-    store = open_store(dir.path());
+    store = value(place->open({}));
     queue = open_queue(*store, dir.path());
     start(std::move(function));
   }
@@ -74,13 +75,17 @@ class WorkerTest : public testing::Test {
   }
 
   support::TempDir dir;
-  std::unique_ptr<SqliteStore> store = open_store(dir.path());
+  std::unique_ptr<StorePlace> place = GetParam().make_place(dir.path());
+  std::unique_ptr<Store> store = value(place->open({}));
   std::unique_ptr<Queue> queue = open_queue(*store, dir.path());
   Gate gate, arrived;
   std::unique_ptr<Worker> worker;
 };
 
-TEST_F(WorkerTest, DoesJobsInTheirOrder) {
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(WorkerTest);
+INSTANTIATE_TEST_SUITE_P(Each, WorkerTest, testing::ValuesIn(store_kinds()));
+
+TEST_P(WorkerTest, DoesJobsInTheirOrder) {
   std::vector<std::string> order;
   for (const char* payload : {"one", "two", "three"}) submit(payload);
   start([&](JobContext& context) {
@@ -96,7 +101,7 @@ TEST_F(WorkerTest, DoesJobsInTheirOrder) {
   EXPECT_EQ(wait_for_end(*queue, late).result, "four done") << "a worker that waits must notice";
 }
 
-TEST_F(WorkerTest, LetsAShorterJobGoFirstAtACheckpointAndGoesOnFromThere) {
+TEST_P(WorkerTest, LetsAShorterJobGoFirstAtACheckpointAndGoesOnFromThere) {
   std::vector<std::string> order;
   const std::string longest = value(queue->submit({.lane = "a", .payload = "long", .expected = 1h})).job.id;
   const auto function = [&](JobContext& context) -> Result<JobResult> {
@@ -126,7 +131,7 @@ TEST_F(WorkerTest, LetsAShorterJobGoFirstAtACheckpointAndGoesOnFromThere) {
   EXPECT_EQ(order, (std::vector<std::string>{"long 1", "long 2", "short 1", "long 3", "same lane 1"}));
 }
 
-TEST_F(WorkerTest, AJobThatMadeWayCanBeStoppedAndCancelled) {
+TEST_P(WorkerTest, AJobThatMadeWayCanBeStoppedAndCancelled) {
   const std::string stopped = value(queue->submit({.lane = "a", .payload = "long", .expected = 1h})).job.id;
   const std::string cancelled = value(queue->submit({.lane = "b", .payload = "long", .expected = 2h})).job.id;
   std::string shorter;
@@ -156,7 +161,7 @@ TEST_F(WorkerTest, AJobThatMadeWayCanBeStoppedAndCancelled) {
   EXPECT_EQ(wait_for_end(*queue, shorter).state, JobState::succeeded);
 }
 
-TEST_F(WorkerTest, RecordsTheErrorOfAJobAndGoesOn) {
+TEST_P(WorkerTest, RecordsTheErrorOfAJobAndGoesOn) {
   submit("bad");
   submit("good");
   start([](JobContext& context) -> Result<JobResult> {
@@ -170,7 +175,7 @@ TEST_F(WorkerTest, RecordsTheErrorOfAJobAndGoesOn) {
   EXPECT_EQ(wait_for_end(*queue, "e000002").state, JobState::succeeded);
 }
 
-TEST_F(WorkerTest, TurnsAnExceptionIntoAnInternalError) {
+TEST_P(WorkerTest, TurnsAnExceptionIntoAnInternalError) {
   submit("known");
   submit("unknown");
   start([](JobContext& context) -> Result<JobResult> {
@@ -184,7 +189,7 @@ TEST_F(WorkerTest, TurnsAnExceptionIntoAnInternalError) {
   EXPECT_EQ(wait_for_end(*queue, "e000002").error->code, ErrorCode::internal);
 }
 
-TEST_F(WorkerTest, CancelsAJobThatWaitsAtOnce) {
+TEST_P(WorkerTest, CancelsAJobThatWaitsAtOnce) {
   const std::string first = submit();
   const std::string second = submit();
   start(three_intervals());
@@ -196,7 +201,7 @@ TEST_F(WorkerTest, CancelsAJobThatWaitsAtOnce) {
   EXPECT_EQ(code_of(queue->cancel(first)), ErrorCode::conflict) << "its result stands";
 }
 
-TEST_F(WorkerTest, CancelsAJobThatRunsAndRemovesItsFiles) {
+TEST_P(WorkerTest, CancelsAJobThatRunsAndRemovesItsFiles) {
   const std::string id = submit();
   start(three_intervals());
   gate.open();
@@ -210,7 +215,7 @@ TEST_F(WorkerTest, CancelsAJobThatRunsAndRemovesItsFiles) {
   EXPECT_FALSE(fs::exists(folder(id)));
 }
 
-TEST_F(WorkerTest, DropsWhatAJobReturnsAfterACancel) {
+TEST_P(WorkerTest, DropsWhatAJobReturnsAfterACancel) {
   const std::string id = submit();
   Gate began;
   start([&](JobContext&) {
@@ -226,7 +231,7 @@ TEST_F(WorkerTest, DropsWhatAJobReturnsAfterACancel) {
   EXPECT_EQ(job.result, "");
 }
 
-TEST_F(WorkerTest, StopsAfterAnIntervalAndKeepsIt) {
+TEST_P(WorkerTest, StopsAfterAnIntervalAndKeepsIt) {
   const std::string id = submit();
   start(three_intervals());
   wait_for(*queue, id, [](const Job& job) { return job.state == JobState::running; });
@@ -245,7 +250,7 @@ TEST_F(WorkerTest, StopsAfterAnIntervalAndKeepsIt) {
   EXPECT_TRUE(fs::is_empty(folder(id))) << "the checkpoint has served its purpose";
 }
 
-TEST_F(WorkerTest, ShowsProgressAtOnce) {
+TEST_P(WorkerTest, ShowsProgressAtOnce) {
   const std::string id = submit();
   Gate published;
   start([&](JobContext& context) {
@@ -265,7 +270,7 @@ TEST_F(WorkerTest, ShowsProgressAtOnce) {
   EXPECT_EQ(value(store->find(id)).progress, "all") << "the last word is on disk";
 }
 
-TEST_F(WorkerTest, NotesOnDiskWhatItIsAboutToDo) {
+TEST_P(WorkerTest, NotesOnDiskWhatItIsAboutToDo) {
   const std::string id = submit();
   Gate entered;
   start([&](JobContext& context) {
@@ -283,7 +288,7 @@ TEST_F(WorkerTest, NotesOnDiskWhatItIsAboutToDo) {
   wait_for_end(*queue, id);
 }
 
-TEST_F(WorkerTest, WritesProgressToDiskOnlySoOften) {
+TEST_P(WorkerTest, WritesProgressToDiskOnlySoOften) {
   const std::string id = submit();
   Gate published;
   worker = std::make_unique<Worker>(
@@ -302,14 +307,52 @@ TEST_F(WorkerTest, WritesProgressToDiskOnlySoOften) {
   wait_for_end(*queue, id);
 }
 
-TEST_F(WorkerTest, WaitsNoLongerThanAsked) {
+TEST_P(WorkerTest, WaitsNoLongerThanAsked) {
   const auto seen = queue->revision();
   EXPECT_EQ(queue->wait_for_change(seen, 1ms), seen);
   submit();
   EXPECT_NE(queue->wait_for_change(seen, patience), seen);
 }
 
-TEST_F(WorkerTest, DrainsAtTheEndOfAnIntervalAndGoesOnAfterARestart) {
+TEST_P(WorkerTest, MakesNothingMoreOfAJobThatAnotherHasTakenOver) {
+  for (const bool asks : {true, false}) {
+    SCOPED_TRACE(asks ? "asks before it goes on" : "does not ask");
+    const std::string id = submit();
+    ErrorCode told{};
+    start([&, asks](JobContext& context) -> Result<JobResult> {
+      value(context.confirm_claim());
+      arrived.open();
+      gate.pass();
+      if (!asks) return JobResult{.text = "late"};
+      EXPECT_EQ(code_of(context.confirm_claim()), ErrorCode::cancelled);
+      EXPECT_TRUE(context.cancel_token().stop_requested());
+      const auto saved = context.save_checkpoint(1, "late");
+      told = code_of(saved);
+      return propagate(saved);
+    });
+    arrived.pass();
+    // Somebody else takes the job for abandoned, and claims it.
+    Job record = value(store->find(id));
+    record.claimed = false;
+    value(store->restore(record));
+    ASSERT_EQ(value(store->claim())->id, id);
+    gate.open();
+    worker->drain(patience);
+    if (asks) {
+      EXPECT_EQ(told, ErrorCode::cancelled);
+    }
+    const Job job = value(store->find(id));
+    EXPECT_EQ(job.state, JobState::running);
+    EXPECT_EQ(job.claim_number, 2);
+    EXPECT_TRUE(job.claimed) << "by the other";
+    EXPECT_FALSE(fs::exists(folder(id))) << "not even a checkpoint";
+    EXPECT_FALSE(worker->trouble());
+    value(store->apply(id, {.event = Event::succeed, .claim = 2, .result = "of the other"}));
+    EXPECT_EQ(value(queue->find(id)).result, "of the other");
+  }
+}
+
+TEST_P(WorkerTest, DrainsAtTheEndOfAnIntervalAndGoesOnAfterARestart) {
   const std::string id = submit();
   const std::string next = submit();
   start(three_intervals());
@@ -332,7 +375,7 @@ TEST_F(WorkerTest, DrainsAtTheEndOfAnIntervalAndGoesOnAfterARestart) {
   EXPECT_EQ(wait_for_end(*queue, next).result, "123");
 }
 
-TEST_F(WorkerTest, TellsAJobThatGoesOnWhatItHadPublished) {
+TEST_P(WorkerTest, TellsAJobThatGoesOnWhatItHadPublished) {
   submit();
   std::vector<std::string> earlier;
   const JobFunction publishing = [&](JobContext& context) -> Result<JobResult> {
@@ -353,7 +396,7 @@ TEST_F(WorkerTest, TellsAJobThatGoesOnWhatItHadPublished) {
   EXPECT_EQ(earlier, (std::vector<std::string>{"", "half way"}));
 }
 
-TEST_F(WorkerTest, InterruptsAJobThatTakesLongerThanTheGrace) {
+TEST_P(WorkerTest, InterruptsAJobThatTakesLongerThanTheGrace) {
   const std::string id = submit();
   start(three_intervals());
   gate.open();
@@ -365,7 +408,7 @@ TEST_F(WorkerTest, InterruptsAJobThatTakesLongerThanTheGrace) {
   EXPECT_FALSE(fs::exists(folder(id)));
 }
 
-TEST_F(WorkerTest, DrainsAnIdleWorkerWithoutDelay) {
+TEST_P(WorkerTest, DrainsAnIdleWorkerWithoutDelay) {
   start(three_intervals());
   const auto begin = std::chrono::steady_clock::now();
   worker->drain(patience);
@@ -375,7 +418,7 @@ TEST_F(WorkerTest, DrainsAnIdleWorkerWithoutDelay) {
   EXPECT_EQ(value(queue->find("e000001")).state, JobState::queued);
 }
 
-TEST_F(WorkerTest, EndsAStoppedJobAfterARestartFromItsCheckpoint) {
+TEST_P(WorkerTest, EndsAStoppedJobAfterARestartFromItsCheckpoint) {
   const std::string id = submit();
   start(three_intervals());
   gate.open();
@@ -389,7 +432,7 @@ TEST_F(WorkerTest, EndsAStoppedJobAfterARestartFromItsCheckpoint) {
   EXPECT_EQ(job.result, "1");
 }
 
-TEST_F(WorkerTest, KeepsFilesThatNobodyKnowsWhenItOpens) {
+TEST_P(WorkerTest, KeepsFilesThatNobodyKnowsWhenItOpens) {
   const std::string id = submit();
   start(three_intervals());
   gate.open();
@@ -401,7 +444,7 @@ TEST_F(WorkerTest, KeepsFilesThatNobodyKnowsWhenItOpens) {
   EXPECT_TRUE(fs::exists(folder("notes"))) << "no job's name: none of our business";
 }
 
-TEST_F(WorkerTest, RemovesARecordWithItsFiles) {
+TEST_P(WorkerTest, RemovesARecordWithItsFiles) {
   const std::string id = submit();
   start(three_intervals());
   for (int u = 0; u < 3; ++u) gate.open();
@@ -412,7 +455,7 @@ TEST_F(WorkerTest, RemovesARecordWithItsFiles) {
 }
 
 // The record says that a job has ended before its worker has put away what is beside it.
-TEST_F(WorkerTest, NothingIsLeftOfAJobThatIsRemovedTheMomentItEnds) {
+TEST_P(WorkerTest, NothingIsLeftOfAJobThatIsRemovedTheMomentItEnds) {
   start([](JobContext& context) -> Result<JobResult> {
     if (auto saved = context.save_checkpoint(1, "x"); !saved) return propagate(saved);
     return JobResult{};
@@ -429,7 +472,7 @@ TEST_F(WorkerTest, NothingIsLeftOfAJobThatIsRemovedTheMomentItEnds) {
   }
 }
 
-TEST_F(WorkerTest, ExpiresEndedJobsAsItWorks) {
+TEST_P(WorkerTest, ExpiresEndedJobsAsItWorks) {
   queue = value(Queue::open(*store, {.folder = dir.path() / "jobs", .retention = {.max_count = 1}}));
   for (int i = 0; i < 3; ++i) submit();
   start([](JobContext& context) -> Result<JobResult> {
@@ -444,7 +487,7 @@ TEST_F(WorkerTest, ExpiresEndedJobsAsItWorks) {
   EXPECT_FALSE(fs::exists(folder("e000001")));
 }
 
-TEST_F(WorkerTest, RemovesWhatAKilledRunLeftHalfWritten) {
+TEST_P(WorkerTest, RemovesWhatAKilledRunLeftHalfWritten) {
   const std::string id = submit();
   fs::create_directories(folder(id));
   support::write_file(folder(id) / ".splatdrag-1-0.tmp", "half a checkpoint");
@@ -457,7 +500,7 @@ TEST_F(WorkerTest, RemovesWhatAKilledRunLeftHalfWritten) {
   EXPECT_EQ(wait_for_end(*queue, id).state, JobState::succeeded);
 }
 
-TEST_F(WorkerTest, NeverOverwritesACheckpointByAWrongNumber) {
+TEST_P(WorkerTest, NeverOverwritesACheckpointByAWrongNumber) {
   const std::string id = submit();
   start([](JobContext& context) -> Result<JobResult> {
     if (auto saved = context.save_checkpoint(2, "right"); !saved) return propagate(saved);
@@ -467,7 +510,8 @@ TEST_F(WorkerTest, NeverOverwritesACheckpointByAWrongNumber) {
   EXPECT_EQ(wait_for_end(*queue, id).result, "right");
 }
 
-TEST_F(WorkerTest, FailsTheJobOnAFullDiskAndHarmsNothingElse) {
+TEST_P(WorkerTest, FailsTheJobOnAFullDiskAndHarmsNothingElse) {
+  if (GetParam().name != "Sqlite") GTEST_SKIP() << "this process's full disk is not the server's";
   const std::string id = submit();
   const std::string next = submit();
   std::optional<FullDisk> full;
@@ -494,7 +538,7 @@ TEST_F(WorkerTest, FailsTheJobOnAFullDiskAndHarmsNothingElse) {
   EXPECT_FALSE(worker->trouble());
 }
 
-TEST_F(WorkerTest, KeepsALaneInSequenceAmongSeveralWorkers) {
+TEST_P(WorkerTest, KeepsALaneInSequenceAmongSeveralWorkers) {
   std::mutex mutex;
   std::set<std::string> busy_lanes;
   std::map<std::string, std::vector<std::string>> order;
@@ -527,7 +571,7 @@ TEST_F(WorkerTest, KeepsALaneInSequenceAmongSeveralWorkers) {
   for (const auto& [lane, ids] : order) EXPECT_TRUE(std::is_sorted(ids.begin(), ids.end())) << lane;
 }
 
-TEST_F(WorkerTest, BearsManyHandsAtOnce) {
+TEST_P(WorkerTest, BearsManyHandsAtOnce) {
   constexpr int threads = 4, rounds = 12;
   const JobFunction function = [](JobContext& context) -> Result<JobResult> {
     for (int u = context.finished_intervals() + 1; u <= 2; ++u) {

@@ -1,0 +1,84 @@
+#include "engine/jobs/store_rules.h"
+
+#include <algorithm>
+#include <array>
+#include <iterator>
+#include <utility>
+
+namespace engine::jobs {
+namespace {
+
+/// In the order of ErrorCode.
+constexpr std::array<std::string_view, 12> code_names = {
+    "invalid_argument", "unprocessable", "not_found", "conflict",  "corrupt_data", "unsupported",
+    "too_large",        "no_space",      "busy",      "cancelled", "unavailable",  "internal"};
+static_assert(std::size_t(ErrorCode::internal) + 1 == code_names.size());
+
+}  // namespace
+
+std::string_view code_name(ErrorCode code) { return code_names[std::size_t(code)]; }
+
+std::optional<ErrorCode> parse_code(std::string_view name) {
+  const auto found = std::find(code_names.begin(), code_names.end(), name);
+  if (found == code_names.end()) return std::nullopt;
+  return ErrorCode(std::distance(code_names.begin(), found));
+}
+
+void no_such_job(const std::string& id) {
+  throw StoreFailure(
+      {ErrorCode::not_found, "there is no job \"" + id + "\"; ended ones are removed after a while", id});
+}
+
+std::int64_t known_number(const std::string& id) {
+  const auto number = number_of(id);
+  if (!number) no_such_job(id);
+  return *number;
+}
+
+void check_room(std::size_t waiting, std::size_t max_queued) {
+  if (waiting < max_queued) return;
+  throw StoreFailure({ErrorCode::busy,
+                      "the queue is full: " + std::to_string(waiting) + " jobs wait, its limit (max_queued) is " +
+                          std::to_string(max_queued) + "; try again later",
+                      "max_queued"});
+}
+
+Submission same_submission(Job earlier, const NewJob& job) {
+  if (earlier.payload != job.payload || earlier.lane != job.lane)
+    throw StoreFailure({ErrorCode::unprocessable,
+                        "this idempotency key came with another request before, job " + earlier.id +
+                            ": use a new key for a new request",
+                        "idempotency_key"});
+  return {.job = std::move(earlier), .created = false};
+}
+
+void check_owner_of_key(const std::optional<Job>& owner, const Job& restored) {
+  if (owner && owner->id != restored.id)
+    throw StoreFailure({ErrorCode::conflict, owner->id + " has the idempotency key of " + restored.id, restored.id});
+}
+
+void check_has_ended(const Job& job) {
+  if (is_final(job.state)) return;
+  throw StoreFailure({ErrorCode::conflict,
+                      job.id + " is " + std::string(to_string(job.state)) + ": cancel it and wait for its end first",
+                      job.id});
+}
+
+std::map<std::int64_t, int> places_in_queue(const std::vector<ActiveJob>& active) {
+  struct Waiting {
+    std::int64_t turn, number;
+  };
+  std::vector<Waiting> waiting;
+  std::map<std::string_view, std::int64_t> last_turn;  // by lane: its jobs come in order, whatever each of them takes
+  for (const ActiveJob& job : active) {
+    std::int64_t& turn = last_turn.try_emplace(job.lane, job.turn).first->second;
+    turn = std::max(turn, job.turn);
+    if (job.waits) waiting.push_back({turn, job.number});
+  }
+  std::ranges::stable_sort(waiting, {}, &Waiting::turn);
+  std::map<std::int64_t, int> places;
+  for (const Waiting& job : waiting) places.emplace(job.number, int(places.size()) + 1);
+  return places;
+}
+
+}  // namespace engine::jobs
