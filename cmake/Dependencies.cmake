@@ -31,6 +31,7 @@ pkg_check_modules(httplib REQUIRED IMPORTED_TARGET cpp-httplib>=0.11)
 # Scenes in SOG, and datasets sent as zip files. Debian's CMake package also wants libzip's programs installed; pkg-config does not.
 pkg_check_modules(libzip REQUIRED IMPORTED_TARGET libzip>=1.7)
 pkg_check_modules(libwebp REQUIRED IMPORTED_TARGET libwebp>=1.2)  # SOG's pictures, to the bit
+pkg_check_modules(libpq REQUIRED IMPORTED_TARGET libpq>=14)       # job records that many hosts share
 # Checksums of stored files. XXH3's output is fixed since 0.8.0.
 pkg_check_modules(libxxhash REQUIRED IMPORTED_TARGET libxxhash>=0.8)
 # Networks, for correction by a diffusion model (engine/diffusion): where both are found. Debian's libtorch, or another

@@ -1,12 +1,13 @@
 # One room is one static library with its warnings and its tests.
 #
 #   engine_room(render SOURCES forward.cc ... USES scene core LINKS hwy::hwy
-#               TESTS project_test.cc GOLDEN_TESTS ... SLOW_TESTS ...)
+#               TESTS project_test.cc GOLDEN_TESTS ... SLOW_TESTS ... SERVED_TESTS ...)
 #
 # USES are the room's arrows: the only rooms whose headers it may include (tests/house holds the #include lines
 # against them). LINKS are third-party libraries. Tests live in tests/<folder>/ and carry the label of their list:
-# unit (milliseconds each), golden (reference vectors and real captures), slow. Their names begin with the folder. The
-# target all_LABEL builds all programs of a label. TEST_ENVIRONMENT are variables, NAME=VALUE, that they run with.
+# unit (milliseconds each), golden (reference vectors and real captures), slow, served (by a PostgreSQL server that the
+# program starts: one process for all of its tests). Their names begin with the folder. The target all_LABEL builds all
+# programs of a label. TEST_ENVIRONMENT are variables, NAME=VALUE, that they run with.
 
 add_library(splatdrag_warnings INTERFACE)
 target_compile_options(splatdrag_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
@@ -42,6 +43,8 @@ function(splatdrag_tests target label folder library)
     # These of UBSan's checks take two fifths of a test's compile time, and find what AddressSanitizer finds, too, or what
     # the room's own sources are checked for.
     target_compile_options(${target} PRIVATE -fno-sanitize=null,alignment,object-size,vptr)
+  endif()
+  if(SPLATDRAG_SANITIZE OR label STREQUAL "served")
     # To start a program under a sanitizer takes longer than most tests do: one process for all of a program's.
     add_test(NAME ${folder}/${label} COMMAND ${target})
     set_tests_properties(${folder}/${label} PROPERTIES LABELS ${label} TIMEOUT 1800)
@@ -63,7 +66,7 @@ function(splatdrag_tests target label folder library)
 endfunction()
 
 function(splatdrag_room kind folder name)
-  cmake_parse_arguments(ROOM "" "" "SOURCES;USES;LINKS;TEST_LINKS;TEST_ENVIRONMENT;TESTS;GOLDEN_TESTS;SLOW_TESTS" ${ARGN})
+  cmake_parse_arguments(ROOM "" "" "SOURCES;USES;LINKS;TEST_LINKS;TEST_ENVIRONMENT;TESTS;GOLDEN_TESTS;SLOW_TESTS;SERVED_TESTS" ${ARGN})
   if(ROOM_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "room ${name}: unknown arguments ${ROOM_UNPARSED_ARGUMENTS}")
   endif()
@@ -80,12 +83,16 @@ function(splatdrag_room kind folder name)
   splatdrag_tests(${name}_test unit ${folder} ${name}_test_deps ${ROOM_TESTS})
   splatdrag_tests(${name}_golden_test golden ${folder} ${name}_test_deps ${ROOM_GOLDEN_TESTS})
   splatdrag_tests(${name}_slow_test slow ${folder} ${name}_test_deps ${ROOM_SLOW_TESTS})
+  splatdrag_tests(${name}_served_test served ${folder} ${name}_test_deps ${ROOM_SERVED_TESTS})
+  if(TARGET ${name}_served_test)
+    target_link_libraries(${name}_served_test PRIVATE splatdrag_postgres_server)
+  endif()
 endfunction()
 
 function(engine_room name)
-  cmake_parse_arguments(ROOM "" "" "SOURCES;USES;LINKS;TEST_LINKS;TEST_ENVIRONMENT;TESTS;GOLDEN_TESTS;SLOW_TESTS" ${ARGN})
+  cmake_parse_arguments(ROOM "" "" "SOURCES;USES;LINKS;TEST_LINKS;TEST_ENVIRONMENT;TESTS;GOLDEN_TESTS;SLOW_TESTS;SERVED_TESTS" ${ARGN})
   list(TRANSFORM ROOM_USES PREPEND engine_)
   splatdrag_room(engine engine/${name} engine_${name} SOURCES ${ROOM_SOURCES} USES ${ROOM_USES} LINKS ${ROOM_LINKS}
                  TEST_LINKS ${ROOM_TEST_LINKS} TEST_ENVIRONMENT ${ROOM_TEST_ENVIRONMENT} TESTS ${ROOM_TESTS} GOLDEN_TESTS ${ROOM_GOLDEN_TESTS}
-                 SLOW_TESTS ${ROOM_SLOW_TESTS})
+                 SLOW_TESTS ${ROOM_SLOW_TESTS} SERVED_TESTS ${ROOM_SERVED_TESTS})
 endfunction()

@@ -2,7 +2,8 @@
 # Installs what splatdrag needs on Debian 12. Asks nothing, and does nothing where all is installed.
 #
 #   install-packages.sh          to build and run it
-#   install-packages.sh tests    to run all tests, too: a browser, Node.js to drive it, and what diffusion models need
+#   install-packages.sh tests    to run all tests, too: a browser, Node.js to drive it, a PostgreSQL server, and what
+#                                diffusion models need
 #   install-packages.sh lint     to check the sources, too: clang-format, clang-tidy, and yamllint for the contract
 #   install-packages.sh fuzz     to fuzz the readers, too: clang and its runtime
 set -euo pipefail
@@ -15,13 +16,15 @@ packages=(
   libeigen3-dev                                        # sparse equations
   nlohmann-json3-dev libtomlplusplus-dev libcli11-dev
   zlib1g-dev libzstd-dev libwebp-dev                   # compressed scenes
-  libsqlite3-dev libzip-dev libxxhash-dev              # job records, zip files, checksums of stored files
+  libsqlite3-dev libpq-dev                             # job records, in a file or in a database
+  libzip-dev libxxhash-dev                             # zip files, checksums of stored files
   libcpp-httplib-dev libspdlog-dev prometheus-cpp-dev  # the service: HTTP, logs, metrics
   libgtest-dev libbenchmark-dev                        # tests and benchmarks
   curl jq                                              # the demo talks to the service
 )
 if [[ "${1:-}" == tests ]]; then
   packages+=(chromium webp)  # webp: the README's animation
+  packages+=(postgresql-15)  # the tests start servers of their own with it, and never reach the one that it may start
   packages+=(libtorch-dev libopenblas0-pthread libutf8proc-dev)  # diffusion models; without OpenBLAS, training takes five times as long
   # A newer Node.js from elsewhere will do.
   if ! command -v node >/dev/null || ! command -v npm >/dev/null; then

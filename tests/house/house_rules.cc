@@ -33,6 +33,7 @@ const std::vector<Reserved>& reserved() {
       {"tbb/", {"engine/core"}},
       {"oneapi/", {"engine/core"}},
       {"sqlite3.h", {"engine/jobs"}},
+      {"libpq-fe.h", {"engine/jobs"}, false},
       {"httplib.h", {"server/http"}, false},
       {"CLI/", {"server/cli"}},
       {"toml++/", {"server/cli"}},
