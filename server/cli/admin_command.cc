@@ -30,7 +30,13 @@ Error in_use(Error error) {
   return error;
 }
 
-Result<void> check(const fs::path& folder, Terminal& terminal) {
+struct AdminOptions {
+  fs::path folder;
+  std::string store;  ///< rebuild: as of edits::ServiceOptions.
+};
+
+Result<void> check(const AdminOptions& options, Terminal& terminal) {
+  const fs::path& folder = options.folder;
   if (auto exists = check_is_folder(folder); !exists) return exists;
   const auto scenes = scenes::check_store(folder / "scenes");
   if (!scenes) return tl::make_unexpected(in_use(scenes.error()));
@@ -40,31 +46,35 @@ Result<void> check(const fs::path& folder, Terminal& terminal) {
     for (const Error& damage : *damaged) terminal.out << damage.where << ": " << damage.message << '\n';
   for (const std::string& file : scenes->unchecked)
     terminal.out << file << ": has no checksum yet, it gets one when it is read\n";
+  if (edits->in_database)
+    terminal.out << "the records of edits are in a database, which looks after itself: they were not looked at\n";
   const std::size_t files = scenes->files + edits->files, count = scenes->damaged.size() + edits->damaged.size();
   terminal.out << files << " files, " << count << " damaged, " << scenes->unchecked.size() << " without checksum\n";
   if (count == 0) return {};
   return fail(ErrorCode::corrupt_data, std::to_string(count) + " damaged or lost: see above", folder.string());
 }
 
-Result<void> rebuild(const fs::path& folder, Terminal& terminal) {
+Result<void> rebuild(const AdminOptions& options, Terminal& terminal) {
+  const fs::path& folder = options.folder;
   if (auto exists = check_is_folder(folder); !exists) return exists;
   const auto scenes = scenes::SceneStore::open({.folder = folder / "scenes", .scene_root = {}});
   if (!scenes) return tl::make_unexpected(in_use(scenes.error()));
-  const auto rebuilt = edits::rebuild_records(**scenes, folder / "edits");
+  const auto rebuilt = edits::rebuild_records(**scenes, folder / "edits", options.store);
   if (!rebuilt) return propagate(rebuilt);
-  for (const fs::path& file : rebuilt->moved_away) terminal.out << "what was there is now " << file.string() << '\n';
+  for (const std::string& aside : rebuilt->moved_away) terminal.out << "what was there is now " << aside << '\n';
   for (const Error& finding : rebuilt->findings) terminal.out << finding.message << '\n';
   return {};
 }
 
-void add(CLI::App& admin, const std::string& name, const std::string& description,
-         Result<void> (*run)(const fs::path&, Terminal&), Action& action) {
+std::shared_ptr<AdminOptions> add(CLI::App& admin, const std::string& name, const std::string& description,
+                                  Result<void> (*run)(const AdminOptions&, Terminal&), Action& action) {
   CLI::App* const command = admin.add_subcommand(name, description);
-  const auto folder = std::make_shared<fs::path>();
-  command->add_option("--data-dir,--data", *folder, "Data folder of the service, which does not run meanwhile")
+  const auto options = std::make_shared<AdminOptions>();
+  command->add_option("--data-dir,--data", options->folder, "Data folder of the service, which does not run meanwhile")
       ->required()
       ->type_name("DIR");
-  command->callback([folder, run, &action] { action = [=](Terminal& terminal) { return run(*folder, terminal); }; });
+  command->callback([options, run, &action] { action = [=](Terminal& terminal) { return run(*options, terminal); }; });
+  return options;
 }
 
 }  // namespace
@@ -73,8 +83,15 @@ void add_admin_command(CLI::App& program, Action& action) {
   CLI::App* const admin = program.add_subcommand("admin", "Checks and mends the data folder of a service");
   admin->require_subcommand(1);
   add(*admin, "check", "Reads all that is stored and names what is damaged or lost; changes nothing", check, action);
-  add(*admin, "rebuild", "Makes the records of edits again from the notes beside them; what was there is kept aside",
-      rebuild, action);
+  const auto options =
+      add(*admin, "rebuild",
+          "Makes the records of edits again from the notes beside them; what was there is kept aside", rebuild, action);
+  admin->get_subcommand("rebuild")
+      ->add_option(
+          "--store", options->store,
+          "Makes them in this database (postgresql://USER@HOST/DATABASE), where they are from then on; without "
+          "it, in a file of the data folder")
+      ->type_name("URL");
 }
 
 }  // namespace server::cli

@@ -119,6 +119,18 @@ void add_store_options(CLI::App& command, ServeOptions& options) {
   command.add_option("--data-dir", options.data_dir, "Folder for scenes and edits; nothing is written anywhere else")
       ->required()
       ->type_name("DIR");
+  command
+      .add_option(
+          "--store", options.edits.store,
+          "Database for the records of edits, in place of a file in the data folder: "
+          "postgresql://USER@HOST/DATABASE. It belongs to this data folder alone. A password is better given by "
+          "the environment (PGPASSFILE, PGPASSWORD) than here")
+      ->type_name("URL");
+  command
+      .add_option("--lease-seconds", options.lease_seconds,
+                  "With --store: an edit whose service has not been heard of for so long may be taken over")
+      ->check(CLI::Range(3, 3600))
+      ->type_name("N");
   command.add_option("--scene-root", options.scenes.scene_root, "Folder below which clients may open files by path")
       ->check(CLI::ExistingDirectory)
       ->type_name("DIR");

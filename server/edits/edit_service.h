@@ -31,7 +31,9 @@ namespace server::edits {
 using engine::Result;
 
 struct ServiceOptions {
-  std::filesystem::path folder;  ///< <data-dir>/edits: job records and what running edits need.
+  std::filesystem::path folder;    ///< <data-dir>/edits: job records and what running edits need.
+  std::string store = {};          ///< Database with the records (PostgresOptions::address); empty: a file here.
+  std::chrono::seconds lease{30};  ///< How long a claim of an edit lasts there that is not renewed.
   std::size_t max_queued = 32;
   engine::jobs::Retention retention = {};
   int pictured_views = 4;  ///< Of each interval, for its intermediate renders.
@@ -60,8 +62,8 @@ class EditService {
  public:
   /// Takes up what was left unfinished.
   ///   scenes  outlives the service
-  ///   errors  corrupt_data: the records of edits are damaged or lost (the message says how to go on); unavailable,
-  ///           no_space
+  ///   errors  corrupt_data: the records of edits are damaged or lost (the message says how to go on); conflict: they
+  ///           are kept elsewhere, or are another data folder's; unavailable, no_space; those of PostgresStore::open()
   [[nodiscard]] static Result<std::unique_ptr<EditService>> open(scenes::SceneStore& scenes,
                                                                  const ServiceOptions& options);
   ~EditService();

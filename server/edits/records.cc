@@ -11,7 +11,9 @@
 #include "engine/core/atomic_file.h"
 #include "engine/core/file_descriptor.h"
 #include "engine/jobs/notes.h"
+#include "engine/jobs/postgres_store.h"
 #include "engine/jobs/sqlite_store.h"
+#include "server/edits/records_database.h"
 
 namespace server::edits {
 namespace {
@@ -34,8 +36,31 @@ std::int64_t highest_edit(const scenes::SceneStore& scenes) {
   return highest;
 }
 
-Result<OpenRecords> open_in(const jobs::SqliteOptions& sqlite, const jobs::QueueOptions& options) {
-  auto opened = jobs::SqliteStore::open(sqlite);
+/// What the records have to know, wherever they are.
+struct Known {
+  std::int64_t used_numbers = 0;
+  bool must_exist = false;
+  int max_deaths = 3;
+};
+
+///   store  as of ServiceOptions
+Result<std::unique_ptr<jobs::Store>> open_store(const fs::path& folder, const std::string& store,
+                                                std::chrono::seconds lease, const Known& known) {
+  if (store.empty())
+    return jobs::SqliteStore::open({.folder = folder,
+                                    .used_numbers = known.used_numbers,
+                                    .must_exist = known.must_exist,
+                                    .max_deaths = known.max_deaths});
+  auto database = database_of(folder, store);
+  if (!database) return propagate(database);
+  database->lease = lease;
+  database->used_numbers = known.used_numbers;
+  database->must_exist = known.must_exist;
+  database->max_deaths = known.max_deaths;
+  return jobs::PostgresStore::open(*database);
+}
+
+Result<OpenRecords> open_queue(Result<std::unique_ptr<jobs::Store>> opened, const jobs::QueueOptions& options) {
   if (!opened) return propagate(opened);
   auto queue = jobs::Queue::open(**opened, options);
   if (!queue) return propagate(queue);
@@ -71,6 +96,13 @@ class TemporaryFolder {
   fs::path path_;
 };
 
+/// What of check_records() needs no records.
+void check_notes(const fs::path& folder, const jobs::Traces& traces, RecordsCheck& found) {
+  for (const std::string& id : traces.notes)
+    if (const auto note = jobs::read_note(jobs_folder(folder), id); !note)
+      found.damaged.push_back({note.error().code, note.error().message, "edits/jobs/" + id});
+}
+
 /// What check_records() finds by opening a copy of the records and of the notes as a service would.
 Result<void> check_copy(const fs::path& folder, const jobs::Traces& traces, RecordsCheck& found) {
   const auto copy = TemporaryFolder::make();
@@ -86,8 +118,8 @@ Result<void> check_copy(const fs::path& folder, const jobs::Traces& traces, Reco
   for (const std::string& id : traces.folders)
     if (!error) fs::create_directory(notes / id, error);
   if (error) return tl::make_unexpected(engine::file_error(error.value(), "write", copy->path()));
-  const auto opened =
-      open_in({.folder = copy->path(), .must_exist = !traces.notes.empty(), .max_deaths = 0}, {.folder = notes});
+  const Known known{.must_exist = !traces.notes.empty(), .max_deaths = 0};
+  const auto opened = open_queue(open_store(copy->path(), {}, {}, known), {.folder = notes});
   if (!opened && opened.error().code != ErrorCode::corrupt_data && opened.error().code != ErrorCode::unsupported)
     return propagate(opened);
   if (!opened) {
@@ -102,33 +134,57 @@ Result<void> check_copy(const fs::path& folder, const jobs::Traces& traces, Reco
 }  // namespace
 
 Result<OpenRecords> open_records(const scenes::SceneStore& scenes, const ServiceOptions& options) {
+  const bool had_database = is_in_database(options.folder), in_file = options.store.empty();
+  if (had_database && in_file)
+    return engine::fail(ErrorCode::conflict,
+                        "the records of this data folder's edits are in a database: give its address by --store, or "
+                        "have them made again here from the notes beside the edits, by splatdrag admin rebuild",
+                        options.folder / folder_id_name);
   const auto traces = jobs::find_traces(jobs_folder(options.folder));
   if (!traces) return propagate(traces);
   const std::int64_t highest = std::max(traces->highest_number, highest_edit(scenes));
-  auto opened = open_in(
-      {.folder = options.folder, .used_numbers = highest, .must_exist = highest > 0, .max_deaths = options.attempts},
+  auto opened = open_queue(
+      open_store(options.folder, options.store, options.lease,
+                 {.used_numbers = highest, .must_exist = highest > 0, .max_deaths = options.attempts}),
       {.folder = jobs_folder(options.folder), .max_queued = options.max_queued, .retention = options.retention});
-  if (!opened && opened.error().code == ErrorCode::corrupt_data)
+  if (opened) return opened;
+  if (std::error_code ignored; !had_database && !in_file) fs::remove(options.folder / folder_id_name, ignored);
+  if (opened.error().code == ErrorCode::corrupt_data)
     opened.error().message +=
-        "; put back a copy of it, or have it made again from the notes beside the edits, by splatdrag admin rebuild";
+        in_file ? "; put back a copy of it, or have it made again from the notes beside the edits, by splatdrag admin "
+                  "rebuild"
+                : "; check that it is the right one, or have them made in it again from the notes beside the edits, by "
+                  "splatdrag admin rebuild --store";
+  if (opened.error().code == ErrorCode::invalid_argument) opened.error().where = "--store";
   return opened;
 }
 
-Result<Rebuilt> rebuild_records(const scenes::SceneStore& scenes, const fs::path& folder) {
+Result<Rebuilt> rebuild_records(const scenes::SceneStore& scenes, const fs::path& folder, const std::string& store) {
   Rebuilt rebuilt;
-  for (const char* name : store_files) {
+  const bool had_database = is_in_database(folder);
+  if (!store.empty()) {
+    const auto database = database_of(folder, store);
+    if (!database) return propagate(database);
+    const auto schema = jobs::PostgresStore::move_away(*database);
+    if (std::error_code ignored; !schema && !had_database) fs::remove(folder / folder_id_name, ignored);
+    if (!schema) return propagate(schema);
+    if (!schema->empty()) rebuilt.moved_away.push_back("the schema " + *schema);
+  }
+  std::vector<std::string> files(store_files.begin(), store_files.end());
+  if (store.empty()) files.emplace_back(folder_id_name);
+  for (const std::string& name : files) {
     std::error_code error;
     if (!fs::exists(folder / name, error)) continue;
     const fs::path aside = free_name(folder / name);
     fs::rename(folder / name, aside, error);
     if (error) return tl::make_unexpected(engine::file_error(error.value(), "move", folder / name));
-    rebuilt.moved_away.push_back(aside);
+    rebuilt.moved_away.push_back(aside.string());
   }
   const auto traces = jobs::find_traces(jobs_folder(folder));
   if (!traces) return propagate(traces);
+  const Known known{.used_numbers = std::max(traces->highest_number, highest_edit(scenes))};
   const auto opened =
-      open_in({.folder = folder, .used_numbers = std::max(traces->highest_number, highest_edit(scenes))},
-              {.folder = jobs_folder(folder)});
+      open_queue(open_store(folder, store, ServiceOptions().lease, known), {.folder = jobs_folder(folder)});
   if (!opened) return propagate(opened);
   rebuilt.findings = opened->queue->findings();
   return rebuilt;
@@ -145,6 +201,11 @@ Result<RecordsCheck> check_records(const fs::path& folder) {
   if (traces->counter_is_damaged)
     found.damaged.push_back(
         {ErrorCode::corrupt_data, "the highest number of an edit cannot be read", "edits/jobs/last_number"});
+  if (is_in_database(folder)) {
+    found.in_database = true;
+    check_notes(folder, *traces, found);
+    return found;
+  }
   if (auto checked = check_copy(folder, *traces, found); !checked) return propagate(checked);
   return found;
 }

@@ -1,7 +1,11 @@
 // The records of edits on disk: opened, made again from the notes beside the edits, or only looked at.
 //
-//     <data-dir>/edits/jobs.db       the records
+//     <data-dir>/edits/jobs.db       the records, or
+//                      folder_id     by which a database knows whose records it has
 //                      jobs/         a note and a folder for each edit (engine/jobs/notes.h)
+//
+// What edits read and make lies in the data folder, too: a service may carry out only those of its own folder. So a
+// database belongs to one folder, a folder keeps its records in one place, and one service has them open at a time.
 #pragma once
 
 #include <cstddef>
@@ -24,26 +28,29 @@ struct OpenRecords {
 };
 /// Ids go on above all that a record, a note, a folder or a version of a scene tells of.
 ///   errors  corrupt_data: the records are damaged, or absent although there have been edits; the message says how to
-///   go
-///           on. Those of jobs::Store and Queue::open().
+///           go on. conflict: the database is another folder's, or this folder's records are in one and it is not
+///           given. Those of jobs::Store, PostgresStore::open() and Queue::open().
 [[nodiscard]] Result<OpenRecords> open_records(const scenes::SceneStore& scenes, const ServiceOptions& options);
 
 struct Rebuilt {
-  std::vector<std::filesystem::path> moved_away;  ///< Where the files that were there are now.
-  std::vector<engine::Error> findings;            ///< What Queue::open() put back, and what it could not.
+  std::vector<std::string> moved_away;  ///< Where what was there is now: files, or a schema of the database.
+  std::vector<engine::Error> findings;  ///< What Queue::open() put back, and what it could not.
 };
 /// Moves the records away and makes them again from the notes. For an edit whose note is lost there will be no record;
-/// its folder stays.
+/// its folder stays. Where they were kept elsewhere before, that place has them no more.
 ///   folder  <data-dir>/edits
-///   errors  unavailable, no_space
-[[nodiscard]] Result<Rebuilt> rebuild_records(const scenes::SceneStore& scenes, const std::filesystem::path& folder);
+///   store   as of ServiceOptions
+///   errors  unavailable, no_space; conflict: the database is another folder's; those of PostgresStore::open()
+[[nodiscard]] Result<Rebuilt> rebuild_records(const scenes::SceneStore& scenes, const std::filesystem::path& folder,
+                                              const std::string& store = {});
 
 struct RecordsCheck {
   std::vector<engine::Error> damaged;  ///< `where` is the file's path inside the data folder.
   std::size_t files = 0;               ///< Looked at.
+  bool in_database = false;            ///< The records are elsewhere, and were not looked at.
 };
 /// Holds records and notes against their checksums and each other, on a copy: nothing is changed. Nobody else may have
-/// the folder open.
+/// the folder open. Of records in a database only the notes are looked at.
 ///   folder  <data-dir>/edits; need not exist
 ///   errors  unavailable, no_space
 [[nodiscard]] Result<RecordsCheck> check_records(const std::filesystem::path& folder);

@@ -148,6 +148,7 @@ void share_out(ServeOptions& options, spdlog::logger& logger) {
   options.scenes.program_release = SPLATDRAG_VERSION;
   options.scenes.preview_lifetime = std::chrono::seconds(options.preview_seconds);
   options.edits.folder = options.data_dir / "edits";
+  options.edits.lease = std::chrono::seconds(options.lease_seconds);
   options.edits.threads = options.threads;
   options.edits.logger = &logger;
   options.renders.threads = options.threads;

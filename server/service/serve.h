@@ -26,6 +26,7 @@ struct ServeOptions {
   int drain_seconds = 30;            ///< Time that a running edit gets to finish its interval.
   int unready_seconds = 0;           ///< Time between a signal to end and the end of taking requests.
   std::filesystem::path model_dir;   ///< Of pre-trained networks (server/models/models.h). Empty: there are none.
+  int lease_seconds = 30;            ///< Of edits whose records are in a database.
   int preview_seconds = 600;         ///< Life of a preview that nobody looks at.
   http::ServerOptions http;
   http::AccessOptions access;

@@ -247,7 +247,15 @@ TEST_F(Serve, RefusesWhatWouldGoWrong) {
   EXPECT_EQ(refused({"serve", "--port", "0", "--data-dir", elsewhere, "--token-file", second_.path() / "empty"},
                     "the token file is empty"),
             2);
+  const auto with_store = [&](const std::string& address) {
+    return std::vector<std::string>{"serve", "--port", "0", "--data-dir", elsewhere, "--store", address};
+  };
+  const std::string nowhere = "postgresql://me:secret@/edits?host=" + second_.path().string();
+  EXPECT_EQ(refused(with_store(nowhere), "error: the job store cannot be reached: No such file or directory ("), 12);
+  EXPECT_EQ(refused(with_store("postgresql://me:se/secret@host/edits"), "cannot be read: expected postgresql://"), 2);
+  EXPECT_EQ(support::read_file(second_.path() / "stderr").find("secret"), std::string::npos);
   EXPECT_EQ(refused({"serve"}, "--data-dir"), 2);
+  EXPECT_EQ(refused({"serve", "--data-dir", elsewhere, "--lease-seconds", "1"}, "--lease-seconds"), 2);
   EXPECT_EQ(refused({"serve", "--data-dir", elsewhere, "--max-handles", "257"}, "--max-handles"), 2);
   EXPECT_EQ(refused({"serve", "--data-dir", elsewhere, "--max-scenes", "2.5"}, "--max-scenes"), 2);
   EXPECT_EQ(refused({"serve", "--data-dir", elsewhere, "--max-json-bytes", "2MiB"}, "--max-json-bytes"), 2);
