@@ -39,15 +39,21 @@ constexpr const char* can_run =
 /// One that runs although nobody holds it was interrupted, and has not made way.
 constexpr const char* in_turn = "ORDER BY (state = 'running') DESC, turn, number LIMIT 1";
 
-/// What read() reads. A list has no long texts.
-std::string select(const PostgresOptions& options, bool whole) {
+/// Held by a claim that nobody has renewed in time.
+std::string ran_out(const PostgresOptions& options) {
+  return "ended IS NULL AND claimed AND lease_until < " + options.now;
+}
+
+/// What read() reads, and another column behind it. A list has no long texts.
+std::string select(const PostgresOptions& options, bool whole, const std::string& more = {}) {
   const std::string payload = whole ? "payload" : "''::bytea", result = whole ? "result" : "''::bytea";
   return "SELECT number, lane, " + payload +
          ", idempotency_key, state, claimed, stopped_early, finished_intervals, progress, " + result +
          ", error_code, error_message, error_where, created, started, ended, place, died_at, deaths, expected, "
          "claim_number, " +
-         options.now + " FROM splatdrag.jobs ";
+         options.now + more + " FROM splatdrag.jobs ";
 }
+constexpr int columns_of_job = 22;
 
 std::optional<Time> time_at(const PostgresRows& rows, int row, int column) {
   if (rows.is_null(row, column)) return std::nullopt;
@@ -277,6 +283,12 @@ struct PostgresStore::Impl {
     change = written.text(0, 0);
   }
 
+  /// The one that claim() gives out, for a change, and whether a claim has run out.
+  PostgresRows find_next() {
+    return work.run(
+        select(options, true, ", EXISTS (SELECT 1 FROM splatdrag.jobs AS held WHERE " + ran_out(options) + ")") +
+        "WHERE " + can_run + " " + in_turn + " FOR UPDATE OF jobs SKIP LOCKED");
+  }
   void insert(const Job& job) {
     const auto inserted = work.run(
         "INSERT INTO splatdrag.jobs AS old (number, lane, payload, idempotency_key, expected, turn, state, created) "
@@ -303,8 +315,7 @@ struct PostgresStore::Impl {
 
   /// The holder of these is no more, or its claim has run out.
   void abandon_where(const std::string& where) {
-    const auto rows = work.run(select(options, true) + "WHERE ended IS NULL AND claimed AND " + where +
-                               " ORDER BY number FOR UPDATE SKIP LOCKED");
+    const auto rows = work.run(select(options, true) + "WHERE " + where + " ORDER BY number FOR UPDATE SKIP LOCKED");
     for (int row = 0; row < rows.size(); ++row) {
       const auto [job, now] = read(rows, row);
       const auto changed = transition(job, {.event = Event::abandon, .max_deaths = options.max_deaths}, now);
@@ -341,7 +352,7 @@ Result<std::unique_ptr<PostgresStore>> PostgresStore::open(const PostgresOptions
     join(impl->work, options);
     PostgresTransaction transaction(impl->work);
     bring_up_to_date(impl->work, options);
-    if (options.alone) impl->abandon_where("true");
+    if (options.alone) impl->abandon_where("ended IS NULL AND claimed");
     transaction.commit();
     impl->process = impl->work.process();
   });
@@ -430,9 +441,12 @@ Result<std::vector<Job>> PostgresStore::list(const Filter& filter) {
 
 Result<std::optional<Job>> PostgresStore::claim() {
   return impl_->transact([&]() -> std::optional<Job> {
-    impl_->abandon_where("lease_until < " + impl_->options.now);
-    const auto rows = impl_->work.run(select(impl_->options, true) + "WHERE " + can_run + " " + in_turn +
-                                      " FOR UPDATE OF jobs SKIP LOCKED");
+    auto rows = impl_->find_next();
+    // The usual case costs one question: is there a job, and no claim that has run out?
+    if (rows.size() == 0 || rows.truth(0, columns_of_job)) {
+      impl_->abandon_where(ran_out(impl_->options));
+      rows = impl_->find_next();
+    }
     if (rows.size() == 0) return std::nullopt;
     const auto [next, now] = read(rows, 0);
     auto claimed = transition(next, {.event = Event::claim}, now);
