@@ -31,7 +31,7 @@ export class Postgres {
     const child = this.process;
     atEnd(() => child.kill('SIGQUIT'));
     this.exited = new Promise((done) => child.on('exit', done));
-    for (let tries = 0; spawnSync('pg_isready', ['-h', this.folder, '-q']).status !== 0; ++tries) {
+    for (let tries = 0; spawnSync(path.join(programs, 'pg_isready'), ['-h', this.folder, '-q']).status !== 0; ++tries) {
       if (tries > 600) throw new Error('the server does not start');
       await sleep(50);
     }
