@@ -21,6 +21,7 @@ struct Queue::RunningJob {
   std::stop_source interrupt;      ///< Fires when the job is cancelled or lost, or the worker has no time left.
   std::atomic<bool> stop = false;  ///< Set when the job is to end and keep its last finished interval.
   std::atomic<bool> lost = false;  ///< Set when another has taken the job over, or has ended it.
+  std::atomic<bool> ends = false;  ///< Set once its end is being recorded, which ends the claim, too.
 
   /// What the record says now, others may have asked for.
   void heed(JobState state) {

@@ -78,13 +78,14 @@ tl::unexpected<Error> JobContext::taken_over() const {
   return fail(ErrorCode::cancelled, job_.id + " has been taken over by another worker", job_.id);
 }
 
-bool JobContext::waits_after(const Error& error) {
-  if (error.code != ErrorCode::unavailable) return false;
+Result<void> JobContext::wait_for_store(const Error& error) {
+  if (error.code != ErrorCode::unavailable) return tl::make_unexpected(error);
   const auto last_revision = queue_.revision();
   worker_.set_trouble(error);
-  if (worker_.draining_ || running_.interrupt.stop_requested()) return false;
+  if (worker_.draining_ || running_.interrupt.stop_requested())
+    return fail(ErrorCode::cancelled, job_.id + " was interrupted while the job store could not be reached", job_.id);
   queue_.wait_for_change(last_revision, worker_.options_.retry_period);
-  return true;
+  return {};
 }
 
 Result<void> JobContext::confirm_claim() {
@@ -96,9 +97,7 @@ Result<void> JobContext::confirm_claim() {
       return {};
     }
     if (running_.is_over(renewed.error())) return taken_over();
-    if (waits_after(renewed.error())) continue;
-    if (renewed.error().code != ErrorCode::unavailable) return propagate(renewed);
-    return fail(ErrorCode::cancelled, job_.id + " was interrupted while the job store could not be reached", job_.id);
+    if (auto again = wait_for_store(renewed.error()); !again) return again;
   }
 }
 
@@ -117,7 +116,8 @@ Result<void> JobContext::write(Change change) {
 Result<void> JobContext::record_interval(const Change& change) {
   for (;;) {
     const auto written = write(change);
-    if (written || !waits_after(written.error())) return written;
+    if (written) return written;
+    if (auto again = wait_for_store(written.error()); !again) return again;
     // What had no answer may have been done.
     const auto record = queue_.store_.find(job_.id);
     if (record && record->claim_number == running_.claim && record->finished_intervals == change.interval) return {};
@@ -195,7 +195,7 @@ void Worker::keep_claims(std::chrono::milliseconds lease) {
     if (renewed) {
       store_has_answered();
       running->heed(*renewed);
-    } else if (!running->is_over(renewed.error())) {
+    } else if (!running->ends && !running->is_over(renewed.error())) {
       set_trouble(renewed.error());
       period = std::min(often, options_.retry_period);
     }
@@ -306,6 +306,7 @@ Result<void> Worker::try_to_record_end(const std::string& id, const Change& chan
 }
 
 void Worker::record_end(Queue::RunningJob& running, const Change& change) {
+  running.ends = true;
   // Of a job that another has, neither the record nor the files are this worker's business.
   while (!running.lost) {
     const auto last_revision = queue_.revision();

@@ -99,8 +99,9 @@ class JobContext {
   Result<void> write(Change change);
   /// The same for the end of an interval, whose checkpoint is there; waits for a store that cannot be reached.
   Result<void> record_interval(const Change& change);
-  /// After an error of the store. Whether to ask it again: it cannot be reached now, and there is time.
-  bool waits_after(const Error& error);
+  /// After an error of the store: waits before it is asked again.
+  ///   errors  cancelled: there is no time to wait; `error` itself, if it is not that the store cannot be reached
+  Result<void> wait_for_store(const Error& error);
   [[nodiscard]] tl::unexpected<Error> taken_over() const;
 
   Worker& worker_;

@@ -339,6 +339,36 @@ TEST_F(PostgresStoreTest, AServerThatIsRestartedInTheMiddleOfAJobLosesNothing) {
   }
 }
 
+TEST_F(PostgresStoreTest, AWorkerThatEndsWhileTheServerIsAwayFailsNoJob) {
+  const support::TempDir dir;
+  PostgresServer& server = PostgresServer::shared();
+  std::binary_semaphore arrived{0}, gate{0};
+  std::optional<ErrorCode> told;
+  {
+    Process process(options(), dir.path(), [&](JobContext& context) -> Result<JobResult> {
+      value(context.confirm_claim());
+      arrived.release();
+      gate.acquire();
+      const auto saved = context.save_checkpoint(1, "one");
+      told = code_of(saved);
+      return propagate(saved);
+    });
+    value(process.queue->submit({.lane = "a", .payload = "{}"}));
+    arrived.acquire();
+    server.stop(ServerStop::crash);
+    gate.release();
+    wait_until([&] { return process.worker.trouble().has_value(); }, "that the worker meets it");
+    process.worker.drain(patience);
+  }
+  EXPECT_EQ(told, ErrorCode::cancelled);
+  server.start();
+  advance(31s);
+  Process other(options(), dir.path(), [](JobContext&) { return JobResult{.text = "done"}; });
+  const Job job = wait_for_end(*other.queue, "e000001");
+  EXPECT_EQ(job.result, "done");
+  EXPECT_EQ(job.claim_number, 2);
+}
+
 TEST_F(PostgresStoreTest, AConnectionThatWasLostMeanwhileIsReplaced) {
   const auto store = open();
   const std::string id = submit(*store);
