@@ -34,8 +34,9 @@ constexpr std::array<std::pair<const char*, const char*>, 6> link{{{"connect_tim
                                                                    {"tcp_user_timeout", "25000"},
                                                                    {"application_name", "splatdrag"}}};
 
-/// libpq's texts in one line, from behind the address that they begin with.
+/// libpq's texts in one line, without the address: who is told of a failure need not know where the database is.
 std::string in_one_line(std::string text) {
+  if (text.starts_with("could not translate host name")) return "its host's name is not known";
   if (const auto failed = text.find(" failed: "); failed != std::string::npos) text.erase(0, failed + 9);
   for (const char* word : {"FATAL: ", "ERROR: "})
     if (text.starts_with(word)) text.erase(0, 7);

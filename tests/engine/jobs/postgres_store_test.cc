@@ -560,6 +560,9 @@ TEST(PostgresAddress, ThatLeadsNowhereIsNamedWithoutItsPassword) {
   const Error refused = error_of("postgresql://me:secret@127.0.0.1:1/jobs");
   EXPECT_EQ(refused.message, "the job store cannot be reached: Connection refused");
   EXPECT_EQ(refused.where, "postgresql://me@127.0.0.1:1/jobs");
+  const std::string no_name(70, 'x');  // longer than a name may be: nobody is asked
+  EXPECT_EQ(error_of("postgresql://me:secret@" + no_name + "/jobs").message,
+            "the job store cannot be reached: its host's name is not known");
 }
 
 TEST(PostgresAddress, WhoIsNotLetInIsToldSo) {
