@@ -6,23 +6,16 @@
 #include <utility>
 
 #include "engine/core/parallel.h"
+#include "engine/repair/thin_plate.h"
 
 namespace engine::repair {
 namespace {
 
 constexpr int most_nodes = 112;         // along the longest edge: a choice
 constexpr double wider = 0.5;           // extents of what has left, added on each side: what is around shows there
-constexpr double band = 3;              // steps from a surface to where the function is 1 or -1
+constexpr float band = 3;               // steps from a surface within which its distance is known
 constexpr double solid = 0.25;          // of the grid: so far behind a surface is its inside, farther is unknown
 constexpr double hidden_behind = 0.01;  // of the distance: depths of splats are no finer
-constexpr int sweeps = 200;
-constexpr float over_relaxation = 1.9f;       // 2 / (1 + sin(pi / n)), the best for n = 60 nodes across
-constexpr std::size_t nodes_per_task = 8192;  // a choice
-
-std::size_t index_in(const std::array<int, 3>& size, int x, int y, int z) {
-  return (std::size_t(z) * std::size_t(size[1]) + std::size_t(y)) * std::size_t(size[0]) + std::size_t(x);
-}
-
 /// What views know of one node.
 struct Known {
   double sum = 0;  ///< Of the function, as each view that shows it has it.
@@ -62,17 +55,19 @@ Closure::Closure(const Bounds& space, std::span<const SpaceView> views) {
   step_ = (1 + 2 * wider) * longest / (most_nodes - 1);
   for (int axis = 0; axis < 3; ++axis)
     size_[std::size_t(axis)] = int(std::ceil((extent[axis] + 2 * wider * longest) / step_)) + 1;
-  const std::size_t nodes = std::size_t(size_[0]) * std::size_t(size_[1]) * std::size_t(size_[2]);
-  value_.assign(nodes, 0.0f), color_.assign(nodes, Vec3(0.0f)), colored_.assign(nodes, 0);
-  diffuse(note(views));
+  const std::size_t nodes = node_index(size_, 0, 0, size_[2]);
+  value_.assign(nodes, band), color_.assign(nodes, Vec3(0.0f)), colored_.assign(nodes, 0);
+  std::vector<Knowledge> known = note(views);
+  measure_across(known);
+  continue_with_least_bending(size_, known, value_);
   spread_colors();
 }
 
-std::size_t Closure::index(const Size& node) const { return index_in(size_, node[0], node[1], node[2]); }
+std::size_t Closure::index(const GridSize& node) const { return node_index(size_, node[0], node[1], node[2]); }
 
-std::vector<std::uint32_t> Closure::note(std::span<const SpaceView> views) {
-  const double width = band * step_, deep = solid * most_nodes * step_;
-  std::vector<std::uint8_t> is_unknown(value_.size(), 0);
+std::vector<Knowledge> Closure::note(std::span<const SpaceView> views) {
+  const double width = double(band) * step_, deep = solid * most_nodes * step_;
+  std::vector<Knowledge> knowledge(value_.size(), Knowledge::nothing);
   parallel_for(std::size_t(size_[2]), 1, [&](std::size_t begin, std::size_t end) {
     for (int z = int(begin); z < int(end); ++z)
       for (int y = 0; y < size_[1]; ++y)
@@ -81,49 +76,46 @@ std::vector<std::uint32_t> Closure::note(std::span<const SpaceView> views) {
           for (const SpaceView& view : views) add(view, low_ + step_ * DVec3(x, y, z), width, deep, known);
           const std::size_t node = index({x, y, z});
           // What one view shows counts for more than that others have something before it.
-          if (known.seen > 0)
-            value_[node] = float(known.sum / known.seen);
-          else if (known.behind > 0)
-            value_[node] = -1;
-          else
-            is_unknown[node] = 1;
+          if (known.seen > 0) {
+            value_[node] = band * float(known.sum / known.seen);
+            knowledge[node] = value_[node] < band ? Knowledge::value : Knowledge::not_negative;
+          } else if (known.behind > 0) {
+            value_[node] = -band, knowledge[node] = Knowledge::not_positive;
+          }
           if (known.near > 0) color_[node] = known.color / float(known.near), colored_[node] = 1;
         }
   });
-  std::vector<std::uint32_t> unknown;
-  for (std::uint32_t node = 0; node < is_unknown.size(); ++node)
-    if (is_unknown[node] != 0) unknown.push_back(node);
-  return unknown;
+  return knowledge;
 }
 
-/// Laplace's equation at the unknown nodes; at the rim of the grid nothing flows. Nodes of either colour of a
-/// checkerboard are relaxed at once: none is next to one of its own.
-void Closure::diffuse(std::span<const std::uint32_t> unknown) {
-  const auto row = std::size_t(size_[0]), slice = row * std::size_t(size_[1]);
-  std::vector<std::uint32_t> nodes[2];
-  for (const std::uint32_t node : unknown)
-    nodes[(node % row + node / row % std::size_t(size_[1]) + node / slice) % 2].push_back(node);
-  const auto relax = [&](std::size_t node) {
-    float sum = 0, count = 0;
-    const auto meet = [&](bool is_inside, std::size_t other) {
-      if (is_inside) sum += value_[other], count += 1;
-    };
-    const std::size_t x = node % row, y = node / row % std::size_t(size_[1]), z = node / slice;
-    meet(x > 0, node - 1), meet(x + 1 < row, node + 1);
-    meet(y > 0, node - row), meet(y + 1 < std::size_t(size_[1]), node + row);
-    meet(z > 0, node - slice), meet(z + 1 < std::size_t(size_[2]), node + slice);
-    value_[node] += over_relaxation * (sum / count - value_[node]);
-  };
-  for (int sweep = 0; sweep < sweeps; ++sweep)
-    for (const auto& half : nodes)
-      parallel_for(half.size(), nodes_per_task, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t k = begin; k < end; ++k) relax(half[k]);
-      });
+/// Distances along rays become distances to the surface: else it would count more the more it is seen at a slant.
+void Closure::measure_across(std::span<const Knowledge> known) {
+  const std::vector<float> along = value_;
+  const std::array<std::size_t, 3> step{index({1, 0, 0}), index({0, 1, 0}), index({0, 0, 1})};
+  parallel_for(std::size_t(size_[2]), 4, [&](std::size_t begin, std::size_t end) {
+    for (int z = int(begin); z < int(end); ++z)
+      for (int y = 0; y < size_[1]; ++y)
+        for (int x = 0; x < size_[0]; ++x) {
+          const GridSize at{x, y, z};
+          const std::size_t node = index(at);
+          if (known[node] != Knowledge::value) continue;
+          float square = 0;
+          for (std::size_t axis = 0; axis < 3; ++axis) {
+            const bool before = at[axis] > 0 && known[node - step[axis]] == Knowledge::value;
+            const bool after = at[axis] + 1 < size_[axis] && known[node + step[axis]] == Knowledge::value;
+            if (!before && !after) continue;
+            const float change = along[after ? node + step[axis] : node] - along[before ? node - step[axis] : node];
+            const float slope = before && after ? change / 2 : change;
+            square += slope * slope;
+          }
+          value_[node] = along[node] / std::sqrt(std::max(square, 1.0f));
+        }
+  });
 }
 
 /// Colours at one resolution.
 struct Closure::Level {
-  Size size{};
+  GridSize size{};
   std::vector<Vec3> color;
   std::vector<float> weight;  ///< 0: none is known.
 };
@@ -131,7 +123,7 @@ struct Closure::Level {
 /// Nodes without a colour get that of the nodes around, as far around as there is one.
 /// Source: Gortler et al. 1996, "The lumigraph", section 3.4.2 (push and pull).
 void Closure::spread_colors() {
-  const auto for_each_node = [](const Size& size, auto&& work) {
+  const auto for_each_node = [](const GridSize& size, auto&& work) {
     for (int z = 0; z < size[2]; ++z)
       for (int y = 0; y < size[1]; ++y)
         for (int x = 0; x < size[0]; ++x) work(x, y, z);
@@ -142,10 +134,10 @@ void Closure::spread_colors() {
     const Level& fine = levels.back();
     Level coarse;
     for (std::size_t axis = 0; axis < 3; ++axis) coarse.size[axis] = (fine.size[axis] + 1) / 2;
-    coarse.color.assign(index_in(coarse.size, 0, 0, coarse.size[2]), Vec3(0.0f));
+    coarse.color.assign(node_index(coarse.size, 0, 0, coarse.size[2]), Vec3(0.0f));
     coarse.weight.assign(coarse.color.size(), 0.0f);
     for_each_node(fine.size, [&](int x, int y, int z) {
-      const std::size_t from = index_in(fine.size, x, y, z), to = index_in(coarse.size, x / 2, y / 2, z / 2);
+      const std::size_t from = node_index(fine.size, x, y, z), to = node_index(coarse.size, x / 2, y / 2, z / 2);
       coarse.color[to] += fine.weight[from] * fine.color[from], coarse.weight[to] += fine.weight[from];
     });
     for (std::size_t node = 0; node < coarse.color.size(); ++node)
@@ -158,8 +150,8 @@ void Closure::spread_colors() {
   for (std::size_t l = levels.size() - 1; l-- > 0;) {
     Level &fine = levels[l], &coarse = levels[l + 1];
     for_each_node(fine.size, [&](int x, int y, int z) {
-      const std::size_t node = index_in(fine.size, x, y, z);
-      const Vec3 around = coarse.color[index_in(coarse.size, x / 2, y / 2, z / 2)];
+      const std::size_t node = node_index(fine.size, x, y, z);
+      const Vec3 around = coarse.color[node_index(coarse.size, x / 2, y / 2, z / 2)];
       fine.color[node] = fine.weight[node] * fine.color[node] + (1 - fine.weight[node]) * around;
     });
   }
@@ -183,7 +175,7 @@ Value Closure::interpolated(const std::vector<Value>& values, DVec3 point) const
   Value sum(0);
   for (int corner = 0; corner < 8; ++corner) {
     double weight = 1;
-    Size node = cell.node;
+    GridSize node = cell.node;
     for (int axis = 0; axis < 3; ++axis) {
       const bool is_far = (corner >> axis & 1) != 0;
       weight *= is_far ? cell.part[axis] : 1 - cell.part[axis];

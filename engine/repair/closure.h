@@ -1,12 +1,10 @@
 // What closes the space that a part has left, where nobody has seen what is behind it.
 //
 // Cameras have looked through some of the space around the part, and have seen surfaces beside it. What lay in its
-// shadow for all of them is unknown. There a function that is 1 before surfaces and -1 behind them goes on smoothly,
-// and where it is zero the closure lies: one for all views, and never far before what a camera has seen. Under a thing
-// that stood on a floor it bulges by up to an eighth of the thing: what is known to be plane is better completed so.
-// Source: Curless and Levoy 1996, "A volumetric method for building complex models from range images", for the function
-// where surfaces were seen; Davis et al. 2002, "Filling holes in complex surfaces using volumetric diffusion", for the
-// rest.
+// shadow for all of them is unknown. There the distance to the surfaces goes on with least bending (thin_plate.h),
+// above 0 where cameras have looked through, and where it is zero the closure lies: one for all views. A floor that a
+// thing stood on goes on as a floor, and meets the wall behind. Source: Curless and Levoy 1996, "A volumetric method
+// for building complex models from range images", for the distance where surfaces were seen.
 #pragma once
 
 #include <array>
@@ -16,6 +14,7 @@
 #include <vector>
 
 #include "engine/core/vec.h"
+#include "engine/repair/thin_plate.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/image.h"
 
@@ -49,28 +48,27 @@ class Closure {
   [[nodiscard]] Vec3 color_at(DVec3 point) const;
 
  private:
-  using Size = std::array<int, 3>;
   /// Where a point is: the first node of its cell, and how far into it.
   struct Cell {
-    Size node{};
+    GridSize node{};
     DVec3 part{0.0};
   };
   struct Level;
 
-  [[nodiscard]] std::size_t index(const Size& node) const;
+  [[nodiscard]] std::size_t index(const GridSize& node) const;
   [[nodiscard]] Cell cell_of(DVec3 point) const;
   /// The mean of the values at the corners of the cell that a point is in.
   template <class Value>
   [[nodiscard]] Value interpolated(const std::vector<Value>& values, DVec3 point) const;
-  /// Values and colours of nodes that some view knows of; lists the others.
-  [[nodiscard]] std::vector<std::uint32_t> note(std::span<const SpaceView> views);
-  void diffuse(std::span<const std::uint32_t> unknown);
+  /// Values and colours of nodes that some view knows of, and what it knows.
+  [[nodiscard]] std::vector<Knowledge> note(std::span<const SpaceView> views);
+  void measure_across(std::span<const Knowledge> known);
   void spread_colors();
 
   double extent_ = 0;
   DVec3 low_{0.0};
   double step_ = 0;                    ///< Between neighbouring nodes of the grid, world units.
-  Size size_{};                        ///< Nodes along each axis.
+  GridSize size_{};                    ///< Nodes along each axis.
   std::vector<float> value_;           ///< [nodes]
   std::vector<Vec3> color_;            ///< [nodes]
   std::vector<std::uint8_t> colored_;  ///< [nodes] A view shows a surface here.
