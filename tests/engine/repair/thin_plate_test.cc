@@ -108,7 +108,7 @@ TEST(ThinPlate, WhereTwoPlanesMeetTheyMeet) {
     EXPECT_NEAR(grid.values[node_index(grid.size, k, 24, 8)], 0, 1.0) << "on the floor, " << k;
     EXPECT_NEAR(grid.values[node_index(grid.size, 8, 24, k)], 0, 1.0) << "on the wall, " << k;
   }
-  EXPECT_GT(grid.values[node_index(grid.size, 12, 24, 12)], 1) << "no tent is before the corner";
+  EXPECT_GT(grid.values[node_index(grid.size, 12, 24, 12)], 0.5) << "no tent is before the corner";
 }
 
 TEST(ThinPlate, TheSameForAnyNumberOfThreads) {
