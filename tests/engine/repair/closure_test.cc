@@ -97,7 +97,7 @@ TEST(Closure, AFloorGoesOnUnderWhatStoodOnIt) {
       const DVec3 foot(x, y, 0);
       const auto found = closed_at(closure, above, above.pixel_from_cam(above.cam_from_world(foot)), 2);
       ASSERT_TRUE(found) << x << ' ' << y;
-      EXPECT_NEAR(found->z, 0, 0.02) << x << ' ' << y << ": it does not bulge";
+      EXPECT_NEAR(found->z, 0, 0.05) << x << ' ' << y << ": two nodes of the grid, and no bulge";
       const Vec3 color = closure.color_at(*found);
       EXPECT_NEAR(color.x, 0.8f, 0.02f);
       EXPECT_NEAR(color.y, 0.0f, 0.02f);
@@ -124,7 +124,7 @@ TEST(Closure, InACornerTheFloorMeetsTheWall) {
   EXPECT_GT(closure.color_at(*wall).y, closure.color_at(*wall).x) << "of the wall's colour";
   const auto floor = closed_at(closure, front, front.pixel_from_cam(front.cam_from_world({0, -0.3, 0})), 2);
   ASSERT_TRUE(floor);
-  EXPECT_NEAR(floor->z, 0, 0.03);
+  EXPECT_NEAR(floor->z, 0, 0.05);
   EXPECT_GT(closure.color_at(*floor).x, closure.color_at(*floor).y) << "of the floor's";
 }
 
@@ -140,7 +140,7 @@ TEST(Closure, LiesNowhereBeforeWhatHasLeftNorInSpaceThatWasSeen) {
   for (int x = 60; x < 100; x += 4)
     for (int y = 60; y < 100; y += 4)
       if (const auto found = closed_at(closure, front, {x + 0.5, y + 0.5}, 0)) {
-        EXPECT_LT(found->z, 0.03) << x << ' ' << y;
+        EXPECT_LT(found->z, 0.05) << x << ' ' << y;
       }
 }
 
@@ -167,7 +167,7 @@ TEST(Closure, HoldsFarFromTheOriginAndAtAnySize) {
     above.translation = size * above.translation - above.rotation * away;
     const auto found = closed_at(closure, above, {80, 80}, 2 * size);
     ASSERT_TRUE(found) << size;
-    EXPECT_NEAR((found->z - away.z) / size, 0, 0.02) << size;
+    EXPECT_NEAR((found->z - away.z) / size, 0, 0.05) << size;
   }
 }
 
