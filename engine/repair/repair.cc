@@ -56,9 +56,10 @@ constexpr double off_surface = 0.03;
 // What is closed must be as wide as so many blurred outlines: between leaves specks were laid into the air (the
 // captured plant: outside -0.12 dB with one, -0.03 with three).
 constexpr int closing_blurs = 3;
-// What closes a place lies so far behind the front of what has left, in extents of that. A choice: from 0.002 to 0.1
-// the captured cases are alike, and the removed doll of the plush capture is closed over 81 to 75 % of its place.
-constexpr double closing_gap = 0.05;
+// What closes a place lies so far behind the front of what has left, in extents of that. A hatch's closure is where the
+// hatch was, give or take two nodes of the grid seen at a slant (with 0.05 half of it was closed). From 0.002 to 0.1
+// the captured cases were alike before closures bent least, and a removed doll was closed over 81 to 75 % of its place.
+constexpr double closing_gap = 0.12;
 // What closes a place has the colour of what is around it, as a hint.
 constexpr float hint_of_closure = 0.5f;
 constexpr std::size_t most_examples = 6;  // of the buffer, for each view: its neighbours on either side
