@@ -16,6 +16,7 @@ constexpr double wider = 0.5;           // extents of what has left, added on ea
 constexpr float band = 3;               // steps from a surface within which its distance is known
 constexpr double solid = 0.25;          // of the grid: so far behind a surface is its inside, farther is unknown
 constexpr double hidden_behind = 0.01;  // of the distance: depths of splats are no finer
+
 /// What views know of one node.
 struct Known {
   double sum = 0;  ///< Of the function, as each view that shows it has it.
@@ -57,7 +58,7 @@ Closure::Closure(const Bounds& space, std::span<const SpaceView> views) {
     size_[std::size_t(axis)] = int(std::ceil((extent[axis] + 2 * wider * longest) / step_)) + 1;
   const std::size_t nodes = node_index(size_, 0, 0, size_[2]);
   value_.assign(nodes, band), color_.assign(nodes, Vec3(0.0f)), colored_.assign(nodes, 0);
-  std::vector<Knowledge> known = note(views);
+  const std::vector<Knowledge> known = note(views);
   measure_across(known);
   continue_with_least_bending(size_, known, value_);
   spread_colors();
@@ -205,8 +206,8 @@ double Closure::inverse_depth_at(const scene::Camera& camera, DVec2 pixel, doubl
   double before = 0;  // the function one stride ago
   for (int k = 0; begin + k * stride < end; ++k) {
     const double z = begin + k * stride, value = double(interpolated(value_, eye + z * ray));
-    if (value <= 0 && k == 0) return begin == from && from > 0 ? 1 / from : 0;  // else it comes from beyond the grid
-    if (value <= 0) return 1 / (z - stride * value / (value - before));
+    if (value < 0 && k == 0) return begin == from && from > 0 ? 1 / from : 0;  // else it comes from beyond the grid
+    if (value < 0) return 1 / (z - stride * value / (value - before));
     before = value;
   }
   return 0;

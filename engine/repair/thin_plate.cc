@@ -16,9 +16,9 @@ constexpr int reach = 8;
 constexpr float stiffness = 4;
 constexpr int coarsest = 16;                                // nodes along the longest edge
 constexpr int sweeps_on_finest = 60, times_on_coarser = 3;  // an eighth of the nodes, which smooth changes come from
-constexpr float over_relaxation = 1.6f;
-// Nodes of one colour have no node in common that is next to both, so that they can be relaxed at once: no two
-// differences of x + 2 y + 3 z between nodes up to two steps apart are multiples of seven.
+constexpr float over_relaxation = 1.6f;                     // below 2, where it no longer settles: a choice
+// Nodes of one colour have no node in common that is next to both, so that they can be relaxed at once: no
+// difference of x + 2 y + 3 z between nodes up to two steps apart is a multiple of seven.
 constexpr int colors = 7;
 constexpr std::size_t nodes_per_task = 4096;  // a choice
 
@@ -118,6 +118,7 @@ class Relaxation {
             places_[std::size_t((x + 2 * y + 3 * z) % colors)].push_back({std::uint32_t(node), around_of({x, y, z})});
   }
 
+  [[nodiscard]] std::span<const std::uint8_t> is_free() const { return is_free_; }  ///< [nodes] Those that are relaxed.
   void run(int sweeps) {
     for (int sweep = 0; sweep < sweeps; ++sweep)
       for (const std::vector<Place>& alike : places_)
@@ -211,8 +212,8 @@ class Relaxation {
   std::array<std::vector<Place>, colors> places_;
 };
 
-/// Values between every other node, for what a finer level knows nothing of or only a bound.
-void refine(const Level& coarse, Level& fine) {
+/// Values between every other node, for those of a finer level that are relaxed and not known.
+void refine(const Level& coarse, std::span<const std::uint8_t> is_free, Level& fine) {
   const GridSize& size = fine.size;
   parallel_for(std::size_t(size[2]), 4, [&](std::size_t begin, std::size_t end) {
     for (int z = int(begin); z < int(end); ++z)
@@ -220,7 +221,7 @@ void refine(const Level& coarse, Level& fine) {
         for (int x = 0; x < size[0]; ++x) {
           const std::size_t node = node_index(size, x, y, z);
           const Knowledge known = fine.known[node];
-          if (known == Knowledge::value) continue;
+          if (known == Knowledge::value || is_free[node] == 0) continue;
           float sum = 0;
           for (int corner = 0; corner < 8; ++corner) {
             const auto along = [&](int at, int bit, int last) {
@@ -244,10 +245,10 @@ void continue_with_least_bending(const GridSize& size, std::span<const Knowledge
   int sweeps = sweeps_on_finest;
   for (std::size_t l = 1; l < levels.size(); ++l) sweeps *= times_on_coarser;
   for (std::size_t l = levels.size(); l-- > 0; sweeps /= times_on_coarser) {
-    if (l + 1 < levels.size()) refine(levels[l + 1], levels[l]);
     // Over as many nodes as there are at this resolution values pull as hard as they bend.
     const float over = std::max(stiffness / float(1 << l), 1.0f);
     Relaxation relaxation(levels[l], std::max(reach >> l, 2), 1 / (over * over * over * over));
+    if (l + 1 < levels.size()) refine(levels[l + 1], relaxation.is_free(), levels[l]);
     relaxation.run(sweeps);
   }
   values = std::move(levels[0].values);

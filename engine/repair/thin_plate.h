@@ -27,7 +27,8 @@ enum class Knowledge : std::uint8_t { nothing, value, not_negative, not_positive
 /// least: the sum of its squared second differences, mixed ones twice, is least, together with that of squared
 /// differences from what is known, and the bounds hold; as nearly as some sweeps come to it, from coarse to fine.
 ///   known   [nodes]
-///   values  [nodes] In: what is known; where only a bound is, a value within it; where nothing is, any. Out: the
+///   values  [nodes] In: what is known; where only a bound is, a value within it; where nothing is, a finite first
+///   guess. Out: the
 ///           function; other nodes stay as they are. The same bits for any number of threads
 void continue_with_least_bending(const GridSize& size, std::span<const Knowledge> known, std::vector<float>& values);
 

@@ -31,9 +31,6 @@ constexpr double apart = 1.15;
 // costs 1.01 to 1.26 of its cheapest stripes. With 2 a click on the mug takes all that is around it.
 constexpr double nearly_as_weak = 1.5;
 
-// Of a sum over all edges.
-constexpr double rounding = 1e-9;
-
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 // Of the usual spacing, and the most of it, that a node counts for: one whose neighbours are all at its place would
@@ -78,6 +75,7 @@ class GrowingPieces {
 
   void take(std::uint32_t node) {
     is_in_[node] = 1;
+    ++taken_;
     Piece joined = of_[node];
     if (joined.clicks) ++pieces_clicked_;
     clicks_to_come_ -= joined.clicks;
@@ -122,9 +120,8 @@ class GrowingPieces {
   /// as good as elsewhere on the surface.
   [[nodiscard]] double border_ratio(const Piece& piece) const {
     if (piece.clicks == 0) return 0;
-    const double others = all_ - piece.volume;
-    // A piece that is everything, but for rounding, is a thing that stands alone.
-    const double lesser = others > rounding * all_ ? std::min(piece.volume, others) : piece.volume;
+    // All there is is a thing that stands alone.
+    const double lesser = taken_ == is_in_.size() ? piece.volume : std::min(piece.volume, all_ - piece.volume);
     return lesser > 0 ? double(piece.clicks) * (least_border + std::max(piece.leaving, 0.0)) / std::sqrt(lesser) : 0.0;
   }
 
@@ -132,7 +129,7 @@ class GrowingPieces {
   neighbours::Pieces pieces_;
   std::vector<std::uint8_t> is_in_;
   std::vector<Piece> of_;  ///< By the node that neighbours::Pieces names a piece by; before, a node's clicks.
-  std::size_t clicks_to_come_ = 0, pieces_clicked_ = 0;
+  std::size_t taken_ = 0, clicks_to_come_ = 0, pieces_clicked_ = 0;
   double all_ = 0, sum_ = 0;
 };
 

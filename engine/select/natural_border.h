@@ -45,8 +45,9 @@ struct NaturalBorder {
 /// their size: an edge by its width, the geometric mean of its ends' spacings, for a border, and by the square of it
 /// for what is enclosed, as on a surface: a wall's few large Gaussians are much, and their long border is no short one.
 /// Where there are clicks on both sides, or the walk leaked, levels near one half are preferred a little: it decides
-/// where nothing else does. Where nothing is given for the outside, all that can be reached is inside. Farther out and
-/// in there are other borders: levels that are joined more weakly than any that enclose somewhat more or less.
+/// where nothing else does. Where nothing is given for the outside and the walk did not leak, all that can be reached
+/// is inside. Farther out and in there are other borders: levels that are joined more weakly than any that enclose
+/// somewhat more or less.
 ///   weight     [edges] 0 or more, the same both ways
 ///   potential  [nodes] of random_walk()
 ///   given      [nodes]; clicked nodes are given for their side

@@ -65,6 +65,14 @@ std::string text(double number) {
   return out.str();
 }
 
+/// Each of them once, ascending: who clicks twice at one place says it once.
+std::vector<std::uint32_t> distinct(std::span<const std::uint32_t> nodes) {
+  std::vector<std::uint32_t> out(nodes.begin(), nodes.end());
+  std::ranges::sort(out);
+  out.erase(std::ranges::unique(out).begin(), out.end());
+  return out;
+}
+
 /// So much or a little more, so that the next click rarely asks for other surroundings.
 double by_steps(double reach) { return std::exp2(std::ceil(2 * std::log2(reach)) / 2); }
 
@@ -214,7 +222,7 @@ Result<Grown> Neighbourhood::grow_beyond(const scene::GaussianCloud& cloud, cons
 }
 
 NaturalBorder Neighbourhood::border_of(const Seeds& seeds, const BorderChoice& choice) const {
-  const bool leaks = !choice.beyond && seeds.clicked.outside.size() < clicks_around;
+  const bool leaks = !choice.beyond && distinct(seeds.clicked.outside).size() < clicks_around;
   const std::vector<float> leak =
       leaks ? leak_beyond(std::span(seeds.clicked.inside).first(seeds.by_hand)) : std::vector<float>{};
   BorderChoice chosen = choice;
@@ -229,15 +237,16 @@ DVec3 Neighbourhood::place_of(std::uint32_t node) const {
 }
 
 std::vector<float> Neighbourhood::leak_beyond(std::span<const std::uint32_t> clicked) const {
+  const std::vector<std::uint32_t> nodes = distinct(clicked);
   std::vector<float> clicks;
   double spread = 0;
-  for (const std::uint32_t one : clicked) {
-    for (const std::uint32_t other : clicked) spread = std::max(spread, distance(place_of(one), place_of(other)));
-    const float* const at = points_.data() + std::size_t(3) * one;
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) spread = std::max(spread, distance(place_of(nodes[i]), place_of(nodes[k])));
+    const float* const at = points_.data() + std::size_t(3) * nodes[i];
     clicks.insert(clicks.end(), at, at + 3);
   }
   if (!(spread > 0)) return {};
-  const auto count = double(clicked.size());
+  const auto count = double(nodes.size());
   const double extent = spread * (count + 1) / (count - 1);
   const std::vector<neighbours::Neighbour> nearest = neighbours::PointIndex(clicks, 3).nearest(points_, 1);
   std::vector<float> leak;
