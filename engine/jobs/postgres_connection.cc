@@ -134,16 +134,22 @@ void PostgresConnection::open() {
   }
   PQsetNoticeProcessor(
       handle_.get(), [](void*, const char*) {}, nullptr);
-  execute(session);
+  try {
+    execute(session);
+  } catch (...) {
+    close();  // without its limits of time it would pass for open
+    throw;
+  }
 }
 
 std::string PostgresConnection::reason() const {
   std::string text = handle_ ? in_one_line(PQerrorMessage(handle_.get())) : "there is no memory for a connection";
   // No text of libpq or of the server has it today.
+  const std::string_view instead = "(password)";
   if (const auto password = address_.settings.find("password");
       password != address_.settings.end() && !password->second.empty())
-    for (auto at = text.find(password->second); at != std::string::npos; at = text.find(password->second))
-      text.replace(at, password->second.size(), "(password)");
+    for (std::size_t at = 0; (at = text.find(password->second, at)) != std::string::npos; at += instead.size())
+      text.replace(at, password->second.size(), instead);  // which may hold the password itself: "pass", say
   return text;
 }
 

@@ -118,9 +118,11 @@ Result<void> JobContext::record_interval(const Change& change) {
     const auto written = write(change);
     if (written) return written;
     if (auto again = wait_for_store(written.error()); !again) return again;
-    // What had no answer may have been done.
-    const auto record = queue_.store_.find(job_.id);
-    if (record && record->claim_number == running_.claim && record->finished_intervals == change.interval) return {};
+    // What had no answer may have been done, and would be refused a second time.
+    auto record = queue_.store_.find(job_.id);
+    for (; !record; record = queue_.store_.find(job_.id))
+      if (auto again = wait_for_store(record.error()); !again) return again;
+    if (record->claim_number == running_.claim && record->finished_intervals == change.interval) return {};
   }
 }
 

@@ -572,6 +572,9 @@ TEST(PostgresAddress, WhoIsNotLetInIsToldSo) {
   server.run(name, "CREATE ROLE visitor LOGIN PASSWORD 'right'; CREATE SCHEMA splatdrag AUTHORIZATION visitor");
   EXPECT_EQ(error_of(server.address(name, "visitor:secret")).message,
             "the job store cannot be reached: password authentication failed for user \"visitor\"");
+  EXPECT_EQ(error_of(server.address(name, "visitor:password")).message,
+            "the job store cannot be reached: (password) authentication failed for user \"visitor\"")
+      << "a password that is a word of the message";
   EXPECT_EQ(error_of(server.address("nowhere")).message,
             "the job store cannot be reached: database \"nowhere\" does not exist");
   EXPECT_TRUE(PostgresStore::open({.address = server.address(name, "visitor:right")}))
