@@ -167,7 +167,6 @@ Result<Neighbourhood::Seeds> Neighbourhood::seeds_of(const scene::GaussianCloud&
   };
   std::erase_if(seeds.clicked.inside, belongs_to(Given::inside));
   std::erase_if(seeds.clicked.outside, belongs_to(Given::outside));
-  seeds.by_hand = seeds.clicked.inside.size();
   if (seeds.clicked.inside.empty())
     return fail(ErrorCode::unprocessable, "all Gaussians around the inside points are nearer to outside ones",
                 "inside[0]");
@@ -205,8 +204,9 @@ void Neighbourhood::take_far_nodes(std::vector<Given>& given) const {
 }
 
 Result<Grown> Neighbourhood::grow(const scene::GaussianCloud& cloud, const Grow& grow) const {
-  const auto seeds = seeds_of(cloud, grow);
+  auto seeds = seeds_of(cloud, grow);
   if (!seeds) return propagate(seeds);
+  if (distinct(seeds->clicked.outside).size() < clicks_around) seeds->leak = leak_beyond(seeds->clicked.inside);
   const NaturalBorder border = grow.whole ? whole_border(*seeds, grow.wider) : border_of(*seeds, {false, grow.wider});
   return Grown{rows_where_marked(border.inside), border.wider, border.more, border.less, is_cut_short_};
 }
@@ -221,14 +221,10 @@ Result<Grown> Neighbourhood::grow_beyond(const scene::GaussianCloud& cloud, cons
   return Grown{rows_where_marked(border.inside), border.wider, border.more, border.less, is_cut_short_};
 }
 
-NaturalBorder Neighbourhood::border_of(const Seeds& seeds, const BorderChoice& choice) const {
-  const bool leaks = !choice.beyond && distinct(seeds.clicked.outside).size() < clicks_around;
-  const std::vector<float> leak =
-      leaks ? leak_beyond(std::span(seeds.clicked.inside).first(seeds.by_hand)) : std::vector<float>{};
-  BorderChoice chosen = choice;
-  chosen.leaks = !leak.empty();
-  const std::vector<double> potential = random_walk(graph_, weight_, seeds.given, leak);
-  return natural_border(graph_, weight_, potential, seeds.given, seeds.clicked, chosen);
+NaturalBorder Neighbourhood::border_of(const Seeds& seeds, BorderChoice choice) const {
+  choice.leaks = !seeds.leak.empty();
+  const std::vector<double> potential = random_walk(graph_, weight_, seeds.given, seeds.leak);
+  return natural_border(graph_, weight_, potential, seeds.given, seeds.clicked, choice);
 }
 
 DVec3 Neighbourhood::place_of(std::uint32_t node) const {

@@ -99,7 +99,7 @@ class Neighbourhood {
   struct Seeds {
     std::vector<Given> given;  ///< [nodes]
     ClickedNodes clicked;      ///< The node that each point is on, where no point of the other side has it.
-    std::size_t by_hand = 0;   ///< So many of those inside, the first ones, are of points; the others of far ends.
+    std::vector<float> leak;   ///< [nodes] Of the walk, by the points alone, not by far ends; empty: none.
   };
   struct FarEnds {
     std::vector<double> squared;  ///< [n] Distance of each node from the nearest of so many clicks.
@@ -109,7 +109,7 @@ class Neighbourhood {
   /// Claims the nodes that a point lies on; returns the one that covers it most.
   std::uint32_t claim(const scene::GaussianCloud& cloud, DVec3 point, Given side,
                       std::map<std::uint32_t, Claim>& claims) const;
-  [[nodiscard]] NaturalBorder border_of(const Seeds& seeds, const BorderChoice& choice) const;
+  [[nodiscard]] NaturalBorder border_of(const Seeds& seeds, BorderChoice choice) const;
   [[nodiscard]] DVec3 place_of(std::uint32_t node) const;  ///< Relative to the middle.
   /// How likely a walk ends outside at each node: the farther it is from all clicks, by the square. Who clicks several
   /// times does so all over the thing, so that it extends about as far as the clicks do: as `n` values that are drawn
