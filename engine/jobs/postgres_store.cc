@@ -109,23 +109,6 @@ std::optional<std::string_view> key_of(const std::string& idempotency_key) {
   return idempotency_key.empty() ? std::nullopt : std::optional<std::string_view>(idempotency_key);
 }
 
-/// Runs `body` and turns what is thrown into an Error.
-template <class Body>
-auto guarded(Body body) -> Result<decltype(body())> {
-  try {
-    if constexpr (std::is_void_v<decltype(body())>) {
-      body();
-      return {};
-    } else {
-      return body();
-    }
-  } catch (const StoreFailure& failure) {
-    return tl::make_unexpected(failure.error);
-  } catch (const std::exception& e) {
-    return fail(ErrorCode::internal, std::string("job store: ") + e.what());
-  }
-}
-
 }  // namespace
 
 struct PostgresStore::Impl {
@@ -246,19 +229,17 @@ struct PostgresStore::Impl {
     if (rows.size() == 0) no_such_job(id);
     return read(rows, 0);
   }
-  /// What read() leaves out.
-  void find_places(std::span<Job> jobs) {
-    const auto waits = [](const Job& job) { return job.state == JobState::queued; };
-    if (std::ranges::none_of(jobs, waits)) return;
+  std::vector<ActiveJob> active_jobs() {
     const auto rows =
         work.run("SELECT number, lane, state = 'queued', turn FROM splatdrag.jobs WHERE ended IS NULL ORDER BY number");
     std::vector<ActiveJob> active;
     for (int row = 0; row < rows.size(); ++row)
       active.push_back({rows.integer(row, 0), rows.text(row, 1), rows.truth(row, 2), rows.integer(row, 3)});
-    const auto places = places_in_queue(active);
-    for (Job& job : jobs)
-      if (const auto place = places.find(number_of(job.id).value_or(0)); waits(job) && place != places.end())
-        job.queue_position = place->second;
+    return active;
+  }
+  /// What read() leaves out.
+  void find_places(std::span<Job> jobs) {
+    give_places(jobs, [this] { return active_jobs(); });
   }
 
   /// Writes down all of a record that may change.

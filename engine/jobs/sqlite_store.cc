@@ -2,7 +2,6 @@
 
 #include <sqlite3.h>
 
-#include <algorithm>
 #include <cstdint>
 #include <exception>
 #include <mutex>
@@ -110,9 +109,6 @@ std::string checksum_of_row(int schema_of_row = schema_number) {
   return "row_checksum(" + summed_columns(schema_of_row) + ")";
 }
 
-/// SQLite's result codes become an Error here, travel as an exception to guarded() and leave this file as a Result.
-using Failure = StoreFailure;
-
 class Database {
  public:
   explicit Database(std::filesystem::path file) : file_(std::move(file)) {}
@@ -130,10 +126,10 @@ class Database {
   }
   void execute(const char* sql) { check(sqlite3_exec(handle_, sql, nullptr, nullptr, nullptr)); }
   void check(int code) const {
-    if (code != SQLITE_OK && code != SQLITE_ROW && code != SQLITE_DONE) throw Failure(error(code));
+    if (code != SQLITE_OK && code != SQLITE_ROW && code != SQLITE_DONE) throw StoreFailure(error(code));
   }
   [[noreturn]] void corrupt(const std::string& what) const {
-    throw Failure({ErrorCode::corrupt_data, "the job store is damaged (" + what + ")", file_});
+    throw StoreFailure({ErrorCode::corrupt_data, "the job store is damaged (" + what + ")", file_});
   }
   [[nodiscard]] sqlite3* handle() const { return handle_; }
   [[nodiscard]] const std::filesystem::path& file() const { return file_; }
@@ -309,12 +305,7 @@ std::vector<ActiveJob> active_jobs(Database& database) {
 
 /// What read() leaves out.
 void find_places(Database& database, std::span<Job> jobs) {
-  const auto waits = [](const Job& job) { return job.state == JobState::queued; };
-  if (std::ranges::none_of(jobs, waits)) return;
-  const auto places = places_in_queue(active_jobs(database));
-  for (Job& job : jobs)
-    if (const auto place = places.find(number_of(job.id).value_or(0)); waits(job) && place != places.end())
-      job.queue_position = place->second;
+  give_places(jobs, [&] { return active_jobs(database); });
 }
 
 Job find_in(Database& database, const std::string& id) {
@@ -359,7 +350,7 @@ void write_in(Database& database, const Job& job) {
 
 Job apply_in(Database& database, const std::string& id, const Change& change, Time now) {
   const auto changed = transition(find_in(database, id), change, now);
-  if (!changed) throw Failure(changed.error());
+  if (!changed) throw StoreFailure(changed.error());
   write_in(database, *changed);
   return find_in(database, id);
 }
@@ -399,7 +390,7 @@ void check_rows(Database& database, int schema_of_rows = schema_number) {
 void bring_up_to_date(Database& database, int found_schema) {
   if (found_schema == 0) {
     if (text_of(database, "SELECT count(*) FROM sqlite_schema") != "0")
-      throw Failure({ErrorCode::corrupt_data, "the file is no job store", database.file()});
+      throw StoreFailure({ErrorCode::corrupt_data, "the file is no job store", database.file()});
     database.execute(schema);
   }
   // A damaged number of the schema would have columns added twice.
@@ -429,15 +420,16 @@ void prepare(Database& database, Time now, const SqliteOptions& options) {
   // EXCLUSIVE before the first access: the lock is then held until the process ends, and no shared memory is needed.
   database.execute("PRAGMA locking_mode = EXCLUSIVE; PRAGMA synchronous = FULL;");
   if (text_of(database, "PRAGMA journal_mode = WAL") != "wal")
-    throw Failure({ErrorCode::unavailable, "this file system cannot hold a job store: choose another data folder",
-                   database.file()});
+    throw StoreFailure({ErrorCode::unavailable, "this file system cannot hold a job store: choose another data folder",
+                        database.file()});
   Transaction transaction(database);
   const int found_schema = std::stoi(text_of(database, "PRAGMA user_version"));
   if (found_schema > schema_number)
-    throw Failure({ErrorCode::unsupported,
-                   "the job store was written by a newer version (" + std::to_string(found_schema) + ", known is " +
-                       std::to_string(schema_number) + "): use that one, or choose another data folder",
-                   database.file()});
+    throw StoreFailure({ErrorCode::unsupported,
+                        "the job store was written by a newer version (" + std::to_string(found_schema) +
+                            ", known is " + std::to_string(schema_number) +
+                            "): use that one, or choose another data folder",
+                        database.file()});
   bring_up_to_date(database, found_schema);
   check_all(database);
   for (const std::string& id : ids(Statement(database, "SELECT number FROM jobs WHERE claimed ORDER BY number")))
@@ -451,23 +443,6 @@ std::uintmax_t size_of(const std::filesystem::path& file) {
   std::error_code error;
   const auto size = std::filesystem::file_size(file, error);
   return error ? 0 : size;
-}
-
-/// Runs `body` and turns what SQLite and the library throw into an Error.
-template <class Body>
-auto guarded(Body body) -> Result<decltype(body())> {
-  try {
-    if constexpr (std::is_void_v<decltype(body())>) {
-      body();
-      return {};
-    } else {
-      return body();
-    }
-  } catch (const Failure& failure) {
-    return tl::make_unexpected(failure.error);
-  } catch (const std::exception& e) {
-    return fail(ErrorCode::internal, std::string("job store: ") + e.what());
-  }
 }
 
 }  // namespace
@@ -505,7 +480,7 @@ Result<std::unique_ptr<SqliteStore>> SqliteStore::open(const SqliteOptions& opti
   return guarded([&] {
     auto impl = std::make_unique<Impl>(options.folder / "jobs.db", options.now);
     if (options.must_exist && size_of(impl->database.file()) == 0)
-      throw Failure(
+      throw StoreFailure(
           {ErrorCode::corrupt_data, "the job store is gone, but there have been jobs", impl->database.file()});
     impl->database.open(options.busy_timeout);
     prepare(impl->database, impl->now(), options);
@@ -529,7 +504,7 @@ Result<Submission> SqliteStore::submit(const NewJob& job, std::size_t max_queued
         .run();
     seal(database, sqlite3_last_insert_rowid(database.handle()));
     Job accepted = find_in(database, id_of(sqlite3_last_insert_rowid(database.handle())));
-    if (const auto witnessed = witness(accepted); !witnessed) throw Failure(witnessed.error());
+    if (const auto witnessed = witness(accepted); !witnessed) throw StoreFailure(witnessed.error());
     return {.job = std::move(accepted), .created = true};
   });
 }
@@ -606,7 +581,7 @@ Result<JobState> SqliteStore::renew(const std::string& id, std::int64_t claim) {
   return guarded([&] {
     const std::lock_guard lock(impl_->mutex);
     const Job job = find_in(impl_->database, id);
-    if (auto holds = check_claim(job, claim); !holds) throw Failure(holds.error());
+    if (auto holds = check_claim(job, claim); !holds) throw StoreFailure(holds.error());
     return job.state;
   });
 }

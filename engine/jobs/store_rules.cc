@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <iterator>
+#include <map>
 #include <utility>
 
 namespace engine::jobs {
@@ -13,6 +14,24 @@ constexpr std::array<std::string_view, 12> code_names = {
     "invalid_argument", "unprocessable", "not_found", "conflict",  "corrupt_data", "unsupported",
     "too_large",        "no_space",      "busy",      "cancelled", "unavailable",  "internal"};
 static_assert(std::size_t(ErrorCode::internal) + 1 == code_names.size());
+
+/// The jobs that wait, in the order of their turns, by number: 1 for the next one.
+std::map<std::int64_t, int> places_in_queue(const std::vector<ActiveJob>& active) {
+  struct Waiting {
+    std::int64_t turn, number;
+  };
+  std::vector<Waiting> waiting;
+  std::map<std::string_view, std::int64_t> last_turn;  // by lane: its jobs come in order, whatever each of them takes
+  for (const ActiveJob& job : active) {
+    std::int64_t& turn = last_turn.try_emplace(job.lane, job.turn).first->second;
+    turn = std::max(turn, job.turn);
+    if (job.waits) waiting.push_back({turn, job.number});
+  }
+  std::ranges::stable_sort(waiting, {}, &Waiting::turn);
+  std::map<std::int64_t, int> places;
+  for (const Waiting& job : waiting) places.emplace(job.number, int(places.size()) + 1);
+  return places;
+}
 
 }  // namespace
 
@@ -64,21 +83,13 @@ void check_has_ended(const Job& job) {
                       job.id});
 }
 
-std::map<std::int64_t, int> places_in_queue(const std::vector<ActiveJob>& active) {
-  struct Waiting {
-    std::int64_t turn, number;
-  };
-  std::vector<Waiting> waiting;
-  std::map<std::string_view, std::int64_t> last_turn;  // by lane: its jobs come in order, whatever each of them takes
-  for (const ActiveJob& job : active) {
-    std::int64_t& turn = last_turn.try_emplace(job.lane, job.turn).first->second;
-    turn = std::max(turn, job.turn);
-    if (job.waits) waiting.push_back({turn, job.number});
-  }
-  std::ranges::stable_sort(waiting, {}, &Waiting::turn);
-  std::map<std::int64_t, int> places;
-  for (const Waiting& job : waiting) places.emplace(job.number, int(places.size()) + 1);
-  return places;
+void give_places(std::span<Job> jobs, const std::function<std::vector<ActiveJob>()>& active) {
+  const auto waits = [](const Job& job) { return job.state == JobState::queued; };
+  if (std::ranges::none_of(jobs, waits)) return;
+  const auto places = places_in_queue(active());
+  for (Job& job : jobs)
+    if (const auto place = places.find(number_of(job.id).value_or(0)); waits(job) && place != places.end())
+      job.queue_position = place->second;
 }
 
 }  // namespace engine::jobs

@@ -4,10 +4,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <exception>
-#include <map>
+#include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "engine/jobs/store.h"
@@ -19,6 +22,23 @@ struct StoreFailure : std::exception {
   explicit StoreFailure(Error e) : error(std::move(e)) {}
   Error error;
 };
+
+/// Runs `body` and turns what is thrown into an Error.
+template <class Body>
+auto guarded(Body body) -> Result<decltype(body())> {
+  try {
+    if constexpr (std::is_void_v<decltype(body())>) {
+      body();
+      return {};
+    } else {
+      return body();
+    }
+  } catch (const StoreFailure& failure) {
+    return tl::make_unexpected(failure.error);
+  } catch (const std::exception& e) {
+    return fail(ErrorCode::internal, std::string("job store: ") + e.what());
+  }
+}
 
 /// The name of a code in a row, and back. Names, because the numbers of an enum may change between versions and the row
 /// stays.
@@ -44,8 +64,8 @@ struct ActiveJob {
   bool waits = false;  ///< It is queued.
   std::int64_t turn = 0;
 };
-/// The jobs that wait, in the order of their turns, by number: 1 for the next one.
-///   active  all that have not ended, by number
-[[nodiscard]] std::map<std::int64_t, int> places_in_queue(const std::vector<ActiveJob>& active);
+/// Gives each of the jobs that waits its place among all that wait, by their turns: 1 for the next one.
+///   active  all that have not ended, by number; asked for only where a job waits
+void give_places(std::span<Job> jobs, const std::function<std::vector<ActiveJob>()>& active);
 
 }  // namespace engine::jobs
