@@ -15,11 +15,6 @@ namespace {
 constexpr std::size_t grain = 16384;  // rows per task: some 50 us of work for a handful of handles
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-bool inside(const Box& box, DVec3 point) {
-  const DVec3 from_center = glm::abs(point - box.center);
-  return from_center.x <= box.size.x / 2 && from_center.y <= box.size.y / 2 && from_center.z <= box.size.z / 2;
-}
-
 /// What one chunk of rows saw of one sphere. Distances are squared.
 struct Sighting {
   std::size_t owned = 0;      ///< Gaussians that belong to the handle.
@@ -57,6 +52,11 @@ std::string why_empty(std::size_t handle, const Sphere& sphere, const Sighting& 
 }
 
 }  // namespace
+
+bool inside(const Box& box, DVec3 point) {
+  const DVec3 from_center = glm::abs(point - box.center);
+  return from_center.x <= box.size.x / 2 && from_center.y <= box.size.y / 2 && from_center.z <= box.size.z / 2;
+}
 
 Result<Assignment> assign(const Array3& mean, std::span<const Sphere> spheres, const std::optional<Box>& region) {
   assert(spheres.size() < std::numeric_limits<std::uint16_t>::max());

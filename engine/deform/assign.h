@@ -23,6 +23,8 @@ struct Sphere {
 struct Box {
   DVec3 center{0.0}, size{0.0};
 };
+/// Is the point in the box, or on a face of it?
+[[nodiscard]] bool inside(const Box& box, DVec3 point);
 
 /// Row i of the scene belongs to handle handle[i] - 1; 0: it is not dragged.
 using HandleColumn = std::vector<std::uint16_t>;

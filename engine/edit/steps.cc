@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "engine/core/rows.h"
+#include "engine/deform/assign.h"
 #include "engine/edit/handles.h"
 #include "engine/edit/masks.h"
 #include "engine/edit/messages.h"
@@ -15,6 +16,7 @@
 #include "engine/edit/views.h"
 #include "engine/edit/workload.h"
 #include "engine/render/forward.h"
+#include "engine/repair/outskirts.h"
 #include "engine/repair/stretch.h"
 
 namespace engine::edit {
@@ -75,6 +77,42 @@ class Uncorrected {
   render::Workspace workspace_;
 };
 
+/// Does all that moves go away as a whole? What is held bends where it is, and what is behind it is its inside.
+bool leaves_as_a_whole(const Edit& edit) {
+  using How = deform::Attachment::How;
+  return std::ranges::all_of(edit.parts.attachments, [](const deform::Attachment& part) {
+    return part.how == How::one_piece || part.how == How::free;
+  });
+}
+
+/// What pictures show to be of the part goes with it, and what they never showed of it does not arrive.
+void look_at_outskirts(State& state, Edit& edit) {
+  const Request& request = edit.request;
+  if (edit.corrector == nullptr || !request.selected || request.crumbs == Crumbs::keep ||
+      request.mode == Mode::extend || !leaves_as_a_whole(edit))
+    return;
+  const Rows part = united(state.scene.dragged_rows(), edit.given_up);
+  repair::Outskirts outskirts = repair::outskirts_of(edit.input, part, edit.candidates);
+  std::erase_if(outskirts.backing, [&](std::uint32_t row) {
+    return request.region &&
+           !deform::inside(deform::Box{request.region->center, request.region->size}, DVec3(edit.input.mean.get(row)));
+  });
+  state.report.crumbs += outskirts.backing.size();
+  edit.given_up = united(edit.given_up, outskirts.backing);
+  edit.buried = std::move(outskirts.buried);
+}
+
+/// Copies of buried rows go again.
+void leave_buried(WorkingScene& working, const Rows& buried, Rows& copies) {
+  std::erase_if(copies, [&](std::uint32_t row) {
+    if (!std::ranges::binary_search(buried, working.parent()[row])) return false;
+    working.leave_behind(row);
+    float& logit = working.gaussians().opacity_logit[row];
+    logit = std::min(logit, working::keep_logit(Mode::move));
+    return true;
+  });
+}
+
 }  // namespace
 
 void plan_ahead(const State& state, Edit& edit) {
@@ -123,6 +161,7 @@ Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Cam
     edit.progress.refine(work);
   }
   for (const scene::Camera& view : state.views) state.masks.emplace_back(view.width, view.height);
+  if (choice->moves) look_at_outskirts(state, edit);
   Rows vanishing = edit.given_up;
   if (edit.corrector != nullptr) vanishing = united(vanishing, edit.request.healed);
   if (vanishing.empty()) return {};
@@ -142,6 +181,7 @@ Result<Rows> paste(State& state, Edit& edit, int u, const PlannedMotion& motion)
   Rows copies = copy_and_paste(state.scene, motion, departure_of(edit.request), edit.params().rotate_sh);
   if (u == 1 && !motion.moving.empty())
     for (const std::uint32_t row : edit.given_up) state.scene.give_up(row);
+  if (u == 1) leave_buried(state.scene, edit.buried, copies);
   // An elastic body has drawn its Gaussians out already.
   if (edit.corrector != nullptr && edit.optimises() && edit.params().interpolation != Interpolation::arap)
     repair::draw_out(state.scene);

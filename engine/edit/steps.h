@@ -35,7 +35,8 @@ struct Edit {
   correct::Repainter* repainter;
   ProgressMeter progress;
   Parts parts = {};                            ///< How what moves hangs on to what stays.
-  Rows given_up = {};                          ///< Crumbs that go away, in the first interval.
+  Rows given_up = {};                          ///< Crumbs and backing that go away, in the first interval.
+  Rows buried = {};                            ///< Rows of the part that no picture shows: they do not arrive.
   std::vector<scene::Camera> candidates = {};  ///< That views are chosen from; they have seen the scene.
   std::optional<repair::Repair> repair = {};   ///< What the unedited scene looks like to a corrector.
   Rows masked_rows = {};                       ///< Those that the masks were last united with.
