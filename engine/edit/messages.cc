@@ -46,6 +46,13 @@ std::string left_open(std::span<const Uncovered> views) {
          worst.view + "\"";
 }
 
+std::string buried_left_out(std::size_t rows) {
+  return std::to_string(rows) +
+         " Gaussians of the part do not arrive: they lie in what stays, where no camera sees them, and would hang "
+         "around "
+         "the part as a haze; crumbs \"keep\" takes them along";
+}
+
 std::string faint_left_out(std::size_t copies) {
   return std::to_string(copies) + " dragged Gaussians have an opacity below 1/255 and are left out";
 }

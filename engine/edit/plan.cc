@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "engine/edit/views.h"
+#include "engine/repair/outskirts.h"
 #include "engine/repair/witnesses.h"
 
 namespace engine::edit {
@@ -28,6 +29,7 @@ constexpr double dome_row_seconds = 4e-7;      // rays of virtual cameras throug
 constexpr double drag_row_seconds = 2e-7;      // to deform, paste or relocate one dragged Gaussian; bodies take longer
 constexpr double observe_frames = 1.1;         // largest weights, or depth beside colour
 constexpr double look_frames = 1.3;            // depth and trust beside colour
+constexpr double outskirts_frames = 3;         // depths of the rest, weights of all; the part alone takes little
 constexpr double surface_seconds = 8e-3;       // to find the surfaces that go on in a view
 constexpr double index_row_seconds = 4e-7;     // a search tree of the scene, for seeds
 // The chart, the closure, and rows that nobody has seen, which are looked at in each view. Measured beside other work,
@@ -86,7 +88,14 @@ class Maker {
   [[nodiscard]] double choice() const {
     const double small = std::min(double(comparison_side * comparison_side), pixels_);
     const double dome = work_.virtual_views ? dome_row_seconds * n_ : 0;
-    return slow(dome) + motion() * work_.intervals + 2 * double(work_.candidates) * footprint(small);
+    return slow(dome) + motion() * work_.intervals + 2 * double(work_.candidates) * footprint(small) + outskirts();
+  }
+  /// What cameras show of the part, of the rest, and of both.
+  [[nodiscard]] double outskirts() const {
+    if (!work_.selected || !work_.corrected || !work_.vacates || work_.iterations == 0) return 0;
+    const double pixels = std::min(double(repair::outskirts_side * repair::outskirts_side), pixels_);
+    const double frame = work_.frame.gaussians + work_.frame.pixel * pixels;
+    return double(std::min(work_.candidates, repair::outskirts_cameras)) * (outskirts_frames * frame + slow(row_seconds * n_));
   }
 
   /// What a moment shows.

@@ -80,6 +80,7 @@ struct Workload {
   int later_tuning = 0;         ///< and before each later one.
   double mean_strength = 0.5;   ///< Of the corrections of an interval.
   bool vacates = true;          ///< The dragged part leaves its place, which is then filled: a move.
+  bool selected = false;        ///< A selection says what leaves, and its outskirts may go with it.
   std::size_t candidates = 0;   ///< C: cameras that are compared.
   bool virtual_views = false;   ///< They have to be found first.
   std::size_t views = 0;        ///< V, that the edit looks through.

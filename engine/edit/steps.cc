@@ -1,6 +1,7 @@
 #include "engine/edit/steps.h"
 
 #include <algorithm>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <utility>
@@ -77,40 +78,56 @@ class Uncorrected {
   render::Workspace workspace_;
 };
 
-/// Does all that moves go away as a whole? What is held bends where it is, and what is behind it is its inside.
+/// Does all that moves go away as a whole? What is held, or has anchors, bends where it is, and what is behind it is
+/// its inside. Of what does not move as a body nobody knows.
 bool leaves_as_a_whole(const Edit& edit) {
   using How = deform::Attachment::How;
-  return std::ranges::all_of(edit.parts.attachments, [](const deform::Attachment& part) {
-    return part.how == How::one_piece || part.how == How::free;
-  });
+  if (edit.request.mode == Mode::remove) return true;
+  const auto is_anchored = [&](int group) {
+    return std::ranges::any_of(edit.request.handles,
+                               [&](const Handle& handle) { return handle.group == group && handle.is_anchor(); });
+  };
+  return !edit.parts.attachments.empty() &&
+         std::ranges::all_of(edit.parts.attachments, [&](const deform::Attachment& part) {
+           return part.how == How::one_piece || (part.how == How::free && !is_anchored(part.group));
+         });
 }
 
 /// What pictures show to be of the part goes with it, and what they never showed of it does not arrive.
-void look_at_outskirts(State& state, Edit& edit) {
+Result<void> look_at_outskirts(State& state, Edit& edit, const ViewChoice& choice) {
   const Request& request = edit.request;
-  if (edit.corrector == nullptr || !request.selected || request.crumbs == Crumbs::keep ||
+  if (edit.corrector == nullptr || !edit.optimises() || !request.selected || request.crumbs == Crumbs::keep ||
       request.mode == Mode::extend || !leaves_as_a_whole(edit))
-    return;
-  const Rows part = united(state.scene.dragged_rows(), edit.given_up);
-  repair::Outskirts outskirts = repair::outskirts_of(edit.input, part, edit.candidates);
-  std::erase_if(outskirts.backing, [&](std::uint32_t row) {
-    return request.region &&
-           !deform::inside(deform::Box{request.region->center, request.region->size}, DVec3(edit.input.mean.get(row)));
+    return {};
+  const Rows part = united(choice.moved, edit.given_up);
+  auto outskirts = repair::outskirts_of(edit.input, part, choice.witnesses, [&] { return edit.progress.advance(1); });
+  if (!outskirts) return propagate(outskirts);
+  std::erase_if(outskirts->backing, [&](std::uint32_t row) {
+    const bool stays = request.region && !deform::inside(deform::Box{request.region->center, request.region->size},
+                                                         DVec3(edit.input.mean.get(row)));
+    return stays || std::ranges::binary_search(request.healed, row);  // what is healed goes anyway
   });
-  state.report.crumbs += outskirts.backing.size();
-  edit.given_up = united(edit.given_up, outskirts.backing);
-  edit.buried = std::move(outskirts.buried);
+  state.report.crumbs += outskirts->backing.size();
+  edit.given_up = united(edit.given_up, outskirts->backing);
+  if (request.mode == Mode::remove) return {};
+  std::ranges::set_intersection(outskirts->buried, choice.moved, std::back_inserter(edit.buried));
+  if (!edit.buried.empty()) state.report.warnings.push_back(buried_left_out(edit.buried.size()));
+  return {};
 }
 
-/// Copies of buried rows go again.
-void leave_buried(WorkingScene& working, const Rows& buried, Rows& copies) {
-  std::erase_if(copies, [&](std::uint32_t row) {
-    if (!std::ranges::binary_search(buried, working.parent()[row])) return false;
-    working.leave_behind(row);
+/// Buried rows go where they are, and do not arrive: what is planned for them is taken back.
+void hold_back(const Rows& buried, PlannedMotion& motion) {
+  const auto is_buried = [&](std::uint32_t row) { return std::ranges::binary_search(buried, row); };
+  for (std::size_t k = 0; k < motion.rows.size(); ++k)
+    if (is_buried(motion.rows[k])) motion.deformation.moves[k] = 0;
+  std::erase_if(motion.moving, is_buried);
+}
+void leave_buried(WorkingScene& working, const Rows& buried) {
+  for (const std::uint32_t row : buried) {
     float& logit = working.gaussians().opacity_logit[row];
     logit = std::min(logit, working::keep_logit(Mode::move));
-    return true;
-  });
+    working.leave_behind(row);
+  }
 }
 
 }  // namespace
@@ -161,8 +178,9 @@ Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Cam
     edit.progress.refine(work);
   }
   for (const scene::Camera& view : state.views) state.masks.emplace_back(view.width, view.height);
-  if (choice->moves) look_at_outskirts(state, edit);
-  Rows vanishing = edit.given_up;
+  if (choice->moves)
+    if (auto looked = look_at_outskirts(state, edit, *choice); !looked) return looked;
+  Rows vanishing = united(edit.given_up, edit.buried);
   if (edit.corrector != nullptr) vanishing = united(vanishing, edit.request.healed);
   if (vanishing.empty()) return {};
   return unite_masks(state.scene, vanishing, state.views, state.masks,
@@ -172,8 +190,10 @@ Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Cam
 Result<PlannedMotion> deform(const State& state, Edit& edit, int u) {
   if (auto going = edit.progress.enter(Stage::deform, u); !going) return propagate(going);
   Memory memory;  // each interval has bodies of its own
-  return plan_motion(state.scene, edit.request, edit.parts, state.positions, u, state.report.resolved.intervals,
-                     memory);
+  PlannedMotion motion =
+      plan_motion(state.scene, edit.request, edit.parts, state.positions, u, state.report.resolved.intervals, memory);
+  if (u == 1) hold_back(edit.buried, motion);
+  return motion;
 }
 
 Result<Rows> paste(State& state, Edit& edit, int u, const PlannedMotion& motion) {
@@ -181,7 +201,7 @@ Result<Rows> paste(State& state, Edit& edit, int u, const PlannedMotion& motion)
   Rows copies = copy_and_paste(state.scene, motion, departure_of(edit.request), edit.params().rotate_sh);
   if (u == 1 && !motion.moving.empty())
     for (const std::uint32_t row : edit.given_up) state.scene.give_up(row);
-  if (u == 1) leave_buried(state.scene, edit.buried, copies);
+  if (u == 1) leave_buried(state.scene, edit.buried);
   // An elastic body has drawn its Gaussians out already.
   if (edit.corrector != nullptr && edit.optimises() && edit.params().interpolation != Interpolation::arap)
     repair::draw_out(state.scene);

@@ -112,6 +112,10 @@ Result<ViewChoice> choose_views(const WorkingScene& begun, const scene::Gaussian
                                      [&](double part) { return advance((1 + part) / 2); });
   if (!sources) return propagate(sources);
 
+  for (std::size_t i = 0; i < candidates.size(); ++i)
+    if ((*sources)[i] > 0) choice.witnesses.push_back(candidates[i]);
+  choice.moved = std::move(dry.changed);
+
   const DVec3 middle = middle_of(request);
   std::vector<views::Candidate> rated;
   for (std::size_t i = 0; i < candidates.size(); ++i)

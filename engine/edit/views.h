@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <span>
 #include <vector>
@@ -32,6 +33,9 @@ constexpr int comparison_side = 192;
 struct ViewChoice {
   std::vector<scene::Camera> views;  ///< Up to params.views, best first, scaled to the working picture size.
   bool moves = false;                ///< Does the drag move anything?
+  std::vector<std::uint32_t> moved;  ///< Rows of the scene that it moves, or removes, ascending.
+  /// Candidates that show some of that where it is.
+  std::vector<scene::Camera> witnesses;
 };
 
 /// Chooses views by the area that the part covers in them, at its source and at its target, and by their spread. The

@@ -11,22 +11,22 @@
 #include "engine/neighbours/point_index.h"
 #include "engine/render/forward.h"
 #include "engine/render/weight_sums.h"
+#include "engine/repair/part_shown.h"
 #include "engine/scene/sh.h"
 
 namespace engine::repair {
 namespace {
 
-constexpr std::size_t most_cameras = 48;  // a choice, as the next one
-constexpr int side = 320;                 // pixels
-constexpr float covered = 0.5f;           // from this opacity of the part on a pixel shows it
 constexpr double most_of_it = 0.5;        // of a row's light
-// Of the light that a row has without what stays, as much at most is seen, in the picture that shows most of it.
+// Of the light that a row has without what stays, less than so much is seen, in the picture that shows most of it.
 constexpr double hardly_seen = 0.5;
-constexpr double least_light = 1;         // pixels of a picture: less says nothing
+// Pixels, over all pictures: less says nothing of a row; and in one picture: shares of less are noise. In scenes of
+// millions of rows few have a pixel to themselves.
+constexpr double least_light = 1, trace_of_light = 0.05;
 constexpr int rim_px = 2;                 // outlines are blurred by as much
 constexpr std::size_t nearest_asked = 8;  // rows whose mean colour is compared: a choice
-// Of the light of the part: what backs it, or sticks out of it, is less than that where nobody would see it. Three toys
-// of a capture have 0.3 to 1.4 % and 31 to 125 %; ideal things, which need neither, 0.1 % and up to 7 %.
+// Of the part's light where it shows: what backs it has less, or what would stick out of it, where nobody would see it.
+// Three toys of a capture have 0.3 to 1.4 % and 31 to 125 %; captured cases, which need neither, 0.5 and 9 % at most.
 constexpr double seen_as_backing = 0.002, seen_as_haze = 0.1;
 
 /// What pictures tell: sums of blending weights over their pixels, and numbers of pictures.
@@ -39,35 +39,14 @@ struct Told {
   std::vector<double> shown;          ///< Of the light of one picture, the largest share that the scene shows as well.
 };
 
-/// Pixels that the part covers, and in which it is before the rest.
-scene::Mask shows_part(const render::Rendering& part, const render::Rendering& rest) {
-  scene::Mask shows(part.alpha.width, part.alpha.height);
-  for (std::size_t i = 0; i < shows.data.size(); ++i) {
-    const float alpha = part.alpha.data[i], behind = rest.median_depth.data[i];
-    shows.data[i] = alpha > covered && (behind == 0 || part.depth.data[i] < behind * alpha);
-  }
-  return shows;
-}
-
-/// 1 at the pixels of a mask, or beside it.
-scene::Image image_of(const scene::Mask& mask, bool inside) {
-  scene::Image image(mask.width, mask.height, 1);
-  for (std::size_t i = 0; i < image.data.size(); ++i) image.data[i] = (mask.data[i] != 0) == inside ? 1.0f : 0.0f;
-  return image;
-}
-
-/// Notes which rows are before the part, and which behind it.
-void compare_depths(const Array3& means, const scene::Camera& camera, const render::Rendering& part,
-                    const scene::Mask& shows, Told& told) {
-  for (std::size_t row = 0; row < means.size(); ++row) {
-    const DVec3 p = camera.cam_from_world(means.get(row));
-    if (!(p.z > 0)) continue;
-    const DVec2 pixel = camera.pixel_from_cam(p);
-    if (!(pixel.x >= 0 && pixel.y >= 0 && pixel.x < camera.width && pixel.y < camera.height)) continue;
-    const int x = int(pixel.x), y = int(pixel.y);
-    if (shows.at(x, y) == 0) continue;
-    ++(p.z * double(part.alpha.at(x, y)) < double(part.depth.at(x, y)) ? told.in_front : told.behind)[row];
-  }
+/// What is beside these pixels, and not so near that outlines blur it; 1, else 0. [1]
+scene::Image beside(const scene::Image& shown) {
+  scene::Mask mask(shown.width, shown.height);
+  for (std::size_t i = 0; i < mask.data.size(); ++i) mask.data[i] = shown.data[i] != 0;
+  mask = mask::dilate(mask, rim_px);
+  scene::Image out(shown.width, shown.height, 1);
+  for (std::size_t i = 0; i < out.data.size(); ++i) out.data[i] = mask.data[i] == 0 ? 1.0f : 0.0f;
+  return out;
 }
 
 Vec3 color_of(const scene::GaussianCloud& cloud, std::size_t row) {
@@ -117,9 +96,9 @@ class Look {
       : scene_(scene), part_(part), alone_(scene::gather(scene, part)), rest_(scene) {
     rest_.hidden = part;
     depth_only_.color = false, depth_only_.depth = true;
-    told_.light = told_.on_part = std::vector<double>(scene.size());
+    light_ = told_.light = told_.on_part = std::vector<double>(scene.size());
     told_.in_front = told_.behind = std::vector<int>(scene.size());
-    told_.alone = told_.beside = told_.shown = std::vector<double>(part.size());
+    alone_light_ = told_.alone = told_.beside = told_.shown = std::vector<double>(part.size());
   }
   Look(const Look&) = delete;
   Look& operator=(const Look&) = delete;
@@ -127,19 +106,18 @@ class Look {
   void from(const scene::Camera& camera) {
     render::forward(alone_, camera, depth_only_, {}, workspace_, of_part_);
     render::forward(rest_, camera, depth_only_, {}, workspace_, of_rest_);
-    const scene::Mask shows = shows_part(of_part_, of_rest_);
-    if (shows.area() == 0) return;
-    std::vector<double> light(scene_.size()), on_part(scene_.size()), alone(part_.size()), beside(part_.size());
-    render::add_weight_sums(render::Layers(scene_), camera, image_of(shows, true), workspace_, light, on_part);
-    render::add_weight_sums(render::Layers(alone_), camera, image_of(mask::dilate(shows, rim_px), false), workspace_,
-                            alone, beside);
-    for (std::size_t row = 0; row < light.size(); ++row)
-      told_.light[row] += light[row], told_.on_part[row] += on_part[row];
+    const scene::Image shown = where_shown(of_part_, of_rest_);
+    if (std::ranges::count(shown.data, 1.0f) == 0) return;
+    for (std::vector<double>* sums : {&light_, &alone_light_}) std::ranges::fill(*sums, 0.0);
+    render::add_weight_sums(render::Layers(scene_), camera, shown, workspace_, light_, told_.on_part);
+    render::add_weight_sums(render::Layers(alone_), camera, beside(shown), workspace_, alone_light_, told_.beside);
+    for (std::size_t row = 0; row < light_.size(); ++row) told_.light[row] += light_[row];
     for (std::size_t i = 0; i < part_.size(); ++i) {
-      told_.alone[i] += alone[i], told_.beside[i] += beside[i];
-      if (alone[i] >= least_light) told_.shown[i] = std::max(told_.shown[i], light[part_[i]] / alone[i]);
+      told_.alone[i] += alone_light_[i];
+      if (alone_light_[i] >= trace_of_light)
+        told_.shown[i] = std::max(told_.shown[i], light_[part_[i]] / alone_light_[i]);
     }
-    compare_depths(scene_.mean, camera, of_part_, shows, told_);
+    compare_depths(scene_.mean, camera, of_part_, shown, told_.in_front, told_.behind);
   }
   [[nodiscard]] const Told& told() const { return told_; }
 
@@ -151,18 +129,22 @@ class Look {
   render::ForwardOptions depth_only_;
   render::Workspace workspace_;
   render::Rendering of_part_, of_rest_;
+  std::vector<double> light_, alone_light_;  ///< Of one picture: [rows], [rows of the part].
   Told told_;
 };
 
 }  // namespace
 
-Outskirts outskirts_of(const scene::GaussianCloud& scene, std::span<const std::uint32_t> part,
-                       std::span<const scene::Camera> cameras) {
+Result<Outskirts> outskirts_of(const scene::GaussianCloud& scene, std::span<const std::uint32_t> part,
+                               std::span<const scene::Camera> cameras, const std::function<Result<void>()>& looked) {
   Outskirts out;
   if (part.empty()) return out;
   Look look(scene, part);
-  const std::size_t count = std::min(cameras.size(), most_cameras);
-  for (std::size_t k = 0; k < count; ++k) look.from(scene::fit_within(cameras[k * cameras.size() / count], side));
+  const std::size_t count = std::min(cameras.size(), outskirts_cameras);
+  for (std::size_t k = 0; k < count; ++k) {
+    look.from(scene::fit_within(cameras[k * cameras.size() / count], outskirts_side));
+    if (auto going = looked(); !going) return propagate(going);
+  }
 
   const Told& told = look.told();
   double of_part = 0, of_backing = 0, of_haze = 0;

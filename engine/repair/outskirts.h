@@ -7,25 +7,36 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
+#include "engine/core/result.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/gaussian_cloud.h"
 
 namespace engine::repair {
 
+/// Cameras that are looked through at most, and pixels of the longer side of their pictures: choices.
+constexpr std::size_t outskirts_cameras = 48;
+constexpr int outskirts_side = 320;
+
 /// Rows by what pictures show of them. All ascending.
 struct Outskirts {
-  std::vector<std::uint32_t>
-      backing;  ///< Not of the part: what is seen of them is mostly seen on the part, from behind.
-  std::vector<std::uint32_t> buried;  ///< Of the part: no picture shows them, and without the rest they stick out.
+  /// Not of the part: what is seen of them is seen mostly on the part, from behind, and they have its colour.
+  std::vector<std::uint32_t> backing;
+  /// Of the part: none of the pictures shows half of them, as they lie in what stays or behind it; without that they
+  /// show beside the part.
+  std::vector<std::uint32_t> buried;
 };
 
-/// Looks at a part from up to 48 of the cameras, in pictures of 320 pixels; three forward passes and two sums of
-/// weights for each. Nothing where no camera shows it.
-///   part  rows, ascending
-[[nodiscard]] Outskirts outskirts_of(const scene::GaussianCloud& scene, std::span<const std::uint32_t> part,
-                                     std::span<const scene::Camera> cameras);
+/// Looks at a part from an even choice of the cameras: two forward passes and two
+/// sums of weights for each. Nothing where none shows it, nor where it is so little that nobody would see it.
+///   part     rows, ascending
+///   cameras  best those that show some of the part: what the others show is not asked
+///   looked   called after each camera; its error ends it
+[[nodiscard]] Result<Outskirts> outskirts_of(const scene::GaussianCloud& scene, std::span<const std::uint32_t> part,
+                                             std::span<const scene::Camera> cameras,
+                                             const std::function<Result<void>()>& looked);
 
 }  // namespace engine::repair

@@ -7,6 +7,7 @@
 
 #include "engine/core/rows.h"
 #include "engine/render/weight_sums.h"
+#include "engine/repair/part_shown.h"
 
 namespace engine::repair {
 namespace {
@@ -20,7 +21,6 @@ constexpr double was_there = 0.1;
 // By so much, root mean square over the pixels where they have a tenth, may a picture change without them: what hangs
 // before a floor has nearly its colour.
 constexpr double looks_alike = 0.03, tenth = 0.1;
-constexpr float covered = 0.5f;         // from this opacity of the part on a pixel shows it
 constexpr std::size_t most_views = 12;  // a choice, as the next one
 constexpr int side = 320;               // pixels
 
@@ -30,30 +30,6 @@ struct Told {
   std::vector<double> on_part;        ///< Of it, at pixels that show the part before what is solid of the rest.
   std::vector<int> in_front, behind;  ///< Views in which its mean is at such a pixel: before the part, or behind it.
 };
-
-/// Pixels that the part covers, and in which it is before the rest; 1, else 0. [1]
-scene::Image shows_part(const render::Rendering& part, const render::Rendering& rest) {
-  scene::Image shows(part.alpha.width, part.alpha.height, 1);
-  for (std::size_t i = 0; i < shows.data.size(); ++i) {
-    const float alpha = part.alpha.data[i], behind = rest.median_depth.data[i];
-    shows.data[i] = alpha > covered && (behind == 0 || part.depth.data[i] < behind * alpha) ? 1.0f : 0.0f;
-  }
-  return shows;
-}
-
-/// Notes which rows are before the part, and which behind it.
-void compare_depths(const Array3& means, const scene::Camera& view, const render::Rendering& part,
-                    const scene::Image& shows, Told& told) {
-  for (std::size_t row = 0; row < means.size(); ++row) {
-    const DVec3 p = view.cam_from_world(means.get(row));
-    if (!(p.z > 0)) continue;
-    const DVec2 pixel = view.pixel_from_cam(p);
-    if (!(pixel.x >= 0 && pixel.y >= 0 && pixel.x < view.width && pixel.y < view.height)) continue;
-    const int x = int(pixel.x), y = int(pixel.y);
-    if (shows.at(x, y) == 0) continue;
-    ++(p.z * double(part.alpha.at(x, y)) < double(part.depth.at(x, y)) ? told.in_front : told.behind)[row];
-  }
-}
 
 /// What the rows of a scene contribute.
 ///   part    rows of it
@@ -75,9 +51,9 @@ Told told_of(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> p
   for (const scene::Camera& view : views) {
     render::forward(alone, view, depth_only, {}, workspace, of_part);
     render::forward(rest, view, depth_only, {}, workspace, of_rest);
-    const scene::Image shows = shows_part(of_part, of_rest);
-    render::add_weight_sums(scene, view, shows, workspace, told.light, told.on_part);
-    compare_depths(cloud.mean, view, of_part, shows, told);
+    const scene::Image shown = where_shown(of_part, of_rest);
+    render::add_weight_sums(scene, view, shown, workspace, told.light, told.on_part);
+    compare_depths(cloud.mean, view, of_part, shown, told.in_front, told.behind);
   }
   return told;
 }

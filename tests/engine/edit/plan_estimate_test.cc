@@ -37,6 +37,7 @@ TEST(PlanEstimate, GrowsWithEverythingThatCosts) {
       {"candidates", [](Workload& w) { ++w.candidates; }},
       {"virtual views", [](Workload& w) { w.virtual_views = true; }},
       {"views", [](Workload& w) { ++w.views; }},
+      {"outskirts", [](Workload& w) { w.selected = true; }},
       {"picture size", [](Workload& w) { w.view_pixels *= 2; }},
       {"pictures", [](Workload& w) { ++w.pictured; }},
       {"a slower machine", [](Workload& w) { w.frame.gaussians *= 2; }},
