@@ -95,7 +95,8 @@ class Maker {
     if (!work_.selected || !work_.corrected || !work_.vacates || work_.iterations == 0) return 0;
     const double pixels = std::min(double(repair::outskirts_side * repair::outskirts_side), pixels_);
     const double frame = work_.frame.gaussians + work_.frame.pixel * pixels;
-    return double(std::min(work_.candidates, repair::outskirts_cameras)) * (outskirts_frames * frame + slow(row_seconds * n_));
+    return double(std::min(work_.candidates, repair::outskirts_cameras)) *
+           (outskirts_frames * frame + slow(row_seconds * n_));
   }
 
   /// What a moment shows.

@@ -17,7 +17,7 @@
 namespace engine::repair {
 namespace {
 
-constexpr double most_of_it = 0.5;        // of a row's light
+constexpr double most_of_it = 0.5;  // of a row's light
 // Of the light that a row has without what stays, less than so much is seen, in the picture that shows most of it.
 constexpr double hardly_seen = 0.5;
 // Pixels, over all pictures: less says nothing of a row; and in one picture: shares of less are noise. In scenes of
