@@ -46,11 +46,10 @@ std::string left_open(std::span<const Uncovered> views) {
          worst.view + "\"";
 }
 
-std::string buried_left_out(std::size_t rows) {
-  return std::to_string(rows) +
-         " Gaussians of the part do not arrive: they lie in what stays, where no camera sees them, and would hang "
-         "around "
-         "the part as a haze; crumbs \"keep\" takes them along";
+std::string outskirts_go(std::size_t backing, std::size_t buried) {
+  return "what nobody sees of the part by itself goes: " + std::to_string(backing) +
+         " Gaussians of its colour behind it, and " + std::to_string(buried) +
+         " of its own that lie in what stays; crumbs \"keep\" keeps them";
 }
 
 std::string faint_left_out(std::size_t copies) {

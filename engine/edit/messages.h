@@ -15,7 +15,7 @@ namespace engine::edit {
 [[nodiscard]] std::string no_view_sees_it();
 [[nodiscard]] std::string no_view_to_exclude(const std::string& name);
 [[nodiscard]] std::string handle_lost(std::size_t handle, int interval);  ///< handle: from 0
-[[nodiscard]] std::string buried_left_out(std::size_t rows);
+[[nodiscard]] std::string outskirts_go(std::size_t backing, std::size_t buried);
 [[nodiscard]] std::string faint_left_out(std::size_t copies);
 /// unprocessable, `where` is "handles".
 [[nodiscard]] Error leaves_nothing();

@@ -1,6 +1,7 @@
 #include "engine/edit/steps.h"
 
 #include <algorithm>
+#include <functional>
 #include <iterator>
 #include <optional>
 #include <string>
@@ -78,40 +79,52 @@ class Uncorrected {
   render::Workspace workspace_;
 };
 
-/// Does all that moves go away as a whole? What is held, or has anchors, bends where it is, and what is behind it is
-/// its inside. Of what does not move as a body nobody knows.
+bool is_at_rest(const Handle& handle) {
+  return handle.is_anchor() || (handle.end() == handle.source && !handle.rotation && handle.scale.value_or(1) == 1);
+}
+
+/// Does all that moves go away as a whole? What is held, or rests at a handle, bends where it is, and what is behind it
+/// is its inside. Of what does not move as a body nobody knows.
 bool leaves_as_a_whole(const Edit& edit) {
   using How = deform::Attachment::How;
   if (edit.request.mode == Mode::remove) return true;
-  const auto is_anchored = [&](int group) {
+  const auto is_pinned = [&](int group) {
     return std::ranges::any_of(edit.request.handles,
-                               [&](const Handle& handle) { return handle.group == group && handle.is_anchor(); });
+                               [&](const Handle& handle) { return handle.group == group && is_at_rest(handle); });
   };
   return !edit.parts.attachments.empty() &&
          std::ranges::all_of(edit.parts.attachments, [&](const deform::Attachment& part) {
-           return part.how == How::one_piece || (part.how == How::free && !is_anchored(part.group));
+           return part.how == How::one_piece || (part.how == How::free && !is_pinned(part.group));
          });
 }
 
-/// What pictures show to be of the part goes with it, and what they never showed of it does not arrive.
-Result<void> look_at_outskirts(State& state, Edit& edit, const ViewChoice& choice) {
+bool has_outskirts(const Edit& edit) {
   const Request& request = edit.request;
-  if (edit.corrector == nullptr || !edit.optimises() || !request.selected || request.crumbs == Crumbs::keep ||
-      request.mode == Mode::extend || !leaves_as_a_whole(edit))
-    return {};
+  return edit.corrector != nullptr && edit.optimises() && request.selected && request.crumbs != Crumbs::keep &&
+         request.mode != Mode::extend && leaves_as_a_whole(edit);
+}
+
+/// What pictures show to be of the part goes with it, and what they never showed of it does not arrive.
+///   advance  called with the part that is done; its error ends it
+Result<void> look_at_outskirts(State& state, Edit& edit, const ViewChoice& choice,
+                               const std::function<Result<void>(double)>& advance) {
+  const Request& request = edit.request;
   const Rows part = united(choice.moved, edit.given_up);
-  auto outskirts = repair::outskirts_of(edit.input, part, choice.witnesses, [&] { return edit.progress.advance(1); });
+  auto outskirts = repair::outskirts_of(edit.input, part, choice.witnesses, advance);
   if (!outskirts) return propagate(outskirts);
   std::erase_if(outskirts->backing, [&](std::uint32_t row) {
-    const bool stays = request.region && !deform::inside(deform::Box{request.region->center, request.region->size},
-                                                         DVec3(edit.input.mean.get(row)));
-    return stays || std::ranges::binary_search(request.healed, row);  // what is healed goes anyway
+    const bool is_outside = request.region && !deform::inside(deform::Box{request.region->center, request.region->size},
+                                                              DVec3(edit.input.mean.get(row)));
+    // What is healed goes anyway, and what is selected and rests where it is stays.
+    return is_outside || std::ranges::binary_search(request.healed, row) ||
+           state.scene.role()[row] != working::Role::frozen;
   });
-  state.report.crumbs += outskirts->backing.size();
+  if (request.mode != Mode::remove)
+    std::ranges::set_intersection(outskirts->buried, choice.moved, std::back_inserter(edit.buried));
+  if (edit.buried.size() == choice.moved.size()) edit.buried.clear();  // else nothing would arrive
   edit.given_up = united(edit.given_up, outskirts->backing);
-  if (request.mode == Mode::remove) return {};
-  std::ranges::set_intersection(outskirts->buried, choice.moved, std::back_inserter(edit.buried));
-  if (!edit.buried.empty()) state.report.warnings.push_back(buried_left_out(edit.buried.size()));
+  if (!outskirts->backing.empty() || !edit.buried.empty())
+    state.report.warnings.push_back(outskirts_go(outskirts->backing.size(), edit.buried.size()));
   return {};
 }
 
@@ -163,8 +176,10 @@ Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Cam
   for (const std::string& name : edit.params().exclude_views)
     if (std::ranges::none_of(edit.candidates, [&](const scene::Camera& c) { return c.name == name; }))
       warnings.push_back(no_view_to_exclude(name));
-  auto choice = choose_views(state.scene, edit.input, edit.candidates, edit.request, edit.parts,
-                             state.report.resolved.intervals, [&](double part) { return edit.progress.advance(part); });
+  const bool looks = has_outskirts(edit);  // which takes about as long as the choice
+  auto choice =
+      choose_views(state.scene, edit.input, edit.candidates, edit.request, edit.parts, state.report.resolved.intervals,
+                   [&](double part) { return edit.progress.advance(looks ? part / 2 : part); });
   if (!choice) return propagate(choice);
   if (!choice->moves)
     warnings.push_back(nothing_moves());
@@ -178,8 +193,11 @@ Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Cam
     edit.progress.refine(work);
   }
   for (const scene::Camera& view : state.views) state.masks.emplace_back(view.width, view.height);
-  if (choice->moves)
-    if (auto looked = look_at_outskirts(state, edit, *choice); !looked) return looked;
+  if (choice->moves && looks)
+    if (auto looked =
+            look_at_outskirts(state, edit, *choice, [&](double part) { return edit.progress.advance((1 + part) / 2); });
+        !looked)
+      return looked;
   Rows vanishing = united(edit.given_up, edit.buried);
   if (edit.corrector != nullptr) vanishing = united(vanishing, edit.request.healed);
   if (vanishing.empty()) return {};

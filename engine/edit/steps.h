@@ -54,7 +54,7 @@ struct Edit {
 [[nodiscard]] Result<State> assign_and_divide(Edit& edit);
 
 /// Step 5. Views: chosen from the candidates by what they see of the source and of the fully deformed target. A mask of
-/// each, still empty.
+/// each, of what vanishes: crumbs, and the outskirts of the part, which the candidates tell.
 ///   cameras  the dataset's; empty: the candidates are virtual
 [[nodiscard]] Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Camera> cameras);
 

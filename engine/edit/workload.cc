@@ -110,7 +110,8 @@ Workload workload_of(std::size_t gaussians, const Request& request, bool correct
   work.first_tuning = request.params.tuning_steps, work.later_tuning = request.params.tuning_steps_later;
   work.mean_strength = (request.params.strength_initial + request.params.strength_final) / 2;
   work.vacates = departure_of(request) == Mode::move;
-  work.selected = request.selected && request.crumbs != Crumbs::keep;
+  work.selected = request.selected && request.crumbs != Crumbs::keep &&
+                  (request.mode == Mode::remove || request.params.interpolation == Interpolation::arap);
   return work;
 }
 

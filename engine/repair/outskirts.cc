@@ -23,7 +23,7 @@ constexpr double hardly_seen = 0.5;
 // Pixels, over all pictures: less says nothing of a row; and in one picture: shares of less are noise. In scenes of
 // millions of rows few have a pixel to themselves.
 constexpr double least_light = 1, trace_of_light = 0.05;
-constexpr int rim_px = 2;                 // outlines are blurred by as much
+constexpr int rim_px = 2;                 // a choice: outlines are blurred
 constexpr std::size_t nearest_asked = 8;  // rows whose mean colour is compared: a choice
 // Of the part's light where it shows: what backs it has less, or what would stick out of it, where nobody would see it.
 // Three toys of a capture have 0.3 to 1.4 % and 31 to 125 %; captured cases, which need neither, 0.5 and 9 % at most.
@@ -36,7 +36,8 @@ struct Told {
   std::vector<int> in_front, behind;   ///< Pictures in which its mean is where the part shows: before it, behind it.
   // [rows of the part] Of the part without the rest:
   std::vector<double> alone, beside;  ///< Everywhere, and beside where the part shows in the scene.
-  std::vector<double> shown;          ///< Of the light of one picture, the largest share that the scene shows as well.
+  std::vector<double> shown;  ///< Of the light of one picture, the largest share that the scene shows as well; -1: none
+                              ///< shows enough of it to tell.
 };
 
 /// What is beside these pixels, and not so near that outlines blur it; 1, else 0. [1]
@@ -98,7 +99,8 @@ class Look {
     depth_only_.color = false, depth_only_.depth = true;
     light_ = told_.light = told_.on_part = std::vector<double>(scene.size());
     told_.in_front = told_.behind = std::vector<int>(scene.size());
-    alone_light_ = told_.alone = told_.beside = told_.shown = std::vector<double>(part.size());
+    alone_light_ = told_.alone = told_.beside = std::vector<double>(part.size());
+    told_.shown = std::vector<double>(part.size(), -1.0);
   }
   Look(const Look&) = delete;
   Look& operator=(const Look&) = delete;
@@ -136,14 +138,15 @@ class Look {
 }  // namespace
 
 Result<Outskirts> outskirts_of(const scene::GaussianCloud& scene, std::span<const std::uint32_t> part,
-                               std::span<const scene::Camera> cameras, const std::function<Result<void>()>& looked) {
+                               std::span<const scene::Camera> cameras,
+                               const std::function<Result<void>(double)>& looked) {
   Outskirts out;
   if (part.empty()) return out;
   Look look(scene, part);
   const std::size_t count = std::min(cameras.size(), outskirts_cameras);
   for (std::size_t k = 0; k < count; ++k) {
     look.from(scene::fit_within(cameras[k * cameras.size() / count], outskirts_side));
-    if (auto going = looked(); !going) return propagate(going);
+    if (auto going = looked(double(k + 1) / double(count)); !going) return propagate(going);
   }
 
   const Told& told = look.told();
@@ -151,7 +154,8 @@ Result<Outskirts> outskirts_of(const scene::GaussianCloud& scene, std::span<cons
   for (std::uint32_t row = 0, i = 0; row < scene.size(); ++row) {
     if (i < part.size() && part[i] == row) {
       of_part += told.on_part[row];
-      if (told.alone[i] >= least_light && told.shown[i] < hardly_seen && told.beside[i] > most_of_it * told.alone[i])
+      if (told.alone[i] >= least_light && told.shown[i] >= 0 && told.shown[i] < hardly_seen &&
+          told.beside[i] > most_of_it * told.alone[i])
         out.buried.push_back(row), of_haze += told.beside[i];
       ++i;
     } else if (told.light[row] >= least_light && told.on_part[row] > most_of_it * told.light[row] &&

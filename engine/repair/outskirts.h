@@ -34,9 +34,9 @@ struct Outskirts {
 /// sums of weights for each. Nothing where none shows it, nor where it is so little that nobody would see it.
 ///   part     rows, ascending
 ///   cameras  best those that show some of the part: what the others show is not asked
-///   looked   called after each camera; its error ends it
+///   looked   called after each camera with the part that is done, 0 to 1; its error ends it
 [[nodiscard]] Result<Outskirts> outskirts_of(const scene::GaussianCloud& scene, std::span<const std::uint32_t> part,
                                              std::span<const scene::Camera> cameras,
-                                             const std::function<Result<void>()>& looked);
+                                             const std::function<Result<void>(double)>& looked);
 
 }  // namespace engine::repair
