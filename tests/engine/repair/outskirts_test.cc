@@ -142,7 +142,7 @@ Seen after(const BackedThing& scene, bool repaired = true) {
     ADD_FAILURE() << outcome.error().message << " at " << outcome.error().where;
     return {};
   }
-  Seen seen{outcome->overlay.removed, outcome->report.crumbs};
+  Seen seen{outcome->overlay.removed, outcome->report.crumbs, false, {}};
   const auto& log_scale = outcome->overlay.rows.log_scale;
   for (std::size_t row = 0; row < log_scale.size(); ++row) seen.has_haze |= log_scale.get(row).x > -2.0f;
   for (const std::string& warning : outcome->report.warnings)
