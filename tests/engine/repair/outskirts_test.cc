@@ -87,7 +87,7 @@ TEST(Outskirts, HairsTooFineForAnyPictureAreNotJudged) {
   scene.cloud.opacity_logit[scene.in_wall[0]] = scene.cloud.opacity_logit[scene.in_wall[1]] = -9;
   for (int i = 0; i < 8000; ++i) {
     const Vec3 mean{-0.8f + 0.0016f * float(i % 1000), -0.55f - 0.08f * float(i / 1000), 0};
-    edit::add_gaussian(scene.cloud, mean, {0.001f, 0.02f, 0.001f}, -4.9f, {0.9f, 0.2f, 0.1f});
+    edit::add_gaussian(scene.cloud, mean, {0.001f, 0.02f, 0.001f}, -4.5f, {0.9f, 0.2f, 0.1f});
     scene.thing.push_back(std::uint32_t(scene.cloud.size() - 1));
   }
   EXPECT_TRUE(of(scene).buried.empty());
