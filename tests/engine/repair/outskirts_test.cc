@@ -74,7 +74,8 @@ TEST(Outskirts, AFringeOfHairsThatAreSeenIsNotBuried) {
   for (std::size_t k = 0; scene.cameras.size() < 42; ++k) scene.cameras.push_back(scene::Camera(scene.cameras[k]));
   scene.cloud.opacity_logit[scene.in_wall[0]] = scene.cloud.opacity_logit[scene.in_wall[1]] = -9;
   for (int i = 0; i < 536; ++i) {  // each below a pixel in any picture, together more than a tenth of the thing
-    const Vec3 mean{-0.8f + 0.012f * float(i % 134), -0.55f - 0.08f * float(i / 134), 0};
+    const int line = i / 134;
+    const Vec3 mean{-0.8f + 0.012f * float(i % 134), -0.55f - 0.08f * float(line), 0};
     edit::add_gaussian(scene.cloud, mean, {0.004f, 0.02f, 0.004f}, -2.2f, {0.9f, 0.2f, 0.1f});
     scene.thing.push_back(std::uint32_t(scene.cloud.size() - 1));
   }
@@ -86,7 +87,8 @@ TEST(Outskirts, HairsTooFineForAnyPictureAreNotJudged) {
   for (std::size_t k = 0; scene.cameras.size() < 42; ++k) scene.cameras.push_back(scene::Camera(scene.cameras[k]));
   scene.cloud.opacity_logit[scene.in_wall[0]] = scene.cloud.opacity_logit[scene.in_wall[1]] = -9;
   for (int i = 0; i < 8000; ++i) {
-    const Vec3 mean{-0.8f + 0.0016f * float(i % 1000), -0.55f - 0.08f * float(i / 1000), 0};
+    const int line = i / 1000;
+    const Vec3 mean{-0.8f + 0.0016f * float(i % 1000), -0.55f - 0.08f * float(line), 0};
     edit::add_gaussian(scene.cloud, mean, {0.001f, 0.02f, 0.001f}, -4.5f, {0.9f, 0.2f, 0.1f});
     scene.thing.push_back(std::uint32_t(scene.cloud.size() - 1));
   }
