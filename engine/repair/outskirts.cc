@@ -12,7 +12,7 @@
 #include "engine/render/forward.h"
 #include "engine/render/weight_sums.h"
 #include "engine/repair/part_shown.h"
-#include "engine/scene/sh.h"
+#include "engine/scene/base_color.h"
 
 namespace engine::repair {
 namespace {
@@ -50,13 +50,6 @@ scene::Image beside(const scene::Image& shown) {
   return out;
 }
 
-Vec3 color_of(const scene::GaussianCloud& cloud, std::size_t row) {
-  const std::size_t stride = scene::sh_coefficients(cloud.sh_degree);
-  Vec3 color;
-  for (int c = 0; c < 3; ++c) color[c] = 0.5f + float(scene::sh_c0) * cloud.sh_row(row)[std::size_t(c) * stride];
-  return color;
-}
-
 /// The mean colour of those of `rows` that are nearest to each row of `of`; infinitely far from any where there are
 /// none.
 std::vector<Vec3> colors_around(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
@@ -68,7 +61,7 @@ std::vector<Vec3> colors_around(const scene::GaussianCloud& cloud, std::span<con
   const auto nearest = neighbours::PointIndex(neighbours::points_of(cloud.mean, rows, origin), 3)
                            .nearest(neighbours::points_of(cloud.mean, of, origin), asked);
   for (std::size_t k = 0; k < nearest.size(); ++k)
-    out[k / asked] += color_of(cloud, rows[nearest[k].index]) / float(asked);
+    out[k / asked] += scene::base_color(cloud, rows[nearest[k].index]) / float(asked);
   return out;
 }
 
@@ -84,7 +77,7 @@ std::vector<std::uint32_t> of_the_colour(const scene::GaussianCloud& scene, std:
   const std::vector<Vec3> of_part = colors_around(scene, part, rows), of_rest = colors_around(scene, rest, rows);
   std::vector<std::uint32_t> out;
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    const Vec3 color = color_of(scene, rows[i]);
+    const Vec3 color = scene::base_color(scene, rows[i]);
     if (glm::distance(color, of_part[i]) < glm::distance(color, of_rest[i])) out.push_back(rows[i]);
   }
   return out;

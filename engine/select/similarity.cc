@@ -6,7 +6,7 @@
 
 #include "engine/core/parallel.h"
 #include "engine/render/project.h"
-#include "engine/scene/sh.h"
+#include "engine/scene/base_color.h"
 #include "engine/select/shapes.h"
 
 namespace engine::select {
@@ -132,11 +132,7 @@ std::vector<Vec3> smoothed(const neighbours::NeighbourGraph& graph, std::span<co
 }  // namespace
 
 Vec3 color_of(const scene::GaussianCloud& cloud, std::size_t row) {
-  const std::size_t stride = scene::sh_coefficients(cloud.sh_degree);
-  Vec3 color;
-  for (int c = 0; c < 3; ++c)
-    color[c] = std::clamp(0.5f + float(scene::sh_c0) * cloud.sh_row(row)[std::size_t(c) * stride], 0.0f, 1.0f);
-  return color;
+  return glm::clamp(scene::base_color(cloud, row), 0.0f, 1.0f);
 }
 
 std::vector<float> similarity_of_edges(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
