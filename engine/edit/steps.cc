@@ -181,7 +181,7 @@ Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Cam
       choose_views(state.scene, edit.input, edit.candidates, edit.request, edit.parts, state.report.resolved.intervals,
                    [&](double part) { return edit.progress.advance(looks ? part / 2 : part); });
   if (!choice) return propagate(choice);
-  if (!choice->moves)
+  if (choice->moved.empty())
     warnings.push_back(nothing_moves());
   else if (choice->views.empty())
     warnings.push_back(no_view_sees_it());
@@ -193,7 +193,7 @@ Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Cam
     edit.progress.refine(work);
   }
   for (const scene::Camera& view : state.views) state.masks.emplace_back(view.width, view.height);
-  if (choice->moves && looks)
+  if (!choice->moved.empty() && looks)
     if (auto looked =
             look_at_outskirts(state, edit, *choice, [&](double part) { return edit.progress.advance((1 + part) / 2); });
         !looked)

@@ -99,9 +99,8 @@ Result<ViewChoice> choose_views(const WorkingScene& begun, const scene::Gaussian
                                 int intervals, const std::function<Result<void>(double)>& advance) {
   DryRun dry = dry_run(begun, input, request, parts, intervals);
   ViewChoice choice;
-  choice.moves = !dry.changed.empty();
   std::vector<std::uint32_t> sources_of = dry.changed;
-  if (!choice.moves && request.params.optimise_unmoved) dry.copies = sources_of = begun.dragged_rows();
+  if (dry.changed.empty() && request.params.optimise_unmoved) dry.copies = sources_of = begun.dragged_rows();
   render::Layers layers(begun.cloud());
   layers.top = &dry.top;
   layers.hidden = layers.changed = dry.changed;

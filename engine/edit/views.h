@@ -32,8 +32,8 @@ constexpr int comparison_side = 192;
 /// What is to be seen: the dragged part before the edit, and after the whole drag without corrections.
 struct ViewChoice {
   std::vector<scene::Camera> views;  ///< Up to params.views, best first, scaled to the working picture size.
-  bool moves = false;                ///< Does the drag move anything?
-  std::vector<std::uint32_t> moved;  ///< Rows of the scene that it moves, or removes, ascending.
+  std::vector<std::uint32_t>
+      moved;  ///< Rows of the scene that it moves, or removes, ascending. None: it moves nothing.
   /// Candidates that show some of that where it is.
   std::vector<scene::Camera> witnesses;
 };
