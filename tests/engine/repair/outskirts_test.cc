@@ -69,30 +69,31 @@ TEST(Outskirts, OfNothingOrFromNowhereThereAreNone) {
   }
 }
 
-TEST(Outskirts, AFringeOfHairsThatAreSeenIsNotBuried) {
+/// A thing with lines of hairs beside it, seen by 42 cameras, and nothing of it in the wall.
+struct Hairs {
+  int lines = 0, per_line = 0;
+  float extent = 0, logit = 0;
+};
+BackedThing with(const Hairs& hairs) {
   BackedThing scene;
   for (std::size_t k = 0; scene.cameras.size() < 42; ++k) scene.cameras.push_back(scene::Camera(scene.cameras[k]));
-  scene.cloud.opacity_logit[scene.in_wall[0]] = scene.cloud.opacity_logit[scene.in_wall[1]] = -9;
-  for (int i = 0; i < 536; ++i) {  // each below a pixel in any picture, together more than a tenth of the thing
-    const int line = i / 134;
-    const Vec3 mean{-0.8f + 0.012f * float(i % 134), -0.55f - 0.08f * float(line), 0};
-    edit::add_gaussian(scene.cloud, mean, {0.004f, 0.02f, 0.004f}, -2.2f, {0.9f, 0.2f, 0.1f});
-    scene.thing.push_back(std::uint32_t(scene.cloud.size() - 1));
-  }
-  EXPECT_TRUE(of(scene).buried.empty());
+  for (const std::uint32_t row : scene.in_wall) scene.cloud.opacity_logit[row] = -9;
+  for (int line = 0; line < hairs.lines; ++line)
+    for (int i = 0; i < hairs.per_line; ++i) {
+      const Vec3 mean{-0.8f + 1.6f / float(hairs.per_line) * float(i), -0.55f - 0.08f * float(line), 0};
+      edit::add_gaussian(scene.cloud, mean, {hairs.extent, 0.02f, hairs.extent}, hairs.logit, {0.9f, 0.2f, 0.1f});
+      scene.thing.push_back(std::uint32_t(scene.cloud.size() - 1));
+    }
+  return scene;
+}
+
+TEST(Outskirts, AFringeOfHairsThatAreSeenIsNotBuried) {
+  // Each below a pixel in any picture, together more than a tenth of the thing.
+  EXPECT_TRUE(of(with({.lines = 4, .per_line = 134, .extent = 0.004f, .logit = -2.2f})).buried.empty());
 }
 
 TEST(Outskirts, HairsTooFineForAnyPictureAreNotJudged) {
-  BackedThing scene;
-  for (std::size_t k = 0; scene.cameras.size() < 42; ++k) scene.cameras.push_back(scene::Camera(scene.cameras[k]));
-  scene.cloud.opacity_logit[scene.in_wall[0]] = scene.cloud.opacity_logit[scene.in_wall[1]] = -9;
-  for (int i = 0; i < 8000; ++i) {
-    const int line = i / 1000;
-    const Vec3 mean{-0.8f + 0.0016f * float(i % 1000), -0.55f - 0.08f * float(line), 0};
-    edit::add_gaussian(scene.cloud, mean, {0.001f, 0.02f, 0.001f}, -4.5f, {0.9f, 0.2f, 0.1f});
-    scene.thing.push_back(std::uint32_t(scene.cloud.size() - 1));
-  }
-  EXPECT_TRUE(of(scene).buried.empty());
+  EXPECT_TRUE(of(with({.lines = 8, .per_line = 1000, .extent = 0.001f, .logit = -4.5f})).buried.empty());
 }
 
 TEST(Outskirts, FarFromTheOriginAreTheSame) {
