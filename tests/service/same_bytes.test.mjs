@@ -132,8 +132,7 @@ test('over REST: an edit of an edit', { skip }, async () => {
   expectSame('an edit of an edit', await partsOf(await client.succeeded(id)));
 });
 
-// With so many iterations that a stop arrives between two intervals.
-const long = { ...requestOf('many intervals, corrected'), params: { ...requestOf('many intervals, corrected').params, iterations: 400 } };
+const long = requestOf('many intervals, corrected');
 /// Stops the long edit when an interval is finished: {kept, parts}. The next has mostly begun before the order comes, and
 /// is then finished, too.
 const stoppedAfter = async (interval) => {
@@ -143,23 +142,27 @@ const stoppedAfter = async (interval) => {
   const edit = await client.succeeded(id);
   return { kept: edit.finished_intervals.length, parts: await partsOf(edit) };
 };
-const nameOfStopped = (kept) => kept === long.params.intervals ? 'a long edit' : `a long edit, stopped after ${kept} of ${long.params.intervals}`;
+const nameOfStopped = (kept) => kept === long.params.intervals ? 'many intervals, corrected' : `many intervals, stopped after ${kept} of ${long.params.intervals}`;
 
 test('over REST: an edit stopped early', { skip }, async () => {
-  for (const interval of rewriting ? [1, 2, 3] : [1, 3]) {
+  const stop = async (interval) => {
     const { kept, parts } = await stoppedAfter(interval);
     assert.ok(kept >= interval);
     // The moment in which an order leaves only the first is too short to make a row of it.
     if (kept > 1) expectSame(nameOfStopped(kept), parts);
+  };
+  if (!rewriting)
+    for (const interval of [1, 2]) await stop(interval);
+  for (let kept = 2; kept < long.params.intervals; ++kept) {
+    // How many are kept is for the machine to say; a new table needs each.
+    for (let earlier = 1; rewriting && !table[nameOfStopped(kept)]; earlier = 1 - earlier) await stop(kept - earlier);
+    used.add(nameOfStopped(kept));
   }
-  for (let kept = 2; kept < long.params.intervals; ++kept) used.add(nameOfStopped(kept));
 });
 
 test('over REST: an edit killed twice and resumed with other numbers of threads', { skip }, async () => {
-  const undisturbed = await client.succeeded((await client.submit({ scene, version: 0, ...long })).id);
-  expectSame(nameOfStopped(long.params.intervals), await partsOf(undisturbed));
   const { id } = await client.submit({ scene, version: 0, ...long });
-  for (const [interval, threads] of [[1, 3], [3, 1]]) {
+  for (const [interval, threads] of [[1, 3], [2, 1]]) {
     await client.until(id, (edit) => edit.interval >= interval && edit.stage === 'optimise', { every: 5 });
     await service.kill();
     service.args = ['--simd', simd, '--threads', threads];
