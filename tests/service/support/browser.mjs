@@ -73,11 +73,17 @@ export const handOn = ({ page, id }) => {
   }, wanted, { timeout });
   /// The camera of the picture, and where that is on the screen.
   const looksFrom = async () => {
-    await page.waitForTimeout(600);  // it saves a little later
-    const pose = await page.evaluate(() => {
-      const id = location.hash.split('/').at(-1);
-      return JSON.parse(localStorage.getItem(`splatdrag.scene.${id}`)).pose;
-    });
+    // It saves a little later; at once where it might be left. What is twice the same has come to rest.
+    const saved = () => page.evaluate(() => {
+      dispatchEvent(new Event('pagehide'));
+      return localStorage.getItem(`splatdrag.scene.${location.hash.split('/').at(-1)}`);
+    }).then((text) => JSON.parse(text).pose);
+    let pose, before;
+    do {
+      before = pose;
+      pose = await saved();
+      await page.waitForTimeout(100);
+    } while (JSON.stringify(pose) !== JSON.stringify(before));
     const box = await id('view').boundingBox();
     return { camera: { ...pose, width: box.width, height: box.height }, box };
   };
