@@ -35,4 +35,10 @@ constexpr double degree = std::numbers::pi / 180;
 [[nodiscard]] Plan opened_mouth();
 [[nodiscard]] Plan opened_mouth_carelessly();
 
+// Plans of things of several parts, in plans_of_homes.cc.
+[[nodiscard]] Plan can_on_floor();
+[[nodiscard]] Plan chair_on_carpet();
+[[nodiscard]] Plan teddy_on_sofa();
+[[nodiscard]] Plan lamp_on_table();
+
 }  // namespace engine::captures

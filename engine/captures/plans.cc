@@ -314,7 +314,11 @@ const std::vector<NamedPlan>& known_plans() {
                                           {"plant", bent_plant},
                                           {"mouth", opened_mouth},
                                           {"mug_careless", mug_selected_carelessly},
-                                          {"mouth_careless", opened_mouth_carelessly}};
+                                          {"mouth_careless", opened_mouth_carelessly},
+                                          {"can", can_on_floor},
+                                          {"chair", chair_on_carpet},
+                                          {"teddy", teddy_on_sofa},
+                                          {"lamp", lamp_on_table}};
   return all;
 }
 
