@@ -10,6 +10,7 @@
 
 #include "engine/core/parallel.h"
 #include "engine/neighbours/morton.h"
+#include "engine/select/leftovers.h"
 #include "engine/select/natural_border.h"
 #include "engine/select/random_walk.h"
 #include "engine/select/similarity.h"
@@ -37,7 +38,8 @@ constexpr double far_border = 0.9;         // of the reach: from here on, rows a
 constexpr double leak_at_extent = 3e-3;
 constexpr double leak_farther = 4.0;  // times that, at most: clicks side by side say little of a large thing
 // So many clicks around a thing tell where it ends better than distances do (of the doll with two outside clicks, a
-// leak gains 20 to 60 of precision, with three and more nothing; of a mug's back it loses 5 of recall then).
+// leak gains 20 to 60 of precision, with three and more nothing; of a mug's back it loses 5 of recall then). Whoever
+// clicks there more often still has seen what is left over, and says what of it belongs to the thing.
 constexpr std::size_t clicks_around = 3;
 
 std::vector<double> squared_distances(const Array3& mean, DVec3 from) {
@@ -207,7 +209,8 @@ Result<Grown> Neighbourhood::grow(const scene::GaussianCloud& cloud, const Grow&
   auto seeds = seeds_of(cloud, grow);
   if (!seeds) return propagate(seeds);
   if (distinct(seeds->clicked.outside).size() < clicks_around) seeds->leak = leak_beyond(seeds->clicked.inside);
-  const NaturalBorder border = grow.whole ? whole_border(*seeds, grow.wider) : border_of(*seeds, {false, grow.wider});
+  NaturalBorder border = grow.whole ? whole_border(*seeds, grow.wider) : border_of(*seeds, {false, grow.wider});
+  take_leftovers(*seeds, border.inside);
   return Grown{rows_where_marked(border.inside), border.wider, border.more, border.less, is_cut_short_};
 }
 
@@ -217,8 +220,14 @@ Result<Grown> Neighbourhood::grow_beyond(const scene::GaussianCloud& cloud, cons
   if (!seeds) return propagate(seeds);
   for (std::size_t node = 0; node < rows_.size(); ++node)
     if (std::binary_search(rows.begin(), rows.end(), rows_[node])) seeds->given[node] = Given::inside;
-  const NaturalBorder border = border_of(*seeds, {.wider = farther, .beyond = true});
+  NaturalBorder border = border_of(*seeds, {.wider = farther, .beyond = true});
+  if (farther > 0) take_leftovers(*seeds, border.inside);
   return Grown{rows_where_marked(border.inside), border.wider, border.more, border.less, is_cut_short_};
+}
+
+void Neighbourhood::take_leftovers(const Seeds& seeds, std::vector<std::uint8_t>& inside) const {
+  if (distinct(seeds.clicked.outside).size() > clicks_around) return;
+  select::take_leftovers(graph_, weight_, seeds.given, seeds.clicked.outside, inside);
 }
 
 NaturalBorder Neighbourhood::border_of(const Seeds& seeds, BorderChoice choice) const {

@@ -68,8 +68,8 @@ class Neighbourhood {
   [[nodiscard]] bool is_cut_short() const { return is_cut_short_; }
 
   /// The rows of the thing: those from which a random walk rather ends at the inside points, up to the natural border
-  /// (natural_border.h). What lies at the reach is outside unless a point says otherwise; outside points beyond it
-  /// count for nothing.
+  /// (natural_border.h), and its leftovers (leftovers.h) unless there are more than three outside points. What lies at
+  /// the reach is outside unless a point says otherwise; outside points beyond it count for nothing.
   ///   cloud    that this was made of
   ///   grow     with this object's surroundings
   ///   errors   unprocessable, `where` = "inside[1]": no row within reach, the point is beyond it, or outside points
@@ -110,6 +110,8 @@ class Neighbourhood {
   std::uint32_t claim(const scene::GaussianCloud& cloud, DVec3 point, Given side,
                       std::map<std::uint32_t, Claim>& claims) const;
   [[nodiscard]] NaturalBorder border_of(const Seeds& seeds, BorderChoice choice) const;
+  /// select::take_leftovers(), but where many outside clicks say where the thing ends.
+  void take_leftovers(const Seeds& seeds, std::vector<std::uint8_t>& inside) const;
   [[nodiscard]] DVec3 place_of(std::uint32_t node) const;  ///< Relative to the middle.
   /// How likely a walk ends outside at each node: the farther it is from all clicks, by the square. Who clicks several
   /// times does so all over the thing, so that it extends about as far as the clicks do: as `n` values that are drawn
