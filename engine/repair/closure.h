@@ -35,7 +35,7 @@ struct Bounds {
 
 class Closure {
  public:
-  /// About two seconds for 48 views on two cores, and 80 MB.
+  /// One to two seconds of computing for 48 views, and 80 MB.
   ///   space  what has left, world units. Where it has no extent there is no closure
   Closure(const Bounds& space, std::span<const SpaceView> views);
 

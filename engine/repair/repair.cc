@@ -345,6 +345,20 @@ std::vector<std::uint32_t> Repair::left_out(const Rows& rows) const {
   return hidden;
 }
 
+void Repair::close_place(const WorkingScene& working, const Rows& rows) {
+  const std::vector<std::uint32_t> hidden = left_out(rows);
+  std::optional<Surveyed> surveyed;
+  // Seeds, which each optimisation changes, would show: only where nothing but the input does, all is as it was.
+  if (std::ranges::includes(hidden, working.member_rows())) surveyed = {open_, hidden};
+  if (closure_ && surveyed && surveyed == surveyed_) return;
+  closure_.reset();
+  surveyed_ = std::move(surveyed);
+  if (open_.empty()) return;
+  render::Layers known(working.cloud());
+  known.hidden = hidden;
+  closure_.emplace(most_of(original_, open_), survey(known, original_, open_, witnesses_, workspace_));
+}
+
 scene::Image Repair::closing(const WorkingScene& working, const Rows& rows, std::size_t v,
                              const scene::Image& surface) {
   const scene::Camera& view = views_[v];
@@ -500,14 +514,9 @@ Result<Corrected> Repair::walk(WorkingScene& working, std::span<const scene::Mas
                      (in_turn ? 0 : shown_views * views);
   double done = 0;  // in views
   const auto advance_by = [&](double more) { return advance(std::min((done += more) / all, 1.0)); };
-  closure_.reset();
-  if (!open_.empty()) {
-    const std::vector<std::uint32_t> hidden = left_out(rows);
-    render::Layers known(working.cloud());
-    known.hidden = hidden;
-    closure_.emplace(most_of(original_, open_), survey(known, original_, open_, witnesses_, workspace_));
+  close_place(working, rows);
+  if (!open_.empty())
     if (auto going = advance_by(closure_views); !going) return propagate(going);
-  }
   const auto telling = most_telling_view(working, rows, round, [&] { return advance_by(telling_views); });
   if (!telling) return propagate(telling);
   auto charted = complete_chart(working, rows, *telling, round);

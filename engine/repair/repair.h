@@ -58,8 +58,9 @@ struct Round {
   bool arrives = false;  ///< The interval is the last one: what moved stays where it is now.
 };
 
-/// Corrects the views of one edit. What it knows of the unedited scene is made once; nothing else is carried from one
-/// correction to the next, so an edit that goes on after an interval makes a new one.
+/// Corrects the views of one edit. What it knows of the unedited scene is made once; from one correction to the next
+/// nothing else is carried but a closure that would be the same, so an edit that goes on after an interval makes a new
+/// one.
 class Repair {
  public:
   ///   original   the scene as the edit found it, in the frame of the edit
@@ -115,6 +116,13 @@ class Repair {
     Uncovered uncovered;
   };
 
+  /// What a closure is made from, but for the input.
+  struct Surveyed {
+    std::vector<std::uint32_t> open;    ///< As open_.
+    std::vector<std::uint32_t> hidden;  ///< left_out()
+    bool operator==(const Surveyed&) const = default;
+  };
+
   struct Telling {
     std::size_t view = 0;
     ContinuedSurfaces surfaces;  ///< In it.
@@ -157,6 +165,8 @@ class Repair {
                                                    const Round& round);
   /// What has left, and rows that nobody has seen: without them shows what is known.
   [[nodiscard]] std::vector<std::uint32_t> left_out(const Rows& rows) const;
+  /// Makes the closure of what the part has left, or keeps it where it would be the same.
+  void close_place(const WorkingScene& working, const Rows& rows);
   /// What closes the place in view v where no surface goes on: [1] inverse depth; 0: nothing does.
   ///   surface  the same of those that go on
   [[nodiscard]] scene::Image closing(const WorkingScene& working, const Rows& rows, std::size_t v,
@@ -193,6 +203,7 @@ class Repair {
   std::vector<std::uint32_t> open_;     ///< Rows of the input whose place is empty now, ascending.
   std::vector<scene::Mask> vacated_;    ///< Per view: what the part has left.
   std::optional<Closure> closure_;      ///< Of what the part has left.
+  std::optional<Surveyed> surveyed_;    ///< Of the closure, where nothing else that an edit changes showed.
   std::vector<scene::Image> far_side_;  ///< Per view: of what the part has left. See far_side().
   render::Workspace workspace_;
   std::vector<float> trust_;                         ///< Of the rows of the working scene, in the correction at hand.

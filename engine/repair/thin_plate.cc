@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "engine/core/parallel.h"
+#include "engine/repair/relaxation.h"
 
 namespace engine::repair {
 namespace {
@@ -16,11 +17,6 @@ constexpr int reach = 8;
 constexpr float stiffness = 4;
 constexpr int coarsest = 16;                                // nodes along the longest edge
 constexpr int sweeps_on_finest = 60, times_on_coarser = 3;  // an eighth of the nodes, which smooth changes come from
-constexpr float over_relaxation = 1.6f;                     // below 2, where it no longer settles: a choice
-// Nodes of one colour have no node in common that is next to both, so that they can be relaxed at once: no
-// difference of x + 2 y + 3 z between nodes up to two steps apart is a multiple of seven.
-constexpr int colors = 7;
-constexpr std::size_t nodes_per_task = 4096;  // a choice
 
 /// One resolution of the function.
 struct Level {
@@ -71,146 +67,19 @@ void widen(const GridSize& size, int by, std::vector<std::uint8_t>& marked) {
   }
 }
 
-using Offset = std::array<int, 3>;
-
-/// The nodes that the bending at a node and its neighbours depends on: those up to two steps away.
-constexpr std::array<Offset, 25> stencil = [] {
-  std::array<Offset, 25> out{};
-  std::size_t count = 0;
-  for (int z = -2; z <= 2; ++z)
-    for (int y = -2; y <= 2; ++y)
-      for (int x = -2; x <= 2; ++x)
-        if (std::max(x, -x) + std::max(y, -y) + std::max(z, -z) <= 2) out[count++] = {x, y, z};
-  return out;
-}();
-constexpr std::uint32_t everywhere = (1u << stencil.size()) - 1;
-
-constexpr std::size_t cell_of(const Offset& by) { return std::size_t(by[0] + 2 + 5 * (by[1] + 2 + 5 * (by[2] + 2))); }
-/// A bit for each node of the stencil, by cell_of().
-constexpr std::array<std::uint32_t, 125> bits = [] {
-  std::array<std::uint32_t, 125> out{};
-  for (std::size_t k = 0; k < stencil.size(); ++k) out[cell_of(stencil[k])] = 1u << k;
-  return out;
-}();
-
 float bounded(float value, Knowledge known) {
   if (known == Knowledge::not_negative) return std::max(value, 0.0f);
   if (known == Knowledge::not_positive) return std::min(value, 0.0f);
   return value;
 }
 
-/// Relaxes one level, node by node.
-class Relaxation {
- public:
-  ///   around  nodes around the unknown ones that are relaxed as well
-  ///   pull    weight of what is known, beside that of bending
-  Relaxation(Level& level, int around, float pull) : level_(level), pull_(pull), measured_(level.values) {
-    const GridSize& size = level.size;
-    const auto row = std::ptrdiff_t(size[0]);
-    stride_ = {1, row, row * size[1]};
-    is_free_.resize(level.known.size());
-    for (std::size_t node = 0; node < is_free_.size(); ++node) is_free_[node] = level.known[node] == Knowledge::nothing;
-    widen(size, around, is_free_);
-    for (int z = 0; z < size[2]; ++z)
-      for (int y = 0; y < size[1]; ++y)
-        for (int x = 0; x < size[0]; ++x)
-          if (const std::size_t node = node_index(size, x, y, z); is_free_[node] != 0)
-            places_[std::size_t((x + 2 * y + 3 * z) % colors)].push_back({std::uint32_t(node), around_of({x, y, z})});
-  }
-
-  [[nodiscard]] std::span<const std::uint8_t> is_free() const { return is_free_; }  ///< [nodes] Those that are relaxed.
-  void run(int sweeps) {
-    for (int sweep = 0; sweep < sweeps; ++sweep)
-      for (const std::vector<Place>& alike : places_)
-        parallel_for(alike.size(), nodes_per_task, [&](std::size_t begin, std::size_t end) {
-          for (std::size_t k = begin; k < end; ++k) relax(alike[k]);
-        });
-  }
-
- private:
-  struct Place {
-    std::uint32_t node = 0;
-    std::uint32_t around = 0;  ///< Those `bits` whose nodes are relaxed as well.
-  };
-  /// First and second derivative of what is minimised by the value of one node, but for a factor of 2.
-  struct Bending {
-    float slope = 0, curvature = 0;
-  };
-
-  [[nodiscard]] std::uint32_t around_of(const Offset& at) const {
-    std::uint32_t out = 0;
-    for (std::size_t k = 0; k < stencil.size(); ++k) {
-      Offset there{};
-      bool is_inside = true;
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        there[axis] = at[axis] + stencil[k][axis];
-        is_inside = is_inside && there[axis] >= 0 && there[axis] < level_.size[axis];
-      }
-      if (is_inside && is_free_[node_index(level_.size, there[0], there[1], there[2])] != 0) out |= 1u << k;
-    }
-    return out;
-  }
-  [[nodiscard]] std::ptrdiff_t step(const Offset& by) const {
-    return by[0] * stride_[0] + by[1] * stride_[1] + by[2] * stride_[2];
-  }
-
-  /// Sets a node to what is least for it alone, and beyond.
-  void relax(const Place& place) {
-    auto [slope, curvature] = place.around == everywhere ? bending_within(place.node) : bending_at_rim(place);
-    float& value = level_.values[place.node];
-    const Knowledge known = level_.known[place.node];
-    if (known == Knowledge::value) slope += pull_ * (value - measured_[place.node]), curvature += pull_;
-    if (!(curvature > 0)) return;  // too few are around for anything to bend
-    value = bounded(value - over_relaxation * slope / curvature, known);
-  }
-
-  /// Where all of the stencil is relaxed: the biharmonic operator.
-  [[nodiscard]] Bending bending_within(std::uint32_t node) const {
-    const float* const value = level_.values.data() + node;
-    float beside = 0, diagonal = 0, beyond = 0;
-    for (std::size_t a = 0; a < 3; ++a) {
-      const std::ptrdiff_t u = stride_[a], v = stride_[(a + 1) % 3];
-      beside += value[u] + value[-u];
-      diagonal += value[u + v] + value[u - v] + value[v - u] + value[-u - v];
-      beyond += value[2 * u] + value[-2 * u];
-    }
-    return {42 * value[0] - 12 * beside + 2 * diagonal + beyond, 42};
-  }
-
-  /// Else the sum over those second differences whose nodes are all relaxed.
-  [[nodiscard]] Bending bending_at_rim(const Place& place) const {
-    const float* const value = level_.values.data() + place.node;
-    Bending out;
-    const auto is_there = [&](const Offset& by) { return (place.around & bits[cell_of(by)]) != 0; };
-    for (std::size_t a = 0; a < 3; ++a)
-      for (int middle = -1; middle <= 1; ++middle) {
-        Offset before{}, at{}, after{};
-        before[a] = middle - 1, at[a] = middle, after[a] = middle + 1;
-        if (!is_there(before) || !is_there(at) || !is_there(after)) continue;
-        const float difference = value[step(before)] - 2 * value[step(at)] + value[step(after)];
-        const float share = middle == 0 ? -2.0f : 1.0f;
-        out.slope += share * difference, out.curvature += share * share;
-      }
-    for (std::size_t a = 0; a < 3; ++a)
-      for (const int u : {-1, 1})
-        for (const int v : {-1, 1}) {
-          Offset first{}, second{}, both{};
-          first[a] = both[a] = u, second[(a + 1) % 3] = both[(a + 1) % 3] = v;
-          if (!is_there(first) || !is_there(second) || !is_there(both)) continue;
-          // Twice: the mixed derivatives of a plate are two.
-          out.slope += 2 * (value[0] - value[step(first)] - value[step(second)] + value[step(both)]);
-          out.curvature += 2;
-        }
-    return out;
-  }
-
-  Level& level_;
-  float pull_;
-  std::array<std::ptrdiff_t, 3> stride_{};
-  std::vector<float> measured_;
-  std::vector<std::uint8_t> is_free_;  ///< Nodes that are relaxed.
-  std::array<std::vector<Place>, colors> places_;
-};
+/// Nodes that are relaxed: the unknown ones, and those at most `around` from one along each axis.
+std::vector<std::uint8_t> free_nodes(const Level& level, int around) {
+  std::vector<std::uint8_t> out(level.known.size());
+  std::ranges::transform(level.known, out.begin(), [](Knowledge known) { return known == Knowledge::nothing; });
+  widen(level.size, around, out);
+  return out;
+}
 
 /// Values between every other node, for those of a finer level that are relaxed and not known.
 void refine(const Level& coarse, std::span<const std::uint8_t> is_free, Level& fine) {
@@ -247,9 +116,9 @@ void continue_with_least_bending(const GridSize& size, std::span<const Knowledge
   for (std::size_t l = levels.size(); l-- > 0; sweeps /= times_on_coarser) {
     // Over as many nodes as there are at this resolution values pull as hard as they bend.
     const float over = std::max(stiffness / float(1 << l), 1.0f);
-    Relaxation relaxation(levels[l], std::max(reach >> l, 2), 1 / (over * over * over * over));
-    if (l + 1 < levels.size()) refine(levels[l + 1], relaxation.is_free(), levels[l]);
-    relaxation.run(sweeps);
+    const std::vector<std::uint8_t> is_free = free_nodes(levels[l], std::max(reach >> l, 2));
+    if (l + 1 < levels.size()) refine(levels[l + 1], is_free, levels[l]);
+    relax(levels[l].size, levels[l].known, is_free, 1 / (over * over * over * over), sweeps, levels[l].values);
   }
   values = std::move(levels[0].values);
 }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <set>
@@ -275,8 +276,16 @@ TEST(Repair, WhatNobodySawUnderAThingGoesWhereTheFloorGoesOn) {
   EXPECT_TRUE(moved.working.check());
 }
 
-TEST(Repair, WhatIsOpenedIsNotClosedAgain) {
-  // A hatch in the floor is lifted off: the floor around it would go on just where the hatch was.
+/// Pictures of twice the size.
+void make_finer(BlockScene& block) {
+  for (scene::Camera& camera : block.cameras) {
+    camera.width *= 2, camera.height *= 2;
+    camera.fx *= 2, camera.fy *= 2, camera.cx *= 2, camera.cy *= 2;
+  }
+}
+
+/// A hatch in the floor is lifted off.
+BlockScene lifted_hatch() {
   BlockScene block(/*gap=*/0.5f);
   std::vector<std::uint32_t> hatch;
   for (std::uint32_t row = 0; row < block.cloud.size(); ++row) {
@@ -290,13 +299,47 @@ TEST(Repair, WhatIsOpenedIsNotClosedAgain) {
   block.request.region.reset();
   block.request.handles[0].source = DVec3(0);
   block.request.handles[0].target = DVec3(0.9, -0.3, 0);
-  Moved moved(std::move(block));
+  return block;
+}
+
+TEST(Repair, WhatIsOpenedIsNotClosedAgain) {
+  Moved moved(lifted_hatch());  // the floor around it would go on just where it was
   const auto outcome = moved.correct();
   ASSERT_TRUE(outcome);
   std::size_t closing = 0;
   for (std::size_t row = moved.original.size(); row < moved.working.size(); ++row)
     closing += moved.working.role()[row] == Role::seed && moved.working.cloud().mean.y[row] < 0.01f;
   EXPECT_LT(closing, 25u) << "along its outline alone; all of it would be 85. What is deeper leaves a hollow";
+}
+
+TEST(Repair, CorrectsAgainAsOneMadeAnewWould) {
+  const auto correct = [](Repair& repair, const Moved& moved, WorkingScene& working, int correction) {
+    return repair.correct(working, moved.masks, {1, correction, 0.5}, [](double) { return Result<void>{}; });
+  };
+  // It may keep its closure where there are no seeds; below the hatch there are.
+  for (BlockScene& block : std::array{BlockScene(/*gap=*/0.5f), lifted_hatch()}) {
+    make_finer(block);
+    Moved moved(std::move(block));
+    Repair repair = moved.repair();
+    ASSERT_TRUE(correct(repair, moved, moved.working, 1));
+    const std::vector<std::uint32_t> seeds = moved.working.rows_of(Role::seed);
+    EXPECT_NE(seeds.empty(), moved.block.request.selected.has_value());
+    const Vec3 eye(moved.block.cameras[0].centre());
+    scene::GaussianCloud& gaussians = moved.working.gaussians();
+    for (const std::uint32_t row :
+         seeds) {  // changed as by an optimisation: deeper, and faint, so that they close little
+      gaussians.mean.set(row, eye + 1.1f * (gaussians.mean.get(row) - eye));
+      gaussians.opacity_logit[row] = -2;
+    }
+    for (const std::uint32_t row : moved.working.rows_of(Role::copy)) gaussians.opacity_logit[row] -= 1;
+    WorkingScene working = moved.working;
+    const auto again = correct(repair, moved, moved.working, 2);
+    Repair another = moved.repair();
+    const auto anew = correct(another, moved, working, 2);
+    ASSERT_TRUE(again && anew);
+    EXPECT_TRUE(again->pictures == anew->pictures) << seeds.size() << " seeds";
+    EXPECT_TRUE(working::members_of(moved.working) == working::members_of(working)) << seeds.size() << " seeds";
+  }
 }
 
 TEST(Repair, LeavesAPitOpenThatViewsHaveLookedInto) {
@@ -310,10 +353,7 @@ TEST(Repair, LeavesAPitOpenThatViewsHaveLookedInto) {
   for (int i = -12; i <= 12; ++i)
     for (int k = -12; k <= 12; ++k)
       add_gaussian(block.cloud, {0.15f * float(i), 0.5f, 0.15f * float(k)}, {0.1f, 0.01f, 0.1f}, 4, floor_color);
-  for (scene::Camera& camera : block.cameras) {  // finer, so that the rim of the pit is narrow
-    camera.width *= 2, camera.height *= 2;
-    camera.fx *= 2, camera.fy *= 2, camera.cx *= 2, camera.cy *= 2;
-  }
+  make_finer(block);  // so that the rim of the pit is narrow
   Moved moved(std::move(block));
   moved.corrector.answer = [](const correct::CorrectionTask& flawed) { return painted(flawed, {0, 1, 0}); };
   ASSERT_TRUE(moved.correct());
