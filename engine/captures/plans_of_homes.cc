@@ -54,12 +54,12 @@ Object covered_floor(float width, float depth, Material covering) {
 /// A printed can with a bare metal foot and lid: the parts of one thing that have nothing of their colours in common.
 Object drink_can(Vec3 foot, float turn) {
   constexpr float print_from = 0.045f, print_to = 0.405f;
-  const Material metal = plain(srgb(198, 200, 204));
-  const Material print = [](const SurfacePoint& p) {
+  const Vec3 metal = srgb(198, 200, 204);
+  const Material print = [=](const SurfacePoint& p) {
     const float height = -p.local.y, around = std::atan2(p.local.z, p.local.x);
     const float wave = height - 0.2f - 0.045f * std::sin(2 * around);
     const bool letters = std::abs(height - 0.31f) < 0.035f && std::sin(17 * around) + std::sin(29 * around) > 0.3f;
-    if (height < print_from || height > print_to) return Finish{srgb(198, 200, 204), 0};
+    if (height < print_from || height > print_to) return Finish{metal, 0};
     if (std::abs(wave) < 0.022f) return Finish{srgb(240, 238, 230), 0};
     return Finish{letters ? srgb(244, 240, 228) : wave < 0 ? srgb(150, 16, 26) : srgb(196, 22, 32), 0};
   };
@@ -142,10 +142,9 @@ Plan teddy_on_sofa() {
     };
   };
   const Vec3 fur = srgb(146, 100, 62), light = srgb(214, 182, 138), dark = srgb(32, 26, 24);
-  const Vec3 belly_color = light;
   const Material belly = [=](const SurfacePoint& p) {
     const bool front = p.local.z < 0 && std::hypot(p.local.x / 0.11f, (p.local.y + 0.18f) / 0.13f) < 1;
-    return Finish{(front ? belly_color : fur) * (1 + 0.2f * procedural::fractal_noise(22.0f * p.local, 3)), 0};
+    return Finish{(front ? light : fur) * (1 + 0.2f * procedural::fractal_noise(22.0f * p.local, 3)), 0};
   };
   Object teddy{"teddy", {Vec3(foot), 0.15f}, {ellipsoid(at(0, 0.19f, 0), {0.17f, 0.2f, 0.15f}, belly)}};
   const auto add = [&](Vec3 middle, Vec3 half_axes, Vec3 color) {

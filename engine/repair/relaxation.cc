@@ -1,6 +1,7 @@
 #include "engine/repair/relaxation.h"
 
 #include <algorithm>
+#include <cassert>
 #include <vector>
 
 #include "engine/core/parallel.h"
@@ -90,13 +91,13 @@ Rule rule_of(Knowledge known) {
 /// How each node is relaxed, by place.
 std::vector<Rule> rules_of(const GridSize& size, const Layout& layout, std::span<const Knowledge> known,
                            std::span<const std::uint8_t> is_free) {
-  std::vector<std::uint8_t> free(colors * layout.per_color, 0);  // by number
-  for_each_node(size, layout, [&](std::size_t node, std::size_t number) { free[number] = is_free[node]; });
-  std::vector<Rule> rules(free.size(), 0);
+  std::vector<std::uint8_t> is_free_at(colors * layout.per_color, 0);  // by number
+  for_each_node(size, layout, [&](std::size_t node, std::size_t number) { is_free_at[number] = is_free[node]; });
+  std::vector<Rule> rules(is_free_at.size(), 0);
   for_each_node(size, layout, [&](std::size_t node, std::size_t number) {
-    if (free[number] == 0) return;
+    if (is_free_at[number] == 0) return;
     std::array<bool, stencil.size()> is_there{};
-    for (std::size_t k = 0; k < stencil.size(); ++k) is_there[k] = free[layout.beside(number, k)] != 0;
+    for (std::size_t k = 0; k < stencil.size(); ++k) is_there[k] = is_free_at[layout.beside(number, k)] != 0;
     rules[layout.place(number)] = differences(is_there) | rule_of(known[node]);
   });
   return rules;
@@ -124,6 +125,9 @@ std::array<std::ptrdiff_t, stencil.size()> steps_of(std::size_t color, const Lay
 
 void relax(const GridSize& size, std::span<const Knowledge> known, std::span<const std::uint8_t> is_free, float pull,
            int sweeps, std::span<float> values) {
+  [[maybe_unused]] const std::size_t nodes = node_index(size, 0, 0, size[2]);
+  assert(nodes < std::size_t{1} << 31);  // blocks are numbered in 32 bits, padding included
+  assert(known.size() == nodes && is_free.size() == nodes && values.size() == nodes);
   const Layout layout(size);
   const std::vector<Rule> rules = rules_of(size, layout, known, is_free);
   std::vector<float> relaxed(rules.size(), 0.0f);

@@ -8,8 +8,10 @@
 
 namespace engine::repair {
 
-/// Sets each free node to what is least for it alone, and beyond: `sweeps` times, colour by colour. Only second
-/// differences between free nodes count. The same bits for any number of threads and any instruction set.
+/// Successive over-relaxation (Young 1954): sets each free node to what is least for it alone, and a little beyond,
+/// `sweeps` times, colour by colour. Only second differences between free nodes count. The same bits for any number of
+/// threads and any instruction set.
+/// Precondition: fewer than 2^31 nodes, and spans of just as many (asserted).
 ///   known    [nodes]
 ///   is_free  [nodes] Those that are relaxed
 ///   pull     weight of squared differences from what is known, beside that of bending

@@ -39,7 +39,7 @@ constexpr double leak_at_extent = 3e-3;
 constexpr double leak_farther = 4.0;  // times that, at most: clicks side by side say little of a large thing
 // So many clicks around a thing tell where it ends better than distances do (of the doll with two outside clicks, a
 // leak gains 20 to 60 of precision, with three and more nothing; of a mug's back it loses 5 of recall then). Whoever
-// clicks there more often still has seen what is left over, and says what of it belongs to the thing.
+// clicks there more often than that has seen what is left over, and says what of it belongs to the thing.
 constexpr std::size_t clicks_around = 3;
 
 std::vector<double> squared_distances(const Array3& mean, DVec3 from) {
@@ -210,7 +210,8 @@ Result<Grown> Neighbourhood::grow(const scene::GaussianCloud& cloud, const Grow&
   if (!seeds) return propagate(seeds);
   if (distinct(seeds->clicked.outside).size() < clicks_around) seeds->leak = leak_beyond(seeds->clicked.inside);
   NaturalBorder border = grow.whole ? whole_border(*seeds, grow.wider) : border_of(*seeds, {false, grow.wider});
-  take_leftovers(*seeds, border.inside);
+  // Who asks for less is not to get back just what that leaves out.
+  if (border.wider >= 0) take_leftovers(*seeds, border.inside);
   return Grown{rows_where_marked(border.inside), border.wider, border.more, border.less, is_cut_short_};
 }
 
@@ -221,7 +222,7 @@ Result<Grown> Neighbourhood::grow_beyond(const scene::GaussianCloud& cloud, cons
   for (std::size_t node = 0; node < rows_.size(); ++node)
     if (std::binary_search(rows.begin(), rows.end(), rows_[node])) seeds->given[node] = Given::inside;
   NaturalBorder border = border_of(*seeds, {.wider = farther, .beyond = true});
-  if (farther > 0) take_leftovers(*seeds, border.inside);
+  if (border.wider > 0) take_leftovers(*seeds, border.inside);
   return Grown{rows_where_marked(border.inside), border.wider, border.more, border.less, is_cut_short_};
 }
 

@@ -68,8 +68,9 @@ class Neighbourhood {
   [[nodiscard]] bool is_cut_short() const { return is_cut_short_; }
 
   /// The rows of the thing: those from which a random walk rather ends at the inside points, up to the natural border
-  /// (natural_border.h), and its leftovers (leftovers.h) unless there are more than three outside points. What lies at
-  /// the reach is outside unless a point says otherwise; outside points beyond it count for nothing.
+  /// (natural_border.h), and its leftovers (leftovers.h) unless outside points are on more than three nodes within
+  /// reach, or less than the natural border was asked for. What lies at the reach is outside unless a point says
+  /// otherwise; outside points beyond it count for nothing.
   ///   cloud    that this was made of
   ///   grow     with this object's surroundings
   ///   errors   unprocessable, `where` = "inside[1]": no row within reach, the point is beyond it, or outside points

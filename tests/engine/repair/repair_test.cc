@@ -317,17 +317,21 @@ TEST(Repair, CorrectsAgainAsOneMadeAnewWould) {
     return repair.correct(working, moved.masks, {1, correction, 0.5}, [](double) { return Result<void>{}; });
   };
   // It may keep its closure where there are no seeds; below the hatch there are.
-  for (BlockScene& block : std::array{BlockScene(/*gap=*/0.5f), lifted_hatch()}) {
+  struct Sample {
+    BlockScene block;
+    bool is_seeded;
+  };
+  for (auto& [block, is_seeded] : std::array{Sample{BlockScene(/*gap=*/0.5f), false}, Sample{lifted_hatch(), true}}) {
     make_finer(block);
     Moved moved(std::move(block));
     Repair repair = moved.repair();
     ASSERT_TRUE(correct(repair, moved, moved.working, 1));
     const std::vector<std::uint32_t> seeds = moved.working.rows_of(Role::seed);
-    EXPECT_NE(seeds.empty(), moved.block.request.selected.has_value());
+    EXPECT_EQ(!seeds.empty(), is_seeded);
     const Vec3 eye(moved.block.cameras[0].centre());
     scene::GaussianCloud& gaussians = moved.working.gaussians();
-    for (const std::uint32_t row :
-         seeds) {  // changed as by an optimisation: deeper, and faint, so that they close little
+    // Changed as by an optimisation: deeper, and faint, so that they close little.
+    for (const std::uint32_t row : seeds) {
       gaussians.mean.set(row, eye + 1.1f * (gaussians.mean.get(row) - eye));
       gaussians.opacity_logit[row] = -2;
     }

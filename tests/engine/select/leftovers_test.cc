@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "engine/core/parallel.h"
 #include "tests/engine/select/weighted_graphs.h"
 
 namespace engine::select {
@@ -58,12 +59,13 @@ TEST(Leftovers, AreNotWhatHangsOnByTheRest) {
 
 TEST(Leftovers, AreLittleBesideTheThing) {
   EXPECT_EQ(taken(on_a_leg(33, 1.0f, 0.1f)), (Taken{thing, 33, 0}));
-  EXPECT_EQ(taken(on_a_leg(70, 0.1f, 0.1f)), (Taken{thing, 0, 0})) << "a thing of its own";
+  EXPECT_EQ(taken(on_a_leg(34, 1.0f, 0.1f)), (Taken{thing, 0, 0})) << "a thing of its own, and not cut in two either";
 }
 
-TEST(Leftovers, AreNotWhereSomebodyClickedOutside) {
-  const std::uint32_t clicked = thing + 10;
-  EXPECT_EQ(taken(on_a_leg(20, 0.1f, 0.1f), {clicked}, {clicked}), (Taken{thing, 0, 0}));
+TEST(Leftovers, AreNotNextToWhereSomebodyClickedOutside) {
+  const std::uint32_t under_leg = floor_begin + floor_side * 10 + 10, far_off = floor_begin + floor_side * 10 + 14;
+  EXPECT_EQ(taken(on_a_leg(20, 1.0f, 0.1f), {under_leg}, {under_leg}), (Taken{thing, 0, 0}));
+  EXPECT_EQ(taken(on_a_leg(20, 1.0f, 0.1f), {far_off}, {far_off}), (Taken{thing, 20, 0}));
 }
 
 TEST(Leftovers, AreNotCutOutOfWhatGoesOn) {
@@ -77,6 +79,15 @@ TEST(Leftovers, AreNothingOfAFloorThatTheThingStandsOn) {
     edges.push_back({edge.a + floor_begin, edge.b + floor_begin, edge.weight});
   for (std::uint32_t x = 0; x < side; ++x) edges.push_back({x, floor_begin + floor_side * 10 + x, 0.3f});
   EXPECT_EQ(taken(graph_of(nodes, edges)), (Taken{thing, 0, 0}));
+}
+
+TEST(Leftovers, AreTheSameForAnyNumberOfThreads) {
+  const WeightedGraph on = on_a_leg(20, 0.06f, 0.1f);
+  for (const int threads : {1, 2, 4}) {
+    Taken found;
+    WorkArena(threads).run([&] { found = taken(on); });
+    EXPECT_EQ(found, (Taken{thing, 20, 0})) << threads;
+  }
 }
 
 TEST(Leftovers, OfNothingOrWithoutEdgesAreNone) {

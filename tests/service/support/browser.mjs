@@ -73,17 +73,18 @@ export const handOn = ({ page, id }) => {
   }, wanted, { timeout });
   /// The camera of the picture, and where that is on the screen.
   const looksFrom = async () => {
-    // It saves a little later; at once where it might be left. What is twice the same has come to rest.
+    // It saves a little later; at once where it might be left. What is three times the same has come to rest.
     const saved = () => page.evaluate(() => {
       dispatchEvent(new Event('pagehide'));
       return localStorage.getItem(`splatdrag.scene.${location.hash.split('/').at(-1)}`);
     }).then((text) => JSON.parse(text).pose);
-    let pose, before;
-    do {
-      before = pose;
-      pose = await saved();
-      await page.waitForTimeout(100);
-    } while (JSON.stringify(pose) !== JSON.stringify(before));
+    let pose;
+    for (let alike = 0; alike < 3;) {
+      const next = await saved();
+      alike = JSON.stringify(next) === JSON.stringify(pose) ? alike + 1 : 1;
+      pose = next;
+      if (alike < 3) await page.waitForTimeout(100);
+    }
     const box = await id('view').boundingBox();
     return { camera: { ...pose, width: box.width, height: box.height }, box };
   };
