@@ -46,7 +46,7 @@ Patch ellipsoid(Vec3 middle, Vec3 half_axes, Material material, int segments = 3
 }
 
 /// A floor of its own covering, its top at height 0, of so much in x and z.
-Object covered_floor(float width, float depth, Material covering) {
+Object covered_floor(float width, float depth, const Material& covering) {
   return {
       "floor", {}, {procedural::quad(at(-0.5f * width, 0, -0.6f * depth), {width, 0, 0}, {0, 0, depth}, covering, 1)}};
 }
