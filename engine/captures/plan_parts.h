@@ -2,17 +2,25 @@
 #pragma once
 
 #include <numbers>
+#include <utility>
+#include <vector>
 
 #include "engine/captures/plan.h"
 #include "engine/core/vec.h"
+#include "engine/procedural/surface.h"
 
 namespace engine::captures {
 
 constexpr double degree = std::numbers::pi / 180;
+constexpr float on_things = 2.2f;  ///< Gaussians per area, relative to the table top.
 
 /// A place at a height; the world's y points down.
 [[nodiscard]] constexpr Vec3 at(float x, float height, float z) { return {x, -height, z}; }
 [[nodiscard]] constexpr DVec3 dat(double x, double height, double z) { return {x, -height, z}; }
+
+inline void append(std::vector<procedural::Patch>& to, std::vector<procedural::Patch> more) {
+  for (procedural::Patch& patch : more) to.push_back(std::move(patch));
+}
 
 [[nodiscard]] inline Motion shifted(DVec3 shift) {
   return [=](DVec3 point) { return point + shift; };

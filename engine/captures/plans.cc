@@ -18,12 +18,6 @@ using procedural::plain;
 using procedural::srgb;
 using procedural::wood;
 
-constexpr float on_things = 2.2f;  // Gaussians per area, relative to the table top
-
-void append(std::vector<procedural::Patch>& to, std::vector<procedural::Patch> more) {
-  for (procedural::Patch& patch : more) to.push_back(std::move(patch));
-}
-
 procedural::Material checks(Vec3 one, Vec3 other, float side) {
   return [=](const procedural::SurfacePoint& p) {
     const auto cell = [&](float x) { return int(std::floor(x / side)); };

@@ -24,11 +24,6 @@ using procedural::srgb;
 using procedural::SurfacePoint;
 
 constexpr float pi = std::numbers::pi_v<float>;
-constexpr float on_things = 2.2f;  // Gaussians per area, relative to the table top
-
-void append(std::vector<Patch>& to, std::vector<Patch> more) {
-  for (Patch& patch : more) to.push_back(std::move(patch));
-}
 
 /// An upright ellipsoid.
 Patch ellipsoid(Vec3 middle, Vec3 half_axes, Material material, int segments = 32) {
@@ -136,19 +131,17 @@ Plan chair_on_carpet() {
 
 Plan teddy_on_sofa() {
   const DVec3 foot = dat(-0.3, 0, 0.02), shift = dat(0.66, 0, -0.03);
-  const auto plush = [](Vec3 color) {
-    return [=](const SurfacePoint& p) {
-      return Finish{color * (1 + 0.2f * procedural::fractal_noise(22.0f * p.local, 3)), 0};
-    };
+  const auto shaggy = [](Vec3 color, const SurfacePoint& p) {
+    return Finish{color * (1 + 0.2f * procedural::fractal_noise(22.0f * p.local, 3)), 0};
   };
   const Vec3 fur = srgb(146, 100, 62), light = srgb(214, 182, 138), dark = srgb(32, 26, 24);
   const Material belly = [=](const SurfacePoint& p) {
     const bool front = p.local.z < 0 && std::hypot(p.local.x / 0.11f, (p.local.y + 0.18f) / 0.13f) < 1;
-    return Finish{(front ? light : fur) * (1 + 0.2f * procedural::fractal_noise(22.0f * p.local, 3)), 0};
+    return shaggy(front ? light : fur, p);
   };
   Object teddy{"teddy", {Vec3(foot), 0.15f}, {ellipsoid(at(0, 0.19f, 0), {0.17f, 0.2f, 0.15f}, belly)}};
   const auto add = [&](Vec3 middle, Vec3 half_axes, Vec3 color) {
-    teddy.patches.push_back(ellipsoid(middle, half_axes, plush(color)));
+    teddy.patches.push_back(ellipsoid(middle, half_axes, [=](const SurfacePoint& p) { return shaggy(color, p); }));
   };
   add(at(0, 0.47f, -0.01f), {0.145f, 0.135f, 0.135f}, fur);    // head
   add(at(0, 0.43f, -0.125f), {0.062f, 0.05f, 0.05f}, light);   // snout

@@ -15,7 +15,6 @@ namespace {
 
 using procedural::srgb;
 
-constexpr float on_things = 2.2f;         // Gaussians per area, relative to the table top
 constexpr std::uint64_t plant_seed = 11;  // of how its leaves grow
 
 float smoothstep(float low, float high, float x) {
