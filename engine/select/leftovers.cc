@@ -53,25 +53,25 @@ class Leftovers {
  public:
   Leftovers(const neighbours::NeighbourGraph& graph, std::span<const float> weight,
             std::span<const std::uint32_t> clicked, std::vector<std::uint8_t>& inside)
-      : graph_(graph), weight_(weight), inside_(inside), was_clicked_(graph.size(), 0), is_among_(graph.size(), 0) {
+      : graph_(graph), weight_(weight), inside_(inside), was_clicked_(graph.size(), 0), number_(graph.size(), none) {
     for (const std::uint32_t node : clicked) was_clicked_[node] = 1;
     most_nodes_ = of_thing * double(std::count(inside.begin(), inside.end(), std::uint8_t{1}));
     most_weight_ = border_weight * weight_within(graph, weight, inside);
   }
 
   /// Those among the pieces that some nodes make up.
-  ///   nodes  none of them inside
+  ///   nodes  ascending, none of them inside
   void take(std::span<const std::uint32_t> nodes) {
-    for (const std::uint32_t node : nodes) is_among_[node] = 1;
-    neighbours::Pieces pieces(graph_.size());
-    for (const std::uint32_t node : nodes)
-      for (std::uint32_t edge = graph_.begin[node]; edge < graph_.begin[node + 1]; ++edge)
-        if (is_among_[graph_.to[edge]] != 0) pieces.join(node, graph_.to[edge]);
-    std::vector<Piece> piece_at(graph_.size());  // by the node that `pieces` names one by
-    for (const std::uint32_t node : nodes) count(node, piece_at[pieces.of(node)]);
-    for (const std::uint32_t node : nodes) {
-      is_among_[node] = 0;
-      if (is_leftover(piece_at[pieces.of(node)])) inside_[node] = 1;
+    for (std::uint32_t i = 0; i < nodes.size(); ++i) number_[nodes[i]] = i;
+    neighbours::Pieces pieces(nodes.size());
+    for (std::uint32_t i = 0; i < nodes.size(); ++i)
+      for (std::uint32_t edge = graph_.begin[nodes[i]]; edge < graph_.begin[nodes[i] + 1]; ++edge)
+        if (const std::uint32_t other = number_[graph_.to[edge]]; other != none) pieces.join(i, other);
+    std::vector<Piece> piece_at(nodes.size());  // by the number that `pieces` names one by
+    for (std::uint32_t i = 0; i < nodes.size(); ++i) count(nodes[i], piece_at[pieces.of(i)]);
+    for (std::uint32_t i = 0; i < nodes.size(); ++i) {
+      number_[nodes[i]] = none;
+      if (is_leftover(piece_at[pieces.of(i)])) inside_[nodes[i]] = 1;
     }
   }
 
@@ -83,7 +83,7 @@ class Leftovers {
       piece.is_next_to_click = piece.is_next_to_click || was_clicked_[other] != 0;
       if (inside_[other] != 0)
         piece.to_inside += double(weight_[edge]);
-      else if (is_among_[other] == 0)
+      else if (number_[other] == none)
         piece.to_rest += double(weight_[edge]), ++piece.edges_to_rest;
     }
   }
@@ -92,10 +92,13 @@ class Leftovers {
            piece.to_inside > as_firmly * piece.to_rest && piece.to_rest <= most_weight_ * double(piece.edges_to_rest);
   }
 
+  static constexpr std::uint32_t none = ~0u;
+
   const neighbours::NeighbourGraph& graph_;
   std::span<const float> weight_;
   std::vector<std::uint8_t>& inside_;
-  std::vector<std::uint8_t> was_clicked_, is_among_;  ///< [nodes]
+  std::vector<std::uint8_t> was_clicked_;  ///< [nodes]
+  std::vector<std::uint32_t> number_;      ///< [nodes] Among those that are looked at; `none`: it is not.
   double most_nodes_ = 0, most_weight_ = 0;
 };
 
