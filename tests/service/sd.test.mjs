@@ -53,8 +53,8 @@ let service, scene, request;
 before(async () => {
   const demo = await demoScene({ gaussians: 4000, views: 5, size: '96x72', photos: false });
   const bareScene = await bare.client.upload(demo.ply);
-  // Extended, for where something leaves its place, that is closed in space before anything is painted: seconds, which tell nothing of
-  // networks. One edit moves.
+  // Extended, for where something leaves its place, that is closed in space before anything is painted, which tells nothing of networks.
+  // One edit moves.
   request = { scene: bareScene.id, ...demo.ball, mode: 'extend', prompt: 'a ball on a table',
     params: { corrector: 'sd', intervals: 2, annealing_steps: 2, iterations: 3, views: 2, max_image_side: 64, tuning_steps: 3, tuning_steps_later: 3,
       sampling_steps: 8, lora_rank: 2 } };

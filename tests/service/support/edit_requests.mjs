@@ -4,8 +4,8 @@ import { movedRequest } from './variants.mjs';
 /// Far enough for an edit to work in a frame of its own, near enough for floats to keep half a millimetre.
 export const farAway = [4000, -2500, 8000];
 
-// Of a corrected edit nearly all time goes into closing in space what its part has left, anew in each correction, however
-// small scene and pictures are: corrections are few where one more would show nothing new. All that `paper` has of its
+// Closing in space what a part has left takes as long for small scenes and pictures as for large ones, and is mostly done
+// anew in each correction: corrections are few where one more would show nothing new. All that `paper` has of its
 // own are in the edits that extend, which leave nothing.
 const small = { views: 6, max_image_side: 96, iterations: 24 };
 const finer = { views: 9, max_image_side: 160, iterations: 40 };
@@ -30,7 +30,7 @@ export const editRequests = ({ ball, leaf }) => {
   const both = { mode: 'move', handles: [...ball.handles.map((handle) => ({ ...handle, group: 1 })), ...leaf.handles] };
   const tip = { mode: 'move', handles: leaf.handles.slice(2) };
   const around = { center: ball.handles[0].source, size: [0.5, 0.3, 0.6] };
-  // So thin that the space is closed in half the time, thick enough to leave a hole.
+  // So thin that closing its place takes little, thick enough to leave a hole.
   const rod = { ...ball, region: { center: ball.handles[0].source, size: [0.5, 0.24, 0.24] } };
   const demo = (name, request, more = {}) => ({ name, scene: 'demo', dataset: true, request, ...more });
   const virtual = (name, request, more = {}) => demo(name, request, { dataset: false, ...more });
