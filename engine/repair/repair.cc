@@ -307,6 +307,7 @@ Result<Repair::Telling> Repair::most_telling_view(const WorkingScene& working, c
 
 Result<std::size_t> Repair::complete_chart(WorkingScene& working, Rows& rows, const Telling& telling,
                                            const Round& round) {
+  if (!telling.surfaces.main) return 0;  // there may be no view at all
   std::optional<Chart> chart = chart_of(views_[telling.view], telling.surfaces);
   if (!chart) return 0;
   for (std::size_t v = 0; v < views_.size(); ++v) {
