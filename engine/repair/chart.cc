@@ -30,6 +30,8 @@ constexpr double finest = 16;
 // things may stand about.
 constexpr int ring_px = 4;
 constexpr double nearly_all = 0.8;
+// Trust of a pixel from which on nothing is seen through what is there.
+constexpr float lets_nothing_through = 0.98f;
 // Halvings of the interval in which a ray is known to meet the surface: to a millionth of the depth.
 constexpr int halvings = 20;
 
@@ -171,6 +173,28 @@ bool is_surrounded(const Chart& chart, int rim_px) {
   for (std::size_t i = 0; i < far.data.size(); ++i)
     if (far.data[i] != 0 && near.data[i] == 0) ++ring, known += chart.weights.data[i] > 0 ? 1 : 0;
   return ring > 0 && double(known) >= nearly_all * double(ring);
+}
+
+scene::Mask rim_of(const Chart& chart, const scene::Camera& view, const scene::Image& trust, int rim_px) {
+  const int wide = 2 * rim_px;  // as is_surrounded() has it
+  scene::Mask surface = chart.goes_on;
+  for (std::size_t i = 0; i < surface.data.size(); ++i) surface.data[i] |= chart.weights.data[i] > 0;
+  surface = mask::eroded(mask::dilate(surface, wide), wide);  // what nobody tells of on either side is no surface
+  scene::Mask rim = mask::dilate(chart.goes_on, wide);
+  for (int y = 0; y < rim.height; ++y)
+    for (int x = 0; x < rim.width; ++x) {
+      std::uint8_t& flag = rim.at(x, y);
+      const double here = double(chart.inverse_depth.at(x, y));
+      if (flag == 0) continue;
+      flag = 0;
+      if (surface.at(x, y) == 0 || chart.goes_on.at(x, y) != 0 || !(here > 0)) continue;
+      const DVec3 p = view.cam_from_world(point_at(chart.camera, {x + 0.5, y + 0.5}, here));
+      if (!(p.z > 0)) continue;
+      const DVec2 at = view.pixel_from_cam(p);
+      const bool is_inside = at.x >= 0 && at.y >= 0 && at.x < view.width && at.y < view.height;
+      flag = is_inside && trust.at(int(at.x), int(at.y)) < lets_nothing_through;
+    }
+  return rim;
 }
 
 scene::Image picture_of(const Chart& chart) {

@@ -62,6 +62,9 @@ constexpr int closing_blurs = 3;
 constexpr double closing_gap = 0.12;
 // What closes a place has the colour of what is around it, as a hint.
 constexpr float hint_of_closure = 0.5f;
+// Inverse depth of a seed beneath what is seen of the same surface, in parts of that: so far behind that what is seen
+// stays in front, and not so far that anybody sees a step. 1 and 0.99 are worse (ADR 45).
+constexpr float beneath = 0.997f;
 constexpr std::size_t most_examples = 6;  // of the buffer, for each view: its neighbours on either side
 // How long it takes to show a view again once all are completed, in units of what one takes to be completed. A choice.
 constexpr double shown_views = 0.25;
@@ -310,21 +313,25 @@ Result<std::size_t> Repair::complete_chart(WorkingScene& working, Rows& rows, co
   if (!telling.surfaces.main) return 0;  // there may be no view at all
   std::optional<Chart> chart = chart_of(views_[telling.view], telling.surfaces);
   if (!chart) return 0;
+  const int untold_px = chart_rim_px(views_[telling.view]);
+  scene::Image trust_in_view;
   for (std::size_t v = 0; v < views_.size(); ++v) {
     ViewNow now = look(working, rows.dragged, v);
     doubt_unseen(working, rows, v, now);
     add_view(*chart, views_[v], {now.color, now.inverse_depth, mask::eroded(now.reliable, chart_rim_px(views_[v]))});
+    if (v == telling.view) trust_in_view = std::move(now.trust);
   }
   // Where a surface ends, a view that shows what is beyond its edge tells more than a chart, which has the surface
   // alone (the old case `lift` by a chart: 26.7 -> 22.4 dB).
-  if (!is_surrounded(*chart, chart_rim_px(views_[telling.view]))) return 0;
+  if (!is_surrounded(*chart, untold_px)) return 0;
+  const scene::Mask rim = rim_of(*chart, views_[telling.view], trust_in_view, untold_px);
   const int side = chart->camera.width;
   correct::Example known{picture_of(*chart), scene::Mask(side, side), {0, 0, side, side}};
   scene::Image surface = chart->inverse_depth, trust(side, side, 1);
   for (std::size_t i = 0; i < trust.data.size(); ++i) {
     trust.data[i] = chart->weights.data[i] > 0 ? 1.0f : 0.0f;
     known.excluded.data[i] = trust.data[i] == 0;
-    if (chart->goes_on.data[i] == 0) surface.data[i] = 0;
+    if (chart->goes_on.data[i] == 0) surface.data[i] *= rim.data[i] != 0 ? beneath : 0;
   }
 
   if (auto tuned = corrector_.fine_tune(std::span(&known, 1), 0); !tuned) return propagate(tuned);

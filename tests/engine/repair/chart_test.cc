@@ -108,6 +108,44 @@ TEST(Chart, ShowsWhatViewsShow) {
     }
 }
 
+TEST(Chart, ItsRimIsWhereTheViewSeesThroughTheSurfaceAround) {
+  const scene::Camera view = slanted();
+  auto chart = chart_of(view, ground_behind(view));
+  ASSERT_TRUE(chart);
+  constexpr int untold = 2;  // pixels beside the hole of which the view tells nothing
+  const scene::Rect ring{hole.x0 - untold, hole.y0 - untold, hole.x1 + untold, hole.y1 + untold};
+  add_view(*chart, view, Seen(view, ring));
+  scene::Image trust(width, height, 1, 1.0f);
+  EXPECT_EQ(rim_of(*chart, view, trust, untold).area(), 0u) << "nothing is seen through it";
+  for (int y = ring.y0; y < ring.y1; ++y)
+    for (int x = ring.x0; x < width / 2; ++x) trust.at(x, y) = 0.9f;  // its left half lets through
+  const scene::Mask rim = rim_of(*chart, view, trust, untold);
+  EXPECT_GT(rim.area(), 20u);
+  for (int y = 0; y < rim.height; ++y)
+    for (int x = 0; x < rim.width; ++x) {
+      if (rim.at(x, y) == 0) continue;
+      EXPECT_EQ(chart->goes_on.at(x, y), 0);
+      const DVec2 at = view.pixel_from_cam(view.cam_from_world(point_of(*chart, x, y)));
+      EXPECT_TRUE(at.x >= ring.x0 && at.x < width / 2.0 && at.y >= ring.y0 && at.y < ring.y1) << at.x << ", " << at.y;
+    }
+}
+
+TEST(Chart, HasNoRimBeyondTheEdgeOfASurface) {
+  const scene::Camera view = slanted();
+  auto chart = chart_of(view, ground_behind(view));
+  ASSERT_TRUE(chart);
+  constexpr int untold = 2;
+  // To the right of the hole nobody tells of the ground: it may end there.
+  add_view(*chart, view, Seen(view, {hole.x0 - untold, 0, width, height}));
+  const scene::Mask rim = rim_of(*chart, view, scene::Image(width, height, 1), untold);
+  EXPECT_GT(rim.area(), 10u) << "to its left, and a little in the corners there";
+  for (int y = 0; y < rim.height; ++y)
+    for (int x = 0; x < rim.width; ++x) {
+      if (rim.at(x, y) == 0) continue;
+      EXPECT_LT(view.pixel_from_cam(view.cam_from_world(point_of(*chart, x, y))).x, hole.x0 + untold + 1);
+    }
+}
+
 TEST(Chart, LeavesOutWhatIsNotTheSurface) {
   const scene::Camera view = slanted();
   auto chart = chart_of(view, ground_behind(view));
