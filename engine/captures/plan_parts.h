@@ -22,6 +22,9 @@ inline void append(std::vector<procedural::Patch>& to, std::vector<procedural::P
   for (procedural::Patch& patch : more) to.push_back(std::move(patch));
 }
 
+/// Cubes of two colours.
+[[nodiscard]] procedural::Material checks(Vec3 one, Vec3 other, float side);
+
 [[nodiscard]] inline Motion shifted(DVec3 shift) {
   return [=](DVec3 point) { return point + shift; };
 }
@@ -48,5 +51,10 @@ inline void append(std::vector<procedural::Patch>& to, std::vector<procedural::P
 [[nodiscard]] Plan chair_on_carpet();
 [[nodiscard]] Plan teddy_on_sofa();
 [[nodiscard]] Plan lamp_on_table();
+
+// Plans of things that turn on hinges, in plans_of_hinges.cc.
+[[nodiscard]] Plan lid_opened();
+[[nodiscard]] Plan door_opened();
+[[nodiscard]] Plan laptop_opened();
 
 }  // namespace engine::captures

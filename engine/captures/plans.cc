@@ -18,14 +18,6 @@ using procedural::plain;
 using procedural::srgb;
 using procedural::wood;
 
-procedural::Material checks(Vec3 one, Vec3 other, float side) {
-  return [=](const procedural::SurfacePoint& p) {
-    const auto cell = [&](float x) { return int(std::floor(x / side)); };
-    const bool even = (cell(p.local.x + 0.37f * side) + cell(p.local.y) + cell(p.local.z + 0.21f * side)) % 2 == 0;
-    return procedural::Finish{(even ? one : other) * (1 + 0.1f * procedural::fractal_noise(9.0f * p.local, 2)), 0};
-  };
-}
-
 /// A round table of radius 0.62 on one leg.
 Object side_table() {
   const procedural::Material top = wood(srgb(206, 158, 108), srgb(132, 82, 46), 0.23f);
@@ -255,44 +247,6 @@ Plan rod_drawn_out() {
   return plan;
 }
 
-/// A chest without its lid, of thin boards that are seen from both sides.
-Object chest(Vec3 foot, Vec3 size) {
-  const procedural::Material boards = wood(srgb(150, 104, 66), srgb(92, 58, 36), 0.11f);
-  const Vec3 x(size.x, 0, 0), up(0, -size.y, 0), z(0, 0, size.z);
-  const Vec3 a(-0.5f * size.x, 0, -0.5f * size.z);
-  Object out{"chest",
-             {foot, 0},
-             {procedural::quad(a, x, up, boards, on_things), procedural::quad(a + z, up, x, boards, on_things),
-              procedural::quad(a, up, z, boards, on_things), procedural::quad(a + x, z, up, boards, on_things),
-              procedural::quad(a + 0.02f * up, x, z, boards, on_things)}};
-  for (procedural::Patch& patch : out.patches) patch.two_sided = true;
-  return out;
-}
-
-Plan lid_opened() {
-  const Vec3 size(0.74f, 0.3f, 0.46f);
-  const DVec3 foot = dat(0.05, 0, -0.25), hinge = foot + dat(0, double(size.y), 0.5 * double(size.z));
-  const double front = -double(size.z);
-  Plan plan{.what = "The lid of a chest opened by 55 degrees; nobody has seen the inside before.", .is_test = true};
-  plan.surroundings = evaluate::furnished_room();
-  plan.surroundings.push_back(chest(Vec3(foot), size));
-  plan.things = {{{"lid",
-                   {Vec3(foot) + at(0, size.y, 0), 0},
-                   box({0, 0, 0}, {size.x + 0.03f, 0.06f, size.z + 0.03f},
-                       checks(srgb(196, 160, 96), srgb(120, 44, 40), 0.12f), on_things)},
-                  turned(hinge, {1, 0, 0}, -55 * degree)}};
-  plan.orbit = {.target = dat(0.05, 0.25, -0.2), .distance = 3.2, .lowest = 14, .highest = 40};
-  const double half = 0.5 * double(size.x);
-  plan.grips = {{hinge + dat(-0.75 * half, 0.06, front + 0.06), 0.42},
-                {hinge + dat(0.75 * half, 0.06, front + 0.06), 0.42},
-                {hinge + dat(0, 0.06, -0.03), 0.16, 0, true}};
-  plan.region = edit::Region{foot + dat(0, double(size.y) + 0.04, 0), {0.86, 0.08, 0.56}};
-  plan.clicks = {
-      {hinge + dat(-0.2, 0.06, 0.5 * front), hinge + dat(0.25, 0.06, 0.7 * front), hinge + dat(0, 0.03, front - 0.015)},
-      {foot + dat(0, 0.15, 0.5 * front), foot + dat(0.5, 0, -0.2), hinge + dat(0, 0.4, 1.4)}};
-  return plan;
-}
-
 }  // namespace
 
 const std::vector<NamedPlan>& known_plans() {
@@ -312,7 +266,9 @@ const std::vector<NamedPlan>& known_plans() {
                                           {"can", can_on_floor},
                                           {"chair", chair_on_carpet},
                                           {"teddy", teddy_on_sofa},
-                                          {"lamp", lamp_on_table}};
+                                          {"lamp", lamp_on_table},
+                                          {"door", door_opened},
+                                          {"laptop", laptop_opened}};
   return all;
 }
 
