@@ -33,6 +33,11 @@ constexpr float judged_transmittance = 0.01f;
 // masks 5 pixels too wide, precision is 0.97 in place of 0.73 (turn), 0.68 in place of 0.61 (mug).
 constexpr double border_width = 0.02, border_of_thing = 0.1;
 
+// A mask's parts that a disc of this part of that width does not fit into are believed all over: of a leg or a stem,
+// which is all border, nothing else would be said, and it would stay where it is. Chosen on the captured cases mug,
+// turn, board, rod, plant, mouth, can, chair and door: with 1, mug loses 0.25 dB.
+constexpr double thin = 2.0 / 3;
+
 // Of the share of a row's weight that lies inside, from one half.
 constexpr double undecided_margin = 0.1;
 
@@ -54,17 +59,20 @@ RowSet visible_rows(const scene::GaussianCloud& cloud, const scene::Camera& came
   return out;
 }
 
-/// Of each pixel, how likely it shows the thing: 1 well inside the mask, 0 well outside, one half near its border,
-/// where masks are rarely right.
+/// Of each pixel, how likely it shows the thing: 1 well inside the mask and in its thin parts, 0 well outside, one half
+/// near its border, where masks are rarely right.
 scene::Image belief(const scene::Mask& inside) {
   scene::Mask outside(inside.width, inside.height);
   for (std::size_t pixel = 0; pixel < inside.data.size(); ++pixel) outside.data[pixel] = inside.data[pixel] == 0;
   const double width = std::min(border_width * inside.width, border_of_thing * std::sqrt(double(inside.area())));
   const int radius = std::max(1, int(std::lround(width)));
   const scene::Mask maybe_inside = mask::dilate(inside, radius), maybe_outside = mask::dilate(outside, radius);
+  const scene::Mask thick = mask::opened(inside, std::max(1, int(std::lround(thin * radius))));
   scene::Image value(inside.width, inside.height, 1);
-  for (std::size_t pixel = 0; pixel < value.data.size(); ++pixel)
-    value.data[pixel] = maybe_outside.data[pixel] == 0 ? 1.0f : maybe_inside.data[pixel] == 0 ? 0.0f : 0.5f;
+  for (std::size_t pixel = 0; pixel < value.data.size(); ++pixel) {
+    const bool is_thin = inside.data[pixel] != 0 && thick.data[pixel] == 0;
+    value.data[pixel] = maybe_outside.data[pixel] == 0 || is_thin ? 1.0f : maybe_inside.data[pixel] == 0 ? 0.0f : 0.5f;
+  }
   return value;
 }
 

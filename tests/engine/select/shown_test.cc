@@ -100,6 +100,23 @@ TEST(RowsInMasks, SayNothingOfWhatIsNearTheirBorder) {
   EXPECT_EQ(found.undecided, 1u);
 }
 
+TEST(RowsInMasks, BelieveThinParts) {
+  scene::GaussianCloud cloud;
+  for (const float x : {0.0f, 0.1f}) add_at(cloud, {x, 0, 2}, 12, -6.0f);  // at pixels 50 and 55, half a pixel wide
+  const auto judge = [&](int from, int to) {
+    scene::Mask bar(100, 100);
+    for (int y = 0; y < 100; ++y)
+      for (int x = 0; x < 100; ++x) bar.at(x, y) = (x >= from && x < to) || x < 30;
+    render::Workspace workspace;
+    return rows_in_masks(cloud, {{{front_camera(), bar}}}, workspace);
+  };
+  const MaskedRows thin = judge(49, 51);
+  EXPECT_TRUE(thin.inside[0]) << "a leg, all of it near the mask's border";
+  EXPECT_TRUE(!thin.inside[1] && thin.judged[1]);
+  const MaskedRows wide = judge(45, 51);
+  EXPECT_FALSE(wide.judged[0]) << "the rim of what is wide is not believed";
+}
+
 TEST(RowsInMasks, CountViewsByTheirAreaAndReportWhatIsNearlyEven) {
   scene::GaussianCloud cloud;
   add_at(cloud, {0, 0, 2}, 12, -2.0f);
