@@ -24,7 +24,8 @@ rm -rf "$out"
 mkdir -p "$out"
 "$splatdrag" demo-scene --out "$out/input"
 
-# The service chooses a free port and says which.
+# The service chooses a free port and says which. On a busy machine it may not have made its file when it is first read.
+: >"$out/service.out"
 "$splatdrag" serve --port "${SPLATDRAG_PORT:-0}" --data-dir "$out/service" --scene-root "$out/input" \
   >"$out/service.out" 2>"$out/service.log" &
 service=$!
