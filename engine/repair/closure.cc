@@ -25,8 +25,11 @@ struct Known {
   int near = 0;
 };
 
-void add(const SpaceView& view, DVec3 point, double width, double deep, Known& known) {
-  const DVec3 p = view.camera.cam_from_world(point);
+/// Adds what a view tells of a node.
+///   p      the node, in the view's frame
+///   width  of what is known on either side of a surface, world units
+///   deep   of what is inside behind it, world units
+void add(const SpaceView& view, DVec3 p, double width, double deep, Known& known) {
   if (!(p.z > 0)) return;
   const DVec2 pixel = view.camera.pixel_from_cam(p);
   if (!(pixel.x >= 0 && pixel.y >= 0 && pixel.x < view.camera.width && pixel.y < view.camera.height)) return;
@@ -70,11 +73,18 @@ std::vector<Knowledge> Closure::note(std::span<const SpaceView> views) {
   const double width = double(band) * step_, deep = solid * most_nodes * step_;
   std::vector<Knowledge> knowledge(value_.size(), Knowledge::nothing);
   parallel_for(std::size_t(size_[2]), 1, [&](std::size_t begin, std::size_t end) {
+    std::vector<Known> row(static_cast<std::size_t>(size_[0]));
     for (int z = int(begin); z < int(end); ++z)
-      for (int y = 0; y < size_[1]; ++y)
+      for (int y = 0; y < size_[1]; ++y) {
+        std::ranges::fill(row, Known{});
+        // View by view, as a row of nodes is a line in its picture: what is read lies together.
+        for (const SpaceView& view : views) {
+          const DVec3 first = view.camera.cam_from_world(low_ + step_ * DVec3(0, y, z));
+          const DVec3 step = view.camera.rotation * DVec3(step_, 0, 0);
+          for (int x = 0; x < size_[0]; ++x) add(view, first + double(x) * step, width, deep, row[std::size_t(x)]);
+        }
         for (int x = 0; x < size_[0]; ++x) {
-          Known known;
-          for (const SpaceView& view : views) add(view, low_ + step_ * DVec3(x, y, z), width, deep, known);
+          const Known& known = row[std::size_t(x)];
           const std::size_t node = index({x, y, z});
           // What one view shows counts for more than that others have something before it.
           if (known.seen > 0) {
@@ -85,6 +95,7 @@ std::vector<Knowledge> Closure::note(std::span<const SpaceView> views) {
           }
           if (known.near > 0) color_[node] = known.color / float(known.near), colored_[node] = 1;
         }
+      }
   });
   return knowledge;
 }
