@@ -288,13 +288,14 @@ TEST(EditWithACorrector, WhatIsStretchedIsDrawnOutOncePerInterval) {
           return Result<void>{};
         };
         Outcome outcome = run_with_scene_corrector(block, observer);
+        if (!first) {
+          first = std::move(outcome);
+          return;
+        }
+        EXPECT_EQ(outcome.overlay, first->overlay) << threads;
         const auto resumed = decode(checkpoint, block.cloud, block.request);
         ASSERT_TRUE(resumed) << resumed.error().message;
         EXPECT_EQ(run_with_scene_corrector(block, {}, *resumed).overlay, outcome.overlay) << "gone on with";
-        if (!first)
-          first = std::move(outcome);
-        else
-          EXPECT_EQ(outcome.overlay, first->overlay) << threads;
       });
     EXPECT_GT(mean_extent(*first), 1.2 * stays);
     if (!once)
@@ -308,7 +309,8 @@ TEST(EditWithACorrector, GoesOnAfterAnIntervalToTheSameBytes) {
   for (const Mode mode : {Mode::move, Mode::extend})
     for (const bool far_away : {false, true}) {
       BlockScene block(0, mode);
-      block.request.params.intervals = 3;
+      const int intervals = mode == Mode::move && !far_away ? 3 : 2;  // under a sanitizer each takes ten seconds
+      block.request.params.intervals = intervals;
       block.request.params.annealing_steps = 2;
       block.request.params.iterations = 4;
       if (far_away) {
@@ -328,7 +330,7 @@ TEST(EditWithACorrector, GoesOnAfterAnIntervalToTheSameBytes) {
         return Result<void>{};
       };
       const Outcome undisturbed = run_with_scene_corrector(block, observer);
-      ASSERT_EQ(checkpoints.size(), 3u);
+      ASSERT_EQ(checkpoints.size(), std::size_t(intervals));
       if (mode == Mode::move) {
         EXPECT_GT(undisturbed.report.seeds, 0u);
       }
