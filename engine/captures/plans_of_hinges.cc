@@ -115,7 +115,7 @@ Plan door_opened() {
                 {foot + dat(-0.88 * half, middle, skin), 0.2, 0, true}};
   plan.region = edit::Region{foot + dat(0, middle, front - 0.5 * double(thick)), {0.6, 0.72, 0.07}};
   plan.clicks = {{foot + dat(-0.1, 0.5, skin), foot + dat(0.2, 0.15, skin), foot + dat(-0.2, 0.1, skin)},
-                 {foot + dat(half, 0.35, 0), foot + dat(0, double(size.y), 0.1), foot + dat(0, 0, -0.5)}};
+                 {foot + dat(half + 0.3, 0, -0.2), foot + dat(0, double(size.y), 0.1), foot + dat(0, 0, -0.5)}};
   return plan;
 }
 
