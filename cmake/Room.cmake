@@ -45,10 +45,14 @@ function(splatdrag_tests target label folder library)
     target_compile_options(${target} PRIVATE -fno-sanitize=null,alignment,object-size,vptr)
   endif()
   if(SPLATDRAG_SANITIZE OR label STREQUAL "served")
-    # To start a program under a sanitizer takes longer than most tests do: one process for all of a program's. Of those
-    # of repair and edit that is half an hour on a machine that others use.
+    # To start a program under a sanitizer takes longer than most tests do: one process for all of a program's. Those of
+    # repair and edit take half an hour on a machine that others use.
+    set(patience 1800)
+    if(SPLATDRAG_SANITIZE)
+      set(patience 3600)
+    endif()
     add_test(NAME ${folder}/${label} COMMAND ${target})
-    set_tests_properties(${folder}/${label} PROPERTIES LABELS ${label} TIMEOUT 3600)
+    set_tests_properties(${folder}/${label} PROPERTIES LABELS ${label} TIMEOUT ${patience})
     if(ROOM_TEST_ENVIRONMENT)
       set_tests_properties(${folder}/${label} PROPERTIES ENVIRONMENT "${ROOM_TEST_ENVIRONMENT}")
     endif()

@@ -40,6 +40,11 @@ for ((i = 0; i < 100; ++i)); do
   fi
   sleep 0.1
 done
+if [[ -z "$url" ]]; then
+  echo "error: the service has not said its address within 10 seconds:" >&2
+  cat "$out/service.log" >&2
+  exit 1
+fi
 
 # call METHOD PATH [curl options]: the answer's body; an error of the service is shown and ends the demo.
 call() {

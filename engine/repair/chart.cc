@@ -30,8 +30,10 @@ constexpr double finest = 16;
 // things may stand about.
 constexpr int ring_px = 4;
 constexpr double nearly_all = 0.8;
-// Trust of a pixel from which on nothing is seen through what is there.
-constexpr float lets_nothing_through = 0.98f;
+// Trust of a pixel of a view from which on next to nothing of what nobody has seen shows there.
+constexpr float wholly_seen = 0.98f;
+// At a slant a rim is wider in the chart than in the view, by so many times at most: a choice.
+constexpr int widened = 2;
 // Halvings of the interval in which a ray is known to meet the surface: to a millionth of the depth.
 constexpr int halvings = 20;
 
@@ -84,6 +86,19 @@ std::optional<DVec3> meet(const scene::Camera& camera, DVec2 pixel, double dista
   if (!(seen_at.x >= known.x0 && seen_at.x < known.x1 && seen_at.y >= known.y0 && seen_at.y < known.y1))
     return std::nullopt;
   return point;
+}
+
+/// Where a camera sees a point, if it lies before it and in its picture.
+struct SeenAt {
+  DVec2 at{0.0};     ///< Pixels.
+  double depth = 0;  ///< Along the optical axis, world units.
+};
+std::optional<SeenAt> place_in(const scene::Camera& view, DVec3 point) {
+  const DVec3 p = view.cam_from_world(point);
+  if (!(p.z > 0)) return std::nullopt;
+  const DVec2 at = view.pixel_from_cam(p);
+  if (!(at.x >= 0 && at.y >= 0 && at.x < view.width && at.y < view.height)) return std::nullopt;
+  return SeenAt{at, p.z};
 }
 
 /// The value between pixel centres, by the four around it.
@@ -146,18 +161,18 @@ void add_view(Chart& chart, const scene::Camera& view, const Shown& shown) {
       for (int x = 0; x < side; ++x) {
         const double here = double(chart.inverse_depth.at(x, y));
         if (!(here > 0)) continue;
-        const DVec3 point = point_at(chart.camera, {x + 0.5, y + 0.5}, here), p = view.cam_from_world(point);
-        if (!(p.z > 0)) continue;
-        const DVec2 at = view.pixel_from_cam(p);
-        if (!(at.x >= 0 && at.y >= 0 && at.x < view.width && at.y < view.height)) continue;
+        const DVec3 point = point_at(chart.camera, {x + 0.5, y + 0.5}, here);
+        const auto seen_at = place_in(view, point);
+        if (!seen_at) continue;
+        const auto [at, depth] = *seen_at;
         const int u = int(at.x), v = int(at.y);
         const bool shows_it =
-            shown.reliable.at(u, v) != 0 && std::abs(p.z * double(shown.inverse_depth.at(u, v)) - 1) < off_surface;
+            shown.reliable.at(u, v) != 0 && std::abs(depth * double(shown.inverse_depth.at(u, v)) - 1) < off_surface;
         const DVec3 back = view.centre() - point;
         const double slant = glm::dot(facing, back) / glm::length(back);
         if (!shows_it || slant < grazing) continue;
         // Pixels of the view on a pixel of the chart.
-        const double fineness = std::min(slant * std::pow(view.fy / p.z / (chart.camera.fy * here), 2), finest);
+        const double fineness = std::min(slant * std::pow(view.fy / depth / (chart.camera.fy * here), 2), finest);
         const float weight = float(fineness * fineness);
         for (int c = 0; c < 3; ++c) chart.colors.at(x, y, c) += weight * between(shown.color, at, c);
         chart.weights.at(x, y) += weight;
@@ -166,9 +181,8 @@ void add_view(Chart& chart, const scene::Camera& view, const Shown& shown) {
 }
 
 bool is_surrounded(const Chart& chart, int rim_px) {
-  // At a slant a rim is wider in the chart than in the view.
-  const scene::Mask near = mask::dilate(chart.goes_on, 2 * rim_px);
-  const scene::Mask far = mask::dilate(chart.goes_on, 2 * rim_px + ring_px);
+  const scene::Mask near = mask::dilate(chart.goes_on, widened * rim_px);
+  const scene::Mask far = mask::dilate(chart.goes_on, widened * rim_px + ring_px);
   std::size_t ring = 0, known = 0;
   for (std::size_t i = 0; i < far.data.size(); ++i)
     if (far.data[i] != 0 && near.data[i] == 0) ++ring, known += chart.weights.data[i] > 0 ? 1 : 0;
@@ -176,10 +190,11 @@ bool is_surrounded(const Chart& chart, int rim_px) {
 }
 
 scene::Mask rim_of(const Chart& chart, const scene::Camera& view, const scene::Image& trust, int rim_px) {
-  const int wide = 2 * rim_px;  // as is_surrounded() has it
+  const int wide = widened * rim_px;
   scene::Mask surface = chart.goes_on;
   for (std::size_t i = 0; i < surface.data.size(); ++i) surface.data[i] |= chart.weights.data[i] > 0;
-  surface = mask::eroded(mask::dilate(surface, wide), wide);  // what nobody tells of on either side is no surface
+  surface =
+      mask::eroded(mask::dilate(surface, wide), wide);  // where nobody tells of it, on one side at least, it may end
   scene::Mask rim = mask::dilate(chart.goes_on, wide);
   for (int y = 0; y < rim.height; ++y)
     for (int x = 0; x < rim.width; ++x) {
@@ -188,11 +203,8 @@ scene::Mask rim_of(const Chart& chart, const scene::Camera& view, const scene::I
       if (flag == 0) continue;
       flag = 0;
       if (surface.at(x, y) == 0 || chart.goes_on.at(x, y) != 0 || !(here > 0)) continue;
-      const DVec3 p = view.cam_from_world(point_at(chart.camera, {x + 0.5, y + 0.5}, here));
-      if (!(p.z > 0)) continue;
-      const DVec2 at = view.pixel_from_cam(p);
-      const bool is_inside = at.x >= 0 && at.y >= 0 && at.x < view.width && at.y < view.height;
-      flag = is_inside && trust.at(int(at.x), int(at.y)) < lets_nothing_through;
+      const auto seen_at = place_in(view, point_at(chart.camera, {x + 0.5, y + 0.5}, here));
+      flag = seen_at && trust.at(int(seen_at->at.x), int(seen_at->at.y)) < wholly_seen;
     }
   return rim;
 }

@@ -37,8 +37,9 @@ void add_view(Chart& chart, const scene::Camera& view, const Shown& shown);
 ///   rim_px  so near to it in the view that found it, no view told anything
 [[nodiscard]] bool is_surrounded(const Chart& chart, int rim_px);
 
-/// Pixels around what goes on where the view that found it shows the surface through the blurred outline of the part:
-/// what is there lets through what is behind it, which nobody has seen. Beyond the edge of a surface there are none.
+/// Pixels around what goes on, up to twice `rim_px` away, where the view that found it does not wholly show what
+/// somebody has seen: outlines of the part were blurred there, and what is left lets through what is behind it. Where
+/// nobody tells of the surface on one side it may end, and has no rim.
 ///   trust   [1] of the view
 ///   rim_px  as for is_surrounded(), after all views were added
 [[nodiscard]] scene::Mask rim_of(const Chart& chart, const scene::Camera& view, const scene::Image& trust, int rim_px);

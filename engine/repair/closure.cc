@@ -77,7 +77,7 @@ std::vector<Knowledge> Closure::note(std::span<const SpaceView> views) {
     for (int z = int(begin); z < int(end); ++z)
       for (int y = 0; y < size_[1]; ++y) {
         std::ranges::fill(row, Known{});
-        // View by view, as a row of nodes is a line in its picture: what is read lies together.
+        // View by view: a row of nodes is a line in each picture, whose pixels are read one after another.
         for (const SpaceView& view : views) {
           const DVec3 first = view.camera.cam_from_world(low_ + step_ * DVec3(0, y, z));
           const DVec3 step = view.camera.rotation * DVec3(step_, 0, 0);

@@ -310,7 +310,7 @@ Result<Repair::Telling> Repair::most_telling_view(const WorkingScene& working, c
 
 Result<std::size_t> Repair::complete_chart(WorkingScene& working, Rows& rows, const Telling& telling,
                                            const Round& round) {
-  if (!telling.surfaces.main) return 0;  // there may be no view at all
+  if (!telling.surfaces.main) return 0;  // no view shows where it goes on, or there is none
   std::optional<Chart> chart = chart_of(views_[telling.view], telling.surfaces);
   if (!chart) return 0;
   const int untold_px = chart_rim_px(views_[telling.view]);
@@ -327,18 +327,22 @@ Result<std::size_t> Repair::complete_chart(WorkingScene& working, Rows& rows, co
   const scene::Mask rim = rim_of(*chart, views_[telling.view], trust_in_view, untold_px);
   const int side = chart->camera.width;
   correct::Example known{picture_of(*chart), scene::Mask(side, side), {0, 0, side, side}};
-  scene::Image surface = chart->inverse_depth, trust(side, side, 1);
+  scene::Image surface = chart->inverse_depth, below = surface, trust(side, side, 1);
   for (std::size_t i = 0; i < trust.data.size(); ++i) {
     trust.data[i] = chart->weights.data[i] > 0 ? 1.0f : 0.0f;
     known.excluded.data[i] = trust.data[i] == 0;
-    if (chart->goes_on.data[i] == 0) surface.data[i] *= rim.data[i] != 0 ? beneath : 0;
+    if (chart->goes_on.data[i] == 0) surface.data[i] = 0;
+    below.data[i] *= rim.data[i] != 0 ? beneath : 0;
   }
 
   if (auto tuned = corrector_.fine_tune(std::span(&known, 1), 0); !tuned) return propagate(tuned);
   auto picture =
       ask_corrector(known.picture, known.excluded, std::move(trust), telling.view, {0}, round, Purpose::chart);
   if (!picture) return propagate(picture);
-  const std::size_t seeds = add_seeds(working, chart->camera, surface, *picture, *originals_);
+  // Apart, so that the step between the two is no slope.
+  const std::size_t seeds = add_seeds(working, chart->camera, surface, *picture, *originals_) +
+                            add_seeds(working, chart->camera, below, *picture, *originals_);
+  for (std::size_t i = 0; i < below.data.size(); ++i) surface.data[i] = std::max(surface.data[i], below.data[i]);
   double front = std::numeric_limits<double>::infinity();  // of what has left
   for (const std::uint32_t row : open_)
     front = std::min(front, chart->camera.cam_from_world(original_.mean.get(row)).z);

@@ -32,9 +32,9 @@ struct MaskedRows {
 /// Lifts masks to rows: inside is a row of which the views show more inside the masks than outside. Weights are summed
 /// over all views, each in units of its picture's area, so that none counts for more by its resolution; pixels near a
 /// mask's border (a fiftieth of the picture's width, or a tenth of the root of the mask's area if that is less) count
-/// for either side by half, unless they are in a part of the mask so thin that it is all border. What no view shows is
-/// not judged. A forward pass for each view. Source: Shen et al. 2024, "FlashSplat": which label of a row renders the
-/// masks best is known in closed form. Precondition: as above.
+/// for either side by half, unless an opening of the mask by two thirds of that removes them: legs, stems, and corners.
+/// What no view shows is not judged. A forward pass for each view. Source: Shen et al. 2024, "FlashSplat": which label
+/// of a row renders the masks best is known in closed form. Precondition: as above.
 [[nodiscard]] MaskedRows rows_in_masks(const scene::GaussianCloud& cloud, const Masks& masks,
                                        render::Workspace& workspace);
 

@@ -102,19 +102,24 @@ TEST(RowsInMasks, SayNothingOfWhatIsNearTheirBorder) {
 
 TEST(RowsInMasks, BelieveThinParts) {
   scene::GaussianCloud cloud;
-  for (const float x : {0.0f, 0.1f}) add_at(cloud, {x, 0, 2}, 12, -6.0f);  // at pixels 50 and 55, half a pixel wide
-  const auto judge = [&](int from, int to) {
-    scene::Mask bar(100, 100);
-    for (int y = 0; y < 100; ++y)
-      for (int x = 0; x < 100; ++x) bar.at(x, y) = (x >= from && x < to) || x < 30;
+  add_at(cloud, {0, 0, 2}, 12, -6.0f);     // on the last pixels of a bar
+  add_at(cloud, {0.1f, 0, 2}, 12, -6.0f);  // five hundredths of the picture beside it
+  constexpr int times = 3;                 // a border of six pixels
+  scene::Camera camera = front_camera();
+  camera.fx *= times, camera.fy *= times, camera.cx *= times, camera.cy *= times;
+  camera.width *= times, camera.height *= times;
+  const auto judge = [&](int wide) {
+    scene::Mask bar(camera.width, camera.height);
+    for (int y = 0; y < bar.height; ++y)
+      for (int x = 0; x < bar.width; ++x) bar.at(x, y) = (x >= 152 - wide && x < 152) || x < 90;
     render::Workspace workspace;
-    return rows_in_masks(cloud, {{{front_camera(), bar}}}, workspace);
+    return rows_in_masks(cloud, {{{camera, bar}}}, workspace);
   };
-  const MaskedRows thin = judge(49, 51);
+  const MaskedRows thin = judge(8);
   EXPECT_TRUE(thin.inside[0]) << "a leg, all of it near the mask's border";
   EXPECT_TRUE(!thin.inside[1] && thin.judged[1]);
-  const MaskedRows wide = judge(45, 51);
-  EXPECT_FALSE(wide.judged[0]) << "the rim of what is wide is not believed";
+  EXPECT_FALSE(judge(10).judged[0]) << "an opening by four pixels leaves it";
+  EXPECT_FALSE(judge(30).judged[0]) << "the rim of what is wide";
 }
 
 TEST(RowsInMasks, CountViewsByTheirAreaAndReportWhatIsNearlyEven) {
