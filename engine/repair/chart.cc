@@ -8,6 +8,7 @@
 #include "engine/core/parallel.h"
 #include "engine/core/vec.h"
 #include "engine/mask/mask.h"
+#include "engine/repair/in_picture.h"
 #include "engine/repair/seed.h"
 
 namespace engine::repair {
@@ -88,19 +89,6 @@ std::optional<DVec3> meet(const scene::Camera& camera, DVec2 pixel, double dista
   return point;
 }
 
-/// Where a camera sees a point, if it lies before it and in its picture.
-struct SeenAt {
-  DVec2 at{0.0};     ///< Pixels.
-  double depth = 0;  ///< Along the optical axis, world units.
-};
-std::optional<SeenAt> place_in(const scene::Camera& view, DVec3 point) {
-  const DVec3 p = view.cam_from_world(point);
-  if (!(p.z > 0)) return std::nullopt;
-  const DVec2 at = view.pixel_from_cam(p);
-  if (!(at.x >= 0 && at.y >= 0 && at.x < view.width && at.y < view.height)) return std::nullopt;
-  return SeenAt{at, p.z};
-}
-
 /// The value between pixel centres, by the four around it.
 float between(const scene::Image& image, DVec2 at, int channel) {
   const double x = std::clamp(at.x - 0.5, 0.0, image.width - 1.0), y = std::clamp(at.y - 0.5, 0.0, image.height - 1.0);
@@ -161,20 +149,19 @@ void add_view(Chart& chart, const scene::Camera& view, const Shown& shown) {
       for (int x = 0; x < side; ++x) {
         const double here = double(chart.inverse_depth.at(x, y));
         if (!(here > 0)) continue;
-        const DVec3 point = point_at(chart.camera, {x + 0.5, y + 0.5}, here);
-        const auto seen_at = place_in(view, point);
-        if (!seen_at) continue;
-        const auto [at, depth] = *seen_at;
-        const int u = int(at.x), v = int(at.y);
+        const DVec3 point = point_at(chart.camera, {x + 0.5, y + 0.5}, here), p = view.cam_from_world(point);
+        const auto at = pixel_in_picture(view, p);
+        if (!at) continue;
+        const int u = int(at->x), v = int(at->y);
         const bool shows_it =
-            shown.reliable.at(u, v) != 0 && std::abs(depth * double(shown.inverse_depth.at(u, v)) - 1) < off_surface;
+            shown.reliable.at(u, v) != 0 && std::abs(p.z * double(shown.inverse_depth.at(u, v)) - 1) < off_surface;
         const DVec3 back = view.centre() - point;
         const double slant = glm::dot(facing, back) / glm::length(back);
         if (!shows_it || slant < grazing) continue;
         // Pixels of the view on a pixel of the chart.
-        const double fineness = std::min(slant * std::pow(view.fy / depth / (chart.camera.fy * here), 2), finest);
+        const double fineness = std::min(slant * std::pow(view.fy / p.z / (chart.camera.fy * here), 2), finest);
         const float weight = float(fineness * fineness);
-        for (int c = 0; c < 3; ++c) chart.colors.at(x, y, c) += weight * between(shown.color, at, c);
+        for (int c = 0; c < 3; ++c) chart.colors.at(x, y, c) += weight * between(shown.color, *at, c);
         chart.weights.at(x, y) += weight;
       }
   });
@@ -193,18 +180,17 @@ scene::Mask rim_of(const Chart& chart, const scene::Camera& view, const scene::I
   const int wide = widened * rim_px;
   scene::Mask surface = chart.goes_on;
   for (std::size_t i = 0; i < surface.data.size(); ++i) surface.data[i] |= chart.weights.data[i] > 0;
-  surface =
-      mask::eroded(mask::dilate(surface, wide), wide);  // where nobody tells of it, on one side at least, it may end
-  scene::Mask rim = mask::dilate(chart.goes_on, wide);
+  // Where nobody tells of it, on one side at least, it may end.
+  surface = mask::eroded(mask::dilate(surface, wide), wide);
+  const scene::Mask near = mask::dilate(chart.goes_on, wide);
+  scene::Mask rim(near.width, near.height);
   for (int y = 0; y < rim.height; ++y)
     for (int x = 0; x < rim.width; ++x) {
-      std::uint8_t& flag = rim.at(x, y);
       const double here = double(chart.inverse_depth.at(x, y));
-      if (flag == 0) continue;
-      flag = 0;
-      if (surface.at(x, y) == 0 || chart.goes_on.at(x, y) != 0 || !(here > 0)) continue;
-      const auto seen_at = place_in(view, point_at(chart.camera, {x + 0.5, y + 0.5}, here));
-      flag = seen_at && trust.at(int(seen_at->at.x), int(seen_at->at.y)) < wholly_seen;
+      if (near.at(x, y) == 0 || surface.at(x, y) == 0 || chart.goes_on.at(x, y) != 0 || !(here > 0)) continue;
+      const DVec3 point = point_at(chart.camera, {x + 0.5, y + 0.5}, here);
+      const auto at = pixel_in_picture(view, view.cam_from_world(point));
+      rim.at(x, y) = at && trust.at(int(at->x), int(at->y)) < wholly_seen;
     }
   return rim;
 }

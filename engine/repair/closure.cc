@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "engine/core/parallel.h"
+#include "engine/repair/in_picture.h"
 #include "engine/repair/thin_plate.h"
 
 namespace engine::repair {
@@ -30,10 +31,9 @@ struct Known {
 ///   width  of what is known on either side of a surface, world units
 ///   deep   of what is inside behind it, world units
 void add(const SpaceView& view, DVec3 p, double width, double deep, Known& known) {
-  if (!(p.z > 0)) return;
-  const DVec2 pixel = view.camera.pixel_from_cam(p);
-  if (!(pixel.x >= 0 && pixel.y >= 0 && pixel.x < view.camera.width && pixel.y < view.camera.height)) return;
-  const int x = int(pixel.x), y = int(pixel.y);
+  const auto pixel = pixel_in_picture(view.camera, p);
+  if (!pixel) return;
+  const int x = int(pixel->x), y = int(pixel->y);
   const double surface = double(view.known.at(x, y)), before = double(view.before.at(x, y));
   if (!(surface > 0)) {
     if (!(before > 0) || p.z < before * (1 - hidden_behind)) known.sum += 1, ++known.seen;
@@ -46,6 +46,13 @@ void add(const SpaceView& view, DVec3 p, double width, double deep, Known& known
     ++known.behind;
   if (std::abs(ahead) <= width && view.left.at(x, y) == 0)
     known.color += Vec3(view.color.at(x, y, 0), view.color.at(x, y, 1), view.color.at(x, y, 2)), ++known.near;
+}
+
+/// Adds what a view tells of a row of nodes, a line in its picture.
+///   first, step  the first node and the way from one to the next, world units
+void add(const SpaceView& view, DVec3 first, DVec3 step, double width, double deep, std::span<Known> row) {
+  const DVec3 p = view.camera.cam_from_world(first), along = view.camera.rotation * step;
+  for (std::size_t x = 0; x < row.size(); ++x) add(view, p + double(x) * along, width, deep, row[x]);
 }
 
 }  // namespace
@@ -77,12 +84,9 @@ std::vector<Knowledge> Closure::note(std::span<const SpaceView> views) {
     for (int z = int(begin); z < int(end); ++z)
       for (int y = 0; y < size_[1]; ++y) {
         std::ranges::fill(row, Known{});
-        // View by view: a row of nodes is a line in each picture, whose pixels are read one after another.
-        for (const SpaceView& view : views) {
-          const DVec3 first = view.camera.cam_from_world(low_ + step_ * DVec3(0, y, z));
-          const DVec3 step = view.camera.rotation * DVec3(step_, 0, 0);
-          for (int x = 0; x < size_[0]; ++x) add(view, first + double(x) * step, width, deep, row[std::size_t(x)]);
-        }
+        // View by view, so that pixels of a picture are read one after another.
+        for (const SpaceView& view : views)
+          add(view, low_ + step_ * DVec3(0, y, z), DVec3(step_, 0, 0), width, deep, row);
         for (int x = 0; x < size_[0]; ++x) {
           const Known& known = row[std::size_t(x)];
           const std::size_t node = index({x, y, z});

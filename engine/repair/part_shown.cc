@@ -2,6 +2,8 @@
 
 #include <cstddef>
 
+#include "engine/repair/in_picture.h"
+
 namespace engine::repair {
 namespace {
 
@@ -22,10 +24,9 @@ void compare_depths(const Array3& means, const scene::Camera& view, const render
                     const scene::Image& shown, std::span<int> in_front, std::span<int> behind) {
   for (std::size_t row = 0; row < means.size(); ++row) {
     const DVec3 p = view.cam_from_world(means.get(row));
-    if (!(p.z > 0)) continue;
-    const DVec2 pixel = view.pixel_from_cam(p);
-    if (!(pixel.x >= 0 && pixel.y >= 0 && pixel.x < view.width && pixel.y < view.height)) continue;
-    const int x = int(pixel.x), y = int(pixel.y);
+    const auto pixel = pixel_in_picture(view, p);
+    if (!pixel) continue;
+    const int x = int(pixel->x), y = int(pixel->y);
     if (shown.at(x, y) == 0) continue;
     ++(p.z * double(part.alpha.at(x, y)) < double(part.depth.at(x, y)) ? in_front : behind)[row];
   }

@@ -15,6 +15,7 @@
 #include "engine/mask/mask.h"
 #include "engine/render/forward.h"
 #include "engine/repair/chart.h"
+#include "engine/repair/in_picture.h"
 #include "engine/repair/seed.h"
 #include "engine/repair/surfaces.h"
 #include "engine/repair/survey.h"
@@ -265,13 +266,12 @@ void Repair::clear_unseen(WorkingScene& working, Rows& rows, const scene::Camera
   for (const std::uint32_t row : unseen_) {
     if (working.role()[row] != Role::frozen) continue;
     const DVec3 p = camera.cam_from_world(working.cloud().mean.get(row));
-    if (!(p.z > 0)) continue;
-    const DVec2 pixel = camera.pixel_from_cam(p);
-    if (!(pixel.x >= 0 && pixel.y >= 0 && pixel.x < camera.width && pixel.y < camera.height)) continue;
-    const double inverse_depth = double(surface.at(int(pixel.x), int(pixel.y)));
+    const auto pixel = pixel_in_picture(camera, p);
+    if (!pixel) continue;
+    const double inverse_depth = double(surface.at(int(pixel->x), int(pixel->y)));
     if (!(inverse_depth > 0) || p.z * inverse_depth > 1 + off_surface) continue;
     // What lies where the part was not, and not on the surface either, is the inside of something else.
-    if (p.z * inverse_depth < 1 - off_surface && !is_within(pixel, p.z)) continue;
+    if (p.z * inverse_depth < 1 - off_surface && !is_within(*pixel, p.z)) continue;
     working.give_up(row);
     rows.gone.push_back(row), rows.dragged.push_back(row);
   }
@@ -310,7 +310,7 @@ Result<Repair::Telling> Repair::most_telling_view(const WorkingScene& working, c
 
 Result<std::size_t> Repair::complete_chart(WorkingScene& working, Rows& rows, const Telling& telling,
                                            const Round& round) {
-  if (!telling.surfaces.main) return 0;  // no view shows where it goes on, or there is none
+  if (views_.empty()) return 0;  // nothing that changes is seen
   std::optional<Chart> chart = chart_of(views_[telling.view], telling.surfaces);
   if (!chart) return 0;
   const int untold_px = chart_rim_px(views_[telling.view]);

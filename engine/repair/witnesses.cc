@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "engine/render/forward.h"
+#include "engine/repair/in_picture.h"
 
 namespace engine::repair {
 namespace {
@@ -57,12 +58,11 @@ bool Witnesses::saw(DVec3 point) const {
   for (std::size_t k = 0; k < cameras_.size(); ++k) {
     const scene::Camera& camera = cameras_[k];
     const DVec3 p = camera.cam_from_world(point);
-    if (!(p.z > 0)) continue;
-    const DVec2 pixel = camera.pixel_from_cam(p);
-    if (!(pixel.x >= 0 && pixel.y >= 0 && pixel.x < camera.width && pixel.y < camera.height)) continue;
-    const double depth = depth_at(depth_[k], pixel);
+    const auto pixel = pixel_in_picture(camera, p);
+    if (!pixel) continue;
+    const double depth = depth_at(depth_[k], *pixel);
     if (depth > 0 && p.z > depth * (1 + hidden_behind)) continue;
-    if (seen || !is_at_edge(depth_[k], pixel, p.z)) return true;
+    if (seen || !is_at_edge(depth_[k], *pixel, p.z)) return true;
     seen = true;
   }
   return false;
