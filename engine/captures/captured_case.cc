@@ -1,6 +1,7 @@
 #include "engine/captures/captured_case.h"
 
 #include <algorithm>
+#include <cassert>
 #include <numbers>
 #include <numeric>
 #include <optional>
@@ -79,6 +80,30 @@ void gloss_over(const std::vector<std::string>& glossy, const std::vector<proced
       add_gloss(to_light, gleam, first_row + i, cloud);
 }
 
+/// A thing where a motion takes it.
+procedural::Object carried(procedural::Object object, const Motion& motion) {
+  for (procedural::Patch& patch : object.patches)
+    patch.position = [motion, placement = object.placement, place = std::move(patch.position)](float u, float v) {
+      return Vec3(motion(DVec3(placement.world(place(u, v)))));
+    };
+  object.placement = {};
+  return object;
+}
+
+/// Gives the surroundings the colours that they have in the shadows of all things.
+void shade(const Plan& plan, Side side, const CapturedCase& of, scene::GaussianCloud& surroundings) {
+  std::vector<procedural::Object> objects = plan.surroundings;
+  for (const Thing& thing : plan.things)
+    objects.push_back(carried(thing.object, [&, side](DVec3 point) {
+      if (thing.pose) point = thing.pose(point);
+      return side == Side::before ? point : thing.motion(point);
+    }));
+  const scene::GaussianCloud shaded = cover(objects, of.cameras, seed).cloud;
+  assert(shaded.size() > surroundings.size() && "objects are covered one after the other");
+  for (std::size_t i = 0; i < surroundings.size(); ++i)
+    std::ranges::copy(shaded.sh_row(i), surroundings.sh_row(i).begin());
+}
+
 /// Appends the things as they are before the edit, and after it, with all gloss.
 void put_things(const Plan& plan, CapturedCase& out) {
   std::vector<procedural::Object> objects;
@@ -103,13 +128,14 @@ void put_things(const Plan& plan, CapturedCase& out) {
 
 /// Both scenes and what moves in them.
 void put_scenes(const Plan& plan, CapturedCase& out) {
-  Covered around = cover(plan.surroundings, out.cameras, seed);
-  gloss_over(plan.glossy, plan.surroundings, around.object, 0, around.cloud);
+  const Covered around = cover(plan.surroundings, out.cameras, seed);
   std::vector<std::uint32_t> meant;
   for (std::uint32_t i = 0; plan.drawn_from && i < around.cloud.size(); ++i)
     if (plan.drawn_from(DVec3(around.cloud.mean.get(i)))) meant.push_back(i);
-  out.before = around.cloud;
-  out.after = std::move(around.cloud);
+  out.before = out.after = around.cloud;
+  if (plan.casts_shadows) shade(plan, Side::before, out, out.before), shade(plan, Side::after, out, out.after);
+  gloss_over(plan.glossy, plan.surroundings, around.object, 0, out.before);
+  gloss_over(plan.glossy, plan.surroundings, around.object, 0, out.after);
   put_things(plan, out);
   if (!plan.only_after.empty()) {
     const Covered grown = cover(plan.only_after, out.cameras, seed + 2);

@@ -247,6 +247,23 @@ Plan rod_drawn_out() {
   return plan;
 }
 
+/// The same case in a room where things cast shadows, which come along: those of most cases are left out, so that what
+/// is there after the edit is as bright as it was before.
+Plan with_shadows(Plan plan, std::string what, bool is_test) {
+  plan.what = std::move(what);
+  plan.casts_shadows = true;
+  plan.is_test = is_test;
+  return plan;
+}
+
+Plan mug_and_shadow() { return with_shadows(mug_on_side_table(), "The mug on the side table and its shadow.", false); }
+Plan can_and_shadow() { return with_shadows(can_on_floor(), "The can on the planks and its shadow.", false); }
+Plan chair_and_shadow() { return with_shadows(chair_on_carpet(), "The chair on the carpet and its shadow.", false); }
+Plan teddy_and_shadow() { return with_shadows(teddy_on_sofa(), "The teddy on the sofa and its shadow.", true); }
+Plan clutter_and_shadow() {
+  return with_shadows(crate_before_clutter(), "The crate before clutter and its shadow.", true);
+}
+
 }  // namespace
 
 const std::vector<NamedPlan>& known_plans() {
@@ -268,7 +285,12 @@ const std::vector<NamedPlan>& known_plans() {
                                           {"teddy", teddy_on_sofa},
                                           {"lamp", lamp_on_table},
                                           {"door", door_opened},
-                                          {"laptop", laptop_opened}};
+                                          {"laptop", laptop_opened},
+                                          {"mug_shadow", mug_and_shadow},
+                                          {"can_shadow", can_and_shadow},
+                                          {"chair_shadow", chair_and_shadow},
+                                          {"teddy_shadow", teddy_and_shadow},
+                                          {"clutter_shadow", clutter_and_shadow}};
   return all;
 }
 

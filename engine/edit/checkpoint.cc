@@ -100,7 +100,7 @@ void read(ByteReader& in, Members& members) {
   members.cloud = scene::read_cloud(in);
   if (!in.has(members.cloud.size())) return in.fail();
   members.role.resize(members.cloud.size());
-  for (Role& role : members.role) read(in, role, Role::continued);
+  for (Role& role : members.role) read(in, role, Role::relit);
   read(in, members.handle);
   read(in, members.parent);
   read(in, members.mean_at_deform);

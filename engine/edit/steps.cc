@@ -19,6 +19,7 @@
 #include "engine/edit/workload.h"
 #include "engine/render/forward.h"
 #include "engine/repair/outskirts.h"
+#include "engine/repair/shadow.h"
 #include "engine/repair/stretch.h"
 
 namespace engine::edit {
@@ -104,6 +105,11 @@ bool has_outskirts(const Edit& edit) {
          request.mode != Mode::extend && leaves_as_a_whole(edit);
 }
 
+bool is_outside_region(const Edit& edit, std::uint32_t row) {
+  const auto& region = edit.request.region;
+  return region && !deform::inside(deform::Box{region->center, region->size}, DVec3(edit.input.mean.get(row)));
+}
+
 /// What pictures show to be of the part goes with it, and what they never showed of it does not arrive.
 ///   advance  called with the part that is done; its error ends it
 Result<void> look_at_outskirts(State& state, Edit& edit, const ViewChoice& choice,
@@ -113,10 +119,8 @@ Result<void> look_at_outskirts(State& state, Edit& edit, const ViewChoice& choic
   auto outskirts = repair::outskirts_of(edit.input, part, choice.witnesses, advance);
   if (!outskirts) return propagate(outskirts);
   std::erase_if(outskirts->backing, [&](std::uint32_t row) {
-    const bool is_outside = request.region && !deform::inside(deform::Box{request.region->center, request.region->size},
-                                                              DVec3(edit.input.mean.get(row)));
     // What is healed goes anyway, and what is selected and rests where it is stays.
-    return is_outside || std::ranges::binary_search(request.healed, row) ||
+    return is_outside_region(edit, row) || std::ranges::binary_search(request.healed, row) ||
            state.scene.role()[row] != working::Role::frozen;
   });
   if (request.mode != Mode::remove)
@@ -125,6 +129,37 @@ Result<void> look_at_outskirts(State& state, Edit& edit, const ViewChoice& choic
   edit.given_up = united(edit.given_up, outskirts->backing);
   if (!outskirts->backing.empty() || !edit.buried.empty())
     state.report.warnings.push_back(outskirts_go(outskirts->backing.size(), edit.buried.size()));
+  return {};
+}
+
+/// Where what is at a point around the part as it arrives would have been around it before; empty where no single
+/// motion says so.
+std::function<DVec3(DVec3)> back_to_source(const State& state, const Edit& edit) {
+  if (edit.request.mode == Mode::remove || edit.parts.attachments.size() != 1) return {};
+  const deform::Attachment& part = edit.parts.attachments.front();
+  const working::Frame& frame = state.scene.frame();
+  const auto drags = interval_drags(frame, edit.request, state.positions, 1, 1);
+  const deform::RigidMotion motion = deform::nearest_motion(drags, part.group, part.scales);
+  return [motion, &frame](DVec3 point) {
+    const DVec3 arrived = frame.edit_from_world(point) - motion.centre - motion.shift;
+    return frame.world_from_edit(motion.centre + glm::conjugate(motion.turn) * arrived / motion.scale);
+  };
+}
+
+/// What the part has kept the light from, and what it will.
+///   part  rows that leave, ascending
+Result<void> look_for_shadow(const State& state, Edit& edit, const Rows& part,
+                             const std::function<Result<void>(double)>& advance) {
+  auto around = repair::surroundings_of(edit.input, part, state.views, advance);
+  if (!around) return propagate(around);
+  const repair::Shadow shadow(std::move(*around));
+  repair::Relit all = repair::relit_rows(edit.input, part, shadow, back_to_source(state, edit));
+  for (std::size_t k = 0; k < all.rows.size(); ++k) {
+    const std::uint32_t row = all.rows[k];
+    const bool stays = is_outside_region(edit, row) || std::ranges::binary_search(edit.request.healed, row) ||
+                       state.scene.role()[row] != working::Role::frozen;
+    if (!stays) edit.relit.rows.push_back(row), edit.relit.light.push_back(all.light[k]);
+  }
   return {};
 }
 
@@ -198,7 +233,12 @@ Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Cam
             look_at_outskirts(state, edit, *choice, [&](double part) { return edit.progress.advance((1 + part) / 2); });
         !looked)
       return looked;
-  Rows vanishing = united(edit.given_up, edit.buried);
+  if (!choice->moved.empty() && looks)
+    if (auto looked = look_for_shadow(state, edit, united(choice->moved, edit.given_up),
+                                      [&](double) { return edit.progress.advance(1); });
+        !looked)
+      return looked;
+  Rows vanishing = united(united(edit.given_up, edit.buried), edit.relit.rows);
   if (edit.corrector != nullptr) vanishing = united(vanishing, edit.request.healed);
   if (vanishing.empty()) return {};
   return unite_masks(state.scene, vanishing, state.views, state.masks,
@@ -220,6 +260,7 @@ Result<Rows> paste(State& state, Edit& edit, int u, const PlannedMotion& motion)
   if (u == 1 && !motion.moving.empty())
     for (const std::uint32_t row : edit.given_up) state.scene.give_up(row);
   if (u == 1) leave_buried(state.scene, edit.buried);
+  if (u == 1 && !motion.moving.empty()) repair::relight(state.scene, edit.relit);
   // An elastic body has drawn its Gaussians out already.
   if (edit.corrector != nullptr && edit.optimises() && edit.params().interpolation != Interpolation::arap)
     repair::draw_out(state.scene);

@@ -561,17 +561,22 @@ Result<Corrected> Repair::walk(WorkingScene& working, std::span<const scene::Mas
   }
   corrected.trust = std::move(trust_);  // seeds, trails and originals are what the optimisation is to change
   for (std::size_t i = 0; i < working.size(); ++i)
-    if (!working::is_dragged(working.role()[i]) && working.role()[i] != Role::continued) corrected.trust[i] = 0;
+    if (!working::is_dragged(working.role()[i]) && working.role()[i] != Role::continued &&
+        working.role()[i] != Role::relit)
+      corrected.trust[i] = 0;
   return corrected;
 }
 
 Repair::Rows Repair::rows_of(const WorkingScene& working) const {
   Rows rows;
+  std::vector<std::uint8_t> relit(working.input_rows());  // another has come in its place
+  for (const std::uint32_t i : working.rows_of(Role::relit)) relit[working.parent()[i]] = 1;
   for (std::uint32_t i = 0; i < working.size(); ++i) {
     const bool is_gone = working::has_left(working.role()[i]) && mode_ == Mode::move;
     const bool is_moved = working::has_arrived(working.role()[i]);
     if (is_gone) rows.gone.push_back(i);
-    if (is_gone && i < working.input_rows() && !std::ranges::binary_search(veils_, i)) rows.vacating.push_back(i);
+    if (is_gone && i < working.input_rows() && relit[i] == 0 && !std::ranges::binary_search(veils_, i))
+      rows.vacating.push_back(i);
     if (is_moved) rows.moved.push_back(i);
     if (is_gone || is_moved) rows.dragged.push_back(i);
   }

@@ -17,14 +17,15 @@ struct Members;
 
 /// What a row is to the edit. All but `frozen` make up the 3D mask M.
 enum class Role : std::uint8_t {
-  frozen,    ///< Outside M: is never changed.
-  held,      ///< An input row of P_h that has not moved yet.
-  original,  ///< An input row whose copy has left, or that was given up; its opacity was lowered.
-  copy,      ///< A deformed copy at its latest place, in P_h.
-  trail,     ///< Not the input's and not in P_h: a copy that was copied in turn, in an extend, its opacity lowered; or
-             ///< a child that the optimisation gave an original.
-  seed,      ///< New, of the repair: a surface that nobody has seen goes on there. So are its children.
-  continued  ///< New, of the deformation: what a part was drawn out of goes on there. So are its children.
+  frozen,     ///< Outside M: is never changed.
+  held,       ///< An input row of P_h that has not moved yet.
+  original,   ///< An input row whose copy has left, or that was given up; its opacity was lowered.
+  copy,       ///< A deformed copy at its latest place, in P_h.
+  trail,      ///< Not the input's and not in P_h: a copy that was copied in turn, in an extend, its opacity lowered; or
+              ///< a child that the optimisation gave an original.
+  seed,       ///< New, of the repair: a surface that nobody has seen goes on there. So are its children.
+  continued,  ///< New, of the deformation: what a part was drawn out of goes on there. So are its children.
+  relit       ///< New, in the place of an input row that was given up: the same in another light. So are its children.
 };
 
 /// Are rows of this role members of P_h?
@@ -32,7 +33,9 @@ enum class Role : std::uint8_t {
 /// Have rows of this role left their place, in a move? Originals have, and children that the optimisation gave them.
 [[nodiscard]] constexpr bool has_left(Role role) { return role == Role::original || role == Role::trail; }
 /// Are rows of this role neither the input's nor copies of what is dragged?
-[[nodiscard]] constexpr bool is_new(Role role) { return role == Role::seed || role == Role::continued; }
+[[nodiscard]] constexpr bool is_new(Role role) {
+  return role == Role::seed || role == Role::continued || role == Role::relit;
+}
 /// Are rows of this role where the drag brought something?
 [[nodiscard]] constexpr bool has_arrived(Role role) { return role == Role::copy || role == Role::continued; }
 /// May rows of this role be the input's?
@@ -46,7 +49,8 @@ using HandleColumn = std::vector<std::uint16_t>;
 /// A Gaussian and what the edit knows of it, N rows of one kind. Invariants, which check() states as code:
 /// - every column has a value for each Gaussian of the cloud;
 /// - rows [0, input_rows()) are the input's, in its order, each its own parent, frozen, held or original; the rest were
-///   appended, in the order they were made, and are copies, trails, seeds or continued, with an input row for a parent;
+///   appended, in the order they were made, and are copies, trails, seeds, continued or relit, with an input row for a
+///   parent;
 /// - a row has a handle exactly if it belongs to P_h: if it is held or a copy;
 /// - frozen rows are the input's bytes, in the frame of the edit.
 class WorkingScene {
@@ -76,7 +80,7 @@ class WorkingScene {
   [[nodiscard]] scene::GaussianCloud& gaussians() { return cloud_; }
   /// Row k of the new ones is row rows[k] of `from` (which may be cloud() itself), of role[k], and comes from row
   /// ancestor[k] of this scene: it has its parent and, where its role has one, its handle and its mean_at_deform.
-  ///   role     copy, trail, seed or continued; a copy's ancestor belongs to P_h
+  ///   role     copy, trail, seed, continued or relit; a copy's ancestor belongs to P_h
   ///   returns  the first new row
   std::uint32_t append(const scene::GaussianCloud& from, std::span<const std::uint32_t> rows,
                        std::span<const Role> role, std::span<const std::uint32_t> ancestor);

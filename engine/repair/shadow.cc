@@ -1,0 +1,224 @@
+#include "engine/repair/shadow.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "engine/core/parallel.h"
+#include "engine/core/rng.h"
+#include "engine/neighbours/neighbour_graph.h"
+
+namespace engine::repair {
+namespace {
+
+// Lengths are in extents of the part. Chosen on three captured cases with shadows (mug_shadow, can_shadow,
+// chair_shadow), two without (pouf, can), and three toys of a real capture.
+
+// The surface farther away: from so far from the part on, and that near to a place in the mean.
+constexpr float far_from = 0.3f, about = 0.7f;
+// Standard deviations of what counts as the same surface: off its plane, and of logarithms of colours but for their
+// mean, which shadows change a little as well. And the least cosine of the angle between normals.
+constexpr float off_plane = 0.08f, off_hue = 0.25f, same_way = 0.7f;
+// Of what is known of a place, so much must be of that surface: a plane all around is 1. A toy has too little beside it
+// to tell its shades from a shadow.
+constexpr float least_known = 0.06f;
+constexpr std::size_t most_asked = 1500;  // points of the surface farther away: an even choice of them
+// Standard deviation of the window in which a surface is as dark as the mean of its points, and how many are asked.
+constexpr float window = 0.07f;
+constexpr std::size_t window_points = 48;
+// Darker than this is left out of what the surface is like, and the search repeated.
+constexpr float surely_dark = -0.1f;
+constexpr int rounds = 3;
+// A shadow is darker by so many times what its surface varies by in such windows, and by so much at least; at twice
+// that all of it counts. Logarithms of factors of the light.
+constexpr float beyond_texture = 2.5f, least_dark = 0.05f;
+constexpr float darkest = -1.5f;  // less light than a fifth leaves no texture to be lit
+// It begins within so much of the part. From the first of these distances on it fades, to nothing at the second: what
+// is dark there is the shadow of something else as well.
+constexpr float touches = 0.12f, fades_from = 0.6f, fades_until = 1.0f;
+constexpr std::size_t joined = 16;                         // neighbours that a shadow may go on to,
+constexpr float joined_within = 2 * surroundings_spacing;  // and how near they are
+// A point of a scene is on a surface that is so near: trained Gaussians stand off what they show.
+constexpr float on_surface = 2 * surroundings_spacing, beside_point = 2.5f * surroundings_spacing;
+constexpr std::size_t points_between = 4;  // that light is interpolated from
+
+float mean_of(Vec3 v) { return (v.x + v.y + v.z) / 3; }
+
+/// Finds how dark each point is: the logarithm of what is left of the light, over a window.
+class Darkness {
+ public:
+  explicit Darkness(const Surroundings& around, const neighbours::PointIndex& index);
+  [[nodiscard]] const std::vector<Vec3>& mean() const { return mean_; }
+  [[nodiscard]] float texture(std::size_t i) const { return texture_[i]; }
+
+ private:
+  /// Of an even choice of points, those that tell what the surface is like where no shadow is, and how many each is.
+  [[nodiscard]] std::pair<std::vector<std::uint32_t>, float> asked() const;
+  void compare_with_far(std::span<const std::uint32_t> far, float each);
+  void average(std::span<const neighbours::Neighbour> nearest, std::size_t count);
+  [[nodiscard]] float likeness(std::size_t i, std::size_t j, float deviation) const;
+
+  const Surroundings& around_;
+  std::vector<Vec3> shade_, hue_;  ///< Logarithm of the colour; but for its mean.
+  std::vector<Vec3> difference_;   ///< From the surface farther away.
+  std::vector<std::uint8_t> known_;
+  std::vector<Vec3> mean_;
+  std::vector<float> texture_;  ///< What the mean varies by where there is no shadow.
+};
+
+Darkness::Darkness(const Surroundings& around, const neighbours::PointIndex& index)
+    : around_(around),
+      difference_(around.size()),
+      known_(around.size()),
+      mean_(around.size(), Vec3(0.0f)),
+      texture_(around.size()) {
+  constexpr float black = 2e-3f;  // half a step of 255: of what is darker no factor is known
+  for (std::size_t i = 0; i < around.size(); ++i) {
+    shade_.push_back(glm::log(glm::max(around.color[i], Vec3(black))));
+    hue_.push_back(shade_[i] - mean_of(shade_[i]));
+  }
+  const std::size_t count = std::min(window_points, around.size());
+  const auto nearest = index.nearest(around.place, count);
+  for (int round = 0; round < rounds; ++round) {
+    const auto [far, each] = asked();
+    compare_with_far(far, each);
+    average(nearest, count);
+  }
+}
+
+std::pair<std::vector<std::uint32_t>, float> Darkness::asked() const {
+  std::vector<std::uint32_t> far;
+  for (std::uint32_t i = 0; i < around_.size(); ++i)
+    if (around_.distance[i] > far_from && mean_of(mean_[i]) > surely_dark) far.push_back(i);
+  const std::size_t count = std::min(most_asked, far.size());
+  if (count == 0) return {{}, 0.0f};
+  std::vector<std::uint32_t> chosen;
+  for (std::size_t k = 0; k < count; ++k) {
+    // One of each `far.size() / count` neighbours in the list, which runs along rows of a grid.
+    const std::size_t first = k * far.size() / count, last = (k + 1) * far.size() / count;
+    Rng rng(0, k);
+    chosen.push_back(far[first + rng.below(std::uint32_t(last - first))]);
+  }
+  return {std::move(chosen), float(far.size()) / float(count)};
+}
+
+/// How much of the same surface two points are, by their places: 0 to 1.
+float Darkness::likeness(std::size_t i, std::size_t j, float deviation) const {
+  const Vec3 apart = around_.at(j) - around_.at(i);
+  if (std::abs(glm::dot(around_.normal[i], around_.normal[j])) < same_way) return 0;
+  const float from_i = glm::dot(apart, around_.normal[i]) / off_plane;
+  const float from_j = glm::dot(apart, around_.normal[j]) / off_plane;
+  return std::exp(-0.5f * (glm::dot(apart, apart) / (deviation * deviation) + from_i * from_i + from_j * from_j));
+}
+
+void Darkness::compare_with_far(std::span<const std::uint32_t> far, float each) {
+  constexpr float pi = 3.14159265f;
+  // A plane all around a place holds so many points, weighted as below.
+  const float full = 2 * pi * about * about / (surroundings_spacing * surroundings_spacing);
+  parallel_for(around_.size(), 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      float weights = 0, brighter = 0, squares = 0;
+      Vec3 sum(0.0f);
+      for (const std::uint32_t j : far) {
+        const Vec3 off = (hue_[j] - hue_[i]) / off_hue;
+        const float like = likeness(i, j, about);
+        if (like == 0) continue;
+        const float weight = around_.weight[j] * like * std::exp(-0.5f * glm::dot(off, off));
+        weights += weight;
+        sum += weight * shade_[j];
+        // Shadows darken, and texture does both: what is brighter than the mean tells of texture alone.
+        if (const float mean = mean_of(mean_[j]); mean > 0) brighter += weight, squares += weight * mean * mean;
+      }
+      known_[i] = weights * each > least_known * full;
+      difference_[i] = known_[i] != 0 ? shade_[i] - sum / weights : Vec3(0.0f);
+      texture_[i] = brighter > 0 ? std::sqrt(squares / brighter) : 0;
+    }
+  });
+}
+
+void Darkness::average(std::span<const neighbours::Neighbour> nearest, std::size_t count) {
+  constexpr float farthest = 2.2f * window;  // a normal distribution is next to nothing beyond
+  parallel_for(around_.size(), 256, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      float weights = 0;
+      Vec3 sum(0.0f);
+      for (const auto& n : nearest.subspan(i * count, count)) {
+        if (known_[n.index] == 0 || n.squared_distance > farthest * farthest) continue;
+        const float weight = around_.weight[n.index] * likeness(i, n.index, window);
+        weights += weight, sum += weight * difference_[n.index];
+      }
+      mean_[i] = weights > 0 ? sum / weights : Vec3(0.0f);
+    }
+  });
+}
+
+/// Which dark points hang together with one beside the part, through dark ones.
+std::vector<std::uint8_t> from_the_part(const Surroundings& around, const neighbours::PointIndex& index,
+                                        const std::vector<std::uint8_t>& dark) {
+  const std::size_t count = std::min(joined, around.size());
+  const auto nearest = index.nearest(around.place, count);
+  neighbours::Pieces pieces(around.size());
+  for (std::uint32_t i = 0; i < around.size(); ++i)
+    for (const auto& n : std::span(nearest).subspan(i * count, count))
+      if (dark[i] != 0 && dark[n.index] != 0 && n.squared_distance < joined_within * joined_within)
+        pieces.join(i, n.index);
+  std::vector<std::uint8_t> touching(around.size(), 0), out(around.size(), 0);
+  for (std::uint32_t i = 0; i < around.size(); ++i)
+    if (dark[i] != 0 && around.distance[i] < touches) touching[pieces.of(i)] = 1;
+  for (std::uint32_t i = 0; i < around.size(); ++i) out[i] = dark[i] != 0 && touching[pieces.of(i)] != 0;
+  return out;
+}
+
+}  // namespace
+
+Shadow::Shadow(Surroundings around) : around_(std::move(around)), light_(around_.size(), Vec3(1.0f)) {
+  if (around_.size() == 0) return;
+  index_.emplace(around_.place, 3);
+  const Darkness darkness(around_, *index_);
+  std::vector<float> threshold(around_.size());
+  std::vector<std::uint8_t> dark(around_.size());
+  for (std::size_t i = 0; i < around_.size(); ++i) {
+    threshold[i] = std::max(least_dark, beyond_texture * darkness.texture(i));
+    dark[i] = mean_of(darkness.mean()[i]) < -threshold[i];
+  }
+  const std::vector<std::uint8_t> cast = from_the_part(around_, *index_, dark);
+  for (std::size_t i = 0; i < around_.size(); ++i) {
+    if (cast[i] == 0) continue;
+    const Vec3 mean = darkness.mean()[i];
+    const float sure = std::min(-mean_of(mean) / threshold[i] - 1, 1.0f);
+    const float near = std::clamp((fades_until - around_.distance[i]) / (fades_until - fades_from), 0.0f, 1.0f);
+    light_[i] = glm::exp(sure * near * glm::clamp(mean, Vec3(darkest), Vec3(0.0f)));
+    points_ += near > 0 ? 1 : 0;
+  }
+}
+
+double Shadow::reach() const { return around_.extent * (0.5 + double(fades_until)); }
+
+std::vector<Vec3> Shadow::light_at(std::span<const DVec3> points) const {
+  std::vector<Vec3> out(points.size(), Vec3(1.0f));
+  if (empty()) return out;
+  std::vector<float> places;
+  for (const DVec3& point : points) {
+    const Vec3 place = around_.place_of(point);
+    for (int axis = 0; axis < 3; ++axis) places.push_back(place[axis]);
+  }
+  const std::size_t count = std::min(points_between, around_.size());
+  const auto nearest = index_->nearest(places, count);
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const Vec3 place(places[3 * k], places[3 * k + 1], places[3 * k + 2]);
+    float weights = 0;
+    Vec3 sum(0.0f);
+    for (const auto& n : std::span(nearest).subspan(k * count, count)) {
+      if (n.squared_distance > beside_point * beside_point) continue;
+      if (std::abs(glm::dot(place - around_.at(n.index), around_.normal[n.index])) > on_surface) continue;
+      constexpr float least = 1e-6f;  // at a point itself
+      const float weight = 1 / (n.squared_distance + least);
+      weights += weight, sum += weight * light_[n.index];
+    }
+    if (weights > 0) out[k] = sum / weights;
+  }
+  return out;
+}
+
+}  // namespace engine::repair
