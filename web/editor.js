@@ -130,6 +130,7 @@ export class Editor {
   #submitting = 0; // How many submissions are on their way.
   #early = []; // Edits that ended meanwhile.
   #mine = new Set(); // Ids of edits that were asked for here, or were there when the scene was opened.
+  #better = new Set(); // Of these, the ids of those that run a draft well: without their draft they take no screen.
   #counting = null;
   #previewing = null;
   #placing = null;
@@ -201,6 +202,7 @@ export class Editor {
     this.#timers.clear();
     this.#unfollow();
     this.#mine.clear();
+    this.#better.clear();
     this.#early = [];
     for (const abort of [this.#counting, this.#previewing, this.#placing]) abort?.abort();
     this.#previewing = null;
@@ -853,7 +855,7 @@ export class Editor {
     try {
       const edit = await this.#submit({ ...request, scene: this.state.scene.id, version: base, preset: "standard" });
       if (opening !== this.#opened) return;
-      // Undone meanwhile, it is an edit like any other.
+      this.#better.add(edit.id);
       if (this.state.drafted === drafted) this.store.set({ drafted: { ...drafted, better: edit.id } });
       this.store.set({ edits: merged(this.state.edits, edit) });
     } catch (error) {
@@ -1002,7 +1004,8 @@ export class Editor {
       this.#dropDrafts({ version: edit.result_version, base: edit.version });
       return say(`Version ${edit.result_version} is what the draft was for. ${HOLD} to compare.`);
     }
-    if (version !== edit.version || dragging || !this.#mine.has(edit.id))
+    // What ran a draft well that has been undone is offered: what is placed now is somebody's next step.
+    if (version !== edit.version || dragging || this.#better.has(edit.id) || !this.#mine.has(edit.id))
       return say(`Version ${edit.result_version} is ready${this.#mine.has(edit.id) ? "" : ", made elsewhere"}.`, {
         label: "Show",
         run: () => this.showVersion(edit.result_version),

@@ -586,6 +586,13 @@ test("a result that is undone while it is asked to be run well stays undone", as
     editor.state.edits.map((e) => e.id),
     ["e000002", "e000001"],
   );
+  service["GET /v1/scenes/s000001"] = () => ({ ...scene(), versions: [0, 1, 2].map((version) => ({ version, parent: version ? 0 : null })) });
+  streams[0].send(edit({ id: "e000002", state: "succeeded", progress: 1, result_version: 2 }));
+  await settle();
+  assert.deepEqual([editor.state.version, editor.state.handles.length], [0, 1], "and what is placed stays, too");
+  assert.equal(said.at(-1), "Version 2 is ready.");
+  offered.at(-1).run();
+  assert.equal(editor.state.version, 2);
 });
 
 test("a thing is removed by one press, and what is taken next is to be moved again", async () => {
