@@ -269,17 +269,18 @@ std::uint64_t photo_pixels(const View& view) {
 
 }  // namespace
 
-Result<scene::Image> load_photo(const View& view, MemoryBudget* memory) {
-  if (view.photo.empty())
-    return fail(ErrorCode::not_found, "view " + view.camera.name + " has no photo", view.camera.name);
+std::uint64_t photo_memory(const View& view) {
   std::error_code unknown;
   const auto file_bytes = fs::file_size(view.photo, unknown);
-  const std::uint64_t pixels = photo_pixels(view);
   // Interleaved and by channel, four floats each; what the library unpacks from; and the photo without its distortion.
   constexpr std::uint64_t pixel_bytes = 16 + 16 + 8 + 12;
-  const auto share =
-      take_from(memory, (unknown ? 0 : std::uint64_t{file_bytes}) + pixel_bytes * pixels, view.camera.name);
-  if (!share) return propagate(share);
+  return (unknown ? 0 : std::uint64_t{file_bytes}) + pixel_bytes * photo_pixels(view);
+}
+
+Result<scene::Image> load_photo(const View& view) {
+  if (view.photo.empty())
+    return fail(ErrorCode::not_found, "view " + view.camera.name + " has no photo", view.camera.name);
+  const std::uint64_t pixels = photo_pixels(view);
   // About the size that was counted, with up to 8 channels, or none: it may have been exchanged meanwhile.
   auto photo = read_image(view.photo, {.max_pixels = 2 * pixels});
   if (!photo && photo.error().code != ErrorCode::too_large) return photo;

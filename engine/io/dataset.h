@@ -60,10 +60,11 @@ struct DatasetOptions {
 /// Those of all views, in order.
 [[nodiscard]] std::vector<scene::Camera> cameras_of(const Dataset& dataset);
 
+/// What load_photo() takes, bytes. Bringing what it gives to a smaller size, and encoding that, takes no more.
+[[nodiscard]] std::uint64_t photo_memory(const View& view);
+
 /// The view's photo, undistorted: camera.width x camera.height, 3 channels. Reads the file each time it is called.
-///   memory  lends what decoding takes, as long as it takes; null: nobody counts it
-///   errors  not_found: the view has no photo; those of read_image(); corrupt_data: it changed its size meanwhile;
-///           those of MemoryBudget::take()
-[[nodiscard]] Result<scene::Image> load_photo(const View& view, MemoryBudget* memory = nullptr);
+///   errors  not_found: the view has no photo; those of read_image(); corrupt_data: it changed its size meanwhile
+[[nodiscard]] Result<scene::Image> load_photo(const View& view);
 
 }  // namespace engine::io

@@ -46,7 +46,9 @@ std::vector<std::string> warnings_about(const PhotoComparison& found, std::size_
 
 Result<double> psnr_against_photo(const io::View& view, const engine::scene::Image& color,
                                   engine::MemoryBudget* memory) {
-  auto photo = io::load_photo(view, memory);
+  const auto share = engine::take_from(memory, io::photo_memory(view), view.camera.name);
+  if (!share) return propagate(share);
+  auto photo = io::load_photo(view);
   if (!photo) return propagate(photo);
   if (photo->width != color.width || photo->height != color.height) {
     photo = io::resized(*photo, color.width, color.height);

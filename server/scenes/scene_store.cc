@@ -156,13 +156,13 @@ Result<std::shared_ptr<const engine::io::Dataset>> SceneStore::dataset(const std
   return impl_->with(id, [&](const Snapshot& at) { return impl_->datasets.get(at); });
 }
 
-Result<engine::scene::Image> SceneStore::load_photo(const engine::io::View& view, engine::MemoryBudget* memory) {
+Result<engine::scene::Image> SceneStore::load_photo(const engine::io::View& view) {
   const StoreOptions& options = impl_->options;
   const bool is_ours = lies_below(options.folder, view.photo) ||
                        (!options.scene_root.empty() && lies_below(options.scene_root, view.photo));
   if (!is_ours) return engine::fail(engine::ErrorCode::unavailable, "the photo is not where it was", "view");
-  auto photo = engine::io::load_photo(view, memory);
-  if (photo || photo.error().code == engine::ErrorCode::busy) return photo;
+  auto photo = engine::io::load_photo(view);
+  if (photo) return photo;
   return engine::fail(photo.error().code, "the photo cannot be read", "view");
 }
 

@@ -84,9 +84,8 @@ class SceneStore {
   /// A photo of a dataset, as io::load_photo() gives it. Somebody who may write below the scene root may have put a
   /// link in its place: what leads out of the root, and of the store, is not shown.
   ///   errors  unavailable: it is not there any more, or leads elsewhere; those of io::load_photo() without a message
-  ///   of
-  ///           this machine's
-  [[nodiscard]] Result<engine::scene::Image> load_photo(const engine::io::View& view, engine::MemoryBudget* memory);
+  ///           of this machine's
+  [[nodiscard]] Result<engine::scene::Image> load_photo(const engine::io::View& view);
   /// Notes what a comparison of renders with photos found; nothing for figures, if no photo could be compared.
   ///   dataset  its number: what is found about a dataset that has been replaced meanwhile is dropped
   [[nodiscard]] Result<SceneInfo> set_dataset_quality(const std::string& id, int dataset, std::optional<double> mean_db,

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <optional>
+#include <sstream>
 #include <utility>
 
 #include "engine/core/numbers.h"
@@ -158,6 +160,27 @@ Result<Reply> put_dataset(const Call& call, const SceneRouteDependencies& depend
   return reply_with(with_quality(*put, dependencies));
 }
 
+/// Of a photo as get_photo() answers it: by what it is made of, so that nothing has to be decoded to tell.
+std::string photo_etag(const engine::io::View& view, int max_side, const std::string& program) {
+  std::error_code unknown;  // a file that is gone has a tag, too, which nobody will ever be told
+  std::ostringstream text;
+  text << std::hexfloat << program << ' ' << view.photo.string() << ' '
+       << std::filesystem::file_size(view.photo, unknown) << ' '
+       << std::filesystem::last_write_time(view.photo, unknown).time_since_epoch().count() << ' ' << max_side;
+  const auto add = [&text](const auto& pinhole) {
+    text << ' ' << pinhole.width << ' ' << pinhole.height;
+    for (const double value : {pinhole.fx, pinhole.fy, pinhole.cx, pinhole.cy}) text << ' ' << value;
+  };
+  add(view.camera);
+  if (view.lens) {
+    add(*view.lens);
+    text << ' ' << int(view.lens->model);
+    for (const double value : view.lens->k) text << ' ' << value;
+    for (const double value : view.lens->p) text << ' ' << value;
+  }
+  return http::etag_of(text.str());
+}
+
 /// A photo of the dataset, undistorted as its camera is, within max_side.
 Result<Reply> get_photo(const Call& call, const SceneRouteDependencies& dependencies) {
   const std::string view = call.query("view").value_or("");
@@ -173,10 +196,15 @@ Result<Reply> get_photo(const Call& call, const SceneRouteDependencies& dependen
   const auto found = std::ranges::find(views, view, [](const auto& one) { return one.camera.name; });
   if (found == views.end() || found->photo.empty())
     return fail(ErrorCode::not_found, "the dataset has no photo of that name", "view");
+  const RenderServiceOptions& options = dependencies.renders.options();
+  const std::string etag = photo_etag(*found, *side, options.program);
+  if (call.has(etag)) return Reply::not_modified(etag);
   Result<std::vector<std::byte>> bytes;
-  // Decoding takes as long as a picture: it waits for its turn among them.
+  // Decoding takes as long as a picture: it waits for its turn among them. What it takes is held until all is done.
   const auto done = dependencies.renders.run_in_turn([&] {
-    bytes = dependencies.store.load_photo(*found, dependencies.renders.options().memory)
+    const auto share = engine::take_from(options.memory, engine::io::photo_memory(*found), "view");
+    if (!share) return void(bytes = propagate(share));
+    bytes = dependencies.store.load_photo(*found)
                 .and_then([&](engine::scene::Image photo) -> Result<engine::scene::Image> {
                   const auto camera = engine::scene::fit_within(found->camera, *side);
                   if (photo.width <= camera.width) return photo;
@@ -191,7 +219,7 @@ Result<Reply> get_photo(const Call& call, const SceneRouteDependencies& dependen
   Reply reply;
   reply.media_type = "image/jpeg";
   reply.body.assign(reinterpret_cast<const char*>(bytes->data()), bytes->size());
-  reply.etag = http::etag_of(reply.body);
+  reply.etag = etag;
   return reply;
 }
 

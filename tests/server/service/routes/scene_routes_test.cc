@@ -225,6 +225,30 @@ TEST_F(SceneRoutes, ShowAPhotoOfTheDatasetAndTakeTheDatasetAway) {
     EXPECT_EQ(image->height, height);
     EXPECT_NEAR(image->data[0], 0.5f, 0.02f);
   }
+  // Who has it already is told so without a look at it: it takes no memory.
+  const auto& first = store->dataset(id).value()->views[0];
+  const std::string tag = shown(view, "32")->etag;
+  EXPECT_NE(shown(view, "64")->etag, tag);
+  const auto within = [&](std::uint64_t bytes, const std::string& known) {
+    engine::MemoryBudget budget(bytes, "--work-memory", std::chrono::milliseconds(20));
+    RenderService counted({.threads = 2, .max_side = 256, .memory = &budget});
+    router = {};
+    add_scene_routes(router, {*store, counted, *views, {}, {}});
+    FakeCall asked = about(id);
+    asked.in_query = {{"view", view}, {"max_side", "32"}};
+    asked.known_etag = known;
+    return call("GET", "/v1/scenes/{id}/photo", asked);
+  };
+  const std::uint64_t needed = engine::io::photo_memory(first);
+  EXPECT_EQ(within(needed, "another")->status, 200);
+  EXPECT_EQ(within(needed - 1, "another").error().code, ErrorCode::too_large);
+  EXPECT_EQ(within(1, tag)->status, 304);
+  connect();
+  // Another photo in its place is another one, of the same size, too.
+  std::filesystem::last_write_time(first.photo,
+                                   std::filesystem::last_write_time(first.photo) + std::chrono::seconds(1));
+  EXPECT_NE(shown(view, "32")->etag, tag);
+
   EXPECT_EQ(shown("none.png", "64").error().where, "view");
   EXPECT_EQ(shown("", "64").error().code, ErrorCode::invalid_argument);
   EXPECT_EQ(shown(view, "0").error().where, "max_side");
