@@ -88,7 +88,8 @@ export class Selecting {
     const { scene, selectionAnswer } = this.#state;
     if (!scene || this.#list.length === 0) {
       this.#queue.clear();
-      return this.store.set({ selectionAnswer: null, selectionWaits: false });
+      // What was to be taken from the last selection, or kept of it, says nothing of the next one.
+      return this.store.set({ selectionAnswer: null, selectionWaits: false, selectOp: "add" });
     }
     const job = this.#job();
     const known = selectionAnswer?.key === job.key && !selectionAnswer.error;

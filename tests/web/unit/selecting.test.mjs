@@ -97,7 +97,7 @@ test("a click beside everything, and one that says only what is not meant, tell 
   assert.equal(said.length, 2);
 });
 
-test("strokes and lassos carry their camera, and Alt turns adding round", async () => {
+test("strokes and lassos carry their camera, Alt turns adding round, and who begins anew adds", async () => {
   draw("brush", [
     [10, 10],
     [60, 10],
@@ -117,6 +117,9 @@ test("strokes and lassos carry their camera, and Alt turns adding round", async 
   assert.deepEqual([kept.op, kept.polygon.depth], ["intersect", "through"]);
   draw("lasso", [[0, 0]]);
   assert.equal(editor.state.selection.length, 3);
+  editor.selecting.clear();
+  await settle();
+  assert.equal(editor.state.selectOp, "add", "there is nothing left to keep a part of");
 });
 
 test("one question at a time, and the newest selection wins", async () => {
