@@ -2,6 +2,7 @@
 import assert from 'node:assert/strict';
 import { after, before, beforeEach, afterEach, describe, test } from 'node:test';
 import { handOn, launch, openPage } from './support/browser.mjs';
+import { compared } from './support/desk.mjs';
 import { Service } from './support/program.mjs';
 import { datasetZip, demoScene } from './support/scenes.mjs';
 
@@ -347,6 +348,14 @@ describe('who has no pointer', () => {
     }
     assert.fail(`${name} is not to be reached`);
   };
+  const press = async (name, key = 'Enter') => {
+    await tabTo(name);
+    await page.keyboard.press(key);
+  };
+  const aim = async (point) => {
+    await tabTo('view');
+    await hand.aim(point);
+  };
 
   test('takes a thing, moves it, has it repaired and goes back, by keys alone', async (t) => {
     t.after(async () => {
@@ -356,26 +365,14 @@ describe('who has no pointer', () => {
       for (const { version } of versions.slice(1)) await service.client.delete(`${at}/versions/${version}`);
     });
     await page.keyboard.press('Escape');
-    await tabTo('view');
-    // The thing under the cross in the middle.
-    const box = await id('view').boundingBox();
-    const centre = [box.x + box.width / 2, box.y + box.height / 2];
-    for (let i = 0; i < 40; ++i) {
-      const at = await hand.onScreen(mug);
-      const [dx, dy] = [0, 1].map((k) => Math.round((at[k] - centre[k]) / 30));
-      if (dx === 0 && dy === 0) break;
-      for (let k = 0; k < Math.abs(dx); ++k) await page.keyboard.press(dx > 0 ? 'Shift+ArrowRight' : 'Shift+ArrowLeft');
-      for (let k = 0; k < Math.abs(dy); ++k) await page.keyboard.press(dy > 0 ? 'Shift+ArrowDown' : 'Shift+ArrowUp');
-    }
+    await aim(mug);
     await page.keyboard.press('Enter');
     const count = await hand.count();
-    await tabTo('thing-hold');
-    await page.keyboard.press('Enter');
+    await press('thing-hold');
     await page.waitForFunction(() => document.activeElement.dataset.testid === 'handle-0-target');
     for (let i = 0; i < 12; ++i) await page.keyboard.press('ArrowLeft');
     await hand.state('moved');
-    await tabTo('thing-repair');
-    await page.keyboard.press('Enter');
+    await press('thing-repair');
     await hand.state('done');
     const [edit] = (await service.client.get('/v1/edits')).json().edits;
     assert.deepEqual([edit.state, edit.handles[0].gaussians >= count], ['succeeded', true]);
@@ -385,12 +382,140 @@ describe('who has no pointer', () => {
     await tabTo('tab-button-drag');
     await page.keyboard.press('ArrowRight');
     await page.keyboard.press('ArrowRight');
-    await tabTo(`version-${edit.result_version}-delete`);
-    await page.keyboard.press('Enter');
+    await press(`version-${edit.result_version}-delete`);
     await page.waitForFunction(() => document.activeElement.dataset.testid === 'confirm-no');
     await page.keyboard.press('Tab');
     await page.keyboard.press('Enter');
     await id(`version-${edit.result_version}`).waitFor({ state: 'detached' });
+  });
+
+  test('selects with each tool that does not draw, and more, less, only that, all but that', async () => {
+    const another = async (act, than) => {
+      await act();
+      await page.waitForFunction((n) => {
+        const { count, waits } = document.querySelector('[data-testid=selection-count]').dataset;
+        return count > 0 && waits === undefined && count !== String(n);
+      }, than);
+      return hand.count();
+    };
+    const keys = (...names) => async () => {
+      for (const name of names) await page.keyboard.press(name);
+    };
+    await aim(mug);
+    const whole = await another(keys('Enter'), 0);
+    const less = await another(keys(','), whole);
+    assert.ok(less < whole, `${less} of ${whole}`);
+    assert.equal(await another(keys('.'), less), whole);
+    await page.keyboard.press('Escape');
+
+    await tabTo('view');
+    const grown = await another(keys('s', '1', 'Enter'), 0);
+    await tabTo('view');
+    const dab = await another(keys('2', 'Alt+Enter'), grown);
+    assert.ok(dab < grown, `${dab}: with Alt it is taken away`);
+    await tabTo('view');
+    const sphere = await another(keys('5', 'Enter'), dab);
+    assert.ok(sphere > dab);
+    await press('select-op', 'ArrowDown');
+    await page.keyboard.press('ArrowDown');
+    assert.equal(await id('select-op').inputValue(), 'intersect');
+    await tabTo('view');
+    const both = await another(keys('6', 'Enter'), sphere);
+    assert.ok(both < sphere, `${both} of ${sphere}`);
+    const { gaussians } = (await service.client.get(`/v1/scenes/${scene.id}`)).json();
+    assert.equal(await another(() => press('invert-selection'), both), gaussians - both);
+    await another(keys('Control+z'), gaussians - both);
+    const wider = await another(() => press('expand-selection'), both);
+    assert.ok(wider > both);
+    assert.ok(await another(() => press('shrink-selection'), wider) < wider);
+    await press('clear-selection');
+    await id('no-selection').waitFor();
+    await tabTo('view');
+    const healed = await another(keys('e', '2', 'Enter'), 0);
+    await page.getByRole('heading', { name: 'What is healed' }).waitFor();
+    assert.ok(healed < grown);
+  });
+
+  test('looks around, removes a thing, compares, has it run well, thinks better of it, and takes files along', async () => {
+    await aim(mug);
+    const { camera } = await hand.looksFrom();
+    await page.keyboard.press('f');
+    await page.waitForFunction((before) => JSON.parse(localStorage.getItem(before.at))?.pose?.target?.join() !== before.target,
+      { at: `splatdrag.scene.${scene.id}`, target: camera.target.join() });
+    const near = async () => {
+      const { camera: { eye, target } } = await hand.looksFrom();
+      return Math.hypot(...eye.map((x, i) => x - target[i]));
+    };
+    const far = await near();
+    await page.keyboard.press('+');
+    assert.ok(await near() < far);
+    await page.keyboard.press('-');
+    await page.keyboard.press(']');
+    await page.waitForFunction(() => document.querySelector('[data-testid=view-select]').value === 'view_01.png');
+    await page.keyboard.press('r');
+    await page.waitForFunction(() => document.querySelector('[data-testid=view-select]').value === 'view_00.png');
+    for (const [key, constraint] of [['u', 'surface'], ['l', 'level'], ['x', 'x'], ['n', 'normal'], ['v', 'view']]) {
+      await page.keyboard.press(key);
+      assert.equal(await id(`constraint-${constraint}`).getAttribute('aria-pressed'), 'true');
+    }
+
+    await aim(mug);
+    await page.keyboard.press('Enter');
+    await hand.count();
+    await press('thing-remove');
+    await hand.state('done');
+    const [{ result_version: made }] = (await service.client.get('/v1/edits')).json().edits;
+    await hand.shown(made);
+    await page.keyboard.down('b');
+    await hand.shown(0);
+    await page.keyboard.up('b');
+    await hand.shown(made);
+    await page.keyboard.press('c');
+    await compared(page, 'slider');
+    for (let i = 0; i < 3; ++i) await page.keyboard.press('c');
+    assert.equal(await id('compare-mode').inputValue(), '');
+    await press('thing-better');
+    const running = page.locator('[data-testid^=edit-e]:is([data-state=queued], [data-state=running])');
+    await running.waitFor({ state: 'attached' });
+    await tabTo('tab-button-drag');
+    await page.keyboard.press('ArrowRight');
+    await press('edit-cancel');
+    if (await id('confirm-yes').isVisible()) await press('confirm-yes');
+    await page.locator('[data-testid^=edit-e][data-state=cancelled]').waitFor();
+    await page.keyboard.press('Control+z');
+    await hand.shown(0);
+
+    await tabTo('tab-button-edits');
+    await page.keyboard.press('ArrowRight');
+    const [download] = await Promise.all([page.waitForEvent('download'), press('download-0-splat')]);
+    assert.match(download.suggestedFilename(), /\.splat$/);
+    await press(`version-${made}-delete`);
+    await page.waitForFunction(() => document.activeElement.dataset.testid === 'confirm-no');
+    await press('confirm-yes');
+    await id(`version-${made}`).waitFor({ state: 'detached' });
+    await tabTo('tab-button-scene');
+    await page.keyboard.press('ArrowLeft');
+    await page.keyboard.press('ArrowLeft');
+    const [file] = await Promise.all([page.waitForEvent('download'), press('export')]);
+    assert.match(file.suggestedFilename(), /\.json$/);
+  });
+
+  test('says which way is up', async () => {
+    const saved = () => page.waitForResponse((r) => r.request().method() === 'PATCH');
+    await press('up-menu');
+    await press('floor-up');
+    const table = [[-1, 0.05, -0.9], [0.6, 0.05, -0.9], [1.9, 0.05, 0.2]];
+    for (const [i, point] of table.entries()) {
+      await aim(point);
+      const all = i === 2 ? saved() : null;
+      await page.keyboard.press('Enter');
+      if (i < 2) await id('hint').getByText(`${2 - i} more`).waitFor();
+      await all;
+    }
+    const { up } = (await service.client.get(`/v1/scenes/${scene.id}`)).json();
+    assert.ok(up[1] < -0.95, `${up}`);
+    await press('up-menu');
+    await Promise.all([saved(), press('reset-up')]);
   });
 });
 

@@ -114,6 +114,19 @@ export const handOn = ({ page, id }) => {
       await page.mouse.move(...to, { steps: 12 });
       if (drop) await page.mouse.up();
     },
+    /// By keys alone: slides the view until a point is under the cross in its middle, as near as they come.
+    aim: async (point) => {
+      await id('view').focus();
+      // What is nearer than the pivot moves by more than a step of the keys: it need not come to rest.
+      for (let i = 0; i < 6; ++i) {
+        const { camera } = await looksFrom();
+        const { x, y } = project(camera, point);
+        const away = [x - camera.width / 2, y - camera.height / 2].map((d) => Math.round(d / 30));
+        if (away.every((n) => n === 0)) break;
+        for (const [n, [more, less]] of [[away[0], ['Right', 'Left']], [away[1], ['Down', 'Up']]])
+          for (let k = 0; k < Math.abs(n); ++k) await page.keyboard.press(`Shift+Arrow${n > 0 ? more : less}`);
+      }
+    },
     /// The mouse, as fingerOn() has a finger.
     mouse: {
       drop: () => page.mouse.up(),
