@@ -1,7 +1,7 @@
 // What stays, in a real browser: versions, photos, other pages, a service that comes back; and all of it by fingers.
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
-import { after, before, describe, test } from 'node:test';
+import { after, afterEach, before, beforeEach, describe, test } from 'node:test';
 import { fingerOn, openPage } from './support/browser.mjs';
 import { ball, ballMoved, compared, makeDesk, makeRoom, openDesk, tooSmall, violations } from './support/desk.mjs';
 
@@ -364,16 +364,39 @@ describe('by fingers, on a phone', () => {
 });
 
 describe('by fingers, on a tablet', () => {
-  test('a thing is looked at, pulled by the gizmo, selected by corners, and repaired', async (t) => {
-    const desk = await makeDesk(room);
-    t.after(() => desk.service.stop());
-    const { page, id, hand, complaints } = await openDesk(desk, { viewport: { width: 820, height: 1180 }, hasTouch: true, isMobile: true });
-    const finger = await fingerOn(page);
-    const middle = async (name) => {
-      const { x, y, width, height } = await id(name).boundingBox();
-      return [x + width / 2, y + height / 2];
-    };
-    // Two fingers that part bring it nearer.
+  const tablet = { viewport: { width: 820, height: 1180 }, hasTouch: true, isMobile: true };
+  let desk, page, id, hand, complaints, finger;
+  before(async () => {
+    desk = await makeDesk(room);
+  });
+  beforeEach(async () => {
+    ({ page, id, hand, complaints } = await openDesk(desk, tablet));
+    finger = await fingerOn(page);
+  });
+  afterEach(async () => {
+    assert.deepEqual(complaints, []);
+    await page.context().close();
+  });
+  after(() => desk?.service.stop());
+  const middle = async (name) => {
+    const { x, y, width, height } = await id(name).boundingBox();
+    return [x + width / 2, y + height / 2];
+  };
+  /// The browser takes a tap right after a quick drag to stop a fling.
+  const pressAfterADrag = (name) => id(name).click();
+  const another = async (than) => {
+    await page.waitForFunction((n) => {
+      const { count, waits } = document.querySelector('[data-testid=selection-count]').dataset;
+      return count > 0 && waits === undefined && count !== String(n);
+    }, than);
+    return hand.count();
+  };
+  const tab = async (name) => {
+    await id(`tab-button-${name}`).tap();
+    await id(`tab-${name}`).waitFor();
+  };
+
+  test('a scene is looked at from near and far, from aside, along an axis, and flown through', async () => {
     const away = async () => {
       const { camera } = await hand.looksFrom();
       return Math.hypot(...camera.eye.map((x, i) => x - camera.target[i]));
@@ -381,41 +404,127 @@ describe('by fingers, on a tablet', () => {
     const far = await away();
     const box = await id('view').boundingBox();
     const [cx, cy] = [box.x + box.width / 2, box.y + 0.3 * box.height];
+    // Two fingers that part bring it nearer.
     await finger.together([0, 10, 20, 30].map((d) => [cx - 60 - d, cy]), [0, 10, 20, 30].map((d) => [cx + 60 + d, cy]));
     await page.waitForFunction(() => document.querySelector('[data-testid=view-select]').value === '');
     assert.ok(await away() < 0.9 * far, `${await away()} of ${far}`);
-    await id('reset-view').tap();
+    const { camera: near } = await hand.looksFrom();
+    await finger.together([0, 10, 20, 30].map((d) => [cx - 60 + d, cy]), [0, 10, 20, 30].map((d) => [cx + 60 + d, cy]));
+    const { camera: slid } = await hand.looksFrom();
+    assert.ok(slid.target.some((x, i) => Math.abs(x - near.target[i]) > 0.01), 'together they take it aside');
+    await pressAfterADrag('reset-view');
     await hand.shown(0);
+    await page.touchscreen.tap(...await middle('look-minus-y'));
+    const { camera } = await hand.looksFrom();
+    const above = camera.eye.map((x, i) => x - camera.target[i]);
+    assert.ok(above[1] < 0 && Math.hypot(above[0], above[2]) < 1e-6, `from above: ${above}`);
+    await id('fly').tap();
+    await finger.drag([cx, cy], [cx + 30, cy], [cx + 60, cy]);
+    const { camera: turned } = await hand.looksFrom();
+    assert.ok(turned.eye.every((x, i) => Math.abs(x - camera.eye[i]) < 1e-9) && turned.target.some((x, i) => x !== camera.target[i]), 'who flies looks around');
+    await pressAfterADrag('fly');
+  });
 
+  test('a floor is told by three taps', async () => {
+    const saved = () => page.waitForResponse((r) => r.request().method() === 'PATCH');
+    await id('up-menu').tap();
+    await id('floor-up').tap();
+    const places = [];
+    for (const point of [[-0.7, 0.05, -1], [0.5, 0.05, -1], [0.35, 0.05, -0.5]]) places.push(await hand.onScreen(point));
+    for (const [i, place] of places.entries()) {
+      const all = i === 2 ? saved() : null;
+      await page.touchscreen.tap(...place);
+      if (i < 2) await id('hint').getByText(`${2 - i} more`).waitFor();
+      await all;
+    }
+    const { up } = (await desk.client.get(`/v1/scenes/${desk.scene}`)).json();
+    assert.ok(up[1] < -0.98, `${up}`);
+    await id('up-menu').tap();
+    await Promise.all([saved(), id('reset-up').tap()]);
+  });
+
+  test('a thing is taken, pulled by the gizmo, repaired, run well, cancelled, compared by holding, and taken back', async () => {
     await id('auto-repair').evaluate((box) => box.click());  // in the folded sheet
     await page.touchscreen.tap(...await hand.onScreen(ball));
     const whole = await hand.count();
+    if (await id('thing-more').isEnabled()) {
+      await id('thing-more').tap();
+      const more = await another(whole);
+      assert.ok(more > whole);
+      await id('thing-less').tap();
+      assert.equal(await another(more), whole);
+    }
     const [x, y] = await middle('gizmo-move-x');
     await finger.drag([x + 8, y], [x + 30, y], [x + 60, y], [x + 90, y]);
     await hand.state('moved');
     await hand.shot('tablet-gizmo');
-    await id('thing-repair').click();  // the browser takes a tap right after a quick drag to stop a fling
+    await pressAfterADrag('thing-repair');
     await hand.state('done');
     const [edit] = (await desk.client.get('/v1/edits')).json().edits;
     const [{ source, target }] = edit.request.handles;
     assert.ok(edit.handles[0].gaussians >= whole && target[0] - source[0] > 0.1 && Math.abs(target[1] - source[1]) < 1e-9, `${source} to ${target}`);
+    await hand.shown(edit.result_version);
+    await id('thing-better').tap();
+    await tab('edits');
+    await page.getByTestId('edit-cancel').and(page.locator(':visible')).tap();
+    if (await id('confirm-yes').isVisible()) await id('confirm-yes').tap();
+    await page.locator('[data-testid^=edit-e][data-state=cancelled]').waitFor();
+    await page.getByTestId('thumb-1-0').first().tap();
+    const scrub = await id('scrub').boundingBox();
+    await finger.drag([scrub.x + 0.5 * scrub.width, scrub.y + scrub.height / 2], [scrub.x + 0.2 * scrub.width, scrub.y + scrub.height / 2], [scrub.x + 4, scrub.y + scrub.height / 2]);
+    await id('scrub-line').getByText('as it was found').waitFor();
+    await page.getByRole('button', { name: 'Close' }).click();
+    await id('fold').tap();
+    await hand.shown(edit.result_version);
+    const held = await middle('compare');
+    await finger.drag(held, { drop: false });
+    await hand.shown(0);
+    await finger.drop();
+    await hand.shown(edit.result_version);
+    await tab('scene');
+    const [download] = await Promise.all([page.waitForEvent('download'), id(`download-${edit.result_version}-spz`).tap()]);
+    assert.match(download.suggestedFilename(), /\.spz$/);
+    await id('fold').tap();
     await id('thing-undo').tap();
     await hand.state('moved');
     await id('thing-drop').tap();
+    await page.touchscreen.tap(...await hand.onScreen(ball));
+    await hand.count();
+    await id('thing-remove').tap();
+    await hand.state('done');
+    await id('thing-undo').tap();
+    await hand.state('taken');
+  });
 
+  test('a selection is made by corners, a lasso, a brush, a sphere and a box', async () => {
     await id('hand-select').tap();
     await id('select-tool-rectangle').tap();
     const [bx, by] = await hand.onScreen(ball);
     await page.touchscreen.tap(bx - 60, by - 60);
     await page.touchscreen.tap(bx + 60, by + 60);
-    const framed = await hand.count();
+    const framed = await another(0);
     await id('select-op').selectOption('subtract');
     await id('select-tool-brush').tap();
     await finger.drag([bx - 30, by], [bx, by], [bx + 30, by]);
-    await page.waitForFunction((n) => Number(document.querySelector('[data-testid=selection-count]').dataset.count) < n, framed);
-    await hand.count();
+    const less = await another(framed);
+    assert.ok(less < framed);
+    await pressAfterADrag('select-tool-lasso');
+    await id('select-op').selectOption('add');
+    await finger.drag([bx - 80, by - 80], [bx + 80, by - 80], [bx + 80, by + 80], [bx - 80, by + 80], [bx - 80, by - 70]);
+    const lasso = await another(less);
+    assert.ok(lasso > less);
+    await pressAfterADrag('select-tool-sphere');
+    await id('select-op').selectOption('intersect');
+    await finger.drag([bx, by], [bx + 20, by], [bx + 40, by]);
+    const sphere = await another(lasso);
+    assert.ok(sphere < lasso);
+    await pressAfterADrag('select-tool-box');
+    await id('select-op').selectOption('add');
+    await finger.drag([bx, by], [bx + 30, by], [bx + 60, by]);
+    const box = await another(sphere);
+    const [fx, fy] = await middle('shape-minus-x');
+    await finger.drag([fx, fy], [fx - 40, fy], [fx - 80, fy]);
+    assert.ok(await another(box) > box, 'a face is pulled');
     assert.deepEqual(await violations(page), []);
-    assert.deepEqual(complaints, []);
-    await page.context().close();
   });
 });
