@@ -3,7 +3,7 @@
 import * as api from "./api.js";
 import { BY_TOUCH, byId, h, iconButton, problemPlace, showProblem } from "./dom.js";
 
-/** A short message at the foot of the page; read out by screen readers.
+/** A short message, on the picture or over the list of scenes; read out by screen readers.
  *    kind    "good", "bad", or nothing
  *    action  {label, run}: a button in it */
 export function say(message, { kind = "", action = null, seconds = 6 } = {}) {

@@ -126,8 +126,7 @@ function browserStorage() {
 async function route() {
   const id = /^#\/scenes\/([\w-]+)$/.exec(location.hash)?.[1];
   showProblem(byId("fatal"), null);
-  byId("workspace").hidden = !id;
-  byId("home").hidden = !!id;
+  show(id);
   if (!id) {
     editor.close();
     return scenes.refresh();
@@ -136,11 +135,17 @@ async function route() {
   try {
     await editor.open(id);
   } catch (error) {
-    byId("workspace").hidden = true;
-    byId("home").hidden = false;
+    show(null);
     showProblem(byId("fatal"), error.status === 404 ? { detail: `There is no scene ${id} any more.` } : error);
     scenes.refresh();
   }
+}
+
+/** Shows a scene, or the list of them. Messages lie on what there is to see. */
+function show(id) {
+  byId("workspace").hidden = !id;
+  byId("home").hidden = !!id;
+  (id ? byId("view") : document.body).append(byId("toasts"));
 }
 
 function buildTabs() {

@@ -48,7 +48,7 @@ const SKETCH_PX = 2; // A line that is drawn has a corner this often at most.
 const MAX_CACHED_PICTURES = 6; // Enough to go back and forth between two versions and three layers.
 const DRAWING = ["brush", "lasso", "rectangle", "sphere", "box"]; // With the left button.
 const SHAPE_PX = 50; // How far a sphere or a box goes that is clicked rather than drawn.
-const CONTROLS = "button, a, input, select, summary, details, .end"; // What lies on the picture and is no part of it.
+const CONTROLS = "button, a, input, select, summary, details, .toast, .end"; // What lies on the picture and is no part of it.
 const THUMBNAIL = { width: 320, height: 200 };
 
 /** How much a turn of the wheel multiplies by. */

@@ -22,14 +22,14 @@ export const tooSmall = (page) => page.evaluate(() => [...document.querySelector
   .filter(({ box }) => box.width > 0 && (box.height < 24 || box.width < 24 || box.right > innerWidth + 1))
   .map(({ element, box }) => `${element.dataset.testid ?? element.outerHTML.slice(0, 80)}: ${box.width}x${box.height} at ${box.left}`));
 
-/// What lies over the page's edges, so that it would have to be scrolled sideways; and what is on the picture and covers
-/// something else there that can be pressed.
+/// What lies over the page's edges, so that it would have to be scrolled sideways; and what covers something else that can be
+/// pressed, on the picture or beside it.
 export const outOfSight = (page) => page.evaluate(() => {
   const found = document.body.innerText.includes('[object') ? ['an object stands for words'] : [];
   if (document.documentElement.scrollWidth > innerWidth) found.push(`the page is ${document.documentElement.scrollWidth} wide`);
   if (document.querySelector('dialog[open]')) return found;
   const name = (element) => element.dataset?.testid ?? element.outerHTML.slice(0, 60);
-  const what = document.querySelector('.menu[open]') ? '.menu[open] button' : '#chips button, #view-tools button, #view-tools summary, #thing-bar button, #notes summary';
+  const what = document.querySelector('.menu[open]') ? '.menu[open] button' : '#top :is(a, button), #toolbar :is(button, select), #tools :is(button, select), #tabs button, #chips button, #view-tools button, #view-tools summary, #thing-bar button, #notes summary';
   for (const element of document.querySelectorAll(what)) {
     if (!element.checkVisibility()) continue;
     const { left, top, width, height } = element.getBoundingClientRect();
