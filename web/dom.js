@@ -1,5 +1,7 @@
 // Elements from code. Text is always text: nothing is ever parsed as HTML.
 
+import { said } from "./format.js";
+
 /** What the arrow keys mean in the picture: [right, down]. */
 export const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
@@ -71,7 +73,7 @@ export function showProblem(place, error) {
   place.hidden = !error;
   if (!error) return place.replaceChildren();
   place.replaceChildren(
-    h("span", {}, error.detail || error.message || String(error)),
+    h("span", {}, said(error.detail || error.message || String(error))),
     error.where ? h("code", { class: "where" }, error.where) : "",
   );
 }

@@ -96,7 +96,7 @@ function card(editor, id) {
     } catch (error) {
       refused = error;
     }
-    showProblem(problem, refused ?? current()?.error);
+    showProblem(problem, refused ?? errorOf(current()));
   };
   const name = h("span", { class: "edit-name" });
   const state = h("span", { class: "state", testid: "edit-state" });
@@ -181,7 +181,7 @@ function card(editor, id) {
       show.disabled = editor.state.version === edit.result_version;
       reuse.hidden = !ended;
       forget.hidden = !ended;
-      showProblem(problem, refused ?? edit.error);
+      showProblem(problem, refused ?? errorOf(edit));
       curve.update(edit);
       updateIntervals(edit.finished_intervals);
       notes.replaceChildren(...warnings(edit.warnings));
@@ -189,6 +189,9 @@ function card(editor, id) {
     },
   };
 }
+
+/** What it failed of. That it is of this very edit, its card says already. */
+const errorOf = (edit) => edit?.error && { ...edit.error, where: edit.error.where === edit.id ? null : edit.error.where };
 
 /** The part of a view's picture that an edit is about. */
 function frameOf(editor, edit, name) {

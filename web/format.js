@@ -1,4 +1,4 @@
-// Numbers as people read them.
+// Numbers, and what the service says, as people read them.
 
 /** 62000 -> "62,000". */
 export const count = (n) => Math.round(n).toLocaleString("en-US");
@@ -63,3 +63,6 @@ export function when(rfc3339, now = new Date()) {
 export function nameOfFile(filename) {
   return filename.replace(/\.(compressed\.ply|ply|splat|spz|sog|glb)$/i, "") || filename;
 }
+
+/** What the service says, begun as a sentence: with a capital letter, unless it begins with a name ("chair.ply"). */
+export const said = (text) => (/^[a-z]+(?=[ ,])/.test(text) ? `${text[0].toUpperCase()}${text.slice(1)}` : text);

@@ -2,6 +2,7 @@
 // after it; where that is; and what was refused, wherever the panel's own message is.
 
 import { byId, button, h, text } from "./dom.js";
+import { said } from "./format.js";
 import { pictureIn } from "./framing.js";
 import { placeOver, viewOf } from "./photo.js";
 import { partOf } from "./requests.js";
@@ -59,18 +60,18 @@ export function buildNotes(editor, viewer) {
 }
 
 function lines(editor, { notes, open, refused }) {
-  const said = [];
+  const told = [];
   if (refused) {
     const { region } = editor.state;
-    said.push(h("p", {}, refused.detail || refused.message));
+    told.push(h("p", {}, said(refused.detail || refused.message)));
     if (region && (partOf(refused.where).part === "region" || /\bbox\b|\bregion\b/.test(refused.detail)))
-      said.push(button("Without the box", "note-no-region", () => editor.settle({ region: null })));
+      told.push(button("Without the box", "note-no-region", () => editor.settle({ region: null })));
   }
-  said.push(...notes.map((note) => h("p", {}, `${note[0].toUpperCase()}${note.slice(1)}`)));
+  told.push(...notes.map((note) => h("p", {}, said(note))));
   const [worst] = open;
   if (worst && editor.state.views.some(({ name }) => name === worst.view)) {
-    said.push(h("p", {}, `Made up in ${worst.view}: ${share(worst.share, 1)} of what the part has left there.`));
-    said.push(button("Look there", "note-look", () => editor.lookFrom(worst.view)));
+    told.push(h("p", {}, `Made up in ${worst.view}: ${share(worst.share, 1)} of what the part has left there.`));
+    told.push(button("Look there", "note-look", () => editor.lookFrom(worst.view)));
   }
-  return said;
+  return told;
 }

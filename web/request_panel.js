@@ -3,7 +3,7 @@
 import { askChoice, say } from "./dialogs.js";
 import { attrs, button, h, problemPlace, problemText, row, showProblem, text } from "./dom.js";
 import { choice, labelled, pointField, segments, toggle } from "./fields.js";
-import { bytes, count, counted, duration, gaussians } from "./format.js";
+import { bytes, count, counted, duration, gaussians, said } from "./format.js";
 import { hasDiffusion, paramFields } from "./params.js";
 import { buildPresets, runPresets } from "./presets.js";
 import { changesScene, isStated, partOf, readRequests } from "./requests.js";
@@ -284,7 +284,7 @@ function withCrumbs({ gaussians: { crumbs } }, state) {
   return state.crumbs === "remove" ? `, ${count(crumbs)} crumbs gone,` : `, ${count(crumbs)} of them crumbs,`;
 }
 
-export const warnings = (list) => (list ?? []).map((warning) => h("p", { class: "warning" }, warning));
+export const warnings = (list) => (list ?? []).map((warning) => h("p", { class: "warning" }, said(warning)));
 
 /** A box to start from: around the handles and where they go. */
 function boxAround(editor) {

@@ -11,6 +11,7 @@ import {
   gaussians,
   loss,
   nameOfFile,
+  said,
   when,
 } from "../../../web/format.js";
 
@@ -63,4 +64,12 @@ test("times of today come without their date", () => {
   assert.match(when(new Date(2026, 10, 21, 11, 9).toISOString(), now), /^today /);
   assert.match(when(new Date(2026, 10, 20, 11, 9).toISOString(), now), /2026/);
   assert.equal(when("nonsense", now), "");
+});
+
+test("what the service says begins as a sentence does, and a name stays a name", () => {
+  assert.equal(said("the queue is full"), "The queue is full");
+  assert.equal(said("chair.ply is none"), "chair.ply is none");
+  assert.equal(said("handles[0].radius: expected a number"), "handles[0].radius: expected a number");
+  assert.equal(said("140 Gaussians"), "140 Gaussians");
+  assert.equal(said(""), "");
 });
