@@ -36,6 +36,7 @@ import { add, distance, scale, sub, unit } from "./vectors.js";
 // All of these are choices, tried by hand.
 const MAX_SIDE = 1600; // Pixels of the longer side of a picture at rest: sharp enough on a large window.
 const STILL_AFTER_MS = 160; // Without a movement, before the picture is requested at its full size.
+const DRAGGED_MS = 35; // Of the service, for a picture of what is dragged: its preview has taken as long before.
 const PICTURES_AT_ONCE = 3; // While moving: what covers the way there and back of most networks.
 const DOUBLE_CLICK_MS = 400; // A second click sooner than this, at the same place, is no click of its own.
 const CLICK_PX = 4; // A pointer that moves less than this has clicked, not dragged.
@@ -65,7 +66,7 @@ export class Viewer {
   #overlay;
   #held;
   #shapes;
-  #adaptive = new AdaptiveSide();
+  #adaptive = { turning: new AdaptiveSide(), dragging: new AdaptiveSide({ goal: DRAGGED_MS }) };
   #recent = new Recent(MAX_CACHED_PICTURES);
   #displayed = null; // {picture, job}: what is on the canvas.
   #queue;
@@ -102,6 +103,8 @@ export class Viewer {
     this.#shapes = new ShapeView(byId("overlay"), editor, { take: (event, begin) => this.#take(event, begin) });
     this.#listen();
     const { store } = editor;
+    // The next preview of what is dragged is being made: a full picture of this one would take its time from it.
+    store.watch(["preview"], ({ dragging }) => dragging && this.#isMoving());
     store.watch(
       ["pose", "layer", "version", "preview", "comparing", "compareWith", "selectMode", "selectionAnswer", "tinted"],
       () => this.refresh(),
@@ -163,13 +166,14 @@ export class Viewer {
     const { width, height } = this.#size;
     const density = window.devicePixelRatio || 1;
     const full = pictureSize(width * density, height * density, limit);
-    const size = large ? full : pictureSize(full.width, full.height, this.#adaptive.side);
+    const adaptive = this.#adaptive[this.#state.dragging ? "dragging" : "turning"];
+    const size = large ? full : pictureSize(full.width, full.height, adaptive.side);
     const version = shownVersion(this.#state);
     const selection = this.#editor.selecting.idFor(version);
     const key = JSON.stringify([scene.id, version, layer, selection, pictureKey(pose), size]);
     // On a fast service, pictures while moving are as large as any.
     const complete = size.width === full.width && size.height === full.height;
-    return { key, large, complete, scene: scene.id, version, layer, selection, pose, size };
+    return { key, large, complete, adaptive, scene: scene.id, version, layer, selection, pose, size };
   }
 
   /** Asks for what the state says should be on the screen: a small picture at once, the full one when it is still. */
@@ -186,7 +190,8 @@ export class Viewer {
     }
     const small = this.#job(false);
     if (!this.#shows(small)) this.#queue.request(small);
-    const remaining = this.#movingUntil - performance.now();
+    const { dragging, previewing } = this.#state;
+    const remaining = dragging && previewing ? STILL_AFTER_MS : this.#movingUntil - performance.now();
     if (remaining > 0) this.#stillTimer = setTimeout(() => this.refresh(), remaining);
     else this.#queue.request(full);
     this.#busySoon();
@@ -222,7 +227,7 @@ export class Viewer {
     // As many as shared the service with this one, on the way from its first moment to its last.
     const atOnce = (before + this.#queue.underWay) / 2;
     const picture = await createImageBitmap(blob);
-    if (!job.large) this.#adaptive.record(serverTime(timing) ?? performance.now() - requestedAt, atOnce);
+    if (!job.large) job.adaptive.record(serverTime(timing) ?? performance.now() - requestedAt, atOnce);
     return { picture, ms: performance.now() - requestedAt };
   }
 
@@ -594,8 +599,12 @@ export class Viewer {
     const { pose } = this.#state;
     const next = change(pose);
     if (samePose(pose, next)) return;
-    this.#movingUntil = performance.now() + STILL_AFTER_MS;
+    this.#isMoving();
     this.#editor.setPose(next);
+  }
+
+  #isMoving() {
+    this.#movingUntil = performance.now() + STILL_AFTER_MS;
   }
 
   /** A step of a key or a button, [x, y] with y down: turns the view as a drag would, or slides it. */

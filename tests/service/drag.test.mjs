@@ -206,12 +206,29 @@ describe('a thing of a small scene', () => {
   });
 
   test('is left as it was let go, unrepaired, for who wants it so', async () => {
-    const { page, id, hand } = await opened();
+    // In a large window pictures at rest are larger than any while something moves.
+    const { page, id, hand } = await opened({ viewport: { width: 1920, height: 1080 } });
     await id('auto-repair').uncheck();
     const at = await hand.onScreen(mug);
     await page.mouse.click(...at);
     await hand.count();
-    await hand.drag(at, [at[0] - 60, at[1]]);
+    const pictures = [];  // of previews, in the order in which they are asked for
+    page.on('request', (request) => {
+      const [, version] = /versions\/(p\d+)\/render$/.exec(request.url()) ?? [];
+      if (version) pictures.push({ version, width: request.postDataJSON().camera.width });
+    });
+    await hand.drag(at, [at[0] - 60, at[1]], { drop: false });
+    for (let i = 0; i < 40; ++i) {
+      await page.mouse.move(at[0] - 60 - i, at[1]);
+      await page.waitForTimeout(20);
+    }
+    await page.waitForFunction(() => document.querySelector('[data-testid=view]').dataset.quality === 'full');
+    const widest = Math.max(...pictures.map(({ width }) => width));
+    assert.equal(pictures.at(-1).width, widest, 'where it rests, all of it is shown, before it is let go');
+    const onTheWay = pictures.slice(0, -2);
+    const wide = onTheWay.filter(({ width }) => width === widest).length;
+    assert.ok(onTheWay.length > 5 && wide < onTheWay.length / 4, `${wide} of ${onTheWay.length} on the way take the time of the next`);
+    await page.mouse.up();
     await hand.state('moved');
     await id('thing-repair').waitFor();
     await page.waitForFunction(() => /^p\d/.test(document.querySelector('[data-testid=view]').dataset.version));
