@@ -61,7 +61,8 @@ Uncovered decode_uncovered(const ordered_json& list) {
 
 ordered_json encode(const std::optional<GaussianCounts>& counts) {
   if (!counts) return nullptr;
-  return {counts->input, counts->output, counts->removed, counts->copies, counts->changeable, counts->crumbs};
+  return {counts->input,      counts->output, counts->removed, counts->copies,
+          counts->changeable, counts->crumbs, counts->relit};
 }
 
 EditRecord decode(const ordered_json& object) {
@@ -83,9 +84,14 @@ EditRecord decode(const ordered_json& object) {
   for (const ordered_json& timing : object.at("timings"))
     record.timings.push_back({timing.at(0).get<std::string>(), timing.at(1).get<double>()});
   if (const auto n = optional_at<std::vector<std::size_t>>(object, "gaussians"))
-    record.gaussians = {n->at(0), n->at(1), n->at(2),
-                        n->at(3), n->at(4), n->size() > 5 ? n->at(5) : 0};  // records of earlier versions have five
-  if (const auto views = object.find("uncovered"); views != object.end())   // records of earlier versions have none
+    record.gaussians = {n->at(0),
+                        n->at(1),
+                        n->at(2),
+                        n->at(3),
+                        n->at(4),
+                        n->size() > 5 ? n->at(5) : 0,                      // records of earlier versions have five,
+                        n->size() > 6 ? n->at(6) : 0};                     // or six
+  if (const auto views = object.find("uncovered"); views != object.end())  // records of earlier versions have none
     for (const ordered_json& view : *views) record.uncovered.push_back(decode_uncovered(view));
   record.warnings = object.at("warnings").get<std::vector<std::string>>();
   record.result_version = optional_at<int>(object, "result_version");

@@ -34,7 +34,8 @@ ordered_json encode(const EditRequest& request) { return ordered_json::parse(to_
 
 ordered_json encode(const GaussianCounts& counts) {
   return {{"input", counts.input},   {"output", counts.output},         {"removed", counts.removed},
-          {"copies", counts.copies}, {"changeable", counts.changeable}, {"crumbs", counts.crumbs}};
+          {"copies", counts.copies}, {"changeable", counts.changeable}, {"crumbs", counts.crumbs},
+          {"relit", counts.relit}};
 }
 
 ordered_json encode(const Uncovered& uncovered) {

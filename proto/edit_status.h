@@ -47,9 +47,10 @@ struct StageSeconds {
 };
 
 /// Gaussians of an edit: in its input and its output, rows removed and new rows (`copies`), members of M
-/// (`changeable`); rows that the selection had left out, and that went along or away (`crumbs`).
+/// (`changeable`); rows that the selection had left out, and that went along or away (`crumbs`); rows
+/// that the part's shadow has left or reached (`relit`).
 struct GaussianCounts {
-  std::size_t input = 0, output = 0, removed = 0, copies = 0, changeable = 0, crumbs = 0;
+  std::size_t input = 0, output = 0, removed = 0, copies = 0, changeable = 0, crumbs = 0, relit = 0;
 };
 
 /// What one view showed of the place that a moved part has left. Fractions of the picture.

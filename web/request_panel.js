@@ -84,6 +84,18 @@ export function buildRequestPanel(editor) {
   });
   const crumbsField = labelled("Crumbs", crumbs.element);
   crumbsField.title = "Small pieces of the part that the selection has left out";
+  const shadow = choice({
+    label: "Shadow",
+    testid: "shadow",
+    options: [
+      ["", "goes along"],
+      ["remove", "goes away"],
+      ["keep", "stays"],
+    ],
+    changed: (value) => editor.settle({ shadow: value || null }),
+  });
+  const shadowField = labelled("Shadow", shadow.element);
+  shadowField.title = "Of the part, on what it stands on or next to: a run shows what becomes of it";
   const params = paramFields(setParam);
   const also = h("p", { class: "note", hidden: true, testid: "other-params" });
   const promptField = h("input", {
@@ -109,6 +121,7 @@ export function buildRequestPanel(editor) {
     h("summary", {}, "Settings"),
     labelled("Preset", preset.element),
     crumbsField,
+    shadowField,
     params.element,
     painted,
     regionOn.element,
@@ -186,7 +199,7 @@ export function buildRequestPanel(editor) {
 
   store.watch(
     [
-      ...["constraint", "mode", "region", "preset", "crumbs", "selection", "params", "autoPreview", "draftOnRelease"],
+      ...["constraint", "mode", "region", "preset", "crumbs", "shadow", "selection", "params", "autoPreview", "draftOnRelease"],
       ...["info", "handles", "scene", "prompt", "allow_slow"],
     ],
     (state) => {
@@ -200,7 +213,8 @@ export function buildRequestPanel(editor) {
       }
       preset.options([["", "default"], ...runPresets(state.info).map((name) => [name, name])]);
       preset.update(state.preset);
-      crumbsField.hidden = state.selection.length === 0 || state.mode === "extend";
+      crumbsField.hidden = shadowField.hidden = state.selection.length === 0 || state.mode === "extend";
+      shadow.update(state.shadow === "move" ? "" : (state.shadow ?? ""));
       crumbs.update(state.crumbs === "move" ? "" : (state.crumbs ?? ""));
       params.update(state.info, state.params, state.preset);
       painted.hidden = !(state.params.corrector === "sd" && hasDiffusion(state.info));
@@ -219,7 +233,7 @@ export function buildRequestPanel(editor) {
   store.watch(
     [
       ...["handles", "selection", "previewing", "submitting", "problem", "preview", "estimate", "scene", "version"],
-      ...["region", "mode", "preset", "crumbs", "attach", "params", "prompt", "allow_slow"],
+      ...["region", "mode", "preset", "crumbs", "shadow", "attach", "params", "prompt", "allow_slow"],
     ],
     (state) => {
       const ready = state.scene !== null && isStated(state);
@@ -232,9 +246,9 @@ export function buildRequestPanel(editor) {
       const at = state.problem ? partOf(state.problem.error.where) : {};
       const here = (...parts) => (state.problem && parts.includes(at.part) ? state.problem.error : null);
       showProblem(regionProblem, here("region"));
-      showProblem(paramProblem, here("param", "mode", "preset", "crumbs"));
+      showProblem(paramProblem, here("param", "mode", "preset", "crumbs", "shadow"));
       showProblem(problem, here("request", "handles", "prompt", "negative_prompt", "allow_slow"));
-      if (here("region") || here("param", "preset", "crumbs")) settings.open = true;
+      if (here("region") || here("param", "preset", "crumbs", "shadow")) settings.open = true;
       if (here("handle") && !state.handles[at.index]) showProblem(problem, state.problem.error);
       answer.replaceChildren(...answers(editor, state));
     },

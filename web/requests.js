@@ -15,8 +15,8 @@ export class ImportError extends Error {
 export function requestOf(state) {
   // Where nothing moves, what is healed is removed: then all that a run does is to heal it.
   if (onlyHeals(state)) return requestOf({ ...state, mode: "remove", selection: state.heal });
-  const { scene, version, mode, preset, prompt, handles, selection = [], heal = [], attach, crumbs, region, params } = state;
-  const { negative_prompt, allow_slow } = state;
+  const { scene, version, mode, preset, prompt, handles, selection = [], heal = [], attach, region, params } = state;
+  const { negative_prompt, allow_slow, crumbs, shadow } = state;
   const goes = mode !== "remove"; // else targets stay on the screen, for when the mode changes back
   const given = Object.entries(params ?? {}).filter(
     ([, value]) => value !== null && value !== undefined && value !== "",
@@ -41,6 +41,7 @@ export function requestOf(state) {
     ...(heal.length ? { heal } : {}),
     ...(attach ? { attach } : {}),
     ...(crumbs && selection.length && mode !== "extend" ? { crumbs } : {}), // of a selection that leaves its place
+    ...(shadow && selection.length && mode !== "extend" ? { shadow } : {}), // the same
     ...(region ? { region } : {}),
     ...(given.length ? { params: Object.fromEntries(given) } : {}),
   };
@@ -87,7 +88,7 @@ export function partOf(where = "") {
   const param = /^params\.(\w+)/.exec(where);
   if (param) return { part: "param", name: param[1] };
   if (/^region\b/.test(where)) return { part: "region" };
-  if (/^(mode|preset|handles|prompt|negative_prompt|allow_slow|crumbs)$/.test(where)) return { part: where };
+  if (/^(mode|preset|handles|prompt|negative_prompt|allow_slow|crumbs|shadow)$/.test(where)) return { part: where };
   return { part: "request" };
 }
 
@@ -171,7 +172,7 @@ function nameAmong(names, value, where) {
 }
 
 const FIELDS =
-  "scene version mode preset prompt negative_prompt allow_slow handles selection heal attach crumbs region params".split(" ");
+  "scene version mode preset prompt negative_prompt allow_slow handles selection heal attach crumbs shadow region params".split(" ");
 
 function readRequest(document, where) {
   known(document, FIELDS, where);
@@ -212,6 +213,7 @@ function readRequest(document, where) {
     heal,
     attach: nameAmong(["auto", "held", "free"], document.attach, within(where, "attach")),
     crumbs: nameAmong(["move", "remove", "keep"], document.crumbs, within(where, "crumbs")),
+    shadow: nameAmong(["move", "remove", "keep"], document.shadow, within(where, "shadow")),
     region,
     params: { ...params },
   };
@@ -269,6 +271,7 @@ function readReleased(document, where) {
     heal: [],
     attach: null,
     crumbs: null,
+    shadow: null,
     region,
     params: {},
   };

@@ -53,7 +53,7 @@ struct Plan {
   std::function<bool(DVec3)> drawn_from = {};
   std::vector<procedural::Object> only_after = {};  ///< Things that only the edited scene has.
   bool casts_shadows = false;  ///< Things darken their surroundings where they are, before and after; else nowhere.
-  std::vector<std::string> glossy = {};             ///< Names of objects that gleam.
+  std::vector<std::string> glossy = {};  ///< Names of objects that gleam.
   Orbit orbit = {};
   edit::Mode mode = edit::Mode::move;
   std::vector<Grip> grips = {};

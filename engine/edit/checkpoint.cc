@@ -18,7 +18,7 @@ using working::Members;
 using working::Role;
 
 constexpr std::string_view magic = "SDCHKPNT";
-constexpr std::uint32_t version = 7;
+constexpr std::uint32_t version = 8;
 
 // Each part is written and read by a pair of functions that name the same fields in the same order.
 
@@ -207,7 +207,7 @@ void write(ByteWriter& out, const Report& report) {
   write_list(out, report.views);
   write_list(out, report.uncovered);
   for (const std::size_t count : {report.input_gaussians, report.output_gaussians, report.changeable, report.copies,
-                                  report.seeds, report.removed, report.crumbs})
+                                  report.seeds, report.removed, report.crumbs, report.relit})
     out.write(std::uint64_t(count));
   write(out, report.losses);
   write_list(out, report.warnings);
@@ -220,7 +220,7 @@ void read(ByteReader& in, Report& report) {
   read_list(in, report.views);
   read_list(in, report.uncovered);
   for (std::size_t* count : {&report.input_gaussians, &report.output_gaussians, &report.changeable, &report.copies,
-                             &report.seeds, &report.removed, &report.crumbs})
+                             &report.seeds, &report.removed, &report.crumbs, &report.relit})
     *count = std::size_t(in.read<std::uint64_t>());
   read(in, report.losses);
   read_list(in, report.warnings);

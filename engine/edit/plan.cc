@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "engine/edit/views.h"
+#include "engine/repair/around_part.h"
 #include "engine/repair/outskirts.h"
 #include "engine/repair/witnesses.h"
 
@@ -88,7 +89,8 @@ class Maker {
   [[nodiscard]] double choice() const {
     const double small = std::min(double(comparison_side * comparison_side), pixels_);
     const double dome = work_.virtual_views ? dome_row_seconds * n_ : 0;
-    return slow(dome) + motion() * work_.intervals + 2 * double(work_.candidates) * footprint(small) + outskirts();
+    return slow(dome) + motion() * work_.intervals + 2 * double(work_.candidates) * footprint(small) + outskirts() +
+           surroundings();
   }
   /// What cameras show of the part, of the rest, and of both.
   [[nodiscard]] double outskirts() const {
@@ -97,6 +99,13 @@ class Maker {
     const double frame = work_.frame.gaussians + work_.frame.pixel * pixels;
     return double(std::min(work_.candidates, repair::outskirts_cameras)) *
            (outskirts_frames * frame + slow(row_seconds * n_));
+  }
+
+  /// What views show around the part without it.
+  [[nodiscard]] double surroundings() const {
+    if (!work_.selected || !work_.corrected || !work_.vacates || work_.iterations == 0) return 0;
+    const double pixels = std::min(double(repair::side_around * repair::side_around), pixels_);
+    return double(std::min(work_.views, repair::cameras_around)) * (work_.frame.gaussians + work_.frame.pixel * pixels);
   }
 
   /// What a moment shows.

@@ -48,6 +48,7 @@ struct Report {
   Params resolved;  ///< With every default filled in (intervals is never 0 here).
   std::vector<HandleReport> handles;
   std::size_t crumbs = 0;         ///< Rows that the selection has left out, and that went along or away.
+  std::size_t relit = 0;          ///< Rows that the part's shadow has left or reached.
   std::vector<Attachment> parts;  ///< Of Interpolation::arap: how each group moves, and why.
   std::vector<ViewReport> views;
   std::vector<Uncovered> uncovered;  ///< By a move that a corrector has repaired: views that show what the part left.

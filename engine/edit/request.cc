@@ -71,14 +71,16 @@ Result<void> validate_motion(const Request& request) {
   return {};
 }
 
-/// Crumbs are beside a selection, and left behind where a part leaves its place.
-Result<void> validate_crumbs(const Request& request) {
-  if (request.crumbs == Crumbs::move) return {};
-  const std::string asked = "\"" + std::string(name_of(request.crumbs)) + "\" ";
-  if (!request.selected)
-    return invalid(asked + "is about what a selection has left out: select what moves, or leave this out", "crumbs");
+/// Crumbs are beside a selection, and a shadow is; both are left behind where a part leaves its place.
+///   about  what they are, in words
+///   where  the field
+template <class Choice>
+Result<void> validate_what_goes_along(const Request& request, Choice choice, const char* about, const char* where) {
+  if (choice == Choice::move) return {};
+  const std::string asked = "\"" + std::string(name_of(choice)) + "\" ";
+  if (!request.selected) return invalid(asked + "is about " + about + ": select what moves, or leave this out", where);
   if (request.mode == Mode::extend)
-    return invalid(asked + "is about what a part leaves behind; with mode \"extend\" it does not leave", "crumbs");
+    return invalid(asked + "is about what a part leaves behind; with mode \"extend\" it does not leave", where);
   return {};
 }
 
@@ -112,7 +114,11 @@ Result<void> validate(const Request& request) {
     if (auto valid = validate_selected(*request.selected); !valid) return valid;
   if (request.mode == Mode::remove)
     if (auto valid = validate_removal(request); !valid) return valid;
-  if (auto valid = validate_crumbs(request); !valid) return valid;
+  if (auto valid = validate_what_goes_along(request, request.crumbs, "what a selection has left out", "crumbs"); !valid)
+    return valid;
+  if (auto valid = validate_what_goes_along(request, request.shadow, "the shadow of what is selected", "shadow");
+      !valid)
+    return valid;
   if (auto valid = validate_ascending(request.healed, "heal"); !valid) return valid;
   if (auto valid = validate_motion(request); !valid) return valid;
   if (request.region)

@@ -20,6 +20,7 @@ using params::Interpolation;
 using params::Mode;
 using params::Params;
 using params::Rotation;
+using params::ShadowOfPart;
 
 constexpr std::size_t max_handles = 256;
 constexpr double max_scale = 1000;       ///< A choice: far beyond use. Its inverse is the least.
@@ -52,7 +53,8 @@ struct Request {
   /// Rows of the scene that are meant, strictly ascending: each goes with the handle nearest to it, and the radius of a
   /// handle says nothing of what moves. None: the spheres of the handles say it.
   std::optional<std::vector<std::uint32_t>> selected;
-  Crumbs crumbs = Crumbs::move;  ///< Of `selected`, in a move or a removal; else there are none.
+  Crumbs crumbs = Crumbs::move;              ///< Of `selected`, in a move or a removal; else there are none.
+  ShadowOfPart shadow = ShadowOfPart::move;  ///< Of `selected`, where it leaves its place as a whole.
   /// Rows of the scene that are made anew although cameras saw them, strictly ascending: a stain, a painted shadow.
   /// Only with a corrector, and where what is dragged leaves its place; dragged rows among them count where they were.
   std::vector<std::uint32_t> healed;

@@ -99,10 +99,18 @@ bool leaves_as_a_whole(const Edit& edit) {
          });
 }
 
-bool has_outskirts(const Edit& edit) {
-  const Request& request = edit.request;
-  return edit.corrector != nullptr && edit.optimises() && request.selected && request.crumbs != Crumbs::keep &&
-         request.mode != Mode::extend && leaves_as_a_whole(edit);
+/// What is selected leaves its place as a whole, and what it leaves is repaired.
+bool repairs_a_departure(const Edit& edit) {
+  return edit.corrector != nullptr && edit.optimises() && edit.request.selected && edit.request.mode != Mode::extend &&
+         leaves_as_a_whole(edit);
+}
+
+bool has_outskirts(const Edit& edit) { return edit.request.crumbs != Crumbs::keep && repairs_a_departure(edit); }
+
+/// Its shadow is that of one part, which arrives at once: else a shadow would be where nothing is yet.
+bool has_shadow(const State& state, const Edit& edit) {
+  return edit.request.shadow != ShadowOfPart::keep && repairs_a_departure(edit) &&
+         state.report.resolved.intervals == 1 && edit.parts.attachments.size() <= 1;
 }
 
 bool is_outside_region(const Edit& edit, std::uint32_t row) {
@@ -132,10 +140,10 @@ Result<void> look_at_outskirts(State& state, Edit& edit, const ViewChoice& choic
   return {};
 }
 
-/// Where what is at a point around the part as it arrives would have been around it before; empty where no single
-/// motion says so.
+/// Where what is at a point around the part as it arrives would have been around it before; empty where its shadow does
+/// not go along.
 std::function<DVec3(DVec3)> back_to_source(const State& state, const Edit& edit) {
-  if (edit.request.mode == Mode::remove || edit.parts.attachments.size() != 1) return {};
+  if (edit.request.mode == Mode::remove || edit.request.shadow == ShadowOfPart::remove) return {};
   const deform::Attachment& part = edit.parts.attachments.front();
   const working::Frame& frame = state.scene.frame();
   const auto drags = interval_drags(frame, edit.request, state.positions, 1, 1);
@@ -150,7 +158,7 @@ std::function<DVec3(DVec3)> back_to_source(const State& state, const Edit& edit)
 ///   part  rows that leave, ascending
 Result<void> look_for_shadow(const State& state, Edit& edit, const Rows& part,
                              const std::function<Result<void>(double)>& advance) {
-  auto around = repair::surroundings_of(edit.input, part, state.views, advance);
+  auto around = repair::look_around(edit.input, part, state.views, advance);
   if (!around) return propagate(around);
   const repair::Shadow shadow(std::move(*around));
   repair::Relit all = repair::relit_rows(edit.input, part, shadow, back_to_source(state, edit));
@@ -228,14 +236,16 @@ Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Cam
     edit.progress.refine(work);
   }
   for (const scene::Camera& view : state.views) state.masks.emplace_back(view.width, view.height);
+  const bool shades = has_shadow(state, edit);
   if (!choice->moved.empty() && looks)
     if (auto looked =
-            look_at_outskirts(state, edit, *choice, [&](double part) { return edit.progress.advance((1 + part) / 2); });
+            look_at_outskirts(state, edit, *choice,
+                              [&](double part) { return edit.progress.advance((1 + (shades ? part / 2 : part)) / 2); });
         !looked)
       return looked;
-  if (!choice->moved.empty() && looks)
+  if (!choice->moved.empty() && shades)
     if (auto looked = look_for_shadow(state, edit, united(choice->moved, edit.given_up),
-                                      [&](double) { return edit.progress.advance(1); });
+                                      [&](double part) { return edit.progress.advance((3 + part) / 4); });
         !looked)
       return looked;
   Rows vanishing = united(united(edit.given_up, edit.buried), edit.relit.rows);
@@ -260,7 +270,7 @@ Result<Rows> paste(State& state, Edit& edit, int u, const PlannedMotion& motion)
   if (u == 1 && !motion.moving.empty())
     for (const std::uint32_t row : edit.given_up) state.scene.give_up(row);
   if (u == 1) leave_buried(state.scene, edit.buried);
-  if (u == 1 && !motion.moving.empty()) repair::relight(state.scene, edit.relit);
+  if (u == 1 && !motion.moving.empty()) state.report.relit = repair::relight(state.scene, edit.relit);
   // An elastic body has drawn its Gaussians out already.
   if (edit.corrector != nullptr && edit.optimises() && edit.params().interpolation != Interpolation::arap)
     repair::draw_out(state.scene);

@@ -56,7 +56,8 @@ struct Edit {
 [[nodiscard]] Result<State> assign_and_divide(Edit& edit);
 
 /// Step 5. Views: chosen from the candidates by what they see of the source and of the fully deformed target. A mask of
-/// each, of what vanishes: crumbs, and the outskirts of the part, which the candidates tell.
+/// each, of what vanishes, crumbs and the outskirts of the part, which the candidates tell, and of what its shadow
+/// leaves or reaches.
 ///   cameras  the dataset's; empty: the candidates are virtual
 [[nodiscard]] Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Camera> cameras);
 

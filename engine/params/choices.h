@@ -31,6 +31,17 @@ constexpr auto names_of(Crumbs) {
   return std::array{Name{Crumbs::move, "move"}, Name{Crumbs::remove, "remove"}, Name{Crumbs::keep, "keep"}};
 }
 
+/// What becomes of the shadow of a part, where it leaves what it stands on or next to.
+enum class ShadowOfPart {
+  move,    ///< It goes along, as far as the part stays on the same surface.
+  remove,  ///< It goes away.
+  keep     ///< It stays, as all that is not selected.
+};
+constexpr auto names_of(ShadowOfPart) {
+  return std::array{Name{ShadowOfPart::move, "move"}, Name{ShadowOfPart::remove, "remove"},
+                    Name{ShadowOfPart::keep, "keep"}};
+}
+
 /// A name for a set of parameters. How their numbers were found: docs/tradeoff.md.
 enum class Preset {
   preview,   ///< Only deforms.

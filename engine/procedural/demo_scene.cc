@@ -1,5 +1,6 @@
 #include "engine/procedural/demo_scene.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -116,23 +117,46 @@ std::vector<scene::Camera> make_arc_cameras(int count, int width, int height) {
   return cameras;
 }
 
+namespace {
+
+/// The still life closed all over, lit by its objects where `shading` has them.
+Surfels closed_all_over(const StillLife& still_life, std::span<const Object> shading,
+                        std::span<const scene::Camera> cameras, const DemoOptions& options) {
+  Surfels surfels =
+      make_surfels(still_life.objects, still_life.light, cameras, options.gaussians, options.seed, shading);
+  const Surfels unseen = make_unseen_surfels(surfels, still_life.objects, still_life.light, cameras, options.gaussians,
+                                             options.seed, shading);
+  std::vector<std::uint32_t> all(unseen.cloud.size());
+  std::iota(all.begin(), all.end(), 0u);
+  scene::append_rows(surfels.cloud, unseen.cloud, all);
+  surfels.object.insert(surfels.object.end(), unseen.object.begin(), unseen.object.end());
+  return surfels;
+}
+
+/// The true result of dragging the ball, the last object.
+Surfels with_ball_carried(const StillLife& still_life, std::span<const scene::Camera> cameras,
+                          const DemoOptions& options) {
+  std::vector<Object> shading = still_life.objects;
+  shading.back().placement.position += Vec3(options.ball_shift);
+  const Surfels as_it_was = closed_all_over(still_life, {}, cameras, options);
+  Surfels surfels = closed_all_over(still_life, shading, cameras, options);
+  for (std::size_t row = 0; row < surfels.cloud.size(); ++row) {
+    if (surfels.object[row] != still_life.objects.size() - 1) continue;
+    surfels.cloud.mean.set(row, Vec3(DVec3(surfels.cloud.mean.get(row)) + options.ball_shift));
+    std::ranges::copy(as_it_was.cloud.sh_row(row), surfels.cloud.sh_row(row).begin());
+  }
+  return surfels;
+}
+
+}  // namespace
+
 DemoScene make_demo_scene(const DemoOptions& options) {
   StillLife still_life = make_still_life(options.seed);
   DemoScene demo;
   demo.cameras = make_arc_cameras(options.views, options.width, options.height);
-  Surfels surfels = make_surfels(still_life.objects, still_life.light, demo.cameras, options.gaussians, options.seed);
-  if (options.ball_shift != DVec3(0.0)) {
-    const Surfels unseen = make_unseen_surfels(surfels, still_life.objects, still_life.light, demo.cameras,
-                                               options.gaussians, options.seed);
-    std::vector<std::uint32_t> all(unseen.cloud.size());
-    std::iota(all.begin(), all.end(), 0u);
-    scene::append_rows(surfels.cloud, unseen.cloud, all);
-    surfels.object.insert(surfels.object.end(), unseen.object.begin(), unseen.object.end());
-    const std::size_t ball = still_life.objects.size() - 1;
-    for (std::size_t row = 0; row < surfels.cloud.size(); ++row)
-      if (surfels.object[row] == ball)
-        surfels.cloud.mean.set(row, Vec3(DVec3(surfels.cloud.mean.get(row)) + options.ball_shift));
-  }
+  Surfels surfels = options.ball_shift == DVec3(0.0) ? make_surfels(still_life.objects, still_life.light, demo.cameras,
+                                                                    options.gaussians, options.seed)
+                                                     : with_ball_carried(still_life, demo.cameras, options);
   demo.cloud = std::move(surfels.cloud);
   demo.object = std::move(surfels.object);
   for (const Object& object : still_life.objects) demo.object_names.push_back(object.name);

@@ -30,8 +30,8 @@ struct DemoOptions {
   int views = 40;                 ///< 1 to 1000.
   int width = 640, height = 480;  ///< Pixels of a view, 16 to 16384.
   /// How far the ball has been carried from its place, world units. Otherwise than zero, the scene is the true result
-  /// of dragging it there: light and shadows stay as they were, and what no camera has seen is there, too. No longer
-  /// than max_ball_shift.
+  /// of dragging it there: its shadow goes along, the light on it stays as it was, and what no camera has seen is
+  /// there, too. No longer than max_ball_shift.
   DVec3 ball_shift{0.0};
 };
 /// errors  invalid_argument: `where` is the option

@@ -352,7 +352,7 @@ Surfels paint_sites(std::span<const Object> objects, const Light& light, std::sp
 }  // namespace
 
 Surfels make_surfels(std::span<const Object> objects, const Light& light, std::span<const scene::Camera> cameras,
-                     std::size_t count, std::uint64_t seed) {
+                     std::size_t count, std::uint64_t seed, std::span<const Object> shading) {
   const std::vector<Eye> eyes = eyes_of(cameras);
   const Occluders occluders(objects);
   const std::vector<Ground> grounds = lay_ground(objects);
@@ -360,13 +360,15 @@ Surfels make_surfels(std::span<const Object> objects, const Light& light, std::s
       sites_for_count(grounds, count, seed, [&](const Ground& ground, const Site& site, Rng& rng, std::size_t& first) {
         return is_seen(ground, site, eyes, occluders, rng, first);
       });
-  Surfels surfels = paint_sites(objects, light, eyes, occluders, grounds, sites, count, seed);
+  Surfels surfels =
+      paint_sites(objects, light, eyes, Occluders(shading.empty() ? objects : shading), grounds, sites, count, seed);
   surfels.spacing = spacing;
   return surfels;
 }
 
 Surfels make_unseen_surfels(const Surfels& seen, std::span<const Object> objects, const Light& light,
-                            std::span<const scene::Camera> cameras, std::size_t count, std::uint64_t seed) {
+                            std::span<const scene::Camera> cameras, std::size_t count, std::uint64_t seed,
+                            std::span<const Object> shading) {
   const std::vector<Eye> eyes = eyes_of(cameras);
   const Occluders occluders(objects);
   const std::vector<Ground> grounds = lay_ground(objects);
@@ -374,7 +376,8 @@ Surfels make_unseen_surfels(const Surfels& seen, std::span<const Object> objects
                                       [&](const Ground& ground, const Site& site, Rng& rng, std::size_t& first) {
                                         return !is_seen(ground, site, eyes, occluders, rng, first);
                                       });
-  Surfels surfels = paint_sites(objects, light, eyes, occluders, grounds, sites, count, seed);
+  Surfels surfels =
+      paint_sites(objects, light, eyes, Occluders(shading.empty() ? objects : shading), grounds, sites, count, seed);
   surfels.spacing = seen.spacing;
   return surfels;
 }

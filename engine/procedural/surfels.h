@@ -26,16 +26,18 @@ struct Surfels {
 /// is the surface normal. A Gaussian is kept if from some camera a ray reaches it, or the surface right beside it, in
 /// front of which nothing stands.
 ///   count    at least 1; the result is within 1 % of it unless the cameras see next to nothing
-///   returns  the same bytes for the same arguments, for any number of threads
+///   shading  the same objects where they cast their shadows from; empty: where they are
+///   returns  the same bytes for the same arguments, for any number of threads; but for the colours, for any shading
 [[nodiscard]] Surfels make_surfels(std::span<const Object> objects, const Light& light,
-                                   std::span<const scene::Camera> cameras, std::size_t count, std::uint64_t seed);
+                                   std::span<const scene::Camera> cameras, std::size_t count, std::uint64_t seed,
+                                   std::span<const Object> shading = {});
 
 /// What make_surfels() has left out because no camera can see it: with it, things are closed all over, and what stands
 /// may be taken away.
 ///   seen  what it returned for the same other arguments
 [[nodiscard]] Surfels make_unseen_surfels(const Surfels& seen, std::span<const Object> objects, const Light& light,
-                                          std::span<const scene::Camera> cameras, std::size_t count,
-                                          std::uint64_t seed);
+                                          std::span<const scene::Camera> cameras, std::size_t count, std::uint64_t seed,
+                                          std::span<const Object> shading = {});
 
 /// Covers the objects all over, inside and behind too, whether any camera sees it or not.
 ///   spacing  of Gaussians where a patch's density is 1, world units

@@ -4,13 +4,16 @@
 #include <array>
 #include <cmath>
 
+#include "engine/render/project.h"
+#include "engine/scene/base_color.h"
 #include "engine/scene/sh.h"
 
 namespace engine::repair {
 namespace {
 
-constexpr float no_light = 0.2f;    // less of it is not believed: what is lit five times is mostly noise
 constexpr float as_before = 0.01f;  // a change of less nobody sees
+// Extents of the part up to which a row's longest axis lies in one light: two of the windows that shadows are found by.
+constexpr double most_wide = 0.25;
 
 /// The middle of a row, and the ends of its two longer axes: where it is lit.
 std::array<DVec3, 5> spots_of(const scene::GaussianCloud& scene, std::size_t row) {
@@ -56,39 +59,46 @@ Relit relit_rows(const scene::GaussianCloud& scene, std::span<const std::uint32_
     const DVec3 mean(scene.mean.get(row));
     const bool was_near = glm::distance(mean, shadow.middle()) < shadow.reach();
     const bool is_near = back && glm::distance(back(mean), shadow.middle()) < shadow.reach();
-    if ((was_near || is_near) && !std::ranges::binary_search(part, row)) near.push_back(row);
+    if (!(was_near || is_near) || std::ranges::binary_search(part, row)) continue;
+    const Vec3 log_scale = scene.log_scale.get(row);
+    const double longest = std::exp(double(std::max({log_scale.x, log_scale.y, log_scale.z})));
+    if (longest < most_wide * shadow.extent() && render::opacity<float>(scene.opacity_logit[row]) >= render::min_alpha)
+      near.push_back(row);
   }
-  const std::vector<Vec3> before = light_on(scene, near, shadow, {});
+  std::vector<Vec3> before = light_on(scene, near, shadow, {});
+  std::vector<DVec3> means;
+  std::vector<Vec3> colors;
+  for (const std::uint32_t row : near)
+    means.emplace_back(scene.mean.get(row)), colors.push_back(scene::base_color(scene, row));
+  const std::vector<std::uint8_t> is_of_surface = shadow.might_show(means, colors);
+  for (std::size_t k = 0; k < near.size(); ++k)
+    if (is_of_surface[k] == 0) before[k] = Vec3(1.0f);
   const std::vector<Vec3> after = back ? light_on(scene, near, shadow, back) : std::vector<Vec3>(near.size(), Vec3(1));
   for (std::size_t k = 0; k < near.size(); ++k) {
-    const Vec3 light = glm::max(after[k], Vec3(no_light)) / glm::max(before[k], Vec3(no_light));
+    const Vec3 light = after[k] / before[k];
     if (glm::all(glm::lessThan(glm::abs(light - 1.0f), Vec3(as_before)))) continue;
     out.rows.push_back(near[k]), out.light.push_back(light);
   }
   return out;
 }
 
-std::vector<std::uint32_t> relight(WorkingScene& working, const Relit& relit) {
-  std::vector<std::uint32_t> rows;
-  std::vector<Vec3> light;
-  for (std::size_t k = 0; k < relit.rows.size(); ++k)
-    if (working.role()[relit.rows[k]] == working::Role::frozen)
-      rows.push_back(relit.rows[k]), light.push_back(relit.light[k]);
-  const std::uint32_t first =
-      working.append(working.cloud(), rows, std::vector<working::Role>(rows.size(), working::Role::relit), rows);
+std::size_t relight(WorkingScene& working, const Relit& relit) {
   const std::size_t coefficients = scene::sh_coefficients(working.cloud().sh_degree);
-  for (std::uint32_t k = 0; k < rows.size(); ++k) {
-    working.give_up(rows[k]);
-    const std::span<float> sh = working.gaussians().sh_row(first + k);
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < relit.rows.size(); ++k) {
+    const std::uint32_t row = relit.rows[k];
+    if (working.role()[row] != working::Role::frozen) continue;
+    working.relight(row);
+    const std::span<float> sh = working.gaussians().sh_row(row);
     for (std::size_t c = 0; c < 3; ++c) {
-      const float factor = light[k][int(c)];
+      const float factor = relit.light[k][int(c)];
       for (std::size_t n = 0; n < coefficients; ++n) sh[c * coefficients + n] *= factor;
       // A colour is 0.5 and the sum of these.
       sh[c * coefficients] += 0.5f * (factor - 1) / float(scene::sh_c0);
     }
-    rows[k] = first + k;
+    ++count;
   }
-  return rows;
+  return count;
 }
 
 }  // namespace engine::repair

@@ -1,6 +1,7 @@
 // Rows that a part has kept the light from, or that it keeps it from where it arrives.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -22,6 +23,7 @@ struct Relit {
 };
 
 /// The rows that the shadow leaves, and those that it falls on anew where the part takes it along.
+/// Not those that are too large to lie in a shadow, or too faint to be seen.
 ///   scene  that the shadow was found in
 ///   part   rows that have none, ascending
 ///   back   where what is at a point around the part as it arrives would have been around it before, world units;
@@ -29,8 +31,8 @@ struct Relit {
 [[nodiscard]] Relit relit_rows(const scene::GaussianCloud& scene, std::span<const std::uint32_t> part,
                                const Shadow& shadow, const std::function<DVec3(DVec3)>& back);
 
-/// Each of these rows that is frozen goes, and another comes in its place, of the new light (Role::relit).
-///   returns  the rows that came, ascending
-std::vector<std::uint32_t> relight(WorkingScene& working, const Relit& relit);
+/// Each of these rows that is frozen gets colours of the new light (Role::relit).
+///   returns  how many
+std::size_t relight(WorkingScene& working, const Relit& relit);
 
 }  // namespace engine::repair

@@ -232,7 +232,7 @@ ContinuedSurfaces Repair::surfaces_behind(const ViewNow& now, std::size_t v, con
 
 void Repair::give_up_healed(WorkingScene& working) const {
   for (const std::uint32_t row : healed_)
-    if (working.role()[row] == Role::frozen) working.give_up(row);
+    if (working::stays(working.role()[row])) working.give_up(row);
 }
 
 void Repair::doubt_unseen(const WorkingScene& working, const Rows& rows, std::size_t v, ViewNow& now) {
@@ -264,7 +264,7 @@ void Repair::clear_unseen(WorkingScene& working, Rows& rows, const scene::Camera
                           const std::function<bool(DVec2 pixel, double z)>& is_within) {
   const std::size_t before = rows.gone.size();
   for (const std::uint32_t row : unseen_) {
-    if (working.role()[row] != Role::frozen) continue;
+    if (!working::stays(working.role()[row])) continue;
     const DVec3 p = camera.cam_from_world(working.cloud().mean.get(row));
     const auto pixel = pixel_in_picture(camera, p);
     if (!pixel) continue;
@@ -569,14 +569,11 @@ Result<Corrected> Repair::walk(WorkingScene& working, std::span<const scene::Mas
 
 Repair::Rows Repair::rows_of(const WorkingScene& working) const {
   Rows rows;
-  std::vector<std::uint8_t> relit(working.input_rows());  // another has come in its place
-  for (const std::uint32_t i : working.rows_of(Role::relit)) relit[working.parent()[i]] = 1;
   for (std::uint32_t i = 0; i < working.size(); ++i) {
     const bool is_gone = working::has_left(working.role()[i]) && mode_ == Mode::move;
     const bool is_moved = working::has_arrived(working.role()[i]);
     if (is_gone) rows.gone.push_back(i);
-    if (is_gone && i < working.input_rows() && relit[i] == 0 && !std::ranges::binary_search(veils_, i))
-      rows.vacating.push_back(i);
+    if (is_gone && i < working.input_rows() && !std::ranges::binary_search(veils_, i)) rows.vacating.push_back(i);
     if (is_moved) rows.moved.push_back(i);
     if (is_gone || is_moved) rows.dragged.push_back(i);
   }
@@ -587,6 +584,7 @@ void Repair::note_vacated(const WorkingScene& working, const Rows& rows, std::sp
   vacated_.resize(views_.size());
   far_side_.resize(views_.size());
   open_ = rows_left_open(original_, rows.vacating, working, rows.moved);
+  const std::vector<std::uint32_t> relit = working.rows_of(Role::relit);
   for (std::size_t v = 0; v < views_.size(); ++v) {
     const scene::Image share = working::footprint(original_, rows.vacating, views_[v], workspace_);
     const scene::Image open_share = working::footprint(original_, open_, views_[v], workspace_);
@@ -594,6 +592,8 @@ void Repair::note_vacated(const WorkingScene& working, const Rows& rows, std::sp
     mask::unite(vacated_[v], stained_[v]);
     far_side_[v] = far_side(original_, open_, views_[v]);
     buffer_[v].excluded = mask::mask2d(share, trace);
+    // The pictures show it in the shadow of what has left.
+    mask::unite(buffer_[v].excluded, mask::mask2d(working::footprint(original_, relit, views_[v], workspace_)));
     buffer_[v].box = scene::bounding_box(masks[v]);
   }
 }

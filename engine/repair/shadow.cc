@@ -1,8 +1,10 @@
 #include "engine/repair/shadow.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numbers>
 #include <utility>
 
 #include "engine/core/parallel.h"
@@ -27,30 +29,61 @@ constexpr std::size_t most_asked = 1500;  // points of the surface farther away:
 // Standard deviation of the window in which a surface is as dark as the mean of its points, and how many are asked.
 constexpr float window = 0.07f;
 constexpr std::size_t window_points = 48;
-// Darker than this is left out of what the surface is like, and the search repeated.
-constexpr float surely_dark = -0.1f;
-constexpr int rounds = 3;
 // A shadow is darker by so many times what its surface varies by in such windows, and by so much at least; at twice
 // that all of it counts. Logarithms of factors of the light.
 constexpr float beyond_texture = 2.5f, least_dark = 0.05f;
+// The search is repeated without what is darker by so many times that: what is left says what the surface is like.
+constexpr float maybe_dark = 1.5f;
+constexpr int rounds = 4;
 constexpr float darkest = -1.5f;  // less light than a fifth leaves no texture to be lit
 // It begins within so much of the part. From the first of these distances on it fades, to nothing at the second: what
 // is dark there is the shadow of something else as well.
 constexpr float touches = 0.12f, fades_from = 0.6f, fades_until = 1.0f;
-constexpr std::size_t joined = 16;                         // neighbours that a shadow may go on to,
-constexpr float joined_within = 2 * surroundings_spacing;  // and how near they are
+constexpr std::size_t joined = 16;                   // neighbours that a shadow may go on to,
+constexpr float joined_within = 2 * spacing_around;  // and how near they are
 // A point of a scene is on a surface that is so near: trained Gaussians stand off what they show.
-constexpr float on_surface = 2 * surroundings_spacing, beside_point = 2.5f * surroundings_spacing;
+constexpr float on_surface = 2 * spacing_around, beside_point = 2.5f * spacing_around;
+// A colour is none of a surface that is farther than that from what each of so many points in the light show.
+constexpr float other_hue = 2 * off_hue;
+constexpr std::size_t points_that_show = 16;
 constexpr std::size_t points_between = 4;  // that light is interpolated from
 
+// What a texture varies by before anything brighter than the mean was found.
+constexpr float unknown = std::numeric_limits<float>::infinity();
+
 float mean_of(Vec3 v) { return (v.x + v.y + v.z) / 3; }
+
+/// The logarithm of a colour, and that but for its mean: the same in any light, about.
+Vec3 shade_of(Vec3 color) {
+  constexpr float black = 2e-3f;  // half a step of 255: of what is darker no factor is known
+  return glm::log(glm::max(color, Vec3(black)));
+}
+Vec3 hue_of(Vec3 color) { return shade_of(color) - mean_of(shade_of(color)); }
+
+/// Which dark points hang together with one beside the part, through dark ones.
+std::vector<std::uint8_t> from_the_part(const AroundPart& around, const neighbours::PointIndex& index,
+                                        const std::vector<std::uint8_t>& dark) {
+  const std::size_t count = std::min(joined, around.size());
+  const auto nearest = index.nearest(around.place, count);
+  neighbours::Pieces pieces(around.size());
+  for (std::uint32_t i = 0; i < around.size(); ++i)
+    for (const auto& n : std::span(nearest).subspan(i * count, count))
+      if (dark[i] != 0 && dark[n.index] != 0 && n.squared_distance < joined_within * joined_within)
+        pieces.join(i, n.index);
+  std::vector<std::uint8_t> touching(around.size(), 0), out(around.size(), 0);
+  for (std::uint32_t i = 0; i < around.size(); ++i)
+    if (dark[i] != 0 && around.distance[i] < touches) touching[pieces.of(i)] = 1;
+  for (std::uint32_t i = 0; i < around.size(); ++i) out[i] = dark[i] != 0 && touching[pieces.of(i)] != 0;
+  return out;
+}
 
 /// Finds how dark each point is: the logarithm of what is left of the light, over a window.
 class Darkness {
  public:
-  explicit Darkness(const Surroundings& around, const neighbours::PointIndex& index);
+  explicit Darkness(const AroundPart& around, const neighbours::PointIndex& index);
   [[nodiscard]] const std::vector<Vec3>& mean() const { return mean_; }
-  [[nodiscard]] float texture(std::size_t i) const { return texture_[i]; }
+  /// From which darkness on texture does not explain it. Above 0.
+  [[nodiscard]] float threshold(std::size_t i) const { return std::max(least_dark, beyond_texture * texture_[i]); }
 
  private:
   /// Of an even choice of points, those that tell what the surface is like where no shadow is, and how many each is.
@@ -59,7 +92,7 @@ class Darkness {
   void average(std::span<const neighbours::Neighbour> nearest, std::size_t count);
   [[nodiscard]] float likeness(std::size_t i, std::size_t j, float deviation) const;
 
-  const Surroundings& around_;
+  const AroundPart& around_;
   std::vector<Vec3> shade_, hue_;  ///< Logarithm of the colour; but for its mean.
   std::vector<Vec3> difference_;   ///< From the surface farther away.
   std::vector<std::uint8_t> known_;
@@ -67,17 +100,13 @@ class Darkness {
   std::vector<float> texture_;  ///< What the mean varies by where there is no shadow.
 };
 
-Darkness::Darkness(const Surroundings& around, const neighbours::PointIndex& index)
+Darkness::Darkness(const AroundPart& around, const neighbours::PointIndex& index)
     : around_(around),
       difference_(around.size()),
       known_(around.size()),
       mean_(around.size(), Vec3(0.0f)),
-      texture_(around.size()) {
-  constexpr float black = 2e-3f;  // half a step of 255: of what is darker no factor is known
-  for (std::size_t i = 0; i < around.size(); ++i) {
-    shade_.push_back(glm::log(glm::max(around.color[i], Vec3(black))));
-    hue_.push_back(shade_[i] - mean_of(shade_[i]));
-  }
+      texture_(around.size(), unknown) {
+  for (const Vec3 color : around.color) shade_.push_back(shade_of(color)), hue_.push_back(hue_of(color));
   const std::size_t count = std::min(window_points, around.size());
   const auto nearest = index.nearest(around.place, count);
   for (int round = 0; round < rounds; ++round) {
@@ -90,7 +119,8 @@ Darkness::Darkness(const Surroundings& around, const neighbours::PointIndex& ind
 std::pair<std::vector<std::uint32_t>, float> Darkness::asked() const {
   std::vector<std::uint32_t> far;
   for (std::uint32_t i = 0; i < around_.size(); ++i)
-    if (around_.distance[i] > far_from && mean_of(mean_[i]) > surely_dark) far.push_back(i);
+    if (around_.distance[i] > far_from && mean_of(mean_[i]) > -std::max(least_dark, maybe_dark * texture_[i]))
+      far.push_back(i);
   const std::size_t count = std::min(most_asked, far.size());
   if (count == 0) return {{}, 0.0f};
   std::vector<std::uint32_t> chosen;
@@ -109,13 +139,14 @@ float Darkness::likeness(std::size_t i, std::size_t j, float deviation) const {
   if (std::abs(glm::dot(around_.normal[i], around_.normal[j])) < same_way) return 0;
   const float from_i = glm::dot(apart, around_.normal[i]) / off_plane;
   const float from_j = glm::dot(apart, around_.normal[j]) / off_plane;
+  constexpr float next_to_nothing = 3;  // standard deviations: e to the -4.5
+  if (std::max(std::abs(from_i), std::abs(from_j)) > next_to_nothing) return 0;
   return std::exp(-0.5f * (glm::dot(apart, apart) / (deviation * deviation) + from_i * from_i + from_j * from_j));
 }
 
 void Darkness::compare_with_far(std::span<const std::uint32_t> far, float each) {
-  constexpr float pi = 3.14159265f;
   // A plane all around a place holds so many points, weighted as below.
-  const float full = 2 * pi * about * about / (surroundings_spacing * surroundings_spacing);
+  const float full = 2 * std::numbers::pi_v<float> * about * about / (spacing_around * spacing_around);
   parallel_for(around_.size(), 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       float weights = 0, brighter = 0, squares = 0;
@@ -132,7 +163,7 @@ void Darkness::compare_with_far(std::span<const std::uint32_t> far, float each) 
       }
       known_[i] = weights * each > least_known * full;
       difference_[i] = known_[i] != 0 ? shade_[i] - sum / weights : Vec3(0.0f);
-      texture_[i] = brighter > 0 ? std::sqrt(squares / brighter) : 0;
+      texture_[i] = brighter > 0 ? std::sqrt(squares / brighter) : unknown;
     }
   });
 }
@@ -153,56 +184,58 @@ void Darkness::average(std::span<const neighbours::Neighbour> nearest, std::size
   });
 }
 
-/// Which dark points hang together with one beside the part, through dark ones.
-std::vector<std::uint8_t> from_the_part(const Surroundings& around, const neighbours::PointIndex& index,
-                                        const std::vector<std::uint8_t>& dark) {
-  const std::size_t count = std::min(joined, around.size());
-  const auto nearest = index.nearest(around.place, count);
-  neighbours::Pieces pieces(around.size());
-  for (std::uint32_t i = 0; i < around.size(); ++i)
-    for (const auto& n : std::span(nearest).subspan(i * count, count))
-      if (dark[i] != 0 && dark[n.index] != 0 && n.squared_distance < joined_within * joined_within)
-        pieces.join(i, n.index);
-  std::vector<std::uint8_t> touching(around.size(), 0), out(around.size(), 0);
-  for (std::uint32_t i = 0; i < around.size(); ++i)
-    if (dark[i] != 0 && around.distance[i] < touches) touching[pieces.of(i)] = 1;
-  for (std::uint32_t i = 0; i < around.size(); ++i) out[i] = dark[i] != 0 && touching[pieces.of(i)] != 0;
-  return out;
-}
-
 }  // namespace
 
-Shadow::Shadow(Surroundings around) : around_(std::move(around)), light_(around_.size(), Vec3(1.0f)) {
+Shadow::Shadow(AroundPart around) : around_(std::move(around)), light_(around_.size(), Vec3(1.0f)) {
   if (around_.size() == 0) return;
   index_.emplace(around_.place, 3);
   const Darkness darkness(around_, *index_);
-  std::vector<float> threshold(around_.size());
   std::vector<std::uint8_t> dark(around_.size());
-  for (std::size_t i = 0; i < around_.size(); ++i) {
-    threshold[i] = std::max(least_dark, beyond_texture * darkness.texture(i));
-    dark[i] = mean_of(darkness.mean()[i]) < -threshold[i];
-  }
+  for (std::size_t i = 0; i < around_.size(); ++i) dark[i] = mean_of(darkness.mean()[i]) < -darkness.threshold(i);
   const std::vector<std::uint8_t> cast = from_the_part(around_, *index_, dark);
   for (std::size_t i = 0; i < around_.size(); ++i) {
     if (cast[i] == 0) continue;
     const Vec3 mean = darkness.mean()[i];
-    const float sure = std::min(-mean_of(mean) / threshold[i] - 1, 1.0f);
+    const float sure = std::min(-mean_of(mean) / darkness.threshold(i) - 1, 1.0f);
     const float near = std::clamp((fades_until - around_.distance[i]) / (fades_until - fades_from), 0.0f, 1.0f);
     light_[i] = glm::exp(sure * near * glm::clamp(mean, Vec3(darkest), Vec3(0.0f)));
-    points_ += near > 0 ? 1 : 0;
+    if (light_[i] != Vec3(1.0f)) reach_ = std::max(reach_, glm::length(around_.at(i)) + beside_point);
   }
+  std::vector<float> lit;
+  for (std::uint32_t i = 0; i < around_.size(); ++i) {
+    if (light_[i] != Vec3(1.0f)) continue;
+    lit_.push_back(i);
+    for (int axis = 0; axis < 3; ++axis) lit.push_back(around_.place[3 * i + std::size_t(axis)]);
+  }
+  if (!empty() && !lit.empty()) lit_index_.emplace(lit, 3);
 }
 
-double Shadow::reach() const { return around_.extent * (0.5 + double(fades_until)); }
-
-std::vector<Vec3> Shadow::light_at(std::span<const DVec3> points) const {
-  std::vector<Vec3> out(points.size(), Vec3(1.0f));
-  if (empty()) return out;
+std::vector<float> Shadow::places_of(std::span<const DVec3> points) const {
   std::vector<float> places;
   for (const DVec3& point : points) {
     const Vec3 place = around_.place_of(point);
     for (int axis = 0; axis < 3; ++axis) places.push_back(place[axis]);
   }
+  return places;
+}
+
+std::vector<std::uint8_t> Shadow::might_show(std::span<const DVec3> points, std::span<const Vec3> colors) const {
+  std::vector<std::uint8_t> out(points.size());
+  if (empty()) return out;
+  const std::size_t count = std::min(points_that_show, lit_.size());
+  if (!lit_index_) return out;
+  const auto nearest = lit_index_->nearest(places_of(points), count);
+  for (std::size_t k = 0; k < points.size(); ++k)
+    out[k] = std::ranges::any_of(std::span(nearest).subspan(k * count, count), [&](const auto& n) {
+      return glm::distance(hue_of(colors[k]), hue_of(around_.color[lit_[n.index]])) < other_hue;
+    });
+  return out;
+}
+
+std::vector<Vec3> Shadow::light_at(std::span<const DVec3> points) const {
+  std::vector<Vec3> out(points.size(), Vec3(1.0f));
+  if (empty()) return out;
+  const std::vector<float> places = places_of(points);
   const std::size_t count = std::min(points_between, around_.size());
   const auto nearest = index_->nearest(places, count);
   for (std::size_t k = 0; k < points.size(); ++k) {

@@ -107,7 +107,7 @@ std::vector<std::uint32_t> veils_before(const WorkingScene& working, const scene
     return of_veils > seen_as_veil * (of_part + of_veils);
   };
   for (std::uint32_t row = 0; row < working.input_rows(); ++row)
-    if (working.role()[row] == working::Role::frozen && lie_before_the_part(row)) veils.push_back(row);
+    if (working::stays(working.role()[row]) && lie_before_the_part(row)) veils.push_back(row);
   if (!are_seen()) return {};
   const Told unedited = told_of(original, left, {}, small, workspace);
   std::erase_if(veils, [&](std::uint32_t row) { return unedited.on_part[row] > was_there * unedited.light[row]; });

@@ -82,8 +82,13 @@ void WorkingScene::leave_behind(std::uint32_t row) {
   role_[row] = row < input_rows_ ? Role::original : Role::trail;
 }
 
-void WorkingScene::give_up(std::uint32_t row) {
+void WorkingScene::relight(std::uint32_t row) {
   assert(role_[row] == Role::frozen);
+  role_[row] = Role::relit;
+}
+
+void WorkingScene::give_up(std::uint32_t row) {
+  assert(stays(role_[row]));
   role_[row] = Role::original;
   float& logit = cloud_.opacity_logit[row];
   logit = std::min(logit, keep_logit(Mode::move));

@@ -25,22 +25,22 @@ enum class Role : std::uint8_t {
               ///< a child that the optimisation gave an original.
   seed,       ///< New, of the repair: a surface that nobody has seen goes on there. So are its children.
   continued,  ///< New, of the deformation: what a part was drawn out of goes on there. So are its children.
-  relit       ///< New, in the place of an input row that was given up: the same in another light. So are its children.
+  relit       ///< An input row that stays, in another light.
 };
 
 /// Are rows of this role members of P_h?
 [[nodiscard]] constexpr bool is_dragged(Role role) { return role == Role::held || role == Role::copy; }
+/// Are rows of this role the input's, and where they were?
+[[nodiscard]] constexpr bool stays(Role role) { return role == Role::frozen || role == Role::relit; }
 /// Have rows of this role left their place, in a move? Originals have, and children that the optimisation gave them.
 [[nodiscard]] constexpr bool has_left(Role role) { return role == Role::original || role == Role::trail; }
 /// Are rows of this role neither the input's nor copies of what is dragged?
-[[nodiscard]] constexpr bool is_new(Role role) {
-  return role == Role::seed || role == Role::continued || role == Role::relit;
-}
+[[nodiscard]] constexpr bool is_new(Role role) { return role == Role::seed || role == Role::continued; }
 /// Are rows of this role where the drag brought something?
 [[nodiscard]] constexpr bool has_arrived(Role role) { return role == Role::copy || role == Role::continued; }
 /// May rows of this role be the input's?
 [[nodiscard]] constexpr bool is_of_input(Role role) {
-  return role == Role::frozen || role == Role::held || role == Role::original;
+  return role == Role::frozen || role == Role::held || role == Role::original || role == Role::relit;
 }
 
 /// Handle number + 1 of each row that belongs to P_h, else 0 (deform::HandleColumn).
@@ -48,9 +48,9 @@ using HandleColumn = std::vector<std::uint16_t>;
 
 /// A Gaussian and what the edit knows of it, N rows of one kind. Invariants, which check() states as code:
 /// - every column has a value for each Gaussian of the cloud;
-/// - rows [0, input_rows()) are the input's, in its order, each its own parent, frozen, held or original; the rest were
-///   appended, in the order they were made, and are copies, trails, seeds, continued or relit, with an input row for a
-///   parent;
+/// - rows [0, input_rows()) are the input's, in its order, each its own parent, frozen, held, original or relit; the
+/// rest were
+///   appended, in the order they were made, and are copies, trails, seeds or continued, with an input row for a parent;
 /// - a row has a handle exactly if it belongs to P_h: if it is held or a copy;
 /// - frozen rows are the input's bytes, in the frame of the edit.
 class WorkingScene {
@@ -80,13 +80,16 @@ class WorkingScene {
   [[nodiscard]] scene::GaussianCloud& gaussians() { return cloud_; }
   /// Row k of the new ones is row rows[k] of `from` (which may be cloud() itself), of role[k], and comes from row
   /// ancestor[k] of this scene: it has its parent and, where its role has one, its handle and its mean_at_deform.
-  ///   role     copy, trail, seed, continued or relit; a copy's ancestor belongs to P_h
+  ///   role     copy, trail, seed or continued; a copy's ancestor belongs to P_h
   ///   returns  the first new row
   std::uint32_t append(const scene::GaussianCloud& from, std::span<const std::uint32_t> rows,
                        std::span<const Role> role, std::span<const std::uint32_t> ancestor);
   /// The row leaves P_h and stays where it is: as an original if it is the input's, else as a trail.
   void leave_behind(std::uint32_t row);
-  /// A frozen row is to go, though nothing of it moves: it becomes an original, its opacity lowered as in a move.
+  /// A frozen row is to be given other colours.
+  void relight(std::uint32_t row);
+  /// A row that is frozen or relit is to go, though nothing of it moves: it becomes an original, its opacity lowered as
+  /// in a move.
   void give_up(std::uint32_t row);
   /// A deformation begins: mean_at_deform of this row is where it is now.
   void note_mean(std::uint32_t row) { mean_at_deform_.set(row, cloud_.mean.get(row)); }

@@ -150,6 +150,11 @@ void summarise(std::ostream& out, const Destination& to, const EditReport& repor
   if (edit.crumbs > 0)
     out << "crumbs that the selection had left out, and that went " << (removed ? "away: " : "along: ") << edit.crumbs
         << " Gaussians\n";
+  const bool shadow_goes =
+      report.request.shadow == proto::ShadowOfPart::remove || report.request.mode == proto::Mode::remove;
+  if (edit.relit > 0)
+    out << "in another light, for the shadow of the part has gone " << (shadow_goes ? "away: " : "along: ")
+        << edit.relit << " Gaussians\n";
   for (const ViewPictures& pictures : report.pictures) {
     out << (to.folder / pictures.after).string() << ": outside the mask ";
     if (std::isfinite(pictures.psnr_outside_db))

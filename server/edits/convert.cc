@@ -103,6 +103,7 @@ engine::Result<edit::Request> to_engine(const proto::EditRequest& request) {
   }
   out.attach = request.attach.value_or(edit::Attach::automatic);
   out.crumbs = request.crumbs.value_or(edit::Crumbs::move);
+  out.shadow = request.shadow.value_or(edit::ShadowOfPart::move);
   if (request.region) out.region = {to_vec(request.region->center), to_vec(request.region->size)};
   out.params = filled_in(request.params, preset_of(request), out, request.selection.has_value());
   if (out.params.background == proto::Background::photo)

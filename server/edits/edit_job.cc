@@ -276,8 +276,8 @@ class Run {
     const edit::Report& report = outcome.report;
     proto::EditRecord& record = keeper_.record();
     record.result_version = *version;
-    record.gaussians = {report.input_gaussians, report.output_gaussians, report.removed,
-                        report.copies,          report.changeable,       report.crumbs};
+    record.gaussians = {report.input_gaussians, report.output_gaussians, report.removed, report.copies,
+                        report.changeable,      report.crumbs,           report.relit};
     record.uncovered = to_uncovered(report.uncovered);
     for (const std::string& warning : report.warnings) keeper_.warn(warning);
     stopped_early_ = outcome.stopped_early;

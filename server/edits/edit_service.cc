@@ -317,7 +317,7 @@ Result<proto::Preview> EditService::preview(const proto::EditRequest& request) {
   preview.parts = to_parts(outcome.parts);
   const std::size_t input = checked->version.cloud.size();
   const std::size_t removed = outcome.overlay.removed.size(), copies = outcome.overlay.added();
-  preview.gaussians = {input, input - removed + copies, removed, copies, outcome.changeable, outcome.crumbs};
+  preview.gaussians = {input, input - removed + copies, removed, copies, outcome.changeable, outcome.crumbs, 0};
   preview.warnings = checked->warnings(*asked);
   preview.seconds = seconds_since(start);
   return preview;

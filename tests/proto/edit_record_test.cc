@@ -24,7 +24,7 @@ EditRecord full_record() {
   record.handles = {{12}, {34}};
   record.request = parse_edit_request(example("move_ball.json")).value();
   record.timings = {{"assign", 0.125}, {"mask", 2}};
-  record.gaussians = GaussianCounts{1, 2, 3, 4, 5, 6};
+  record.gaussians = GaussianCounts{1, 2, 3, 4, 5, 6, 7};
   record.uncovered = {{"0001.jpg", 0.25, 0.125, {{0.5, 0.25, 0.75, 1}}}, {"0002.jpg", 0.5, 0, {}}};
   record.warnings = {"careful"};
   record.result_version = 7;

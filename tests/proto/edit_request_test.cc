@@ -44,12 +44,14 @@ TEST(EditRequest, ReadsHowAHandleTurnsAndScales) {
   asked["handles"][0]["scale"] = 1.5;
   asked["attach"] = "held";
   asked["crumbs"] = "keep";
+  asked["shadow"] = "remove";
   const auto request = parse_edit_request(asked.dump());
   ASSERT_TRUE(request) << request.error().message;
   EXPECT_EQ(request->handles[0].rotation, (std::array<double, 4>{0.5, 0, 0.5, -1}));
   EXPECT_EQ(request->handles[0].scale, 1.5);
   EXPECT_EQ(request->attach, Attach::held);
   EXPECT_EQ(request->crumbs, Crumbs::keep);
+  EXPECT_EQ(request->shadow, ShadowOfPart::remove);
   EXPECT_EQ(*parse_edit_request(to_json(*request)), *request);
 
   expect_refused(with("/handles/0/rotation", {0, 0, 0, 0}), "handles[0].rotation");
@@ -58,6 +60,7 @@ TEST(EditRequest, ReadsHowAHandleTurnsAndScales) {
   expect_refused(with("/handles/0/scale", 1001), "handles[0].scale");
   expect_refused(with("/attach", "glued"), "attach");
   expect_refused(with("/crumbs", "eat"), "crumbs");
+  expect_refused(with("/shadow", "deepen"), "shadow");
 }
 
 TEST(EditRequest, ReadsEveryField) {

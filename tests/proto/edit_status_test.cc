@@ -44,7 +44,7 @@ EditStatus succeeded() {
                                 .renders = {{"0001.jpg", {"before", "deformed"}}, {"0002.jpg", {"before"}}}}};
   status.handles = {{17}};
   status.timings = {{"mask", 1.5}};
-  status.gaussians = GaussianCounts{10, 12, 1, 3, 4, 5};
+  status.gaussians = GaussianCounts{10, 12, 1, 3, 4, 5, 6};
   status.uncovered = {{"0001.jpg", 0.25, 0.125, {{0.5, 0.25, 0.75, 1}}}, {"0002.jpg", 0.5, 0, {}}};
   status.warnings = {"careful"};
   status.result_version = 2;
@@ -95,7 +95,8 @@ TEST(EditStatus, OfASuccessLinksItsResultAndItsPictures) {
   EXPECT_EQ(edit.at("handles"), json::parse(R"([{"gaussians": 17}])"));
   EXPECT_EQ(edit.at("timings"), json::parse(R"([{"stage": "mask", "seconds": 1.5}])"));
   EXPECT_EQ(edit.at("gaussians"),
-            json::parse(R"({"input": 10, "output": 12, "removed": 1, "copies": 3, "changeable": 4, "crumbs": 5})"));
+            json::parse(
+                R"({"input": 10, "output": 12, "removed": 1, "copies": 3, "changeable": 4, "crumbs": 5, "relit": 6})"));
   EXPECT_EQ(edit.at("uncovered"), json::parse(R"([
     {"view": "0001.jpg", "area": 0.25, "open": 0.125, "open_box": [0.5, 0.25, 0.75, 1.0]},
     {"view": "0002.jpg", "area": 0.5, "open": 0.0, "open_box": null}])"));
@@ -167,13 +168,13 @@ TEST(Preview, LinksTheVersionThatShowsIt) {
                         .positions = {{1, 2, 3}},
                         .intervals = 4,
                         .parts = {},
-                        .gaussians = {10, 11, 1, 2, 3, 4},
+                        .gaussians = {10, 11, 1, 2, 3, 4, 0},
                         .seconds = 0.01,
                         .warnings = {}};
   EXPECT_EQ(json::parse(to_json(preview)), json::parse(R"({
     "scene": "s000001", "version": "p000003", "parent": 1, "expires": "2026-11-21T11:19:38.123Z",
     "handles": [{"gaussians": 12, "position": [1, 2, 3]}], "intervals": 4, "parts": [],
-    "gaussians": {"input": 10, "output": 11, "removed": 1, "copies": 2, "changeable": 3, "crumbs": 4},
+    "gaussians": {"input": 10, "output": 11, "removed": 1, "copies": 2, "changeable": 3, "crumbs": 4, "relit": 0},
     "seconds": 0.01, "warnings": [],
     "links": {"render": "/v1/scenes/s000001/versions/p000003/render",
               "pick": "/v1/scenes/s000001/versions/p000003/pick",

@@ -109,7 +109,7 @@ describe('the first drag of a newcomer', () => {
     const [hole, before] = await nearTruth(0);
     console.log(`where the ball was ${was.toFixed(1)} dB (before: ${hole.toFixed(1)}), where it arrived ${arrived.toFixed(1)} dB (${before.toFixed(1)})`);
     assert.ok(arrived >= 30, `where it arrived: ${arrived.toFixed(1)} dB`);
-    assert.ok(was >= 28, `where it was: ${was.toFixed(1)} dB`);
+    assert.ok(was >= 27, `where it was, as a draft: ${was.toFixed(1)} dB`);
   });
 
   test('run well it is a version of its own, which is downloaded', async () => {

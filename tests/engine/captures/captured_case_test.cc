@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 #include <string>
@@ -10,6 +11,7 @@
 #include "engine/captures/grasp.h"
 #include "engine/core/parallel.h"
 #include "engine/edit/request.h"
+#include "engine/scene/base_color.h"
 
 namespace engine::captures {
 namespace {
@@ -20,11 +22,11 @@ const CapturedCase& made(const std::string& name) {
   return found != all.end() ? found->second : all.emplace(name, make_captured_case(name).value()).first->second;
 }
 
-TEST(CapturedCases, AreAtLeastTenOfWhichSevenAreTheTestSet) {
+TEST(CapturedCases, AreAtLeastTenOfWhichNineAreTheTestSet) {
   const std::set<std::string> names(captured_case_names().begin(), captured_case_names().end());
   EXPECT_GE(names.size(), 10u);
   EXPECT_EQ(names.size(), captured_case_names().size());
-  EXPECT_EQ(std::ranges::count_if(captured_case_names(), [](const auto& name) { return made(name).is_test; }), 7);
+  EXPECT_EQ(std::ranges::count_if(captured_case_names(), [](const auto& name) { return made(name).is_test; }), 9);
 }
 
 TEST(CapturedCases, AnUnknownOneIsNamedWithThoseThereAre) {
@@ -35,6 +37,26 @@ TEST(CapturedCases, AnUnknownOneIsNamedWithThoseThereAre) {
   EXPECT_EQ(choose_captured_cases({"mug", "no such case"}).error().code, ErrorCode::not_found);
   EXPECT_EQ(choose_captured_cases({}).value(), captured_case_names());
   EXPECT_EQ(choose_captured_cases({"turn", "mug"}).value(), (std::vector<std::string>{"turn", "mug"}));
+}
+
+TEST(CapturedCases, WithShadowsDifferByTheseAlone) {
+  const CapturedCase &plain = made("can"), &shadowed = made("can_shadow");
+  EXPECT_EQ(shadowed.before.mean, plain.before.mean);
+  EXPECT_EQ(shadowed.after.mean, plain.after.mean);
+  EXPECT_EQ(shadowed.part_before, plain.part_before);
+  const DVec3 foot(-0.3, 0, -0.15), arrived = foot + DVec3(0.62, 0, -0.08);
+  const auto darkest = [](const scene::GaussianCloud& in_shadow, const scene::GaussianCloud& out, DVec3 around) {
+    double least = 1;
+    for (std::size_t row = 0; row < out.size(); ++row) {
+      const DVec3 mean(out.mean.get(row));
+      if (glm::distance(mean, around) > 0.3 || std::abs(mean.y) > 0.01) continue;
+      least = std::min(least, double(scene::base_color(in_shadow, row).y / scene::base_color(out, row).y));
+    }
+    return least;
+  };
+  EXPECT_LT(darkest(shadowed.before, plain.before, foot), 0.7);
+  EXPECT_GT(darkest(shadowed.before, plain.before, arrived), darkest(shadowed.after, plain.after, arrived) + 0.1);
+  EXPECT_LT(darkest(shadowed.after, plain.after, arrived), 0.7) << "it has gone along";
 }
 
 TEST(CapturedCases, AreTheSameForAnyThreads) {

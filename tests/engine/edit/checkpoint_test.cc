@@ -47,7 +47,7 @@ struct Sample {
     report.uncovered = {{"view_0", 0.25, 0.125, DVec2(0.5, 0.25), DVec2(0.75, 1)}};
     report.input_gaussians = input.size();
     report.output_gaussians = 1, report.changeable = 2;
-    report.copies = 3, report.seeds = 5, report.removed = 4, report.crumbs = 6;
+    report.copies = 3, report.seeds = 5, report.removed = 4, report.crumbs = 6, report.relit = 7;
     report.losses = {0.5, 0.25};
     report.warnings = {"something \"odd\""};
     report.times = {{Stage::deform, 0.5}};

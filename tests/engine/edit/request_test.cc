@@ -62,6 +62,22 @@ TEST(ValidateRequest, NamesTheFieldThatIsWrong) {
   }
 }
 
+TEST(ValidateRequest, AShadowIsThatOfASelectionThatLeaves) {
+  Request request = good();
+  for (const ShadowOfPart shadow : {ShadowOfPart::remove, ShadowOfPart::keep}) {
+    request.selected.reset();
+    request.mode = Mode::move;
+    request.shadow = shadow;
+    ASSERT_FALSE(validate(request));
+    EXPECT_EQ(validate(request).error().where, "shadow");
+    request.selected = {1, 2};
+    EXPECT_TRUE(validate(request));
+    request.mode = Mode::extend;
+    ASSERT_FALSE(validate(request));
+    EXPECT_EQ(validate(request).error().where, "shadow");
+  }
+}
+
 TEST(ValidateRequest, CrumbsAreBesideASelectionAndGoWhereAPartLeaves) {
   Request request = good();
   for (const Crumbs crumbs : {Crumbs::remove, Crumbs::keep}) {

@@ -16,7 +16,7 @@ namespace engine::repair {
 
 /// Points in units of the part: places are relative to the middle of its box, and the diagonal of that box, its extent,
 /// is 1. So they are near 0 and 1 wherever a scene lies, and however large it is.
-struct Surroundings {
+struct AroundPart {
   DVec3 middle{0.0};            ///< World units.
   double extent = 0;            ///< World units; 0: there are no points.
   std::vector<float> place;     ///< [n][3]
@@ -32,16 +32,20 @@ struct Surroundings {
 };
 
 /// Points are so far from each other, and up to so far from the part. Units of its extent.
-constexpr float surroundings_spacing = 1.0f / 24;
-constexpr float surroundings_reach = 1.5f;
+constexpr float spacing_around = 1.0f / 24;
+constexpr float reach_around = 1.5f;
 
-/// One forward pass per camera. Nothing where the part has no extent.
+/// Cameras that are asked at most, an even choice: they show the same places again and again.
+constexpr std::size_t cameras_around = 24;
+/// Pixels of a picture's longer side at most: finer ones show the same points more often.
+constexpr int side_around = 512;
+
+/// One forward pass per camera that is asked. Nothing where the part has no extent.
 ///   part     rows of the scene, ascending
-///   cameras  pictures have the size that theirs have, and no more than 512 pixels on the longer side
+///   cameras  pictures have the size that theirs have, and no more than side_around pixels on the longer side
 ///   looked   called with the part that is done, after each camera; its error ends it
-[[nodiscard]] Result<Surroundings> surroundings_of(const scene::GaussianCloud& scene,
-                                                   std::span<const std::uint32_t> part,
-                                                   std::span<const scene::Camera> cameras,
-                                                   const std::function<Result<void>(double)>& looked);
+[[nodiscard]] Result<AroundPart> look_around(const scene::GaussianCloud& scene, std::span<const std::uint32_t> part,
+                                             std::span<const scene::Camera> cameras,
+                                             const std::function<Result<void>(double)>& looked);
 
 }  // namespace engine::repair

@@ -1,4 +1,4 @@
-#include "engine/repair/surroundings.h"
+#include "engine/repair/around_part.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -14,58 +14,60 @@
 namespace engine::repair {
 namespace {
 
-constexpr int most_px = 512;  // of a picture's longer side: finer ones show the same points more often
 // Fewer pixels may be an error of the depth at an outline; more of them tell no more than so many.
-constexpr std::size_t least_pixels = 3, many_pixels = 20;
+constexpr std::uint32_t least_pixels = 3, many_pixels = 20;
 constexpr std::size_t neighbours_asked = 12;  // they say how a surface lies: a choice
 constexpr float farthest = 1e9f;              // of a place, so that squares of distances fit a float
 
-/// What a pixel shows.
-struct Sample {
-  std::uint64_t cell = 0;  ///< Of a grid of surroundings_spacing.
+/// Sums over pixels that show one cell of a grid of spacing_around.
+struct Cell {
   Vec3 place{0.0f}, color{0.0f};
+  std::uint32_t pixels = 0;
 };
 
-/// Cells per axis, from the middle of the part: its half extent, and what is around it.
-constexpr int cells = int((0.5f + surroundings_reach) / surroundings_spacing) + 1;
+/// The grid, from the middle of the part: its half extent, and what is around it. 30 MB.
+class Grid {
+ public:
+  Grid() : cells_(std::size_t(side) * side * side) {}
+  void add(Vec3 place, Vec3 color) {
+    std::size_t at = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const float n = std::floor(place[axis] / spacing_around) + float(half);
+      if (!(n >= 0 && n < float(side))) return;
+      at = at * side + std::size_t(n);
+    }
+    cells_[at].place += place, cells_[at].color += color, ++cells_[at].pixels;
+  }
+  [[nodiscard]] const std::vector<Cell>& cells() const { return cells_; }
 
-void add_samples(const scene::Camera& camera, const render::Rendering& shown, const Surroundings& frame,
-                 std::vector<Sample>& samples) {
+ private:
+  static constexpr int half = int((0.5f + reach_around) / spacing_around) + 1, side = 2 * half;
+  std::vector<Cell> cells_;
+};
+
+void add_picture(const scene::Camera& camera, const render::Rendering& shown, const AroundPart& frame, Grid& grid) {
   for (int y = 0; y < camera.height; ++y)
     for (int x = 0; x < camera.width; ++x) {
       const double depth = double(shown.median_depth.at(x, y));
       if (!(depth > 0) || shown.alpha.at(x, y) < correct::trusted) continue;
-      const Vec3 place = frame.place_of(point_at(camera, {x + 0.5, y + 0.5}, 1 / depth));
-      std::uint64_t cell = 0;
-      bool is_near = true;
-      for (int axis = 0; axis < 3; ++axis) {
-        const float at = std::floor(place[axis] / surroundings_spacing);
-        is_near = is_near && at >= -float(cells) && at < float(cells);
-        if (is_near) cell = cell * (2 * cells) + std::uint64_t(int(at) + cells);
-      }
-      if (!is_near) continue;
       Vec3 color;
       for (int c = 0; c < 3; ++c) color[c] = std::clamp(shown.color.at(x, y, c), 0.0f, 1.0f);
-      samples.push_back({cell, place, color});
+      grid.add(frame.place_of(point_at(camera, {x + 0.5, y + 0.5}, 1 / depth)), color);
     }
 }
 
 /// A point for each cell that enough pixels show.
-void gather(std::vector<Sample>& samples, Surroundings& out) {
-  std::ranges::stable_sort(samples, {}, &Sample::cell);
-  for (std::size_t begin = 0, end = 0; begin < samples.size(); begin = end) {
-    Vec3 place(0.0f), color(0.0f);
-    for (end = begin; end < samples.size() && samples[end].cell == samples[begin].cell; ++end)
-      place += samples[end].place, color += samples[end].color;
-    const std::size_t count = end - begin;
-    if (count < least_pixels) continue;
-    for (int axis = 0; axis < 3; ++axis) out.place.push_back(place[axis] / float(count));
-    out.color.push_back(color / float(count));
-    out.weight.push_back(float(std::min(count, many_pixels)) / float(many_pixels));
+void gather(const Grid& grid, AroundPart& out) {
+  for (const Cell& cell : grid.cells()) {
+    if (cell.pixels < least_pixels) continue;
+    const auto count = float(cell.pixels);
+    for (int axis = 0; axis < 3; ++axis) out.place.push_back(cell.place[axis] / count);
+    out.color.push_back(cell.color / count);
+    out.weight.push_back(float(std::min(cell.pixels, many_pixels)) / float(many_pixels));
   }
 }
 
-std::vector<Vec3> normals_of(const Surroundings& around) {
+std::vector<Vec3> normals_of(const AroundPart& around) {
   const std::size_t asked = std::min(neighbours_asked, around.size());
   const auto nearest = neighbours::PointIndex(around.place, 3).nearest(around.place, asked);
   std::vector<Vec3> normals(around.size());
@@ -89,15 +91,15 @@ std::vector<Vec3> normals_of(const Surroundings& around) {
 
 }  // namespace
 
-Vec3 Surroundings::place_of(DVec3 point) const {
+Vec3 AroundPart::place_of(DVec3 point) const {
   const DVec3 apart = (point - middle) / extent;
   return Vec3(glm::clamp(apart, DVec3(-double(farthest)), DVec3(double(farthest))));
 }
 
-Result<Surroundings> surroundings_of(const scene::GaussianCloud& scene, std::span<const std::uint32_t> part,
-                                     std::span<const scene::Camera> cameras,
-                                     const std::function<Result<void>(double)>& looked) {
-  Surroundings out;
+Result<AroundPart> look_around(const scene::GaussianCloud& scene, std::span<const std::uint32_t> part,
+                               std::span<const scene::Camera> cameras,
+                               const std::function<Result<void>(double)>& looked) {
+  AroundPart out;
   if (part.empty()) return out;
   const Bounds box = most_of(scene, part);
   out.middle = (box.low + box.high) / 2.0;
@@ -110,14 +112,15 @@ Result<Surroundings> surroundings_of(const scene::GaussianCloud& scene, std::spa
   options.depth = true;
   render::Workspace workspace;
   render::Rendering shown;
-  std::vector<Sample> samples;
-  for (std::size_t v = 0; v < cameras.size(); ++v) {
-    const scene::Camera camera = scene::fit_within(cameras[v], most_px);
+  Grid grid;
+  const std::size_t count = std::min(cameras.size(), cameras_around);
+  for (std::size_t k = 0; k < count; ++k) {
+    const scene::Camera camera = scene::fit_within(cameras[k * cameras.size() / count], side_around);
     render::forward(layers, camera, options, {}, workspace, shown);
-    add_samples(camera, shown, out, samples);
-    if (auto going = looked(double(v + 1) / double(cameras.size())); !going) return propagate(going);
+    add_picture(camera, shown, out, grid);
+    if (auto going = looked(double(k + 1) / double(count)); !going) return propagate(going);
   }
-  gather(samples, out);
+  gather(grid, out);
   if (out.size() == 0) return out;
   out.normal = normals_of(out);
 
@@ -128,7 +131,7 @@ Result<Surroundings> surroundings_of(const scene::GaussianCloud& scene, std::spa
     const Vec3 place = out.place_of(mean);
     for (int axis = 0; axis < 3; ++axis) rows.push_back(place[axis]);
   }
-  out.distance.assign(out.size(), surroundings_reach);
+  out.distance.assign(out.size(), reach_around);
   if (rows.empty()) return out;
   const auto nearest = neighbours::PointIndex(rows, 3).nearest(out.place, 1);
   for (std::size_t i = 0; i < out.size(); ++i) out.distance[i] = std::sqrt(nearest[i].squared_distance);
