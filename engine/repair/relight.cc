@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "engine/render/project.h"
-#include "engine/scene/base_color.h"
 #include "engine/scene/sh.h"
 
 namespace engine::repair {
@@ -65,14 +64,7 @@ Relit relit_rows(const scene::GaussianCloud& scene, std::span<const std::uint32_
     if (longest < most_wide * shadow.extent() && render::opacity<float>(scene.opacity_logit[row]) >= render::min_alpha)
       near.push_back(row);
   }
-  std::vector<Vec3> before = light_on(scene, near, shadow, {});
-  std::vector<DVec3> means;
-  std::vector<Vec3> colors;
-  for (const std::uint32_t row : near)
-    means.emplace_back(scene.mean.get(row)), colors.push_back(scene::base_color(scene, row));
-  const std::vector<std::uint8_t> is_of_surface = shadow.might_show(means, colors);
-  for (std::size_t k = 0; k < near.size(); ++k)
-    if (is_of_surface[k] == 0) before[k] = Vec3(1.0f);
+  const std::vector<Vec3> before = light_on(scene, near, shadow, {});
   const std::vector<Vec3> after = back ? light_on(scene, near, shadow, back) : std::vector<Vec3>(near.size(), Vec3(1));
   for (std::size_t k = 0; k < near.size(); ++k) {
     const Vec3 light = after[k] / before[k];

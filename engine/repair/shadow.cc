@@ -43,9 +43,6 @@ constexpr std::size_t joined = 16;                   // neighbours that a shadow
 constexpr float joined_within = 2 * spacing_around;  // and how near they are
 // A point of a scene is on a surface that is so near: trained Gaussians stand off what they show.
 constexpr float on_surface = 2 * spacing_around, beside_point = 2.5f * spacing_around;
-// A colour is none of a surface that is farther than that from what each of so many points in the light show.
-constexpr float other_hue = 2 * off_hue;
-constexpr std::size_t points_that_show = 16;
 constexpr std::size_t points_between = 4;  // that light is interpolated from
 
 // What a texture varies by before anything brighter than the mean was found.
@@ -201,41 +198,16 @@ Shadow::Shadow(AroundPart around) : around_(std::move(around)), light_(around_.s
     light_[i] = glm::exp(sure * near * glm::clamp(mean, Vec3(darkest), Vec3(0.0f)));
     if (light_[i] != Vec3(1.0f)) reach_ = std::max(reach_, glm::length(around_.at(i)) + beside_point);
   }
-  std::vector<float> lit;
-  for (std::uint32_t i = 0; i < around_.size(); ++i) {
-    if (light_[i] != Vec3(1.0f)) continue;
-    lit_.push_back(i);
-    for (int axis = 0; axis < 3; ++axis) lit.push_back(around_.place[3 * i + std::size_t(axis)]);
-  }
-  if (!empty() && !lit.empty()) lit_index_.emplace(lit, 3);
-}
-
-std::vector<float> Shadow::places_of(std::span<const DVec3> points) const {
-  std::vector<float> places;
-  for (const DVec3& point : points) {
-    const Vec3 place = around_.place_of(point);
-    for (int axis = 0; axis < 3; ++axis) places.push_back(place[axis]);
-  }
-  return places;
-}
-
-std::vector<std::uint8_t> Shadow::might_show(std::span<const DVec3> points, std::span<const Vec3> colors) const {
-  std::vector<std::uint8_t> out(points.size());
-  if (empty()) return out;
-  const std::size_t count = std::min(points_that_show, lit_.size());
-  if (!lit_index_) return out;
-  const auto nearest = lit_index_->nearest(places_of(points), count);
-  for (std::size_t k = 0; k < points.size(); ++k)
-    out[k] = std::ranges::any_of(std::span(nearest).subspan(k * count, count), [&](const auto& n) {
-      return glm::distance(hue_of(colors[k]), hue_of(around_.color[lit_[n.index]])) < other_hue;
-    });
-  return out;
 }
 
 std::vector<Vec3> Shadow::light_at(std::span<const DVec3> points) const {
   std::vector<Vec3> out(points.size(), Vec3(1.0f));
   if (empty()) return out;
-  const std::vector<float> places = places_of(points);
+  std::vector<float> places;
+  for (const DVec3& point : points) {
+    const Vec3 place = around_.place_of(point);
+    for (int axis = 0; axis < 3; ++axis) places.push_back(place[axis]);
+  }
   const std::size_t count = std::min(points_between, around_.size());
   const auto nearest = index_->nearest(places, count);
   for (std::size_t k = 0; k < points.size(); ++k) {

@@ -1,7 +1,6 @@
 // The shadow that a part casts on what it stands on, or next to. It belongs to the part: left behind, it is a stain.
 #pragma once
 
-#include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
@@ -23,23 +22,15 @@ class Shadow {
   /// the surfaces that it falls on.
   ///   points  world units
   [[nodiscard]] std::vector<Vec3> light_at(std::span<const DVec3> points) const;
-  /// Could the surface have this colour there, in whatever light? What is left of a part where it stood could not.
-  ///   points  world units
-  ///   colors  [points] display-referred
-  [[nodiscard]] std::vector<std::uint8_t> might_show(std::span<const DVec3> points, std::span<const Vec3> colors) const;
   /// World units; points farther from middle() than that are beside it.
   [[nodiscard]] double reach() const { return around_.extent * double(reach_); }
   [[nodiscard]] DVec3 middle() const { return around_.middle; }
   [[nodiscard]] double extent() const { return around_.extent; }  ///< Of the part, world units.
 
  private:
-  [[nodiscard]] std::vector<float> places_of(std::span<const DVec3> points) const;
-
   AroundPart around_;
   std::vector<Vec3> light_;  ///< [n]
   std::optional<neighbours::PointIndex> index_;
-  std::vector<std::uint32_t> lit_;  ///< Points beside the shadow,
-  std::optional<neighbours::PointIndex> lit_index_;
   float reach_ = 0;  ///< Extents of the part; 0: there is no shadow.
 };
 
