@@ -1,7 +1,6 @@
 #include "engine/captures/captured_case.h"
 
 #include <algorithm>
-#include <cassert>
 #include <numbers>
 #include <numeric>
 #include <optional>
@@ -65,10 +64,11 @@ struct Covered {
   std::vector<std::uint16_t> object;  ///< [N]
 };
 
+///   shading  as for cover_all()
 Covered cover(const std::vector<procedural::Object>& objects, std::span<const scene::Camera> cameras,
-              std::uint64_t own_seed) {
+              std::uint64_t own_seed, std::span<const procedural::Object> shading = {}) {
   procedural::Surfels surfels =
-      procedural::cover_all(matt(objects), evaluate::studio_light(), cameras, spacing, own_seed);
+      procedural::cover_all(matt(objects), evaluate::studio_light(), cameras, spacing, own_seed, shading);
   return {fit::with_sh_degree(surfels.cloud, scene::max_sh_degree), std::move(surfels.object)};
 }
 
@@ -90,18 +90,15 @@ procedural::Object carried(procedural::Object object, const Motion& motion) {
   return object;
 }
 
-/// Gives the surroundings the colours that they have in the shadows of all things.
-void shade(const Plan& plan, Side side, const CapturedCase& of, scene::GaussianCloud& surroundings) {
+/// All that casts shadows on one side of the edit.
+std::vector<procedural::Object> all_objects(const Plan& plan, Side side) {
   std::vector<procedural::Object> objects = plan.surroundings;
   for (const Thing& thing : plan.things)
     objects.push_back(carried(thing.object, [&, side](DVec3 point) {
       if (thing.pose) point = thing.pose(point);
       return side == Side::before ? point : thing.motion(point);
     }));
-  const scene::GaussianCloud shaded = cover(objects, of.cameras, seed).cloud;
-  assert(shaded.size() > surroundings.size() && "objects are covered one after the other");
-  for (std::size_t i = 0; i < surroundings.size(); ++i)
-    std::ranges::copy(shaded.sh_row(i), surroundings.sh_row(i).begin());
+  return objects;
 }
 
 /// Appends the things as they are before the edit, and after it, with all gloss.
@@ -128,14 +125,17 @@ void put_things(const Plan& plan, CapturedCase& out) {
 
 /// Both scenes and what moves in them.
 void put_scenes(const Plan& plan, CapturedCase& out) {
-  const Covered around = cover(plan.surroundings, out.cameras, seed);
+  const auto surroundings = [&](Side side) {
+    const auto shading = plan.casts_shadows ? all_objects(plan, side) : std::vector<procedural::Object>();
+    Covered around = cover(plan.surroundings, out.cameras, seed, shading);
+    gloss_over(plan.glossy, plan.surroundings, around.object, 0, around.cloud);
+    return std::move(around.cloud);
+  };
+  out.before = surroundings(Side::before);
+  out.after = plan.casts_shadows ? surroundings(Side::after) : out.before;
   std::vector<std::uint32_t> meant;
-  for (std::uint32_t i = 0; plan.drawn_from && i < around.cloud.size(); ++i)
-    if (plan.drawn_from(DVec3(around.cloud.mean.get(i)))) meant.push_back(i);
-  out.before = out.after = around.cloud;
-  if (plan.casts_shadows) shade(plan, Side::before, out, out.before), shade(plan, Side::after, out, out.after);
-  gloss_over(plan.glossy, plan.surroundings, around.object, 0, out.before);
-  gloss_over(plan.glossy, plan.surroundings, around.object, 0, out.after);
+  for (std::uint32_t i = 0; plan.drawn_from && i < out.before.size(); ++i)
+    if (plan.drawn_from(DVec3(out.before.mean.get(i)))) meant.push_back(i);
   put_things(plan, out);
   if (!plan.only_after.empty()) {
     const Covered grown = cover(plan.only_after, out.cameras, seed + 2);

@@ -169,7 +169,8 @@ std::vector<LightMap> make_light_maps(std::span<const Object> objects, float tex
   return maps;
 }
 
-void bake(std::span<const Object> objects, const Occluders& occluders, const Light& light, std::span<LightMap> maps) {
+void bake(std::span<const Object> objects, std::span<const Object> shading, const Occluders& occluders,
+          const Light& light, std::span<LightMap> maps) {
   struct Row {
     const Object* object;
     const Patch* patch;
@@ -177,12 +178,15 @@ void bake(std::span<const Object> objects, const Occluders& occluders, const Lig
     int y;
   };
   std::vector<Vec3> bounced;  // radiance over pi that each patch sends back, roughly
-  std::vector<Row> rows;
-  for (const Object& object : objects)
-    for (const Patch& patch : object.patches) {
-      LightMap& map = maps[bounced.size()];
+  for (const Object& object : shading)
+    for (const Patch& patch : object.patches)
       // An eighth of the sun (most of a room is in shadow) and half of the sky reaches an average surface of a room.
       bounced.push_back(mean_albedo(patch) * (0.12f * light.sun / pi + 0.5f * light.sky_level));
+  std::vector<Row> rows;
+  auto next_map = maps.begin();
+  for (const Object& object : objects)
+    for (const Patch& patch : object.patches) {
+      LightMap& map = *next_map++;
       for (int y = 0; y < map.height; ++y) rows.push_back({&object, &patch, &map, y});
     }
   parallel_for(rows.size(), 4, [&](std::size_t begin, std::size_t end) {

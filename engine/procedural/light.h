@@ -53,7 +53,10 @@ struct LightMap {
 ///   texel  distance of grid points on a patch of density 1 or more, world units; wider where the density is less
 [[nodiscard]] std::vector<LightMap> make_light_maps(std::span<const Object> objects, float texel);
 /// Fills them in where wanted.
-void bake(std::span<const Object> objects, const Occluders& occluders, const Light& light, std::span<LightMap> maps);
+///   shading    the objects that cast shadows and send light back
+///   occluders  of those
+void bake(std::span<const Object> objects, std::span<const Object> shading, const Occluders& occluders,
+          const Light& light, std::span<LightMap> maps);
 
 /// Linear light as a screen shows it (display-referred, 0 to 1): a filmic curve, then sRGB.
 /// Source: Narkowicz 2016, "ACES filmic tone mapping curve".

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <optional>
 
 #include "engine/core/parallel.h"
 #include "engine/core/rng.h"
@@ -309,9 +310,26 @@ std::vector<Eye> eyes_of(std::span<const scene::Camera> cameras) {
   return eyes;
 }
 
+/// What casts shadows and sends light back: other objects if there are any, else those that are covered.
+class Shading {
+ public:
+  ///   own  occluders of the objects that are covered
+  Shading(std::span<const Object> covered, const Occluders& own, std::span<const Object> others)
+      : objects_(others.empty() ? covered : others), own_(own) {
+    if (!others.empty()) others_.emplace(others);
+  }
+  [[nodiscard]] std::span<const Object> objects() const { return objects_; }
+  [[nodiscard]] const Occluders& occluders() const { return others_ ? *others_ : own_; }
+
+ private:
+  std::span<const Object> objects_;
+  const Occluders& own_;
+  std::optional<Occluders> others_;
+};
+
 /// Puts a Gaussian at every place, in the colour that it has there.
 Surfels paint_sites(std::span<const Object> objects, const Light& light, std::span<const Eye> eyes,
-                    const Occluders& occluders, const std::vector<Ground>& grounds, const std::vector<Site>& sites,
+                    const Shading& shading, const std::vector<Ground>& grounds, const std::vector<Site>& sites,
                     std::size_t count, std::uint64_t seed) {
   Surfels surfels;
   scene::GaussianCloud& cloud = surfels.cloud;
@@ -323,7 +341,7 @@ Surfels paint_sites(std::span<const Object> objects, const Light& light, std::sp
   const float texel = std::max(0.028f, 4.0f / std::sqrt(float(count)));
   std::vector<LightMap> maps = make_light_maps(objects, texel);
   for (const Site& site : sites) maps[site.ground].want(site.u - std::floor(site.u), site.v);
-  bake(objects, occluders, light, maps);
+  bake(objects, shading.objects(), shading.occluders(), light, maps);
 
   parallel_for(sites.size(), 1024, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
@@ -361,7 +379,7 @@ Surfels make_surfels(std::span<const Object> objects, const Light& light, std::s
         return is_seen(ground, site, eyes, occluders, rng, first);
       });
   Surfels surfels =
-      paint_sites(objects, light, eyes, Occluders(shading.empty() ? objects : shading), grounds, sites, count, seed);
+      paint_sites(objects, light, eyes, Shading(objects, occluders, shading), grounds, sites, count, seed);
   surfels.spacing = spacing;
   return surfels;
 }
@@ -377,17 +395,19 @@ Surfels make_unseen_surfels(const Surfels& seen, std::span<const Object> objects
                                         return !is_seen(ground, site, eyes, occluders, rng, first);
                                       });
   Surfels surfels =
-      paint_sites(objects, light, eyes, Occluders(shading.empty() ? objects : shading), grounds, sites, count, seed);
+      paint_sites(objects, light, eyes, Shading(objects, occluders, shading), grounds, sites, count, seed);
   surfels.spacing = seen.spacing;
   return surfels;
 }
 
 Surfels cover_all(std::span<const Object> objects, const Light& light, std::span<const scene::Camera> cameras,
-                  float spacing, std::uint64_t seed) {
+                  float spacing, std::uint64_t seed, std::span<const Object> shading) {
+  const Occluders occluders(objects);
   const std::vector<Ground> grounds = lay_ground(objects);
   const auto sites =
       sites_at_spacing(grounds, spacing, seed, [](const Ground&, const Site&, Rng&, std::size_t&) { return true; });
-  return paint_sites(objects, light, eyes_of(cameras), Occluders(objects), grounds, sites, sites.size(), seed);
+  return paint_sites(objects, light, eyes_of(cameras), Shading(objects, occluders, shading), grounds, sites,
+                     sites.size(), seed);
 }
 
 }  // namespace engine::procedural

@@ -26,7 +26,7 @@ struct Surfels {
 /// is the surface normal. A Gaussian is kept if from some camera a ray reaches it, or the surface right beside it, in
 /// front of which nothing stands.
 ///   count    at least 1; the result is within 1 % of it unless the cameras see next to nothing
-///   shading  the same objects where they cast their shadows from; empty: where they are
+///   shading  objects that cast shadows and send light back; empty: those that are covered
 ///   returns  the same bytes for the same arguments, for any number of threads; but for the colours, for any shading
 [[nodiscard]] Surfels make_surfels(std::span<const Object> objects, const Light& light,
                                    std::span<const scene::Camera> cameras, std::size_t count, std::uint64_t seed,
@@ -42,8 +42,10 @@ struct Surfels {
 /// Covers the objects all over, inside and behind too, whether any camera sees it or not.
 ///   spacing  of Gaussians where a patch's density is 1, world units
 ///   cameras  for which glazed things are painted
+///   shading  as for make_surfels()
 ///   returns  Gaussians by object and patch, in order; the same bytes for the same arguments, for any number of threads
 [[nodiscard]] Surfels cover_all(std::span<const Object> objects, const Light& light,
-                                std::span<const scene::Camera> cameras, float spacing, std::uint64_t seed);
+                                std::span<const scene::Camera> cameras, float spacing, std::uint64_t seed,
+                                std::span<const Object> shading = {});
 
 }  // namespace engine::procedural
