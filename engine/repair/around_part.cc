@@ -1,13 +1,12 @@
 #include "engine/repair/around_part.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
 #include "engine/core/parallel.h"
 #include "engine/correct/corrector.h"
-#include "engine/neighbours/point_index.h"
 #include "engine/render/forward.h"
+#include "engine/repair/plane.h"
 #include "engine/repair/seed.h"
 #include "engine/repair/survey.h"
 
@@ -69,21 +68,13 @@ void gather(const Grid& grid, AroundPart& out) {
 
 std::vector<Vec3> normals_of(const AroundPart& around) {
   const std::size_t asked = std::min(neighbours_asked, around.size());
-  const auto nearest = neighbours::PointIndex(around.place, 3).nearest(around.place, asked);
+  const auto nearest = around.index->nearest(around.place, asked);
   std::vector<Vec3> normals(around.size());
   parallel_for(around.size(), 256, [&](std::size_t begin, std::size_t end) {
+    std::vector<DVec3> beside(asked);
     for (std::size_t i = begin; i < end; ++i) {
-      const auto beside = std::span(nearest).subspan(i * asked, asked);
-      DVec3 mean(0.0);
-      for (const auto& n : beside) mean += DVec3(around.at(n.index)) / double(asked);
-      Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-      for (const auto& n : beside) {
-        const DVec3 offset = DVec3(around.at(n.index)) - mean;
-        const Eigen::Vector3d column(offset.x, offset.y, offset.z);
-        spread += column * column.transpose();
-      }
-      const Eigen::Vector3d least = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors().col(0);
-      normals[i] = Vec3(float(least.x()), float(least.y()), float(least.z()));
+      for (std::size_t k = 0; k < asked; ++k) beside[k] = around.at(nearest[i * asked + k].index);
+      normals[i] = plane_of(beside).normal;
     }
   });
   return normals;
@@ -94,6 +85,16 @@ std::vector<Vec3> normals_of(const AroundPart& around) {
 Vec3 AroundPart::place_of(DVec3 point) const {
   const DVec3 apart = (point - middle) / extent;
   return Vec3(glm::clamp(apart, DVec3(-double(farthest)), DVec3(double(farthest))));
+}
+
+std::vector<float> AroundPart::places_of(std::span<const DVec3> points) const {
+  std::vector<float> places;
+  places.reserve(3 * points.size());
+  for (const DVec3& point : points) {
+    const Vec3 at_point = place_of(point);
+    for (int axis = 0; axis < 3; ++axis) places.push_back(at_point[axis]);
+  }
+  return places;
 }
 
 Result<AroundPart> look_around(const scene::GaussianCloud& scene, std::span<const std::uint32_t> part,
@@ -122,18 +123,18 @@ Result<AroundPart> look_around(const scene::GaussianCloud& scene, std::span<cons
   }
   gather(grid, out);
   if (out.size() == 0) return out;
+  out.index.emplace(out.place, 3);
   out.normal = normals_of(out);
 
-  std::vector<float> rows;
+  std::vector<DVec3> means;
   for (const std::uint32_t row : part) {
     const DVec3 mean(scene.mean.get(row));
     if (glm::any(glm::lessThan(mean, box.low)) || glm::any(glm::greaterThan(mean, box.high))) continue;
-    const Vec3 place = out.place_of(mean);
-    for (int axis = 0; axis < 3; ++axis) rows.push_back(place[axis]);
+    means.push_back(mean);
   }
   out.distance.assign(out.size(), reach_around);
-  if (rows.empty()) return out;
-  const auto nearest = neighbours::PointIndex(rows, 3).nearest(out.place, 1);
+  if (means.empty()) return out;
+  const auto nearest = neighbours::PointIndex(out.places_of(means), 3).nearest(out.place, 1);
   for (std::size_t i = 0; i < out.size(); ++i) out.distance[i] = std::sqrt(nearest[i].squared_distance);
   return out;
 }

@@ -1,6 +1,5 @@
 #include "engine/repair/chart.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -9,6 +8,7 @@
 #include "engine/core/vec.h"
 #include "engine/mask/mask.h"
 #include "engine/repair/in_picture.h"
+#include "engine/repair/plane.h"
 #include "engine/repair/seed.h"
 
 namespace engine::repair {
@@ -38,29 +38,13 @@ constexpr int widened = 2;
 // Halvings of the interval in which a ray is known to meet the surface: to a millionth of the depth.
 constexpr int halvings = 20;
 
-/// Where the points lie: their middle, their normal, and how far they reach.
-struct Place {
-  DVec3 middle{0.0}, normal{0.0};
-  double reach = 0;
-};
-
-Place place_of(std::span<const DVec3> points) {
-  Place place;
-  for (const DVec3 point : points) place.middle += point / double(points.size());
-  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+/// How far from the middle nearly all of the points are.
+double reach_of(std::span<const DVec3> points, DVec3 middle) {
   std::vector<double> reach;
-  for (const DVec3 point : points) {
-    const DVec3 offset = point - place.middle;
-    const Eigen::Vector3d column(offset.x, offset.y, offset.z);
-    spread += column * column.transpose();
-    reach.push_back(glm::length(offset));
-  }
-  const Eigen::Vector3d least = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors().col(0);
-  place.normal = {least.x(), least.y(), least.z()};
+  for (const DVec3 point : points) reach.push_back(glm::length(point - middle));
   const auto farthest = reach.begin() + std::ptrdiff_t(most_of * double(reach.size() - 1));
   std::nth_element(reach.begin(), farthest, reach.end());
-  place.reach = *farthest;
-  return place;
+  return *farthest;
 }
 
 /// A point on the surface, if the ray through a pixel of the chart meets it where it is known.
@@ -113,14 +97,14 @@ std::optional<Chart> chart_of(const scene::Camera& view, const ContinuedSurfaces
     for (int x = 0; x < found.width; ++x)
       if (goes_on_at(x, y)) points.push_back(point_at(view, {x + 0.5, y + 0.5}, double(found.at(x, y))));
   if (points.size() < least_points) return std::nullopt;
-  Place place = place_of(points);
+  Plane place = plane_of(points);
   const DVec3 back = view.centre() - place.middle;
   const double distance = glm::length(back);
   if (glm::dot(place.normal, back) < 0) place.normal = -place.normal;
   if (!(glm::dot(place.normal, back) > grazing * distance)) return std::nullopt;
 
   Chart chart;
-  const double wanted = 2 * surroundings * place.reach * view.fy / distance;
+  const double wanted = 2 * surroundings * reach_of(points, place.middle) * view.fy / distance;
   const int side = int(std::clamp(std::ceil(wanted), double(least_side), double(most_side)));
   // What is farther from the view is up.
   chart.camera = scene::look_at(place.middle + distance * place.normal, place.middle, -back, 1.0, side, side);

@@ -11,7 +11,8 @@ namespace engine::repair {
 namespace {
 
 constexpr float as_before = 0.01f;  // a change of less nobody sees
-// Extents of the part up to which a row's longest axis lies in one light: two of the windows that shadows are found by.
+// Extents of the part up to which a row's longest axis may lie in one light. With 0.15 more of a shadow stays: the
+// captured case can_shadow is 1.6 dB worse where the can was.
 constexpr double most_wide = 0.25;
 
 /// The middle of a row, and the ends of its two longer axes: where it is lit.

@@ -58,13 +58,12 @@ Vec3 shade_of(Vec3 color) {
 Vec3 hue_of(Vec3 color) { return shade_of(color) - mean_of(shade_of(color)); }
 
 /// Which dark points hang together with one beside the part, through dark ones.
-std::vector<std::uint8_t> from_the_part(const AroundPart& around, const neighbours::PointIndex& index,
-                                        const std::vector<std::uint8_t>& dark) {
-  const std::size_t count = std::min(joined, around.size());
-  const auto nearest = index.nearest(around.place, count);
+///   nearest  [n][asked] points to each
+std::vector<std::uint8_t> from_the_part(const AroundPart& around, std::span<const neighbours::Neighbour> nearest,
+                                        std::size_t asked, const std::vector<std::uint8_t>& dark) {
   neighbours::Pieces pieces(around.size());
   for (std::uint32_t i = 0; i < around.size(); ++i)
-    for (const auto& n : std::span(nearest).subspan(i * count, count))
+    for (const auto& n : nearest.subspan(i * asked, std::min(joined, asked)))
       if (dark[i] != 0 && dark[n.index] != 0 && n.squared_distance < joined_within * joined_within)
         pieces.join(i, n.index);
   std::vector<std::uint8_t> touching(around.size(), 0), out(around.size(), 0);
@@ -77,16 +76,17 @@ std::vector<std::uint8_t> from_the_part(const AroundPart& around, const neighbou
 /// Finds how dark each point is: the logarithm of what is left of the light, over a window.
 class Darkness {
  public:
-  explicit Darkness(const AroundPart& around, const neighbours::PointIndex& index);
+  ///   nearest  [n][asked] points to each
+  Darkness(const AroundPart& around, std::span<const neighbours::Neighbour> nearest, std::size_t asked);
   [[nodiscard]] const std::vector<Vec3>& mean() const { return mean_; }
   /// From which darkness on texture does not explain it. Above 0.
   [[nodiscard]] float threshold(std::size_t i) const { return std::max(least_dark, beyond_texture * texture_[i]); }
 
  private:
   /// Of an even choice of points, those that tell what the surface is like where no shadow is, and how many each is.
-  [[nodiscard]] std::pair<std::vector<std::uint32_t>, float> asked() const;
+  [[nodiscard]] std::pair<std::vector<std::uint32_t>, float> far_points() const;
   void compare_with_far(std::span<const std::uint32_t> far, float each);
-  void average(std::span<const neighbours::Neighbour> nearest, std::size_t count);
+  void average(std::span<const neighbours::Neighbour> nearest, std::size_t asked);
   [[nodiscard]] float likeness(std::size_t i, std::size_t j, float deviation) const;
 
   const AroundPart& around_;
@@ -97,23 +97,21 @@ class Darkness {
   std::vector<float> texture_;  ///< What the mean varies by where there is no shadow.
 };
 
-Darkness::Darkness(const AroundPart& around, const neighbours::PointIndex& index)
+Darkness::Darkness(const AroundPart& around, std::span<const neighbours::Neighbour> nearest, std::size_t asked)
     : around_(around),
       difference_(around.size()),
       known_(around.size()),
       mean_(around.size(), Vec3(0.0f)),
       texture_(around.size(), unknown) {
   for (const Vec3 color : around.color) shade_.push_back(shade_of(color)), hue_.push_back(hue_of(color));
-  const std::size_t count = std::min(window_points, around.size());
-  const auto nearest = index.nearest(around.place, count);
   for (int round = 0; round < rounds; ++round) {
-    const auto [far, each] = asked();
+    const auto [far, each] = far_points();
     compare_with_far(far, each);
-    average(nearest, count);
+    average(nearest, asked);
   }
 }
 
-std::pair<std::vector<std::uint32_t>, float> Darkness::asked() const {
+std::pair<std::vector<std::uint32_t>, float> Darkness::far_points() const {
   std::vector<std::uint32_t> far;
   for (std::uint32_t i = 0; i < around_.size(); ++i)
     if (around_.distance[i] > far_from && mean_of(mean_[i]) > -std::max(least_dark, maybe_dark * texture_[i]))
@@ -165,13 +163,13 @@ void Darkness::compare_with_far(std::span<const std::uint32_t> far, float each) 
   });
 }
 
-void Darkness::average(std::span<const neighbours::Neighbour> nearest, std::size_t count) {
+void Darkness::average(std::span<const neighbours::Neighbour> nearest, std::size_t asked) {
   constexpr float farthest = 2.2f * window;  // a normal distribution is next to nothing beyond
   parallel_for(around_.size(), 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       float weights = 0;
       Vec3 sum(0.0f);
-      for (const auto& n : nearest.subspan(i * count, count)) {
+      for (const auto& n : nearest.subspan(i * asked, asked)) {
         if (known_[n.index] == 0 || n.squared_distance > farthest * farthest) continue;
         const float weight = around_.weight[n.index] * likeness(i, n.index, window);
         weights += weight, sum += weight * difference_[n.index];
@@ -184,12 +182,13 @@ void Darkness::average(std::span<const neighbours::Neighbour> nearest, std::size
 }  // namespace
 
 Shadow::Shadow(AroundPart around) : around_(std::move(around)), light_(around_.size(), Vec3(1.0f)) {
-  if (around_.size() == 0) return;
-  index_.emplace(around_.place, 3);
-  const Darkness darkness(around_, *index_);
+  if (!around_.index) return;
+  const std::size_t asked = std::min(window_points, around_.size());
+  const auto nearest = around_.index->nearest(around_.place, asked);
+  const Darkness darkness(around_, nearest, asked);
   std::vector<std::uint8_t> dark(around_.size());
   for (std::size_t i = 0; i < around_.size(); ++i) dark[i] = mean_of(darkness.mean()[i]) < -darkness.threshold(i);
-  const std::vector<std::uint8_t> cast = from_the_part(around_, *index_, dark);
+  const std::vector<std::uint8_t> cast = from_the_part(around_, nearest, asked, dark);
   for (std::size_t i = 0; i < around_.size(); ++i) {
     if (cast[i] == 0) continue;
     const Vec3 mean = darkness.mean()[i];
@@ -203,13 +202,9 @@ Shadow::Shadow(AroundPart around) : around_(std::move(around)), light_(around_.s
 std::vector<Vec3> Shadow::light_at(std::span<const DVec3> points) const {
   std::vector<Vec3> out(points.size(), Vec3(1.0f));
   if (empty()) return out;
-  std::vector<float> places;
-  for (const DVec3& point : points) {
-    const Vec3 place = around_.place_of(point);
-    for (int axis = 0; axis < 3; ++axis) places.push_back(place[axis]);
-  }
+  const std::vector<float> places = around_.places_of(points);
   const std::size_t count = std::min(points_between, around_.size());
-  const auto nearest = index_->nearest(places, count);
+  const auto nearest = around_.index->nearest(places, count);
   for (std::size_t k = 0; k < points.size(); ++k) {
     const Vec3 place(places[3 * k], places[3 * k + 1], places[3 * k + 2]);
     float weights = 0;

@@ -1,12 +1,10 @@
 // The shadow that a part casts on what it stands on, or next to. It belongs to the part: left behind, it is a stain.
 #pragma once
 
-#include <optional>
 #include <span>
 #include <vector>
 
 #include "engine/core/vec.h"
-#include "engine/neighbours/point_index.h"
 #include "engine/repair/around_part.h"
 
 namespace engine::repair {
@@ -30,8 +28,7 @@ class Shadow {
  private:
   AroundPart around_;
   std::vector<Vec3> light_;  ///< [n]
-  std::optional<neighbours::PointIndex> index_;
-  float reach_ = 0;  ///< Extents of the part; 0: there is no shadow.
+  float reach_ = 0;          ///< Extents of the part; 0: there is no shadow.
 };
 
 }  // namespace engine::repair
