@@ -72,30 +72,21 @@ export function buildRequestPanel(editor) {
     options: [["", "default"]],
     changed: (value) => editor.settle({ preset: value }),
   });
-  const crumbs = choice({
-    label: "Crumbs",
-    testid: "crumbs",
-    options: [
-      ["", "go along"],
-      ["remove", "go away"],
-      ["keep", "stay"],
-    ],
-    changed: (value) => editor.settle({ crumbs: value || null }),
-  });
-  const crumbsField = labelled("Crumbs", crumbs.element);
-  crumbsField.title = "Small pieces of the part that the selection has left out";
-  const shadow = choice({
-    label: "Shadow",
-    testid: "shadow",
-    options: [
-      ["", "goes along"],
-      ["remove", "goes away"],
-      ["keep", "stays"],
-    ],
-    changed: (value) => editor.settle({ shadow: value || null }),
-  });
-  const shadowField = labelled("Shadow", shadow.element);
-  shadowField.title = "Of the part, on what it stands on or next to: a run shows what becomes of it";
+  /** What becomes of something that goes along with a selection, unless it is asked to go away or to stay. */
+  const fate = (label, name, [along, away, stays]) => {
+    const options = [["", along], ["remove", away], ["keep", stays]];
+    const words = choice({ label, testid: name, options, changed: (value) => editor.settle({ [name]: value || null }) });
+    const field = labelled(label, words.element);
+    const update = (state) => {
+      field.hidden = state.selection.length === 0 || state.mode === "extend";
+      words.update(state[name] === "move" ? "" : (state[name] ?? ""));
+    };
+    return { field, update };
+  };
+  const crumbs = fate("Crumbs", "crumbs", ["go along", "go away", "stay"]);
+  crumbs.field.title = "Small pieces of the part that the selection has left out";
+  const shadow = fate("Shadow", "shadow", ["goes along", "goes away", "stays"]);
+  shadow.field.title = "Of the part, on what it stands on or next to: a run shows what becomes of it";
   const params = paramFields(setParam);
   const also = h("p", { class: "note", hidden: true, testid: "other-params" });
   const promptField = h("input", {
@@ -120,8 +111,8 @@ export function buildRequestPanel(editor) {
     { class: "settings", testid: "settings" },
     h("summary", {}, "Settings"),
     labelled("Preset", preset.element),
-    crumbsField,
-    shadowField,
+    crumbs.field,
+    shadow.field,
     params.element,
     painted,
     regionOn.element,
@@ -213,9 +204,8 @@ export function buildRequestPanel(editor) {
       }
       preset.options([["", "default"], ...runPresets(state.info).map((name) => [name, name])]);
       preset.update(state.preset);
-      crumbsField.hidden = shadowField.hidden = state.selection.length === 0 || state.mode === "extend";
-      shadow.update(state.shadow === "move" ? "" : (state.shadow ?? ""));
-      crumbs.update(state.crumbs === "move" ? "" : (state.crumbs ?? ""));
+      crumbs.update(state);
+      shadow.update(state);
       params.update(state.info, state.params, state.preset);
       painted.hidden = !(state.params.corrector === "sd" && hasDiffusion(state.info));
       promptField.value = state.prompt ?? "";

@@ -18,6 +18,7 @@ export function requestOf(state) {
   const { scene, version, mode, preset, prompt, handles, selection = [], heal = [], attach, region, params } = state;
   const { negative_prompt, allow_slow, crumbs, shadow } = state;
   const goes = mode !== "remove"; // else targets stay on the screen, for when the mode changes back
+  const leaves = selection.length > 0 && mode !== "extend"; // what goes along with it is asked for there alone
   const given = Object.entries(params ?? {}).filter(
     ([, value]) => value !== null && value !== undefined && value !== "",
   );
@@ -40,8 +41,8 @@ export function requestOf(state) {
     ...(selection.length ? { selection } : {}),
     ...(heal.length ? { heal } : {}),
     ...(attach ? { attach } : {}),
-    ...(crumbs && selection.length && mode !== "extend" ? { crumbs } : {}), // of a selection that leaves its place
-    ...(shadow && selection.length && mode !== "extend" ? { shadow } : {}), // the same
+    ...(crumbs && leaves ? { crumbs } : {}),
+    ...(shadow && leaves ? { shadow } : {}),
     ...(region ? { region } : {}),
     ...(given.length ? { params: Object.fromEntries(given) } : {}),
   };
