@@ -26,13 +26,13 @@ train::TrainedRows changeable_rows(const working::WorkingScene& working, std::sp
   return changeable;
 }
 
-/// Writes what the trainer has made of the members back, and appends their children.
 /// The role of a child that the optimisation gives a row.
 constexpr Role child_of(Role role) {
   if (role == Role::relit) return Role::seed;  // new, where it may stay
   return working::is_new(role) ? role : working::is_dragged(role) ? Role::copy : Role::trail;
 }
 
+/// Writes what the trainer has made of the members back, and appends their children.
 void take_over(const train::Trainer& trainer, std::span<const std::uint32_t> members, working::WorkingScene& working) {
   for (std::size_t k = 0; k < members.size(); ++k)
     working::copy_row(trainer.cloud(), k, working.gaussians(), members[k]);

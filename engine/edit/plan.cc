@@ -92,9 +92,13 @@ class Maker {
     return slow(dome) + motion() * work_.intervals + 2 * double(work_.candidates) * footprint(small) + outskirts() +
            surroundings();
   }
+  /// Is what a selected part leaves repaired, and so looked at before?
+  [[nodiscard]] bool looks_around() const {
+    return work_.selected && work_.corrected && work_.vacates && work_.iterations > 0;
+  }
   /// What cameras show of the part, of the rest, and of both.
   [[nodiscard]] double outskirts() const {
-    if (!work_.selected || !work_.corrected || !work_.vacates || work_.iterations == 0) return 0;
+    if (!looks_around()) return 0;
     const double pixels = std::min(double(repair::outskirts_side * repair::outskirts_side), pixels_);
     const double frame = work_.frame.gaussians + work_.frame.pixel * pixels;
     return double(std::min(work_.candidates, repair::outskirts_cameras)) *
@@ -103,7 +107,7 @@ class Maker {
 
   /// What views show around the part without it.
   [[nodiscard]] double surroundings() const {
-    if (!work_.selected || !work_.corrected || !work_.vacates || work_.iterations == 0) return 0;
+    if (!looks_around()) return 0;
     const double pixels = std::min(double(repair::side_around * repair::side_around), pixels_);
     return double(std::min(work_.views, repair::cameras_around)) * (work_.frame.gaussians + work_.frame.pixel * pixels);
   }

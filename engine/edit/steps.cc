@@ -113,9 +113,14 @@ bool has_shadow(const State& state, const Edit& edit) {
          state.report.resolved.intervals == 1 && edit.parts.attachments.size() <= 1;
 }
 
-bool is_outside_region(const Edit& edit, std::uint32_t row) {
+/// May the edit change this row, though it is not selected? Not outside of the region; what is healed goes anyway, and
+/// what is selected and rests where it is stays.
+bool may_change(const State& state, const Edit& edit, std::uint32_t row) {
   const auto& region = edit.request.region;
-  return region && !deform::inside(deform::Box{region->center, region->size}, DVec3(edit.input.mean.get(row)));
+  const bool is_outside =
+      region && !deform::inside(deform::Box{region->center, region->size}, DVec3(edit.input.mean.get(row)));
+  return !is_outside && !std::ranges::binary_search(edit.request.healed, row) &&
+         state.scene.role()[row] == working::Role::frozen;
 }
 
 /// What pictures show to be of the part goes with it, and what they never showed of it does not arrive.
@@ -126,11 +131,7 @@ Result<void> look_at_outskirts(State& state, Edit& edit, const ViewChoice& choic
   const Rows part = united(choice.moved, edit.given_up);
   auto outskirts = repair::outskirts_of(edit.input, part, choice.witnesses, advance);
   if (!outskirts) return propagate(outskirts);
-  std::erase_if(outskirts->backing, [&](std::uint32_t row) {
-    // What is healed goes anyway, and what is selected and rests where it is stays.
-    return is_outside_region(edit, row) || std::ranges::binary_search(request.healed, row) ||
-           state.scene.role()[row] != working::Role::frozen;
-  });
+  std::erase_if(outskirts->backing, [&](std::uint32_t row) { return !may_change(state, edit, row); });
   if (request.mode != Mode::remove)
     std::ranges::set_intersection(outskirts->buried, choice.moved, std::back_inserter(edit.buried));
   if (edit.buried.size() == choice.moved.size()) edit.buried.clear();  // else nothing would arrive
@@ -164,9 +165,7 @@ Result<void> look_for_shadow(const State& state, Edit& edit, const Rows& part,
   repair::Relit all = repair::relit_rows(edit.input, part, shadow, back_to_source(state, edit));
   for (std::size_t k = 0; k < all.rows.size(); ++k) {
     const std::uint32_t row = all.rows[k];
-    const bool stays = is_outside_region(edit, row) || std::ranges::binary_search(edit.request.healed, row) ||
-                       state.scene.role()[row] != working::Role::frozen;
-    if (!stays) edit.relit.rows.push_back(row), edit.relit.light.push_back(all.light[k]);
+    if (may_change(state, edit, row)) edit.relit.rows.push_back(row), edit.relit.light.push_back(all.light[k]);
   }
   return {};
 }

@@ -49,7 +49,7 @@ using HandleColumn = std::vector<std::uint16_t>;
 /// A Gaussian and what the edit knows of it, N rows of one kind. Invariants, which check() states as code:
 /// - every column has a value for each Gaussian of the cloud;
 /// - rows [0, input_rows()) are the input's, in its order, each its own parent, frozen, held, original or relit; the
-/// rest were
+///   rest were
 ///   appended, in the order they were made, and are copies, trails, seeds or continued, with an input row for a parent;
 /// - a row has a handle exactly if it belongs to P_h: if it is held or a copy;
 /// - frozen rows are the input's bytes, in the frame of the edit.

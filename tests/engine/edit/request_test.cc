@@ -62,36 +62,32 @@ TEST(ValidateRequest, NamesTheFieldThatIsWrong) {
   }
 }
 
-TEST(ValidateRequest, AShadowIsThatOfASelectionThatLeaves) {
+/// What becomes of this is chosen for a selection, where a part leaves.
+template <class Choice>
+void expect_chosen_of_a_selection_that_leaves(Choice Request::*choice, const std::string& where) {
   Request request = good();
-  for (const ShadowOfPart shadow : {ShadowOfPart::remove, ShadowOfPart::keep}) {
+  for (const Choice other : {Choice::remove, Choice::keep}) {
     request.selected.reset();
     request.mode = Mode::move;
-    request.shadow = shadow;
+    request.*choice = other;
     ASSERT_FALSE(validate(request));
-    EXPECT_EQ(validate(request).error().where, "shadow");
+    EXPECT_EQ(validate(request).error().where, where);
     request.selected = {1, 2};
     EXPECT_TRUE(validate(request));
     request.mode = Mode::extend;
     ASSERT_FALSE(validate(request));
-    EXPECT_EQ(validate(request).error().where, "shadow");
+    EXPECT_EQ(validate(request).error().where, where);
   }
+  request.*choice = Choice::move;
+  EXPECT_TRUE(validate(request));
+}
+
+TEST(ValidateRequest, AShadowIsThatOfASelectionThatLeaves) {
+  expect_chosen_of_a_selection_that_leaves(&Request::shadow, "shadow");
 }
 
 TEST(ValidateRequest, CrumbsAreBesideASelectionAndGoWhereAPartLeaves) {
-  Request request = good();
-  for (const Crumbs crumbs : {Crumbs::remove, Crumbs::keep}) {
-    request.crumbs = crumbs;
-    ASSERT_FALSE(validate(request));
-    EXPECT_EQ(validate(request).error().where, "crumbs");
-  }
-  request.selected = {1, 2};
-  EXPECT_TRUE(validate(request));
-  request.mode = Mode::extend;
-  ASSERT_FALSE(validate(request));
-  EXPECT_EQ(validate(request).error().where, "crumbs");
-  request.crumbs = Crumbs::move;
-  EXPECT_TRUE(validate(request));
+  expect_chosen_of_a_selection_that_leaves(&Request::crumbs, "crumbs");
 }
 
 TEST(ValidateRequest, WhatIsRemovedGoesNowhere) {
