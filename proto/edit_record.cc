@@ -79,7 +79,8 @@ EditRecord decode(const ordered_json& object) {
   for (const ordered_json& count : object.at("handles")) record.handles.push_back({count.get<std::size_t>()});
   if (const auto parts = object.find("parts"); parts != object.end())  // records of earlier versions have none
     for (const ordered_json& part : *parts)
-      record.parts.push_back({part.at(0).get<int>(), part.at(1).get<std::string>(), part.at(2).get<std::string>()});
+      record.parts.push_back({part.at(0).get<int>(), part.at(1).get<std::string>(), part.at(2).get<std::string>(),
+                              part.size() > 3 ? part.at(3).get<double>() : 0});  // of earlier versions have three
   if (const ordered_json& request = object.at("request"); !request.is_null()) record.request = decode_request(request);
   for (const ordered_json& timing : object.at("timings"))
     record.timings.push_back({timing.at(0).get<std::string>(), timing.at(1).get<double>()});
@@ -106,7 +107,7 @@ std::string to_json(const EditRecord& record) {
                parts = ordered_json::array(), uncovered = ordered_json::array();
   for (const FinishedInterval& interval : record.finished_intervals) finished.push_back(encode(interval));
   for (const HandleCount& handle : record.handles) handles.push_back(handle.gaussians);
-  for (const Part& part : record.parts) parts.push_back({part.group, part.how, part.why});
+  for (const Part& part : record.parts) parts.push_back({part.group, part.how, part.why, part.settled});
   for (const Uncovered& view : record.uncovered)
     uncovered.push_back({view.view, view.area, view.open, or_null(view.open_box)});
   for (const StageSeconds& timing : record.timings) timings.push_back({timing.stage, timing.seconds});

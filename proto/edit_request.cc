@@ -50,9 +50,9 @@ Region read_region(const JsonField& field, std::string_view size_name) {
   return region;
 }
 
-constexpr std::array<std::string_view, 15> request_fields{
+constexpr std::array<std::string_view, 16> request_fields{
     "scene",     "version", "mode",   "preset", "prompt", "negative_prompt", "allow_slow", "handles",
-    "selection", "heal",    "attach", "crumbs", "shadow", "region",          "params"};
+    "selection", "heal",    "attach", "crumbs", "shadow", "settle", "region", "params"};
 constexpr std::array<std::string_view, 6> config_fields{"start",   "direction",  "voxel_size",
                                                         "cluster", "local_mask", "mode"};
 
@@ -83,6 +83,7 @@ EditRequest read_request(const JsonField& field, Wanted wanted) {
   if (const auto f = members.optional("attach")) request.attach = f->one_of(engine::names<Attach>);
   if (const auto f = members.optional("crumbs")) request.crumbs = f->one_of(engine::names<Crumbs>);
   if (const auto f = members.optional("shadow")) request.shadow = f->one_of(engine::names<ShadowOfPart>);
+  if (const auto f = members.optional("settle")) request.settle = f->one_of(engine::names<Settle>);
   if (const auto f = members.optional("region")) request.region = read_region(*f, "size");
   if (const auto f = members.optional("params")) request.params = read_params(*f);
   return request;
@@ -233,7 +234,7 @@ bool is_request(const json& document) { return is_edit_request(document) || is_r
 /// Whether the document is a request, if a wrong one, though members of it are objects: it has a word that one field
 /// says, and no member is a request itself, beside which such a word would be a comment.
 bool is_one_that_lacks_something(const json& document) {
-  constexpr std::array words{"mode", "preset", "attach", "crumbs", "shadow", "version"};
+  constexpr std::array words{"mode", "preset", "attach", "crumbs", "shadow", "settle", "version"};
   if (!document.is_object()) return false;
   return std::any_of(words.begin(), words.end(),
                      [&](const char* word) { return document.contains(word) && !document[word].is_object(); }) &&
@@ -374,6 +375,7 @@ std::string to_json(const EditRequest& request) {
   if (request.attach) out["attach"] = name_of(*request.attach);
   if (request.crumbs) out["crumbs"] = name_of(*request.crumbs);
   if (request.shadow) out["shadow"] = name_of(*request.shadow);
+  if (request.settle) out["settle"] = name_of(*request.settle);
   if (request.region) out["region"] = {{"center", request.region->center}, {"size", request.region->size}};
   out["params"] = encode(request.params);
   return pretty(out);

@@ -26,6 +26,7 @@ using engine::params::Mode;
 using engine::params::Perceptual;
 using engine::params::Preset;
 using engine::params::Rotation;
+using engine::params::Settle;
 using engine::params::ShadowOfPart;
 
 /// The parameters that a request gives; the rest is left to the preset.
@@ -68,6 +69,7 @@ struct EditRequest {
   std::optional<Attach> attach = {};                ///< What holds it. None: auto.
   std::optional<Crumbs> crumbs = {};                ///< What becomes of what the selection has left out. None: move.
   std::optional<ShadowOfPart> shadow = {};          ///< What becomes of its shadow. None: move.
+  std::optional<Settle> settle = {};                ///< Where it arrives that stands on something. None: automatic.
   std::optional<Region> region;
   Params params;
   bool operator==(const EditRequest&) const = default;

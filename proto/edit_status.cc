@@ -73,7 +73,9 @@ ordered_json encode(const FinishedInterval& finished, const std::string& id) {
           {"renders", std::move(renders)}};
 }
 
-ordered_json encode(const Part& part) { return {{"group", part.group}, {"how", part.how}, {"why", part.why}}; }
+ordered_json encode(const Part& part) {
+  return {{"group", part.group}, {"how", part.how}, {"why", part.why}, {"settled", part.settled}};
+}
 
 ordered_json links_of(const EditStatus& status) {
   const std::string self = link_of_edit(status.id);

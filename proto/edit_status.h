@@ -18,6 +18,7 @@ struct Part {
   int group = 0;
   std::string how;  ///< "one_piece", "free", "held", "drawn_out" or "continued".
   std::string why;  ///< For people.
+  double settled = 0;  ///< So far from where its handles ask it is set down on what it stands on, world units.
 };
 
 /// One picture of an interval, under /v1/edits/{id}/intervals/{u}/renders/{k}.

@@ -65,6 +65,7 @@ export const NOTHING_OPEN = {
   attach: null,
   crumbs: null, // What becomes of what the selection has left out; null: it goes along.
   shadow: null, // What becomes of the shadow of the selection; null: it goes along.
+  settle: null, // "off": the selection goes where its handles say, and is not set down on what it stands on.
   heal: [], // Operations: what a run makes anew.
   params: {},
   autoPreview: true,
@@ -89,7 +90,7 @@ export const NOTHING_OPEN = {
 
 /** What undo brings back, all at once: a drag is meant on a version, in a mode, with settings. */
 const PLACED_KEYS = [
-  ...["version", "handles", "selection", "region", "mode", "preset", "prompt", "params", "heal", "attach", "crumbs", "shadow"],
+  ...["version", "handles", "selection", "region", "mode", "preset", "prompt", "params", "heal", "attach", "crumbs", "shadow", "settle"],
   ...["negative_prompt", "allow_slow"],
 ];
 /** What goes from the screen when another version comes. */
@@ -97,7 +98,7 @@ const OF_THE_VERSION = { comparing: false, compareWith: null, preview: null, pro
 
 // What outlives a reload: as it is; and all, of which open() puts back what still fits the scene.
 const LASTING_KEYS = [
-  ...["region", "mode", "preset", "crumbs", "shadow", "prompt", "negative_prompt", "params", "autoPreview", "layer", "tab"],
+  ...["region", "mode", "preset", "crumbs", "shadow", "settle", "prompt", "negative_prompt", "params", "autoPreview", "layer", "tab"],
   ...["constraint", "gizmo", "frame", "thingMode", "selectTool", "selectDepth", "brushRadius", "tinted", "draftOnRelease", "drafts"],
 ];
 const STORED_KEYS = ["pose", "version", "handles", "selection", "viewName", ...LASTING_KEYS];
@@ -157,7 +158,7 @@ export class Editor {
       // Version 0 does not differ from itself.
       if (layer === "mask" && version === 0 && !preview) store.set({ layer: "color" });
     });
-    const ofRequest = ["handles", "selection", "version", "region", "mode", "preset", "crumbs", "shadow", "attach", "params"];
+    const ofRequest = ["handles", "selection", "version", "region", "mode", "preset", "crumbs", "shadow", "settle", "attach", "params"];
     store.watch([...ofRequest, "autoPreview", "dragging", "selectMode"], () => this.#requestChanged());
     store.watch([...PLACED_KEYS], () => this.#draftOutdated());
     store.watch(STORED_KEYS, () => this.#saveSoon());
@@ -885,6 +886,7 @@ export class Editor {
       attach: request.attach ?? null,
       crumbs: request.crumbs ?? null,
       shadow: request.shadow ?? null,
+      settle: request.settle ?? null,
       heal: request.heal ?? [],
       mode: request.mode ?? "move",
       preset: request.preset ?? "",

@@ -103,7 +103,8 @@ export function buildGizmoPanel(editor, camera) {
     border.hidden = state.selection.length === 0;
     attach.update(state.attach ?? "auto");
     const [part] = (editor.previewIsCurrent && state.preview.parts) || [];
-    text(held, part ? `${HOW[part.how] ?? "Comes off"}: ${part.why}.` : "");
+    const how = part && `${HOW[part.how] ?? "Comes off"}: ${part.why}.`;
+    text(held, part ? how + (part.settled > 0 ? " Its handles miss what it stands on by a little: it is set down." : "") : "");
   });
   return element;
 }

@@ -72,7 +72,7 @@ export function buildPresets(editor) {
 
   store.watch(["info"], ({ info }) => build(info));
   store.watch(
-    ["info", "scene", "version", "handles", "selection", "heal", "region", "mode", "preset", "params", "crumbs", "shadow", "dragging", "preview", "selectMode"],
+    ["info", "scene", "version", "handles", "selection", "heal", "region", "mode", "preset", "params", "crumbs", "shadow", "settle", "dragging", "preview", "selectMode"],
     ({ scene, dragging, selectMode, preview }) => {
       clearTimeout(timer);
       element.hidden = !scene || !changesScene(store.state);

@@ -87,6 +87,17 @@ export function buildRequestPanel(editor) {
   crumbs.field.title = "Small pieces of the part that the selection has left out";
   const shadow = fate("Shadow", "shadow", ["goes along", "goes away", "stays"]);
   shadow.field.title = "Of the part, on what it stands on or next to: a run shows what becomes of it";
+  const settle = choice({
+    label: "Set down",
+    testid: "settle",
+    options: [
+      ["", "on what it stands on"],
+      ["off", "where handles say"],
+    ],
+    changed: (value) => editor.settle({ settle: value || null }),
+  });
+  const settleField = labelled("Set down", settle.element);
+  settleField.title = "A part that handles lift off a floor by a little, or sink into it, or tilt, arrives standing";
   const params = paramFields(setParam);
   const also = h("p", { class: "note", hidden: true, testid: "other-params" });
   const promptField = h("input", {
@@ -113,6 +124,7 @@ export function buildRequestPanel(editor) {
     labelled("Preset", preset.element),
     crumbs.field,
     shadow.field,
+    settleField,
     params.element,
     painted,
     regionOn.element,
@@ -190,7 +202,7 @@ export function buildRequestPanel(editor) {
 
   store.watch(
     [
-      ...["constraint", "mode", "region", "preset", "crumbs", "shadow", "selection", "params", "autoPreview", "draftOnRelease"],
+      ...["constraint", "mode", "region", "preset", "crumbs", "shadow", "settle", "selection", "params", "autoPreview", "draftOnRelease"],
       ...["info", "handles", "scene", "prompt", "allow_slow"],
     ],
     (state) => {
@@ -206,6 +218,8 @@ export function buildRequestPanel(editor) {
       preset.update(state.preset);
       crumbs.update(state);
       shadow.update(state);
+      settleField.hidden = state.selection.length === 0 || state.mode !== "move";
+      settle.update(state.settle === "auto" ? "" : (state.settle ?? ""));
       params.update(state.info, state.params, state.preset);
       painted.hidden = !(state.params.corrector === "sd" && hasDiffusion(state.info));
       promptField.value = state.prompt ?? "";
@@ -223,7 +237,7 @@ export function buildRequestPanel(editor) {
   store.watch(
     [
       ...["handles", "selection", "previewing", "submitting", "problem", "preview", "estimate", "scene", "version"],
-      ...["region", "mode", "preset", "crumbs", "shadow", "attach", "params", "prompt", "allow_slow"],
+      ...["region", "mode", "preset", "crumbs", "shadow", "settle", "attach", "params", "prompt", "allow_slow"],
     ],
     (state) => {
       const ready = state.scene !== null && isStated(state);
@@ -236,9 +250,9 @@ export function buildRequestPanel(editor) {
       const at = state.problem ? partOf(state.problem.error.where) : {};
       const here = (...parts) => (state.problem && parts.includes(at.part) ? state.problem.error : null);
       showProblem(regionProblem, here("region"));
-      showProblem(paramProblem, here("param", "mode", "preset", "crumbs", "shadow"));
+      showProblem(paramProblem, here("param", "mode", "preset", "crumbs", "shadow", "settle"));
       showProblem(problem, here("request", "handles", "prompt", "negative_prompt", "allow_slow"));
-      if (here("region") || here("param", "preset", "crumbs", "shadow")) settings.open = true;
+      if (here("region") || here("param", "preset", "crumbs", "shadow", "settle")) settings.open = true;
       if (here("handle") && !state.handles[at.index]) showProblem(problem, state.problem.error);
       answer.replaceChildren(...answers(editor, state));
     },

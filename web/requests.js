@@ -16,7 +16,7 @@ export function requestOf(state) {
   // Where nothing moves, what is healed is removed: then all that a run does is to heal it.
   if (onlyHeals(state)) return requestOf({ ...state, mode: "remove", selection: state.heal });
   const { scene, version, mode, preset, prompt, handles, selection = [], heal = [], attach, region, params } = state;
-  const { negative_prompt, allow_slow, crumbs, shadow } = state;
+  const { negative_prompt, allow_slow, crumbs, shadow, settle } = state;
   const goes = mode !== "remove"; // else targets stay on the screen, for when the mode changes back
   const leaves = selection.length > 0 && mode !== "extend"; // what goes along with it is asked for there alone
   const given = Object.entries(params ?? {}).filter(
@@ -43,6 +43,7 @@ export function requestOf(state) {
     ...(attach ? { attach } : {}),
     ...(crumbs && leaves ? { crumbs } : {}),
     ...(shadow && leaves ? { shadow } : {}),
+    ...(settle && selection.length && mode === "move" ? { settle } : {}),
     ...(region ? { region } : {}),
     ...(given.length ? { params: Object.fromEntries(given) } : {}),
   };
@@ -89,7 +90,7 @@ export function partOf(where = "") {
   const param = /^params\.(\w+)/.exec(where);
   if (param) return { part: "param", name: param[1] };
   if (/^region\b/.test(where)) return { part: "region" };
-  if (/^(mode|preset|handles|prompt|negative_prompt|allow_slow|crumbs|shadow)$/.test(where)) return { part: where };
+  if (/^(mode|preset|handles|prompt|negative_prompt|allow_slow|crumbs|shadow|settle)$/.test(where)) return { part: where };
   return { part: "request" };
 }
 
@@ -173,7 +174,7 @@ function nameAmong(names, value, where) {
 }
 
 const FIELDS =
-  "scene version mode preset prompt negative_prompt allow_slow handles selection heal attach crumbs shadow region params".split(" ");
+  "scene version mode preset prompt negative_prompt allow_slow handles selection heal attach crumbs shadow settle region params".split(" ");
 
 function readRequest(document, where) {
   known(document, FIELDS, where);
@@ -215,6 +216,7 @@ function readRequest(document, where) {
     attach: nameAmong(["auto", "held", "free"], document.attach, within(where, "attach")),
     crumbs: nameAmong(["move", "remove", "keep"], document.crumbs, within(where, "crumbs")),
     shadow: nameAmong(["move", "remove", "keep"], document.shadow, within(where, "shadow")),
+    settle: nameAmong(["auto", "off"], document.settle, within(where, "settle")),
     region,
     params: { ...params },
   };
@@ -273,6 +275,7 @@ function readReleased(document, where) {
     attach: null,
     crumbs: null,
     shadow: null,
+    settle: null,
     region,
     params: {},
   };

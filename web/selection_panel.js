@@ -88,7 +88,7 @@ export function buildTools(editor) {
   byId("toolbar").append(h("div", { class: "row undo" }, undo, redo));
 
   const shown = ["healing", "selectMode", "thingMode", "selectTool", "selectOp", "clickKind", "nextThing", "selectDepth", "brushRadius"];
-  const undone = ["version", "handles", "selection", "region", "mode", "preset", "params", "crumbs", "shadow", "heal"];
+  const undone = ["version", "handles", "selection", "region", "mode", "preset", "params", "crumbs", "shadow", "settle", "heal"];
   store.watch([...shown, ...undone], (state) => {
     const { selectMode, selectTool } = state;
     hand.update(selectMode ? (state.healing ? "heal" : "select") : state.thingMode ? "thing" : "handle");

@@ -49,8 +49,10 @@ inline void append(std::vector<procedural::Patch>& to, std::vector<procedural::P
 // Plans of things of several parts, in plans_of_homes.cc.
 [[nodiscard]] Plan can_on_floor();
 [[nodiscard]] Plan chair_on_carpet();
+[[nodiscard]] Plan chair_led_by_three();
 [[nodiscard]] Plan teddy_on_sofa();
 [[nodiscard]] Plan lamp_on_table();
+[[nodiscard]] Plan lamp_led_by_two();
 
 // Plans of things that turn on hinges, in plans_of_hinges.cc.
 [[nodiscard]] Plan lid_opened();

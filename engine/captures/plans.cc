@@ -290,7 +290,9 @@ const std::vector<NamedPlan>& known_plans() {
                                           {"can_shadow", can_and_shadow},
                                           {"chair_shadow", chair_and_shadow},
                                           {"teddy_shadow", teddy_and_shadow},
-                                          {"clutter_shadow", clutter_and_shadow}};
+                                          {"clutter_shadow", clutter_and_shadow},
+                                          {"chair_led", chair_led_by_three},
+                                          {"lamp_led", lamp_led_by_two}};
   return all;
 }
 

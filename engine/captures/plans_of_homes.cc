@@ -129,6 +129,19 @@ Plan chair_on_carpet() {
   return plan;
 }
 
+Plan chair_led_by_three() {
+  Plan plan = chair_on_carpet();
+  plan.what = "The chair on the carpet, led by three handles, along and around by 25 degrees.";
+  const procedural::Placement placement = plan.things[0].object.placement;
+  const Motion along = plan.things[0].motion, around = turned(DVec3(placement.position), {0, 1, 0}, 25 * degree);
+  plan.things[0].motion = [=](DVec3 point) { return along(around(point)); };
+  const auto on_chair = [&](float x, float height, float z) { return DVec3(placement.world(at(x, height, z))); };
+  plan.grips = {{on_chair(-0.15f, 0.475f, -0.15f), 0.62},
+                {on_chair(0.15f, 0.475f, -0.15f), 0.62},
+                {on_chair(0, 0.84f, 0.2f), 0.62}};
+  return plan;
+}
+
 Plan teddy_on_sofa() {
   const DVec3 foot = dat(-0.3, 0, 0.02), shift = dat(0.66, 0, -0.03);
   const auto shaggy = [](Vec3 color, const SurfacePoint& p) {
@@ -198,6 +211,14 @@ Plan lamp_on_table() {
   plan.region = standing_on(0, foot, {0.6, 0.8, 0.6});
   plan.clicks = {{foot + dat(0.02, 0.55, -0.2), foot + dat(0, 0.25, -0.022), foot + dat(0, 0.03, -0.12)},
                  {foot + dat(0, 0, -0.4), foot + dat(0.4, 0, 0), dat(-0.3, 1.0, 1.4)}};
+  return plan;
+}
+
+Plan lamp_led_by_two() {
+  Plan plan = lamp_on_table();
+  plan.what = "The lamp on the table, led by two handles: its shade and its foot.";
+  const DVec3 foot(plan.things[0].object.placement.position);
+  plan.grips = {{foot + dat(0, 0.55, -0.2), 0.6}, {foot + dat(0.05, 0.03, -0.12), 0.6}};
   return plan;
 }
 

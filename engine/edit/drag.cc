@@ -167,7 +167,7 @@ void go_on(const Continuation& continuation, int u, int intervals, PlannedMotion
 
 PlannedMotion plan_motion(const WorkingScene& working, const Request& request, const Parts& parts,
                           std::span<const DVec3> positions, int u, int intervals, Memory& memory) {
-  const auto drags = interval_drags(working.frame(), request, positions, u, intervals);
+  const auto drags = interval_drags(working.frame(), request, parts.corrected, positions, u, intervals);
   PlannedMotion motion;
   motion.rows = working.dragged_rows();
   if (request.mode == Mode::remove) {

@@ -101,8 +101,10 @@ std::vector<deform::Drag> whole_drags(const Request& request, const working::Fra
 }
 
 std::vector<deform::Drag> interval_drags(const working::Frame& frame, const Request& request,
-                                         std::span<const DVec3> positions, int u, int intervals) {
+                                         std::span<const Parts::Corrected> corrected, std::span<const DVec3> positions,
+                                         int u, int intervals) {
   std::vector<deform::Drag> drags = whole_drags(request, frame);
+  for (const auto& [handle, target] : corrected) drags[handle].target = frame.edit_from_world(target);
   const deform::Path path(drags);
   const double before = double(u - 1) / intervals, now = double(u) / intervals;
   for (std::size_t i = 0; i < drags.size(); ++i) {

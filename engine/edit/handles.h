@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "engine/deform/motion.h"
+#include "engine/edit/parts.h"
 #include "engine/edit/request.h"
 #include "engine/working/frame.h"
 #include "engine/working/working_scene.h"
@@ -36,8 +37,10 @@ namespace engine::edit {
 /// The drags of interval u = 1..T: from where the handles are now to where they shall be then, which is measured from
 /// where the user placed them: on the line to the target, or, for an elastic body, on the way that deform::Path
 /// takes. The last one ends on the targets exactly.
+///   corrected  handles that go elsewhere than to their targets
 ///   positions  of the handles, in `frame`, as the drags are
 [[nodiscard]] std::vector<deform::Drag> interval_drags(const working::Frame& frame, const Request& request,
+                                                       std::span<const Parts::Corrected> corrected,
                                                        std::span<const DVec3> positions, int u, int intervals);
 
 /// Gives a radius to handles that have none. For an elastic body, of the longest edge of the box around what is

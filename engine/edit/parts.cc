@@ -10,7 +10,9 @@
 #include "engine/core/rows.h"
 #include "engine/deform/attach.h"
 #include "engine/edit/handles.h"
+#include "engine/edit/settle.h"
 #include "engine/select/contact.h"
+#include "engine/select/footing.h"
 #include "engine/select/repeat.h"
 
 namespace engine::edit {
@@ -77,6 +79,28 @@ void draw_out(const scene::LayeredCloud& scene, std::span<const std::uint32_t> r
       {attachment.group, way, repeat->step, std::move(repeat->tile), std::move(repeat->depth)});
 }
 
+/// Of a part that stands on something and goes as one piece: where its handles go, so that it arrives standing.
+///   moved  all rows that move, ascending
+///   drags  of all handles
+///   own    those of the part, without anchors that hold nothing
+void set_down(const scene::LayeredCloud& scene, const Array3& means, std::span<const std::uint32_t> rows,
+              std::span<const select::Touch> touches, std::span<const std::uint32_t> moved,
+              std::span<const deform::Drag> drags, std::span<const deform::Drag> own, deform::Attachment& attachment,
+              Parts& parts) {
+  const deform::RigidMotion asked = deform::nearest_motion(own, attachment.group, attachment.scales);
+  const auto motion = settled(asked, own, [&](const deform::RigidMotion& with) {
+    std::vector<DVec3> arrived;
+    for (const std::uint32_t row : rows) arrived.push_back(with(DVec3(means.get(row))));
+    return select::footings_of(scene, rows, touches, moved, arrived);
+  });
+  if (!motion) return;
+  for (std::size_t i = 0; i < drags.size(); ++i) {
+    if (drags[i].group != attachment.group || drags[i].anchor) continue;
+    parts.corrected.push_back({i, (*motion)(drags[i].source)});
+    attachment.settled = std::max(attachment.settled, glm::distance(parts.corrected.back().target, drags[i].target));
+  }
+}
+
 }  // namespace
 
 Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> handle, const Request& request,
@@ -119,6 +143,8 @@ Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> 
     if (request.mode == Mode::extend) draw_out(scene, rows, contact.touches, own, request.attach, attachment, parts);
     if (attachment.how == How::held || attachment.how == How::drawn_out)
       hold(means, rows, contact.touches, own, attachment, parts);
+    if (attachment.how == How::one_piece && request.settle == Settle::automatic)
+      set_down(scene, means, rows, contact.touches, dragged, drags, own, attachment, parts);
     parts.attachments.push_back(std::move(attachment));
   }
   std::sort(parts.rim.begin(), parts.rim.end());

@@ -33,6 +33,12 @@ struct Parts {
     double away = 0;         ///< From the nearest row, world units.
   };
   std::vector<Astray> astray;  ///< By handle.
+  /// Where a handle goes in place of its target, as its part is set down on what it stands on.
+  struct Corrected {
+    std::size_t handle = 0;  ///< From 0.
+    DVec3 target{0.0};       ///< World units.
+  };
+  std::vector<Corrected> corrected = {};
 };
 
 /// Looks where each group touches what stays, and decides how it moves.

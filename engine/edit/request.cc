@@ -68,6 +68,7 @@ Result<void> validate_motion(const Request& request) {
     if (request.handles[i].scale) return invalid("a handle scales what it grips" + only, where + ".scale");
   }
   if (request.attach != Attach::automatic) return invalid("what holds a part can be chosen" + only, "attach");
+  if (request.settle != Settle::automatic) return invalid("a part is set down" + only, "settle");
   return {};
 }
 

@@ -147,7 +147,7 @@ std::function<DVec3(DVec3)> back_to_source(const State& state, const Edit& edit)
   if (edit.request.mode == Mode::remove || edit.request.shadow == ShadowOfPart::remove) return {};
   const deform::Attachment& part = edit.parts.attachments.front();
   const working::Frame& frame = state.scene.frame();
-  const auto drags = interval_drags(frame, edit.request, state.positions, 1, 1);
+  const auto drags = interval_drags(frame, edit.request, edit.parts.corrected, state.positions, 1, 1);
   const deform::RigidMotion motion = deform::nearest_motion(drags, part.group, part.scales);
   return [motion, &frame](DVec3 point) {
     const DVec3 arrived = frame.edit_from_world(point) - motion.centre - motion.shift;

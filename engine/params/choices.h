@@ -42,6 +42,13 @@ constexpr auto names_of(ShadowOfPart) {
                     Name{ShadowOfPart::keep, "keep"}};
 }
 
+/// Where a part arrives that stands on something.
+enum class Settle {
+  automatic,  ///< Where its handles miss a surface by little, on that.
+  off         ///< Where its handles ask.
+};
+constexpr auto names_of(Settle) { return std::array{Name{Settle::automatic, "auto"}, Name{Settle::off, "off"}}; }
+
 /// A name for a set of parameters. How their numbers were found: docs/tradeoff.md.
 enum class Preset {
   preview,   ///< Only deforms.

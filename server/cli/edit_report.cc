@@ -64,7 +64,10 @@ std::string to_json(const EditReport& report) {
       {"parts",
        list_of(edit.parts,
                [](const auto& part) {
-                 return ordered_json{{"group", part.group}, {"how", engine::name_of(part.how)}, {"why", part.why}};
+                 return ordered_json{{"group", part.group},
+                                     {"how", engine::name_of(part.how)},
+                                     {"why", part.why},
+                                     {"settled", part.settled}};
                })},
       {"views", list_of(edit.views,
                         [](const auto& view) {

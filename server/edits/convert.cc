@@ -104,6 +104,7 @@ engine::Result<edit::Request> to_engine(const proto::EditRequest& request) {
   out.attach = request.attach.value_or(edit::Attach::automatic);
   out.crumbs = request.crumbs.value_or(edit::Crumbs::move);
   out.shadow = request.shadow.value_or(edit::ShadowOfPart::move);
+  out.settle = request.settle.value_or(edit::Settle::automatic);
   if (request.region) out.region = {to_vec(request.region->center), to_vec(request.region->size)};
   out.params = filled_in(request.params, preset_of(request), out, request.selection.has_value());
   if (out.params.background == proto::Background::photo)
@@ -131,7 +132,7 @@ proto::EditRequest resolved(const proto::EditRequest& request, const edit::Param
 std::vector<proto::Part> to_parts(const std::vector<edit::Attachment>& attachments) {
   std::vector<proto::Part> parts;
   for (const edit::Attachment& one : attachments)
-    parts.push_back({one.group, std::string(engine::name_of(one.how)), one.why});
+    parts.push_back({one.group, std::string(engine::name_of(one.how)), one.why, one.settled});
   return parts;
 }
 

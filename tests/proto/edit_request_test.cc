@@ -45,6 +45,7 @@ TEST(EditRequest, ReadsHowAHandleTurnsAndScales) {
   asked["attach"] = "held";
   asked["crumbs"] = "keep";
   asked["shadow"] = "remove";
+  asked["settle"] = "off";
   const auto request = parse_edit_request(asked.dump());
   ASSERT_TRUE(request) << request.error().message;
   EXPECT_EQ(request->handles[0].rotation, (std::array<double, 4>{0.5, 0, 0.5, -1}));
@@ -52,6 +53,7 @@ TEST(EditRequest, ReadsHowAHandleTurnsAndScales) {
   EXPECT_EQ(request->attach, Attach::held);
   EXPECT_EQ(request->crumbs, Crumbs::keep);
   EXPECT_EQ(request->shadow, ShadowOfPart::remove);
+  EXPECT_EQ(request->settle, Settle::off);
   EXPECT_EQ(*parse_edit_request(to_json(*request)), *request);
 
   expect_refused(with("/handles/0/rotation", {0, 0, 0, 0}), "handles[0].rotation");
@@ -61,6 +63,7 @@ TEST(EditRequest, ReadsHowAHandleTurnsAndScales) {
   expect_refused(with("/attach", "glued"), "attach");
   expect_refused(with("/crumbs", "eat"), "crumbs");
   expect_refused(with("/shadow", "deepen"), "shadow");
+  expect_refused(with("/settle", true), "settle");
 }
 
 TEST(EditRequest, ReadsEveryField) {

@@ -143,7 +143,7 @@ TEST(EditEstimate, SaysWhatTheEditWouldCost) {
   const EditEstimate estimate{.handles = {{3}, {4}},
                               .views = 40,
                               .intervals = 2,
-                              .parts = {{1, "held", "it grows there"}},
+                              .parts = {{1, "held", "it grows there", 0.25}},
                               .seconds = 1.5,
                               .memory_bytes = std::uint64_t{5} << 32,
                               .request = some_request(),
@@ -153,7 +153,7 @@ TEST(EditEstimate, SaysWhatTheEditWouldCost) {
   EXPECT_EQ(out.at("handles"), json::parse(R"([{"gaussians": 3}, {"gaussians": 4}])"));
   EXPECT_EQ(out.at("views"), 40);
   EXPECT_EQ(out.at("intervals"), 2);
-  EXPECT_EQ(out.at("parts"), json::parse(R"([{"group": 1, "how": "held", "why": "it grows there"}])"));
+  EXPECT_EQ(out.at("parts"), json::parse(R"([{"group": 1, "how": "held", "why": "it grows there", "settled": 0.25}])"));
   EXPECT_EQ(out.at("estimate"), json::parse(R"({"seconds": 1.5, "memory_bytes": 21474836480})"));
   EXPECT_EQ(*parse_edit_request(out.at("request").dump()), some_request());
   EXPECT_EQ(out.at("warnings"), json::parse(R"(["careful"])"));

@@ -9,6 +9,7 @@
 
 #include "engine/core/parallel.h"
 #include "engine/edit/edit.h"
+#include "tests/engine/edit/block.h"
 #include "tests/engine/edit/samples.h"
 #include "tests/engine/select/small_scenes.h"
 
@@ -305,6 +306,61 @@ TEST(Preview, GivesTheSameBytesForAnyNumberOfThreads) {
   ASSERT_TRUE(alone);
   for (const int threads : {1, 2, 4})
     WorkArena(threads).run([&] { EXPECT_EQ(preview(scene, four_handles(Mode::extend))->overlay, alone->overlay); });
+}
+
+/// The block, its foot as near to the floor as its rows are to each other, and dragged to the right and up by 0.03.
+BlockScene lifted_by_slip() {
+  BlockScene block;
+  block.request.selected.emplace();
+  for (auto row = std::uint32_t(block.floor_rows); row < block.cloud.size(); ++row)
+    block.request.selected->push_back(row);
+  block.request.region.reset();
+  block.request.params.interpolation = Interpolation::arap;
+  *block.request.handles[0].target += DVec3(0, -0.03, 0);
+  return block;
+}
+
+/// How far the rows that arrive are from where they were, on average.
+DVec3 way_of(const BlockScene& block, const PreviewOutcome& outcome) {
+  const scene::GaussianCloud& added = outcome.overlay.rows;
+  DVec3 before(0.0), after(0.0);
+  const std::size_t rows = block.request.selected->size(), first = added.size() - rows;
+  for (const std::uint32_t row : *block.request.selected) before += DVec3(block.cloud.mean.get(row)) / double(rows);
+  for (std::size_t k = first; k < added.size(); ++k) after += DVec3(added.mean.get(k)) / double(rows);
+  return after - before;
+}
+
+TEST(Preview, SetsDownWhatAHandleLiftsBySlip) {
+  BlockScene block = lifted_by_slip();
+  const auto outcome = preview(plain(block.cloud), block.request);
+  ASSERT_TRUE(outcome);
+  ASSERT_EQ(outcome->parts.size(), 1u);
+  EXPECT_NEAR(outcome->parts[0].settled, 0.03, 1e-4);
+  EXPECT_NEAR(glm::distance(way_of(block, *outcome), DVec3(0.9, 0, 0)), 0, 1e-4);
+  EXPECT_NEAR(glm::distance(outcome->positions[0], block.middle + DVec3(0.9, 0, 0)), 0, 1e-4);
+
+  block.request.settle = Settle::off;
+  const auto as_asked = preview(plain(block.cloud), block.request);
+  ASSERT_TRUE(as_asked);
+  EXPECT_EQ(as_asked->parts[0].settled, 0);
+  EXPECT_NEAR(glm::distance(way_of(block, *as_asked), DVec3(0.9, -0.03, 0)), 0, 1e-5);
+}
+
+TEST(Preview, SetsDownTheSameInSeveralIntervals) {
+  BlockScene block = lifted_by_slip();
+  block.request.params.intervals = 3;
+  const auto outcome = preview(plain(block.cloud), block.request);
+  ASSERT_TRUE(outcome);
+  EXPECT_NEAR(glm::distance(way_of(block, *outcome), DVec3(0.9, 0, 0)), 0, 1e-4);
+}
+
+TEST(Preview, LeavesInTheAirWhatIsLifted) {
+  BlockScene block = lifted_by_slip();
+  block.request.handles[0].target = block.middle + DVec3(0.3, -0.4, 0);
+  const auto outcome = preview(plain(block.cloud), block.request);
+  ASSERT_TRUE(outcome);
+  EXPECT_EQ(outcome->parts[0].settled, 0);
+  EXPECT_NEAR(glm::distance(way_of(block, *outcome), DVec3(0.3, -0.4, 0)), 0, 1e-5);
 }
 
 }  // namespace

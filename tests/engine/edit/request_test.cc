@@ -90,6 +90,16 @@ TEST(ValidateRequest, CrumbsAreBesideASelectionAndGoWhereAPartLeaves) {
   expect_chosen_of_a_selection_that_leaves(&Request::crumbs, "crumbs");
 }
 
+TEST(ValidateRequest, OnlyABodyIsSetDown) {
+  Request request = good();
+  request.settle = Settle::off;
+  request.params.interpolation = Interpolation::rigid;
+  ASSERT_FALSE(validate(request));
+  EXPECT_EQ(validate(request).error().where, "settle");
+  request.params.interpolation = Interpolation::arap;
+  EXPECT_TRUE(validate(request));
+}
+
 TEST(ValidateRequest, WhatIsRemovedGoesNowhere) {
   Request request = good();
   request.mode = Mode::remove;
