@@ -52,7 +52,7 @@ Region read_region(const JsonField& field, std::string_view size_name) {
 
 constexpr std::array<std::string_view, 16> request_fields{
     "scene",     "version", "mode",   "preset", "prompt", "negative_prompt", "allow_slow", "handles",
-    "selection", "heal",    "attach", "crumbs", "shadow", "settle", "region", "params"};
+    "selection", "heal",    "attach", "crumbs", "shadow", "settle",          "region",     "params"};
 constexpr std::array<std::string_view, 6> config_fields{"start",   "direction",  "voxel_size",
                                                         "cluster", "local_mask", "mode"};
 

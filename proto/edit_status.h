@@ -16,8 +16,8 @@ namespace proto {
 /// How a group of handles moves what is theirs, where that is as an elastic body.
 struct Part {
   int group = 0;
-  std::string how;  ///< "one_piece", "free", "held", "drawn_out" or "continued".
-  std::string why;  ///< For people.
+  std::string how;     ///< "one_piece", "free", "held", "drawn_out" or "continued".
+  std::string why;     ///< For people.
   double settled = 0;  ///< So far from where its handles ask it is set down on what it stands on, world units.
 };
 

@@ -57,6 +57,14 @@ const std::vector<std::uint32_t>& Memory::crumbs_of(const scene::LayeredCloud& s
       .rows;
 }
 
+const select::Stance& Memory::stance_of(const scene::LayeredCloud& scene, std::span<const std::uint32_t> part,
+                                        std::span<const select::Touch> touches, std::span<const std::uint32_t> moved) {
+  return find_or_make(
+      stances_, [&](const select::Stance& stance) { return stance.is_of(part, moved); },
+      [&] { return select::Stance(scene, part, touches, moved); },
+      [](const select::Stance& stance) { return stance.size(); });
+}
+
 const deform::Body& Memory::body_of(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
                                     std::span<const deform::Drag> drags, std::span<const std::uint8_t> held) {
   return find_or_make(

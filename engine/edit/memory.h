@@ -10,6 +10,7 @@
 #include "engine/scene/overlay.h"
 #include "engine/select/contact.h"
 #include "engine/select/crumbs.h"
+#include "engine/select/footing.h"
 
 namespace engine::edit {
 
@@ -23,6 +24,11 @@ class Memory {
   /// select::crumbs_of()
   [[nodiscard]] const std::vector<std::uint32_t>& crumbs_of(const scene::LayeredCloud& scene,
                                                             std::span<const std::uint32_t> selected);
+  /// The stance that select::Stance's constructor makes of these.
+  ///   touches  of contact_of() for `part` and `moved`
+  [[nodiscard]] const select::Stance& stance_of(const scene::LayeredCloud& scene, std::span<const std::uint32_t> part,
+                                                std::span<const select::Touch> touches,
+                                                std::span<const std::uint32_t> moved);
   /// The body that deform::Body's constructor makes of these.
   [[nodiscard]] const deform::Body& body_of(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
                                             std::span<const deform::Drag> drags, std::span<const std::uint8_t> held);
@@ -48,9 +54,10 @@ class Memory {
   template <class T, class Fits, class Make, class RowsOf>
   const T& find_or_make(std::list<Noted<T>>& known, Fits&& fits, Make&& make, RowsOf&& rows_of);
 
-  std::list<Noted<Crumbs>> crumbs_;          ///< The one used last is last.
-  std::list<Noted<KnownContact>> contacts_;  ///< The same.
-  std::list<Noted<deform::Body>> bodies_;    ///< The same.
+  std::list<Noted<Crumbs>> crumbs_;           ///< The one used last is last.
+  std::list<Noted<KnownContact>> contacts_;   ///< The same.
+  std::list<Noted<select::Stance>> stances_;  ///< The same.
+  std::list<Noted<deform::Body>> bodies_;     ///< The same.
   double saved_seconds_ = 0;
 };
 

@@ -79,20 +79,13 @@ void draw_out(const scene::LayeredCloud& scene, std::span<const std::uint32_t> r
       {attachment.group, way, repeat->step, std::move(repeat->tile), std::move(repeat->depth)});
 }
 
-/// Of a part that stands on something and goes as one piece: where its handles go, so that it arrives standing.
-///   moved  all rows that move, ascending
+/// Of a part that goes as one piece: where its handles go, so that it arrives standing as it stands.
 ///   drags  of all handles
 ///   own    those of the part, without anchors that hold nothing
-void set_down(const scene::LayeredCloud& scene, const Array3& means, std::span<const std::uint32_t> rows,
-              std::span<const select::Touch> touches, std::span<const std::uint32_t> moved,
-              std::span<const deform::Drag> drags, std::span<const deform::Drag> own, deform::Attachment& attachment,
-              Parts& parts) {
-  const deform::RigidMotion asked = deform::nearest_motion(own, attachment.group, attachment.scales);
-  const auto motion = settled(asked, own, [&](const deform::RigidMotion& with) {
-    std::vector<DVec3> arrived;
-    for (const std::uint32_t row : rows) arrived.push_back(with(DVec3(means.get(row))));
-    return select::footings_of(scene, rows, touches, moved, arrived);
-  });
+void set_down(const scene::LayeredCloud& scene, const select::Stance& stance, std::span<const deform::Drag> drags,
+              std::span<const deform::Drag> own, deform::Attachment& attachment, Parts& parts) {
+  const auto motion = settled(deform::nearest_motion(own, attachment.group, attachment.scales), own,
+                              [&](const deform::RigidMotion& with) { return stance.after(scene, with); });
   if (!motion) return;
   for (std::size_t i = 0; i < drags.size(); ++i) {
     if (drags[i].group != attachment.group || drags[i].anchor) continue;
@@ -144,7 +137,7 @@ Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> 
     if (attachment.how == How::held || attachment.how == How::drawn_out)
       hold(means, rows, contact.touches, own, attachment, parts);
     if (attachment.how == How::one_piece && request.settle == Settle::automatic)
-      set_down(scene, means, rows, contact.touches, dragged, drags, own, attachment, parts);
+      set_down(scene, memory.stance_of(scene, rows, contact.touches, dragged), drags, own, attachment, parts);
     parts.attachments.push_back(std::move(attachment));
   }
   std::sort(parts.rim.begin(), parts.rim.end());

@@ -42,7 +42,9 @@ std::optional<deform::RigidMotion> settled(
 
   deform::RigidMotion motion = asked;
   std::optional<select::Footings> footings = stand(motion);
-  if (footings && may_be_tilted(drags)) {
+  // Of two planes, as on a crown, nobody knows the normals better than handles do.
+  const bool is_on_one_plane = footings && footings->before.normal == footings->after.normal;
+  if (is_on_one_plane && may_be_tilted(drags)) {
     const DVec3 leans = asked.turn * footings->before.normal;
     const DQuat upright = deform::pair_rotation(leans, footings->after.normal, deform::Rotation::shortest_arc);
     deform::RigidMotion turned = asked;  // about the middle of the handles, which is known best

@@ -12,9 +12,9 @@
 namespace engine::edit {
 
 /// The motion after which a part stands on what is by its feet as it stood before: as high above it, and, if its
-/// handles are more than one and none asks for a turn, as upright. Nothing where that takes a handle farther from its
-/// target than a twentieth of the longest way, which nobody asks for by mistake; nor where it makes less than a
-/// thousandth of it, which nobody sees.
+/// handles are more than one and none asks for a turn, as upright on a floor. Nothing where that takes a handle farther
+/// from its target than a twentieth of the longest way, which nobody asks for by mistake; nor where it makes less than
+/// a thousandth of it, which nobody sees.
 ///   asked  as one piece, in the frame of the drags, like all of this
 ///   drags  of the group
 ///   stand  what the part stands on, if that is known, with a motion

@@ -1,9 +1,13 @@
 // What a part stands on, where it is and where it arrives.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "engine/core/vec.h"
 #include "engine/scene/overlay.h"
@@ -23,14 +27,31 @@ struct Footings {
   Footing before, after;
 };
 
+/// How a part stands where it is, and so where it would with a motion.
 /// Feet are what is lowest of the part above the surface: so a ball that rolls has others when it arrives.
-///   part     rows of the scene, ascending, at least one (asserted)
-///   touches  [part] of contact_of()
-///   moved    all rows that move, ascending: no surface of theirs counts
-///   arrived  [part] where its rows go, world units
-///   returns  nothing where the part touches too little, or what is by its feet is no plane at one of the ends
-[[nodiscard]] std::optional<Footings> footings_of(const scene::LayeredCloud& scene, std::span<const std::uint32_t> part,
-                                                  std::span<const Touch> touches, std::span<const std::uint32_t> moved,
-                                                  std::span<const DVec3> arrived);
+class Stance {
+ public:
+  /// Some 10 ms where 10,000 rows are around the part; half of that for each motion.
+  ///   part     rows of the scene, ascending, at least one (asserted)
+  ///   touches  [part] of contact_of()
+  ///   moved    all rows that move, ascending: no surface of theirs counts
+  Stance(const scene::LayeredCloud& scene, std::span<const std::uint32_t> part, std::span<const Touch> touches,
+         std::span<const std::uint32_t> moved);
+
+  /// Nothing where the part touches too little, or what is by its feet is no plane at one of the ends.
+  ///   scene   that of the constructor
+  ///   motion  of world units
+  [[nodiscard]] std::optional<Footings> after(const scene::LayeredCloud& scene,
+                                              const std::function<DVec3(DVec3)>& motion) const;
+
+  [[nodiscard]] std::size_t size() const { return part_.size(); }  ///< Rows of the part.
+  /// Would the constructor make the same of these? What touches follows from them.
+  [[nodiscard]] bool is_of(std::span<const std::uint32_t> part, std::span<const std::uint32_t> moved) const;
+
+ private:
+  struct Before;
+  std::vector<std::uint32_t> part_, moved_;
+  std::shared_ptr<const Before> before_;  ///< Null: it stands on nothing.
+};
 
 }  // namespace engine::select

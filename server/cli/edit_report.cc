@@ -61,14 +61,13 @@ std::string to_json(const EditReport& report) {
         {"crumbs", edit.crumbs},
         {"relit", edit.relit}}},
       {"handles", list_of(edit.handles, [](const auto& handle) { return encode(handle); })},
-      {"parts",
-       list_of(edit.parts,
-               [](const auto& part) {
-                 return ordered_json{{"group", part.group},
-                                     {"how", engine::name_of(part.how)},
-                                     {"why", part.why},
-                                     {"settled", part.settled}};
-               })},
+      {"parts", list_of(edit.parts,
+                        [](const auto& part) {
+                          return ordered_json{{"group", part.group},
+                                              {"how", engine::name_of(part.how)},
+                                              {"why", part.why},
+                                              {"settled", part.settled}};
+                        })},
       {"views", list_of(edit.views,
                         [](const auto& view) {
                           return ordered_json{{"name", view.name}, {"mask_area", view.mask_area}};

@@ -44,10 +44,8 @@ class Standing {
   void touches_nothing() { touches_.assign(touches_.size(), Touch::nothing); }
 
   [[nodiscard]] std::optional<Footings> after(const std::function<DVec3(DVec3)>& motion) const {
-    std::vector<DVec3> arrived;
-    for (const std::uint32_t row : part_) arrived.push_back(unit_ * motion(DVec3(cloud_.mean.get(row)) / unit_));
     const scene::LayeredCloud scene{std::make_shared<const scene::GaussianCloud>(cloud_), nullptr};
-    return footings_of(scene, part_, touches_, part_, arrived);
+    return Stance(scene, part_, touches_, part_).after(scene, [&](DVec3 at) { return unit_ * motion(at / unit_); });
   }
   [[nodiscard]] std::optional<Footings> after(DVec3 shift) const {
     return after([&](DVec3 place) { return place + shift; });
@@ -68,7 +66,7 @@ Standing on_a_floor(double unit = 1) {
   return block;
 }
 
-TEST(FootingsOf, TellHowFarAPartIsOffTheFloorItIsMovedAlong) {
+TEST(Stance, TellHowFarAPartIsOffTheFloorItIsMovedAlong) {
   const auto footings = on_a_floor().after({1.2, 0.03, 0.1});
   ASSERT_TRUE(footings);
   EXPECT_NEAR(footings->before.normal.y, 1, 1e-6);
@@ -77,7 +75,7 @@ TEST(FootingsOf, TellHowFarAPartIsOffTheFloorItIsMovedAlong) {
   EXPECT_NEAR(glm::distance(footings->after.foot - footings->before.foot, DVec3(1.2, 0.03, 0.1)), 0, 1e-6);
 }
 
-TEST(FootingsOf, AreTheSameInAnyUnits) {
+TEST(Stance, AreTheSameInAnyUnits) {
   for (const double unit : {1e-3, 1e3}) {
     const auto footings = on_a_floor(unit).after({1.2, 0.03, 0.1});
     ASSERT_TRUE(footings) << unit;
@@ -85,7 +83,7 @@ TEST(FootingsOf, AreTheSameInAnyUnits) {
   }
 }
 
-TEST(FootingsOf, LookAtTheSurfaceAmongWhatNobodyHasSeenBelowIt) {
+TEST(Stance, LookAtTheSurfaceAmongWhatNobodyHasSeenBelowIt) {
   Standing block = on_a_floor();
   block.lies_below(0.4, 300);
   const auto footings = block.after({1.2, -0.04, 0});
@@ -94,7 +92,7 @@ TEST(FootingsOf, LookAtTheSurfaceAmongWhatNobodyHasSeenBelowIt) {
   EXPECT_NEAR(footings->after.height - footings->before.height, -0.04, 0.01);
 }
 
-TEST(FootingsOf, OfASlopeAreAlongIt) {
+TEST(Stance, OfASlopeAreAlongIt) {
   Standing block(DVec3(0.0));
   block.add_floor(-1.5, 0.8, level);
   block.add_floor(0.8, 3, [](DVec2 at) { return 0.3 * (at.x - 0.8); });
@@ -105,12 +103,11 @@ TEST(FootingsOf, OfASlopeAreAlongIt) {
   EXPECT_NEAR(footings->after.normal.x / footings->after.normal.y, -0.3, 0.02);
 }
 
-TEST(FootingsOf, OfABallThatRollsOverACrownAreWhereItTouches) {
+TEST(Stance, OfABallThatRollsOverACrownAreWhereItTouches) {
   constexpr double crown = 2, radius = 0.3;
   scene::GaussianCloud cloud;
   std::vector<std::uint32_t> part;
   std::vector<Touch> touches;
-  std::vector<DVec3> arrived;
   const auto at = [](double angle, double height) {  // of the crown's axis, z
     return height * DVec3(std::sin(angle), std::cos(angle), 0);
   };
@@ -121,20 +118,21 @@ TEST(FootingsOf, OfABallThatRollsOverACrownAreWhereItTouches) {
     part.push_back(std::uint32_t(i));
     touches.push_back(offset.y < -0.8 * radius ? Touch::stands : Touch::nothing);
     add_at(cloud, Vec3(at(0, crown + radius) + offset), 4, std::log(0.03f));
-    const DQuat turn = glm::angleAxis(-rolled, DVec3(0, 0, 1));
-    arrived.push_back(at(way, crown + radius + miss) + turn * offset);
   }
   for (double angle = -1; angle < 1.3; angle += 0.03)
     for (double z = -1; z < 1; z += 0.06) add_at(cloud, Vec3(at(angle, crown) + DVec3(0, 0, z)), 4, std::log(0.03f));
   const scene::LayeredCloud scene{std::make_shared<const scene::GaussianCloud>(cloud), nullptr};
-  const auto footings = footings_of(scene, part, touches, part, arrived);
+  const DQuat turn = glm::angleAxis(-rolled, DVec3(0, 0, 1));
+  const auto footings = Stance(scene, part, touches, part).after(scene, [&](DVec3 point) {
+    return at(way, crown + radius + miss) + turn * (point - at(0, crown + radius));
+  });
   ASSERT_TRUE(footings);
   EXPECT_GT(glm::dot(footings->before.normal, at(0, 1)), 0.99);
   EXPECT_GT(glm::dot(footings->after.normal, at(way, 1)), 0.99);
   EXPECT_NEAR(footings->after.height - footings->before.height, miss, 0.005);
 }
 
-TEST(FootingsOf, AreNoneWhereNothingIsStoodOn) {
+TEST(Stance, AreNoneWhereNothingIsStoodOn) {
   EXPECT_FALSE(on_a_floor().after({1.2, 1.5, 0})) << "in the air";
   EXPECT_FALSE(on_a_floor().after({1e30, 0, 0})) << "beyond everything";
   EXPECT_FALSE(Standing(DVec3(0.0)).after({0.1, 0, 0})) << "alone";
@@ -148,12 +146,12 @@ TEST(FootingsOf, AreNoneWhereNothingIsStoodOn) {
   EXPECT_FALSE(in_a_heap.after({1.2, 0, 0})) << "no plane is in a heap";
 }
 
-TEST(FootingsOf, AreNoneWhereAllIsInOnePlace) {
+TEST(Stance, AreNoneWhereAllIsInOnePlace) {
   scene::GaussianCloud cloud = cloud_at({{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {1, 0, 0}});
   const scene::LayeredCloud scene{std::make_shared<const scene::GaussianCloud>(cloud), nullptr};
   const std::vector<std::uint32_t> part{0, 1, 2, 3, 4, 5};
-  const std::vector<DVec3> arrived(6, DVec3(1, 0, 0));
-  EXPECT_FALSE(footings_of(scene, part, std::vector(6, Touch::stands), part, arrived));
+  const Stance stance(scene, part, std::vector(6, Touch::stands), part);
+  EXPECT_FALSE(stance.after(scene, [](DVec3) { return DVec3(1, 0, 0); }));
 }
 
 }  // namespace
