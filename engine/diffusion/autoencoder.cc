@@ -17,6 +17,7 @@ constexpr double norm_eps = 1e-6;
 
 /// One head over all places of the coarsest level.
 Tensor attend(const Layer& layer, const Tensor& x, int groups) {
+  layer.begin_block();
   const Tensor tokens = group_norm(layer / "group_norm", x, groups, norm_eps).flatten(2).transpose(1, 2);
   const Tensor out =
       attention(linear(layer / "to_q", tokens), linear(layer / "to_k", tokens), linear(layer / "to_v", tokens), 1, {});

@@ -79,6 +79,7 @@ Tensor attention(const Tensor& q, const Tensor& k, const Tensor& v, int heads, c
 }
 
 Tensor resnet(const Layer& layer, const Tensor& x, const Tensor* embedding, int groups, double eps) {
+  layer.begin_block();
   Tensor hidden = convolution(layer / "conv1", at::silu(group_norm(layer / "norm1", x, groups, eps)));
   if (embedding != nullptr)
     hidden = hidden + linear(layer / "time_emb_proj", at::silu(*embedding)).unsqueeze(-1).unsqueeze(-1);
@@ -88,6 +89,7 @@ Tensor resnet(const Layer& layer, const Tensor& x, const Tensor* embedding, int 
 }
 
 Tensor upsample(const Layer& layer, const Tensor& x) {
+  layer.begin_block();
   const std::array<std::int64_t, 2> size{2 * x.size(2), 2 * x.size(3)};
   return layer.shown(convolution(layer / "conv", at::upsample_nearest2d(x, size)));
 }

@@ -19,6 +19,9 @@ struct Model {
   Parameters parameters;
   const Adapter* adapter = nullptr;  ///< Null: none.
   Probe probe = {};
+  /// Called before each block, on the way back as well; what it throws ends the computation. May be empty.
+  std::function<void()> before_block = {};
+  bool recomputes = true;  ///< In training, transformers are computed again on the way back (recompute.h).
 };
 
 /// A layer, or a part of a network, by its name. Lives as long as its model.
@@ -39,6 +42,11 @@ class Layer {
   [[nodiscard]] const Adapter* adapter() const {
     return model_->adapter != nullptr && model_->adapter->adapts(name_) ? model_->adapter : nullptr;
   }
+  /// A block of the network begins here.
+  void begin_block() const {
+    if (model_->before_block) model_->before_block();
+  }
+  [[nodiscard]] bool recomputes() const { return model_->recomputes; }
   /// Shows what this layer gives, and gives it.
   [[nodiscard]] Tensor shown(Tensor out) const;
 

@@ -18,6 +18,7 @@
 #include "engine/core/rng.h"
 #include "engine/diffusion/adapter.h"
 #include "engine/diffusion/autoencoder.h"
+#include "engine/diffusion/going.h"
 #include "engine/diffusion/guard.h"
 #include "engine/diffusion/networks.h"
 #include "engine/diffusion/pictures.h"
@@ -148,7 +149,9 @@ Result<void> StableDiffusionRepainter::fine_tune(std::span<const correct::Histor
       learned_ = std::make_unique<Learned>(Adapter::fresh(weights::tensors_of(configs.unet), targets, options_.rank,
                                                           options_.rank, seed + seed_of_adapter),
                                            options_);
-    const Model autoencoder{networks.autoencoder}, unet{networks.unet, &learned_->adapter};
+    Going going(advance);
+    const Model autoencoder{.parameters = networks.autoencoder, .before_block = going.asked()};
+    const Model unet{.parameters = networks.unet, .adapter = &learned_->adapter, .before_block = going.asked()};
     Result<Tensor> context = fail(ErrorCode::internal, "");
     {
       const at::NoGradGuard no_gradients;
@@ -172,8 +175,7 @@ Result<void> StableDiffusionRepainter::fine_tune(std::span<const correct::Histor
       double loss = 0;
       learned_->optimiser.clear_gradients();
       for (int k = 0; k < options_.batch; ++k) {
-        if (advance)
-          if (auto going = advance((step + double(k) / options_.batch) / steps); !going) return going;
+        if (auto begun = going.at((step + double(k) / options_.batch) / steps); !begun) return begun;
         Rng rng(seed + std::uint64_t(step), std::uint64_t(k));
         const std::size_t drawn = rng.below(std::uint32_t(history.size()));
         const bool whole = rng.uniform() < 0.5f || history[drawn].box.empty();

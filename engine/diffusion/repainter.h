@@ -61,9 +61,8 @@ class StableDiffusionRepainter final : public correct::Repainter {
   ~StableDiffusionRepainter() override;
 
   /// Pictures are seen whole, or as they are when they are repainted, as often the one as the other.
-  ///   errors  those of `advance`, which is asked before each picture of a batch; those of Tokenizer::encode();
-  ///   internal:
-  ///           a loss or a gradient is not finite; too_large
+  ///   errors  those of `advance`, which is asked before each picture of a batch and each block of a network, on the
+  ///           way back too; those of Tokenizer::encode(); internal: a loss or a gradient is not finite; too_large
   [[nodiscard]] Result<void> fine_tune(std::span<const correct::HistoryPicture> history, int steps, std::uint64_t seed,
                                        const correct::Advance& advance) override;
   /// Each picture by itself, cut out around its mask.

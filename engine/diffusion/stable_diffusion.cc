@@ -14,6 +14,7 @@
 #include "engine/core/finite.h"
 #include "engine/core/rng.h"
 #include "engine/diffusion/autoencoder.h"
+#include "engine/diffusion/going.h"
 #include "engine/diffusion/guard.h"
 #include "engine/diffusion/img2img.h"
 #include "engine/diffusion/networks.h"
@@ -124,11 +125,14 @@ Result<scene::Image> StableDiffusion::repaint(const scene::Image& picture, const
     const auto positive = networks_->context_of(options.prompt, "prompt", text_adapter);
     if (!positive) return propagate(positive);
 
-    const Model autoencoder{networks_->autoencoder}, unet{networks_->unet, Adapters::pointer(adapters_->unet)};
+    Going going(advance);
+    const Model autoencoder{.parameters = networks_->autoencoder, .before_block = going.asked()};
+    const Model unet{
+        .parameters = networks_->unet, .adapter = Adapters::pointer(adapters_->unet), .before_block = going.asked()};
     // Encoding and decoding take about as long as a call of the UNet does.
     const double calls = double(scheduler->timesteps().size()) + 2;
-    const auto after = [&](double done) { return advance ? advance(done / calls) : Result<void>{}; };
-    if (auto going = after(0); !going) return propagate(going);
+    const auto after = [&](double done) { return going.at(done / calls); };
+    if (auto begun = after(0); !begun) return propagate(begun);
     const Tensor moments = encode_moments(autoencoder, all.autoencoder, as_tensor(picture));
     Tensor noise = at::empty({1, all.autoencoder.latent_channels, moments.size(2), moments.size(3)}, at::kFloat);
     fill_normal(numbers_of(noise), options.seed, Stream::latents);
@@ -142,7 +146,7 @@ Result<scene::Image> StableDiffusion::repaint(const scene::Image& picture, const
     const auto done = denoise(unet, all.unet, *scheduler, latents, at::cat({*negative, *positive}), options.guidance,
                               later, [&](double part) { return after(1 + part * (calls - 2)); });
     if (!done) return propagate(done);
-    if (auto going = after(calls - 1); !going) return propagate(going);
+    if (auto painted = after(calls - 1); !painted) return propagate(painted);
     return as_picture(decode_latents(autoencoder, all.autoencoder, latents));
   });
 }

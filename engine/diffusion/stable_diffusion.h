@@ -51,7 +51,7 @@ class StableDiffusion {
   /// The picture as the prompt describes it; the less strength, the nearer to what it was. Without a step (little
   /// strength) it is given back as it is.
   ///   picture  [3], 0 to 1, sides multiples of side_multiple()
-  ///   advance  asked before each call of a network; may be empty
+  ///   advance  asked before each call of a network, and within it before each block; may be empty
   ///   returns  of the same size, within 0 to 1
   ///   errors   invalid_argument (`where`: picture, a place in it that is not finite, or the name of an option); those
   ///   of

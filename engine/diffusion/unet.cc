@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "engine/diffusion/recompute.h"
+
 namespace engine::diffusion {
 namespace {
 
@@ -40,6 +42,7 @@ Tensor feed_forward(const Layer& layer, const Tensor& x) {
 
 Tensor transformer(const Layer& layer, const Tensor& x, const Tensor& context, int heads,
                    const weights::UNetConfig& config) {
+  layer.begin_block();
   const std::int64_t batch = x.size(0), width = x.size(1), height = x.size(2), breadth = x.size(3);
   const auto as_tokens = [&](const Tensor& picture) { return picture.reshape({batch, width, -1}).transpose(1, 2); };
   const auto as_picture = [&](const Tensor& tokens) {
@@ -84,12 +87,22 @@ class Call {
     return resnet(layer, x, &embedding_, config_.norm_groups, config_.norm_eps);
   }
 
+  /// Most of what a step of training would keep is what transformers compute: at 512 x 512 pixels the products of five
+  /// of them take 2.7 GB.
+  Tensor transformer_of(const Layer& layer, const Tensor& x, std::size_t level) const {
+    const Part part = [layer, heads = config_.heads[level], &config = config_](const Tensor& in,
+                                                                               const Tensor& context) {
+      return transformer(layer, in, context, heads, config);
+    };
+    return layer.recomputes() ? recomputed(part, x, context_) : part(x, context_);
+  }
+
   Tensor down(int level, Tensor hidden) {
     const Layer block = root_ / "down_blocks" / level;
     for (int i = 0; i < config_.layers_per_block; ++i) {
       hidden = resnet_of(block / "resnets" / i, hidden);
       if (config_.down_attends[std::size_t(level)])
-        hidden = transformer(block / "attentions" / i, hidden, context_, config_.heads[std::size_t(level)], config_);
+        hidden = transformer_of(block / "attentions" / i, hidden, std::size_t(level));
       left_.push_back(hidden);
     }
     if (level + 1 < int(config_.channels.size())) {
@@ -103,7 +116,7 @@ class Call {
   Tensor middle(const Tensor& x) const {
     const Layer block = root_ / "mid_block";
     Tensor hidden = resnet_of(block / "resnets.0", x);
-    hidden = transformer(block / "attentions.0", hidden, context_, config_.heads.back(), config_);
+    hidden = transformer_of(block / "attentions.0", hidden, config_.heads.size() - 1);
     return block.shown(resnet_of(block / "resnets.1", hidden));
   }
 
@@ -115,8 +128,7 @@ class Call {
       hidden = resnet_of(block / "resnets" / layer, at::cat({hidden, left_.back()}, 1));
       left_.pop_back();
       if (config_.up_attends[std::size_t(i)])
-        hidden =
-            transformer(block / "attentions" / layer, hidden, context_, config_.heads[std::size_t(level)], config_);
+        hidden = transformer_of(block / "attentions" / layer, hidden, std::size_t(level));
     }
     if (level > 0) hidden = upsample(block / "upsamplers.0", hidden);
     return block.shown(std::move(hidden));
