@@ -15,6 +15,7 @@ namespace engine::diffusion {
 
 struct StableDiffusion::Networks {
   weights::Configs configs;
+  std::string digest;  ///< Of all that was read of the checkpoint.
   Tokenizer tokenizer;
   Parameters unet, autoencoder, text_encoder;
 

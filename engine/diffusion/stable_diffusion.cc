@@ -52,22 +52,21 @@ struct StableDiffusion::Adapters {
 Result<StableDiffusion> StableDiffusion::open(const std::filesystem::path& path) {
   const auto checkpoint = weights::Checkpoint::open(path);
   if (!checkpoint) return propagate(checkpoint);
-  auto vocabulary = weights::read_vocabulary(checkpoint->tokenizer_folder(), checkpoint->is_open_clip());
+  auto vocabulary = weights::read_vocabulary(checkpoint->tokenizer_folder(), checkpoint->is_open_clip(),
+                                             checkpoint->configs().text_encoder.vocabulary);
   if (!vocabulary) return propagate(vocabulary);
-  const int pieces = checkpoint->configs().text_encoder.vocabulary;
-  for (const auto& [piece, number] : vocabulary->numbers)
-    if (number >= pieces)
-      return fail(ErrorCode::corrupt_data, "the text encoder has " + std::to_string(pieces) + " pieces only",
-                  "vocab.json:" + piece);
   auto unet = Parameters::load(*checkpoint, weights::Network::unet);
   if (!unet) return propagate(unet);
   auto autoencoder = Parameters::load(*checkpoint, weights::Network::autoencoder);
   if (!autoencoder) return propagate(autoencoder);
   auto text_encoder = Parameters::load(*checkpoint, weights::Network::text_encoder);
   if (!text_encoder) return propagate(text_encoder);
+  const auto of_tensors = checkpoint->digest();
+  if (!of_tensors) return propagate(of_tensors);
+  std::string digest = *of_tensors + vocabulary->digest;
   StableDiffusion opened;
-  opened.networks_ = std::make_shared<const Networks>(
-      Networks{checkpoint->configs(), Tokenizer(std::move(*vocabulary)), *unet, *autoencoder, *text_encoder});
+  opened.networks_ = std::make_shared<const Networks>(Networks{
+      checkpoint->configs(), std::move(digest), Tokenizer(std::move(*vocabulary)), *unet, *autoencoder, *text_encoder});
   opened.adapters_ = std::make_shared<const Adapters>();
   return opened;
 }
@@ -84,10 +83,7 @@ Result<void> StableDiffusion::adapt(const weights::AdapterWeights& weights, doub
   });
 }
 
-int StableDiffusion::side_multiple() const {
-  const weights::Configs& all = networks_->configs;
-  return all.autoencoder.pixels_per_latent() << (all.unet.channels.size() - 1);
-}
+int StableDiffusion::side_multiple() const { return weights::side_multiple(networks_->configs); }
 
 const weights::Configs& StableDiffusion::configs() const { return networks_->configs; }
 

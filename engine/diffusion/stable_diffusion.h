@@ -11,14 +11,15 @@
 #include "engine/diffusion/scheduler.h"
 #include "engine/scene/image.h"
 #include "engine/weights/adapter_file.h"
+#include "engine/weights/networks.h"
 
 namespace engine::diffusion {
 
 using correct::Advance;
 
-/// Pixels of the largest picture that is repainted: 1024 x 1024, or as many. The autoencoder holds several tensors of
-/// 128 channels at that size, each of half a gigabyte.
-constexpr std::int64_t max_repaint_pixels = std::int64_t{1} << 20;
+/// Pixels of the largest picture that is repainted. The autoencoder holds several tensors of 128 channels at that size,
+/// each of half a gigabyte.
+constexpr std::int64_t max_repaint_pixels = std::int64_t{weights::max_picture_side} * weights::max_picture_side;
 
 /// How a picture is repainted.
 struct RepaintOptions {

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "engine/io/read_bytes.h"
+#include "engine/weights/digest.h"
 #include "engine/weights/original_names.h"
 
 namespace engine::weights {
@@ -42,31 +43,30 @@ Result<TensorFile> open_part(const fs::path& folder, const std::string& stem) {
 
 template <class Config>
 Result<void> read_config(const fs::path& folder, const char* part, const char* name,
-                         Result<Config> (*parse)(std::span<const std::byte>, const std::string&), Config& config) {
+                         Result<Config> (*parse)(std::span<const std::byte>, const std::string&), Config& config,
+                         Digest& digest) {
   const auto bytes = io::read_bytes(folder / part / name, max_config_bytes);
   if (!bytes) return propagate(bytes);
+  digest.add(*bytes);
   auto parsed = parse(*bytes, std::string(part) + "/" + name);
   if (!parsed) return propagate(parsed);
   config = std::move(*parsed);
   return {};
 }
 
-Result<Configs> read_configs(const fs::path& folder) {
+Result<Configs> read_configs(const fs::path& folder, Digest& digest) {
   Configs configs;
-  if (auto read = read_config(folder, "unet", "config.json", parse_unet_config, configs.unet); !read)
-    return propagate(read);
-  if (auto read = read_config(folder, "vae", "config.json", parse_autoencoder_config, configs.autoencoder); !read)
-    return propagate(read);
-  if (auto read = read_config(folder, "text_encoder", "config.json", parse_text_encoder_config, configs.text_encoder);
-      !read)
-    return propagate(read);
-  if (auto read = read_config(folder, "scheduler", "scheduler_config.json", parse_noise_config, configs.noise); !read)
-    return propagate(read);
-  if (configs.unet.context_width != configs.text_encoder.width)
-    return fail(ErrorCode::corrupt_data,
-                "the text encoder's tokens have " + std::to_string(configs.text_encoder.width) +
-                    " numbers, of which the UNet takes " + std::to_string(configs.unet.context_width),
-                "unet/config.json:cross_attention_dim");
+  const auto read = [&](const char* part, const char* name, auto parse, auto& config) {
+    return read_config(folder, part, name, parse, config, digest);
+  };
+  if (auto done = read("unet", "config.json", parse_unet_config, configs.unet); !done) return propagate(done);
+  if (auto done = read("vae", "config.json", parse_autoencoder_config, configs.autoencoder); !done)
+    return propagate(done);
+  if (auto done = read("text_encoder", "config.json", parse_text_encoder_config, configs.text_encoder); !done)
+    return propagate(done);
+  if (auto done = read("scheduler", "scheduler_config.json", parse_noise_config, configs.noise); !done)
+    return propagate(done);
+  if (const auto valid = validate(configs); !valid) return propagate(valid);
   return configs;
 }
 
@@ -90,8 +90,10 @@ Result<Checkpoint> Checkpoint::open(const fs::path& path) {
     return checkpoint;
   }
   Checkpoint checkpoint;
-  auto configs = read_configs(path);
+  Digest of_configs;
+  auto configs = read_configs(path, of_configs);
   if (!configs) return propagate(configs);
+  checkpoint.configs_digest_ = of_configs.text();
   checkpoint.configs_ = std::move(*configs);
   for (const Part& part : parts) {
     auto file = open_part(path / part.folder, part.stem);
@@ -161,6 +163,18 @@ Result<void> Checkpoint::check() const {
     for (const TensorSpec& spec : tensors_of(configs_, network))
       if (const auto found = find(network, spec); !found) return propagate(found);
   return {};
+}
+
+Result<std::string> Checkpoint::digest() const {
+  Digest digest;
+  digest.add(configs_digest_);
+  for (const Network network : {Network::unet, Network::autoencoder, Network::text_encoder})
+    for (const TensorSpec& spec : tensors_of(configs_, network)) {
+      const auto found = find(network, spec);
+      if (!found) return propagate(found);
+      digest.add(spec.name, found->tensor);
+    }
+  return digest.text();
 }
 
 }  // namespace engine::weights

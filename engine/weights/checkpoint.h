@@ -45,9 +45,13 @@ class Checkpoint {
   [[nodiscard]] Result<FoundTensor> find(Network network, const TensorSpec& spec) const;
   /// Are all tensors of all networks there, in their shapes? Their numbers are not looked at.
   [[nodiscard]] Result<void> check() const;
+  /// Of all tensors of all networks and of the folder's configurations. Reads every number, as loading them does.
+  ///   errors  those of find()
+  [[nodiscard]] Result<std::string> digest() const;
 
  private:
   Configs configs_;
+  std::string configs_digest_;  ///< Of a folder's files of them.
   std::filesystem::path tokenizer_folder_;
   bool single_ = false;  ///< One file in the original layout; its networks share files_[0].
   bool open_clip_ = false;

@@ -25,10 +25,12 @@ int whole(const JsonFields& fields, const char* key, int low, int high, int othe
   return fields.has_value(key) ? whole(fields.at(key), low, high) : otherwise;
 }
 
+/// What is divided by it, or it is added to, stays a float.
 double positive(const JsonFields& fields, const char* key, double otherwise) {
+  constexpr double least = 1e-12, most = 1e6;
   if (!fields.has_value(key)) return otherwise;
   const double number = fields.at(key).number();
-  if (!(number > 0 && number < 1e6)) fields.at(key).fail_here("expected a number above 0");
+  if (!(number >= least && number <= most)) fields.at(key).fail_here("expected a number from 1e-12 to 1e6");
   return number;
 }
 
@@ -252,6 +254,28 @@ Result<NoiseConfig> parse_noise_config(std::span<const std::byte> json, const st
     config.ends_without_noise = sampler == "DDIMScheduler" || sampler == "LCMScheduler";
     if (fields.has_value("set_alpha_to_one")) config.ends_without_noise = fields.at("set_alpha_to_one").boolean();
   });
+}
+
+int side_multiple(const Configs& configs) {
+  return configs.autoencoder.pixels_per_latent() << (configs.unet.channels.size() - 1);
+}
+
+Result<void> validate(const Configs& configs) {
+  const auto too_large = [](int pixels, const char* field) {
+    return fail(ErrorCode::unsupported,
+                "networks for pictures of " + std::to_string(pixels) + " pixels a side, which have at most " +
+                    std::to_string(max_picture_side) + " here",
+                std::string("unet/config.json:") + field);
+  };
+  if (configs.unet.context_width != configs.text_encoder.width)
+    return fail(ErrorCode::corrupt_data,
+                "the text encoder's tokens have " + std::to_string(configs.text_encoder.width) +
+                    " numbers, of which the UNet takes " + std::to_string(configs.unet.context_width),
+                "unet/config.json:cross_attention_dim");
+  if (side_multiple(configs) > max_picture_side) return too_large(side_multiple(configs), "block_out_channels");
+  const int side = configs.unet.sample_side * configs.autoencoder.pixels_per_latent();
+  if (side > max_picture_side) return too_large(side, "sample_size");
+  return {};
 }
 
 }  // namespace engine::weights

@@ -73,6 +73,17 @@ struct Configs {
   NoiseConfig noise;
 };
 
+/// Pixels along a side of the largest picture that networks are shown: twice that of 1.x and 2.x-base. Beyond, their
+/// memory would have no bound that is known.
+constexpr int max_picture_side = 1 << 10;
+
+/// Sides of pictures are multiples of this: 64 for 1.x and 2.x. Each level of either network halves them once more.
+[[nodiscard]] int side_multiple(const Configs& configs);
+
+/// Do networks of these configurations fit each other, and what they are shown into max_picture_side?
+///   errors  corrupt_data, unsupported; `where` is the field
+[[nodiscard]] Result<void> validate(const Configs& configs);
+
 /// Those of Stable Diffusion 1.x, and of 2.x-base, for files that have none beside them.
 [[nodiscard]] Configs stable_diffusion_1();
 [[nodiscard]] Configs stable_diffusion_2_base();

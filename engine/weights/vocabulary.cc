@@ -8,6 +8,7 @@
 
 #include "engine/io/json_fields.h"
 #include "engine/io/read_bytes.h"
+#include "engine/weights/digest.h"
 
 namespace engine::weights {
 namespace {
@@ -39,15 +40,18 @@ Result<std::vector<std::pair<std::string, std::string>>> parse_merges(std::strin
   return merges;
 }
 
-Result<void> read_numbers(const std::filesystem::path& path, Vocabulary& vocabulary) {
+Result<void> read_numbers(const std::filesystem::path& path, int pieces, Vocabulary& vocabulary, Digest& digest) {
   const auto bytes = io::read_bytes(path, max_vocabulary_bytes);
   if (!bytes) return propagate(bytes);
+  digest.add(*bytes);
   const auto document = io::parse_json(*bytes, "vocab.json");
   if (!document) return propagate(document);
   if (!document->is_object()) return fail(ErrorCode::corrupt_data, "expected an object", "vocab.json");
   for (const auto& [piece, number] : document->items()) {
-    if (!number.is_number_unsigned() || number.get<std::uint64_t>() >= (1u << 24))
-      return fail(ErrorCode::corrupt_data, "expected a number of a piece", "vocab.json:" + piece);
+    if (!number.is_number_unsigned() || number.get<std::uint64_t>() >= std::uint64_t(pieces))
+      return fail(ErrorCode::corrupt_data,
+                  "expected the number of a piece, of which the text encoder has " + std::to_string(pieces),
+                  "vocab.json:" + piece);
     vocabulary.numbers.emplace(piece, number.get<int>());
   }
   for (const auto& [mark, number] : {std::pair(begin_mark, &vocabulary.begin), std::pair(end_mark, &vocabulary.end)}) {
@@ -60,9 +64,10 @@ Result<void> read_numbers(const std::filesystem::path& path, Vocabulary& vocabul
 }
 
 /// "pad_token" of special_tokens_map.json: a text, or an object with one as its content.
-Result<int> read_filler(const std::filesystem::path& path, const Vocabulary& vocabulary) {
+Result<int> read_filler(const std::filesystem::path& path, const Vocabulary& vocabulary, Digest& digest) {
   const auto bytes = io::read_bytes(path, max_vocabulary_bytes);
   if (!bytes) return propagate(bytes);
+  digest.add(*bytes);
   const auto document = io::parse_json(*bytes, "special_tokens_map.json");
   if (!document) return propagate(document);
   std::optional<Error> error;
@@ -110,11 +115,13 @@ Vocabulary clip_vocabulary(std::vector<std::pair<std::string, std::string>> merg
   return vocabulary;
 }
 
-Result<Vocabulary> read_vocabulary(const std::filesystem::path& folder, bool open_clip) {
+Result<Vocabulary> read_vocabulary(const std::filesystem::path& folder, bool open_clip, int pieces) {
   Vocabulary vocabulary;
-  if (const auto read = read_numbers(folder / "vocab.json", vocabulary); !read) return propagate(read);
+  Digest digest;
+  if (const auto read = read_numbers(folder / "vocab.json", pieces, vocabulary, digest); !read) return propagate(read);
   const auto bytes = io::read_bytes(folder / "merges.txt", max_vocabulary_bytes);
   if (!bytes) return propagate(bytes);
+  digest.add(*bytes);
   auto merges = parse_merges({reinterpret_cast<const char*>(bytes->data()), bytes->size()}, "merges.txt");
   if (!merges) return propagate(merges);
   vocabulary.merges = std::move(*merges);
@@ -122,10 +129,11 @@ Result<Vocabulary> read_vocabulary(const std::filesystem::path& folder, bool ope
   std::error_code ignored;
   vocabulary.filler = open_clip ? 0 : vocabulary.end;
   if (std::filesystem::is_regular_file(special, ignored)) {
-    const auto filler = read_filler(special, vocabulary);
+    const auto filler = read_filler(special, vocabulary, digest);
     if (!filler) return propagate(filler);
     vocabulary.filler = *filler;
   }
+  vocabulary.digest = digest.text();
   return vocabulary;
 }
 

@@ -17,6 +17,7 @@ struct Vocabulary {
   std::vector<std::pair<std::string, std::string>> merges;  ///< The first are done first.
   int begin = 0, end = 0;                                   ///< Of "<|startoftext|>" and "<|endoftext|>".
   int filler = 0;                                           ///< What prompts are filled up with.
+  std::string digest = {};                                  ///< Of the files that it was read from.
 };
 
 /// CLIP's own: 256 characters for bytes, the same at the end of a word, one piece for each merge, and the two marks.
@@ -28,7 +29,9 @@ struct Vocabulary {
 
 /// Reads vocab.json, merges.txt and, for what prompts are filled up with, special_tokens_map.json, if there is one.
 ///   open_clip  without that file, prompts are filled up as 2.x does: by piece 0
-///   errors     not_found: a file is missing; corrupt_data: not as such files are, or a mark is missing
-[[nodiscard]] Result<Vocabulary> read_vocabulary(const std::filesystem::path& folder, bool open_clip);
+///   pieces     of the text encoder that is given the numbers
+///   errors     not_found: a file is missing; corrupt_data: not as such files are, a mark is missing, or a number is
+///              none of a piece; `where` is "FILE:PLACE"
+[[nodiscard]] Result<Vocabulary> read_vocabulary(const std::filesystem::path& folder, bool open_clip, int pieces);
 
 }  // namespace engine::weights

@@ -41,7 +41,7 @@ const std::vector<Reserved>& reserved() {
       {"prometheus/", {"server/http"}, false},
       {"zip.h", {"engine/io", "server/scenes/uploads"}, false},
       {"webp/", {"engine/io"}, false},
-      {"xxh", {"server/scenes/disk"}, false}};
+      {"xxh", {"engine/weights", "server/scenes/disk"}, false}};
   return list;
 }
 

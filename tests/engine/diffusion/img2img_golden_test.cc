@@ -33,7 +33,9 @@ class Img2ImgGolden : public testing::Test {
     models.emplace(tiny_models());
     file.emplace(support::golden_dir() / "img2img.safetensors");
     json = nlohmann::json::parse(support::read_file(support::golden_dir() / "img2img.json"));
-    tokenizer.emplace(weights::read_vocabulary(models->checkpoint.tokenizer_folder(), false).value());
+    tokenizer.emplace(weights::read_vocabulary(models->checkpoint.tokenizer_folder(), false,
+                                               models->configs().text_encoder.vocabulary)
+                          .value());
   }
 
   /// [2, 77, width]: negative prompt, prompt.

@@ -14,7 +14,7 @@ using Numbers = std::vector<std::int64_t>;
 
 TEST(TokenizerGolden, TinyVocabulary) {
   REQUIRE_SHARED(support::golden_dir() / "tokenizer.json");
-  auto vocabulary = weights::read_vocabulary(support::golden_dir() / "tiny_sd/tokenizer", false);
+  auto vocabulary = weights::read_vocabulary(support::golden_dir() / "tiny_sd/tokenizer", false, 765);
   ASSERT_TRUE(vocabulary) << vocabulary.error().message;
   const Tokenizer tokenizer(std::move(*vocabulary));
   const auto cases = nlohmann::json::parse(support::read_file(support::golden_dir() / "tokenizer.json"))["cases"];

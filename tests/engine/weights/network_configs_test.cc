@@ -1,5 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <cctype>
+#include <string>
+#include <vector>
+
 #include "engine/weights/networks.h"
 #include "tests/engine/weights/samples.h"
 
@@ -115,6 +119,61 @@ TEST(NetworkConfigs, SizesThatCannotBeAreNamed) {
             "unet/config.json:layers_per_block");
   EXPECT_EQ(refused("[]").code, ErrorCode::corrupt_data);
   EXPECT_EQ(refused("{").code, ErrorCode::corrupt_data);
+}
+
+/// Every number of a file, in place of it what no network has.
+TEST(NetworkConfigs, NoNumberIsBelieved) {
+  const std::vector<std::string> numbers{
+      "0",    "-1",   "1.5",   "1e400", "-1e400", "2147483648", "1e18", "9223372036854775808",
+      "null", "true", "\"4\"", "{}",    "[[]]"};
+  int refused_ones = 0;
+  const auto look = [&](auto parse, const std::string& file, const std::string& usual) {
+    ASSERT_TRUE(parse(bytes_of(usual), file)) << usual;
+    for (std::size_t at = 0; at < usual.size(); ++at) {
+      if (!std::isdigit(static_cast<unsigned char>(usual[at])) ||
+          std::string(":[,").find(usual[at - 1]) == std::string::npos)
+        continue;
+      const std::size_t end = usual.find_first_not_of("0123456789.e-", at);
+      for (const std::string& number : numbers) {
+        const std::string json = usual.substr(0, at) + number + usual.substr(end);
+        const auto config = parse(bytes_of(json), file);
+        if (config) continue;  // null is "as usual", and some may be 0
+        EXPECT_TRUE(config.error().where.starts_with(file)) << json << ": " << config.error().where;
+        ++refused_ones;
+      }
+    }
+  };
+  look(parse_unet_config, "unet", unet.substr(0, unet.size() - 1) + R"(,"norm_eps":1e-5,"sample_size":64})");
+  look(parse_autoencoder_config, "vae",
+       R"({"block_out_channels":[4,8],"norm_num_groups":2,"layers_per_block":2,"scaling_factor":0.18215,
+           "down_block_types":["DownEncoderBlock2D","DownEncoderBlock2D"],
+           "up_block_types":["UpDecoderBlock2D","UpDecoderBlock2D"]})");
+  look(parse_text_encoder_config, "text",
+       R"({"hidden_size":6,"intermediate_size":10,"num_hidden_layers":2,"num_attention_heads":2,"vocab_size":520,
+           "max_position_embeddings":77,"layer_norm_eps":1e-5})");
+  look(
+      parse_noise_config, "noise",
+      R"({"beta_schedule":"scaled_linear","beta_start":0.00085,"beta_end":0.012,"num_train_timesteps":1000,"steps_offset":1})");
+  EXPECT_GT(refused_ones, 250);
+}
+
+TEST(NetworkConfigs, PicturesThatNobodyHasMemoryForAreRefused) {
+  Configs configs;
+  EXPECT_TRUE(validate(configs));
+  configs.unet.sample_side = 128;
+  EXPECT_TRUE(validate(configs)) << "1,024 pixels";
+  configs.unet.sample_side = 129;
+  EXPECT_EQ(validate(configs).error().where, "unet/config.json:sample_size");
+  configs = {};
+  configs.unet.context_width = 767;
+  EXPECT_EQ(validate(configs).error().where, "unet/config.json:cross_attention_dim");
+  configs = {};
+  configs.unet.sample_side = 1;
+  configs.unet.channels.assign(8, 320);
+  EXPECT_EQ(side_multiple(configs), 1024);
+  EXPECT_TRUE(validate(configs));
+  configs.autoencoder.channels.assign(5, 128);
+  EXPECT_EQ(validate(configs).error().where, "unet/config.json:block_out_channels") << "multiples of 2,048 pixels";
 }
 
 TEST(NetworkConfigs, OfTheSecondGenerationAreItsOwn) {
