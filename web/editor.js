@@ -61,7 +61,7 @@ export const NOTHING_OPEN = {
   preset: "",
   prompt: null,
   negative_prompt: null,
-  allow_slow: false, // A diffusion model may work for hours.
+  allow_slow: false, // Networks may work for hours.
   attach: null,
   crumbs: null, // What becomes of what the selection has left out; null: it goes along.
   shadow: null, // What becomes of the shadow of the selection; null: it goes along.

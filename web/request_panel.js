@@ -112,10 +112,10 @@ export function buildRequestPanel(editor) {
   const slow = toggle({
     label: "It may take hours",
     testid: "allow-slow",
-    title: "Without a graphics card a diffusion model works for hours: Estimate tells for how long",
+    title: "Without a graphics card networks work for hours: Estimate tells for how long",
     changed: (on) => editor.settle({ allow_slow: on }),
   });
-  const painted = h("div", { testid: "painted" }, labelled("Prompt", promptField), slow.element);
+  const painted = h("div", { testid: "painted" }, labelled("Prompt", promptField));
   const paramProblem = problemPlace("param-problem");
   const settings = h(
     "details",
@@ -127,6 +127,7 @@ export function buildRequestPanel(editor) {
     settleField,
     params.element,
     painted,
+    slow.element,
     regionOn.element,
     regionFields,
     regionProblem,
@@ -223,6 +224,7 @@ export function buildRequestPanel(editor) {
       params.update(state.info, state.params, state.preset);
       painted.hidden = !(state.params.corrector === "sd" && hasDiffusion(state.info));
       promptField.value = state.prompt ?? "";
+      slow.element.hidden = painted.hidden && state.params.perceptual !== "lpips";
       slow.update(state.allow_slow);
       auto.update(state.autoPreview);
       repair.update(state.draftOnRelease);

@@ -1,5 +1,6 @@
 #include "engine/diffusion/lpips.h"
 
+#include <ATen/Parallel.h>
 #include <ATen/TensorOperators.h>
 #include <ATen/core/Tensor.h>
 #include <ATen/core/grad_mode.h>
@@ -11,6 +12,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,40 +25,16 @@ namespace engine::diffusion {
 namespace {
 
 constexpr int least_side = 16;  // four times halved, one pixel is left
-constexpr std::size_t depths = 5;
-
-/// VGG16's convolutions: place in `features`, and channels. A depth ends with the last of each width's run.
-struct Convolution {
-  int place;
-  int in, out;
-  bool ends_depth;  ///< Its features are compared; what comes after begins with half the size.
-};
-constexpr std::array<Convolution, 13> convolutions = {{{0, 3, 64, false},
-                                                       {2, 64, 64, true},
-                                                       {5, 64, 128, false},
-                                                       {7, 128, 128, true},
-                                                       {10, 128, 256, false},
-                                                       {12, 256, 256, false},
-                                                       {14, 256, 256, true},
-                                                       {17, 256, 512, false},
-                                                       {19, 512, 512, false},
-                                                       {21, 512, 512, true},
-                                                       {24, 512, 512, false},
-                                                       {26, 512, 512, false},
-                                                       {28, 512, 512, true}}};
+constexpr std::size_t depths = weights::lpips_depths;
 
 // What pictures in -1 to 1 are shifted and divided by, channel by channel (version 0.1).
 constexpr std::array<float, 3> shift = {-0.030f, -0.088f, -0.188f}, divisor = {0.458f, 0.448f, 0.450f};
 
-Result<Tensor> read(const weights::TensorFile& file, const std::string& name, const weights::Shape& shape) {
-  const std::string where = file.name() + ":" + name;
-  const weights::StoredTensor* stored = file.find(name);
-  if (stored == nullptr) return fail(ErrorCode::corrupt_data, "this tensor is missing", where);
-  if (stored->shape != shape)
-    return fail(ErrorCode::corrupt_data,
-                "its shape is " + weights::text_of(stored->shape) + "; expected " + weights::text_of(shape), where);
-  Tensor tensor = at::empty(shape, at::kFloat);
-  const auto done = weights::read_floats(*stored, where, {tensor.data_ptr<float>(), std::size_t(tensor.numel())});
+/// A tensor of a file that was checked.
+Result<Tensor> read(const weights::TensorFile& file, const weights::TensorSpec& spec) {
+  Tensor tensor = at::empty(spec.shape, at::kFloat);
+  const auto done = weights::read_floats(*file.find(spec.name), file.name() + ":" + spec.name,
+                                         {tensor.data_ptr<float>(), std::size_t(tensor.numel())});
   if (!done) return propagate(done);
   return tensor;
 }
@@ -94,12 +72,15 @@ struct Lpips::Network {
   std::vector<Tensor> linear;  ///< [1, C, 1, 1] of each depth.
 
   /// Of each depth, of unit length.
-  [[nodiscard]] std::vector<Tensor> features(const Tensor& input) const {
+  ///   ask  called before each convolution, on the way back as well
+  [[nodiscard]] std::vector<Tensor> features(const Tensor& input, const std::function<void()>& ask) const {
     std::vector<Tensor> all;
     Tensor hidden = drawn_out(input);
     for (std::size_t i = 0; i < layers.size(); ++i) {
+      ask();
       hidden = at::relu(at::conv2d(hidden, layers[i].weight, layers[i].bias, 1, 1));
-      if (!convolutions[i].ends_depth) continue;
+      if (hidden.requires_grad()) hidden.register_hook([ask](const Tensor&) { ask(); });
+      if (!weights::vgg_convolutions[i].ends_depth) continue;
       all.push_back(of_unit_length(hidden));
       if (all.size() < depths) hidden = at::max_pool2d(hidden, 2, 2);
     }
@@ -107,34 +88,26 @@ struct Lpips::Network {
   }
 };
 
-Lpips::Lpips(std::unique_ptr<const Network> network) : network_(std::move(network)) {}
+Lpips::Lpips(std::unique_ptr<const Network> network, std::string digest, int threads)
+    : network_(std::move(network)), digest_(std::move(digest)), threads_(threads) {}
 Lpips::~Lpips() = default;
 
-Result<std::unique_ptr<Lpips>> Lpips::open(const std::filesystem::path& vgg16, const std::filesystem::path& linear) {
-  const auto network = weights::TensorFile::open(vgg16);
-  if (!network) return propagate(network);
-  const auto own = weights::TensorFile::open(linear);
-  if (!own) return propagate(own);
-  return create(*network, *own);
-}
-
-Result<std::unique_ptr<Lpips>> Lpips::create(const weights::TensorFile& vgg16, const weights::TensorFile& linear) {
-  return guarded(vgg16.name(), [&]() -> Result<std::unique_ptr<Lpips>> {
+Result<std::unique_ptr<Lpips>> Lpips::create(const weights::LpipsFiles& files, int threads) {
+  if (const auto checked = files.check(); !checked) return propagate(checked);
+  return guarded(files.vgg16.name(), [&]() -> Result<std::unique_ptr<Lpips>> {
     auto network = std::make_unique<Network>();
-    for (const Convolution& convolution : convolutions) {
-      const std::string name = "features." + std::to_string(convolution.place);
-      auto weight = read(vgg16, name + ".weight", {convolution.out, convolution.in, 3, 3});
+    for (const weights::VggConvolution& convolution : weights::vgg_convolutions) {
+      auto weight = read(files.vgg16, weights::vgg_weight(convolution));
       if (!weight) return propagate(weight);
-      auto bias = read(vgg16, name + ".bias", {convolution.out});
+      auto bias = read(files.vgg16, weights::vgg_bias(convolution));
       if (!bias) return propagate(bias);
       network->layers.push_back({std::move(*weight), std::move(*bias)});
       if (!convolution.ends_depth) continue;
-      const std::string own = "lin" + std::to_string(network->linear.size()) + ".model.1.weight";
-      auto weighting = read(linear, own, {1, convolution.out, 1, 1});
+      auto weighting = read(files.linear, weights::lpips_weight(network->linear.size(), convolution.out));
       if (!weighting) return propagate(weighting);
       network->linear.push_back(std::move(*weighting));
     }
-    return std::unique_ptr<Lpips>(new Lpips(std::move(network)));
+    return std::unique_ptr<Lpips>(new Lpips(std::move(network), files.digest(), threads));
   });
 }
 
@@ -155,15 +128,19 @@ Result<double> Lpips::evaluate_signed(const scene::Image& rendered, const scene:
       target.channels != 3 || rendered.pixels() == 0)
     return fail(ErrorCode::invalid_argument, "expected two pictures of one size and three channels", "rendered");
   return guarded("lpips", [&]() -> Result<double> {
+    if (threads_ > 0) at::set_num_threads(threads_);
+    const auto ask = [this] {
+      if (auto going = going_on(); !going) throw Ended(going.error());
+    };
     std::vector<Tensor> of_target;
     {
       const at::NoGradGuard no_gradients;
-      of_target = network_->features(as_input(target));
+      of_target = network_->features(as_input(target), ask);
     }
     const at::AutoGradMode gradients(true);
     Tensor input = as_input(rendered);
     input.requires_grad_();
-    const std::vector<Tensor> of_rendered = network_->features(input);
+    const std::vector<Tensor> of_rendered = network_->features(input, ask);
     Tensor sum;
     for (std::size_t depth = 0; depth < depths; ++depth) {
       const Tensor difference = of_rendered[depth] - of_target[depth];

@@ -4,15 +4,21 @@
 #pragma once
 
 #include <array>
-#include <filesystem>
+#include <cstdint>
 #include <memory>
+#include <string>
 
 #include "engine/core/result.h"
 #include "engine/optim/perceptual.h"
 #include "engine/scene/image.h"
-#include "engine/weights/safetensors.h"
+#include "engine/weights/lpips_files.h"
 
 namespace engine::diffusion {
+
+/// What an evaluation with its gradient takes for each pixel, on one thread of the machine of docs/stable-diffusion.md;
+/// and the network.
+constexpr double lpips_pixel_seconds = 1.9e-5;
+constexpr std::uint64_t lpips_pixel_bytes = 4200, lpips_network_bytes = std::uint64_t{60} << 20;
 
 /// The sum over five depths of VGG16 of the weighted squared differences of its features, each scaled to length 1 over
 /// its channels; the mean over places. Pictures are scaled from 0 to 1 to -1 to 1. A side below 16 pixels, which the
@@ -20,17 +26,15 @@ namespace engine::diffusion {
 /// has no slope: its length is taken for constant.
 class Lpips final : public optim::PerceptualLoss {
  public:
-  /// From VGG16 as torchvision has it ("features.0.weight"; the rest of it is not looked at), and LPIPS's own weights
-  /// ("lin0.model.1.weight").
-  ///   errors  those of weights::TensorFile::open(); corrupt_data: a tensor is missing, of another shape, or not finite
-  [[nodiscard]] static Result<std::unique_ptr<Lpips>> open(const std::filesystem::path& vgg16,
-                                                           const std::filesystem::path& linear);
-  [[nodiscard]] static Result<std::unique_ptr<Lpips>> create(const weights::TensorFile& vgg16,
-                                                             const weights::TensorFile& linear);
+  ///   threads  of libtorch; 0: as many as it takes by itself
+  ///   errors   those of weights::LpipsFiles::check(); corrupt_data: a number is not finite
+  [[nodiscard]] static Result<std::unique_ptr<Lpips>> create(const weights::LpipsFiles& files, int threads = 0);
   ~Lpips() override;
 
+  [[nodiscard]] std::string identity() const override { return digest_; }  ///< Of the files.
+
   /// errors  invalid_argument: the pictures are not of one size and three channels; internal: the distance, or its
-  ///         gradient, is not finite; too_large
+  ///         gradient, is not finite; too_large; what is asked between two convolutions, on the way back too (ask())
   [[nodiscard]] Result<double> evaluate(const scene::Image& rendered, const scene::Image& target,
                                         scene::Image& v_rendered) override;
 
@@ -43,8 +47,10 @@ class Lpips final : public optim::PerceptualLoss {
 
  private:
   struct Network;
-  explicit Lpips(std::unique_ptr<const Network> network);
+  Lpips(std::unique_ptr<const Network> network, std::string digest, int threads);
   std::unique_ptr<const Network> network_;
+  std::string digest_;
+  int threads_;
   std::array<double, 5> shares_{};  ///< Of the last evaluate().
 };
 

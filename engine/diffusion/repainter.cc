@@ -34,12 +34,17 @@ constexpr int most_magnified = 4;   // a choice
 // Seeds of a call: a step of training each from the one that is given; of a new adapter the last of its million.
 constexpr std::uint64_t seed_of_adapter = 999'999;
 const std::vector<std::string> targets{"to_q", "to_k", "to_v", "to_out.0"};  // as in the released code
-constexpr const char* steps_key = "optimiser_steps";
+constexpr const char *steps_key = "optimiser_steps", *model_key = "model";   // of a state's metadata
 
-// Seconds at the size of 1.5, 256 x 256 pixels: docs/stable-diffusion.md. A picture at 512 x 512 takes somewhat more
-// than four times as long, since attention grows faster.
-constexpr double measured_parameters = 859.5e6, measured_latents = 32 * 32;
-constexpr double call_seconds = 2.4, guided_call_seconds = 4.2, training_seconds = 5.3, autoencoder_seconds = 5.9;
+// Seconds at the size of 1.5, 512 x 512 pixels, and what is computed there takes beside the networks:
+// docs/stable-diffusion.md. Both go with the pixels; attention's share of them, which goes with their square, is small
+// as long as it is cut into slices, and in training as long as transformers are computed again.
+constexpr double measured_parameters = 859.5e6, measured_latents = 64 * 64;
+constexpr double call_seconds = 10.1, guided_call_seconds = 17, training_seconds = 29, autoencoder_seconds = 25;
+constexpr double measured_width = 320, measured_autoencoder_width = 128;  // of their first layers
+constexpr double painting_bytes = 1.3e9, learning_bytes = 1.7e9;
+// Of each number of an adapter: itself, its gradient, two moments; and copies while a checkpoint is made of them.
+constexpr std::uint64_t adapter_copies = 16;
 
 /// `low` to `high` with more on either side until it is `least` long, as far as there is room from 0 to `most`.
 std::pair<int, int> widened(int low, int high, int least, int most) {
@@ -52,6 +57,16 @@ std::pair<int, int> widened(int low, int high, int least, int most) {
 
 int nearest_multiple(double value, int multiple) {
   return std::max(multiple, int(std::lround(value / multiple)) * multiple);
+}
+
+double numbers_in(const weights::TensorSpec& tensor) {
+  double count = 1;
+  for (const std::int64_t size : tensor.shape) count *= double(size);
+  return count;
+}
+
+double latents_of(const weights::Configs& configs) {
+  return double(configs.unet.sample_side) * configs.unet.sample_side;
 }
 
 tl::unexpected<Error> of_another(const std::string& what) {
@@ -106,17 +121,29 @@ Crop crop_around(scene::Rect box, int picture_width, int picture_height, int sid
 
 RepainterSeconds seconds_of(const weights::Configs& configs, const RepainterOptions& options) {
   double parameters = 0;
-  for (const weights::TensorSpec& tensor : weights::tensors_of(configs.unet)) {
-    double count = 1;
-    for (const std::int64_t size : tensor.shape) count *= double(size);
-    parameters += count;
-  }
-  const double latents = double(configs.unet.sample_side) * configs.unet.sample_side;
-  const double size = parameters / measured_parameters * latents / measured_latents;
+  for (const weights::TensorSpec& tensor : weights::tensors_of(configs.unet)) parameters += numbers_in(tensor);
+  const double size = parameters / measured_parameters * latents_of(configs) / measured_latents;
   return {
       .training_step = size * options.batch * training_seconds,
       .picture = size * autoencoder_seconds,
       .full_strength = size * options.sampling.steps * (options.guidance != 1 ? guided_call_seconds : call_seconds)};
+}
+
+RepainterBytes bytes_of(const weights::Configs& configs, const RepainterOptions& options) {
+  double networks = 0, adapter = 0;
+  for (const auto network : {weights::Network::unet, weights::Network::autoencoder, weights::Network::text_encoder})
+    for (const weights::TensorSpec& tensor : weights::tensors_of(configs, network)) networks += numbers_in(tensor);
+  for (const weights::TensorSpec& tensor : weights::tensors_of(configs.unet))
+    if (std::ranges::any_of(targets, [&](const auto& target) { return tensor.name.ends_with(target + ".weight"); }))
+      adapter += options.rank * double(tensor.shape[0] + tensor.shape[1]);
+  const double size = latents_of(configs) / measured_latents;
+  const double painting = painting_bytes * size * configs.autoencoder.channels.front() / measured_autoencoder_width;
+  const double learning = learning_bytes * size * configs.unet.channels.front() / measured_width;
+  const auto in_bytes = [](double bytes) { return std::uint64_t(std::llround(bytes)); };
+  return {.networks = in_bytes(sizeof(float) * (networks + adapter_copies * adapter)),
+          .painting = in_bytes(painting),
+          // What is learned from is encoded before.
+          .learning = in_bytes(std::max(painting, learning))};
 }
 
 StableDiffusionRepainter::StableDiffusionRepainter(StableDiffusion model, const RepainterOptions& options)

@@ -3,6 +3,7 @@
 // al. 2021, "LoRA".
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 
@@ -51,6 +52,14 @@ struct RepainterSeconds {
   double full_strength = 0;  ///< Besides, at strength 1.
 };
 [[nodiscard]] RepainterSeconds seconds_of(const weights::Configs& configs, const RepainterOptions& options);
+
+/// What it takes of memory, bytes; from the sizes of the networks alone.
+struct RepainterBytes {
+  std::uint64_t networks = 0;  ///< With the adapter and its optimiser.
+  std::uint64_t painting = 0;  ///< Besides, while it paints,
+  std::uint64_t learning = 0;  ///< and while it learns.
+};
+[[nodiscard]] RepainterBytes bytes_of(const weights::Configs& configs, const RepainterOptions& options);
 
 /// Same seeds, same bytes, at a fixed number of libtorch's threads.
 class StableDiffusionRepainter final : public correct::Repainter {

@@ -136,12 +136,27 @@ Workload work_ahead(const scene::GaussianCloud& scene, const Request& request, c
   Workload work = workload_of(scene.size(), request, tools.corrector != nullptr);
   work.repainted = tools.repainter != nullptr;
   work.repaint_time = tools.repaint_time;
+  work.perceptual_pixel_seconds = tools.perceptual_pixel_seconds;
   work.finished = finished;
   work.shown = bool(observer.moment);
   work.pictured = observer.pictured;
   work.kept = bool(observer.interval_done);
   return work;
 }
+
+/// As long as it lives, the perceptual loss asks the observer whether to go on.
+class Asked {
+ public:
+  explicit Asked(Edit& edit) : loss_(edit.perceptual) {
+    loss_.ask([&progress = edit.progress] { return progress.go_on(); });
+  }
+  ~Asked() { loss_.ask({}); }
+  Asked(const Asked&) = delete;
+  Asked& operator=(const Asked&) = delete;
+
+ private:
+  optim::PerceptualLoss& loss_;
+};
 
 }  // namespace
 
@@ -161,6 +176,7 @@ Result<Outcome> run(const scene::GaussianCloud& scene, std::span<const scene::Ca
             tools.repainter,
             ProgressMeter(observer, work_ahead(scene, request, tools, observer, from ? from->interval : 0),
                           from ? from->report.times : std::vector<StageTime>())};
+  const Asked asked(edit);
   Result<State> state = begin(edit, cameras, std::move(from));
   const auto is_enough = [&] { return state->interval > 0 && observer.keep && observer.keep(); };
   while (state && state->interval < state->report.resolved.intervals && !is_enough())

@@ -29,7 +29,8 @@ struct Tools {
   /// Repaints the views once the corrector, which must be there, has completed what is behind the dragged part. Null:
   /// the corrector corrects them. It is used by one edit, from its start, or from restore() where it goes on.
   correct::Repainter* repainter = nullptr;
-  RepaintTime repaint_time = {};  ///< Of the repainter, where it is known: progress goes by it.
+  RepaintTime repaint_time = {};        ///< Of the repainter, where it is known: progress goes by it.
+  double perceptual_pixel_seconds = 0;  ///< Of the perceptual loss, as in Workload.
 };
 
 struct Outcome {

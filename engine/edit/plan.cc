@@ -146,7 +146,8 @@ class Maker {
     add(Stage::set_up, u, views_ * (frames * frame() + slow(set_up_row_seconds * p_h_)));
     const double rows = work_.corrected && work_.vacates ? (1 + seeds_of_dragged) * p_h_ : p_h_;
     add(Stage::optimise, u,
-        slow(work_.iterations * (iteration_seconds + iteration_row_seconds * rows + iteration_pixel_seconds * box_)));
+        slow(work_.iterations * (iteration_seconds + iteration_row_seconds * rows +
+                                 (iteration_pixel_seconds + work_.perceptual_pixel_seconds) * box_)));
   }
 
   void add_correction(int u, int a) {

@@ -84,6 +84,7 @@ void ProgressMeter::finish() {
 }
 
 Result<void> ProgressMeter::report(double part) {
+  part_ = part;
   if (observer_.stop.stop_requested())
     return fail(ErrorCode::cancelled, "the edit was stopped before it was finished; the scene is unchanged");
   if (!observer_.progress) return {};

@@ -45,6 +45,8 @@ class ProgressMeter {
   /// Still in the same stage, of which this part is done, 0 to 1.
   ///   iteration, loss  as in Progress
   [[nodiscard]] Result<void> advance(double part, int iteration = 0, std::optional<double> loss = std::nullopt);
+  /// Nothing has changed, for work that asks more often than there is something to tell. Errors as enter().
+  [[nodiscard]] Result<void> go_on() { return report(part_); }
   /// The last stage ends; all is done.
   void finish();
 
@@ -75,6 +77,7 @@ class ProgressMeter {
   std::vector<StageTime> times_;
   Progress progress_;
   bool entered_ = false;  ///< A stage is being carried out.
+  double part_ = 0;       ///< Of it, that was told last.
   std::chrono::steady_clock::time_point since_{};
 };
 

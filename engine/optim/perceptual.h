@@ -5,6 +5,9 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "engine/core/result.h"
@@ -22,9 +25,21 @@ class PerceptualLoss {
   /// The distance; 0 for equal pictures, never negative but for rounding.
   ///   rendered, target  same size and channels, at least one pixel; what is outside them is unknown
   ///   v_rendered        gradient with respect to `rendered`: resized to it and overwritten
-  ///   errors            those of the library behind it, if there is one
+  ///   errors            those of the library behind it, if there is one, and what going_on() says
   [[nodiscard]] virtual Result<double> evaluate(const scene::Image& rendered, const scene::Image& target,
                                                 scene::Image& v_rendered) = 0;
+
+  /// Another text, other distances. Empty: they depend on nothing but the program.
+  [[nodiscard]] virtual std::string identity() const { return {}; }
+
+  /// An evaluation that takes long asks this, many times; the error that it returns ends it. Empty: it is not asked.
+  void ask(std::function<Result<void>()> going_on) { going_on_ = std::move(going_on); }
+
+ protected:
+  [[nodiscard]] Result<void> going_on() const { return going_on_ ? going_on_() : Result<void>{}; }
+
+ private:
+  std::function<Result<void>()> going_on_;
 };
 
 /// The mix of MS-SSIM and L1.

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdio>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -84,6 +85,56 @@ bool views_are_the_luxury(const JobWorkload& work, const Params& params) {
   return double(work.edit.views) / double(usual.views) > side * side;
 }
 
+/// Another choice, with which an edit takes less: what of its networks it can do without.
+struct Choice {
+  const char* advice;
+  const char* where;  ///< It is made.
+  void (*make)(JobWorkload&);
+};
+
+enum class Need { time, memory };
+
+/// The choices that an edit has, those it loses least by first. Of the time that training takes there are levers.
+std::vector<Choice> choices_of(const JobWorkload& work, Need need) {
+  std::vector<Choice> choices;
+  if (work.models.perceptual)
+    choices.push_back({"set params.perceptual to \"msssim\"", "params.perceptual", [](JobWorkload& less) {
+                         add_models(less, {less.models.repainter, std::nullopt});
+                       }});
+  if (!work.models.repainter) return choices;
+  if (need == Need::memory && (work.edit.first_tuning > 0 || work.edit.later_tuning > 0))
+    choices.push_back({"set params.tuning_steps and params.tuning_steps_later to 0", "params.tuning_steps",
+                       [](JobWorkload& less) { less.edit.first_tuning = less.edit.later_tuning = 0; }});
+  choices.push_back({"set params.corrector to \"scene\"", "params.corrector", [](JobWorkload& less) {
+                       add_models(less, {std::nullopt, less.models.perceptual});
+                     }});
+  return choices;
+}
+
+/// The first choice with which alone the edit fits; null: there is none.
+template <class Fits>
+const Choice* choice_that_does(const std::vector<Choice>& choices, const JobWorkload& work, Fits fits) {
+  for (const Choice& choice : choices) {
+    JobWorkload less = work;
+    choice.make(less);
+    if (fits(less)) return &choice;
+  }
+  return nullptr;
+}
+
+JobWorkload with_all(const std::vector<Choice>& choices, JobWorkload work) {
+  for (const Choice& choice : choices) choice.make(work);
+  return work;
+}
+
+/// "set A, set B and set C"
+std::string all_advice(const std::vector<Choice>& choices) {
+  std::string text;
+  for (std::size_t k = 0; k < choices.size(); ++k)
+    text += (k == 0 ? "" : k + 1 < choices.size() ? ", " : " and ") + std::string(choices[k].advice);
+  return text;
+}
+
 /// A parameter that an edit's time grows with.
 struct Lever {
   const char* name;
@@ -111,6 +162,19 @@ std::vector<Lever> levers_of(const JobWorkload& work, const Params& params,
       {"max_image_side", count(params.max_image_side), least_side, side * side,
        [dataset](JobWorkload& w, std::size_t value) { w.edit.view_pixels = view_pixels_at(int(value), dataset); }},
   };
+  if (work.edit.repainted) {
+    levers.push_back({"tuning_steps", count(work.edit.first_tuning), 1,
+                      double(work.edit.first_tuning) / double(usual.tuning_steps),
+                      [](JobWorkload& w, std::size_t value) { w.edit.first_tuning = int(value); }});
+    levers.push_back({"tuning_steps_later", count(work.edit.later_tuning), 1,
+                      double(work.edit.later_tuning) / double(usual.tuning_steps_later),
+                      [](JobWorkload& w, std::size_t value) { w.edit.later_tuning = int(value); }});
+    levers.push_back(
+        {"sampling_steps", count(params.sampling_steps), 1,
+         double(params.sampling_steps) / double(usual.sampling_steps),
+         [of_a_step = work.edit.repaint_time.full_strength / std::max(1, params.sampling_steps)](
+             JobWorkload& w, std::size_t value) { w.edit.repaint_time.full_strength = of_a_step * double(value); }});
+  }
   std::ranges::stable_sort(levers, std::greater{}, &Lever::luxury);
   return levers;
 }
@@ -139,26 +203,38 @@ engine::Result<void> admit_time(const JobWorkload& work, const Params& params,
   const auto advice = [&](const Lever& lever) {
     return "lower " + address(lever) + " to at most " + std::to_string(lever.fits);
   };
+  const auto fits = [&](const JobWorkload& less) { return estimated_seconds(less) <= limit; };
+  const std::vector<Choice> choices = choices_of(work, Need::time);
+  const Choice* const choice = choice_that_does(choices, work, fits);
   if (!that_do.empty())
     return fail(ErrorCode::too_large,
-                found + advice(that_do[0]) + (that_do.size() > 1 ? ", or " + advice(that_do[1]) : ""),
+                found + advice(that_do[0]) + (that_do.size() > 1 ? ", or " + advice(that_do[1]) : "") +
+                    (choice != nullptr ? std::string(", or ") + choice->advice : ""),
                 address(that_do[0]));
-  if (estimated_seconds(least) <= limit)
+  if (choice != nullptr) return fail(ErrorCode::too_large, found + choice->advice, choice->where);
+  if (fits(least))
     return fail(ErrorCode::too_large,
                 found + "lower " + address(levers[0]) + " and " + address(levers[1]) + ", one alone is not enough",
                 address(levers[0]));
+  if (!choices.empty() && fits(with_all(choices, least)))
+    return fail(ErrorCode::too_large,
+                found + all_advice(choices) + ", and lower " + address(levers[0]) + " and " + address(levers[1]),
+                choices[0].where);
   return fail(ErrorCode::too_large, found + "the scene is too large to be edited here, whatever the parameters are",
               "scene");
 }
 
 engine::Result<void> admit_slow(const JobWorkload& work, bool allowed) {
-  if (allowed || !work.edit.repainted) return {};
+  const bool repainted = work.models.repainter.has_value(), by_lpips = work.models.perceptual.has_value();
+  if (allowed || (!repainted && !by_lpips)) return {};
   const double needed = estimated_seconds(work);
   if (needed <= slow_seconds) return {};
   return fail(ErrorCode::unprocessable,
-              "the diffusion model would work for about " + time_in_words(needed) +
-                  " on this machine: say \"allow_slow\": true to have it do so, or lower params.views, "
-                  "params.tuning_steps, params.sampling_steps or params.iterations",
+              std::string(repainted ? "the diffusion model" : "the network of the perceptual loss") +
+                  " would work for about " + time_in_words(needed) +
+                  " on this machine: say \"allow_slow\": true to have it do so, or lower params.views, " +
+                  (repainted ? "params.tuning_steps, params.sampling_steps or " : "params.max_image_side or ") +
+                  "params.iterations" + (by_lpips ? ", or set params.perceptual to \"msssim\"" : ""),
               "allow_slow");
 }
 
@@ -168,19 +244,28 @@ engine::Result<void> admit(const JobWorkload& work, const Params& params,
   if (limit == 0 || needed <= limit) return {};
   const std::string found = "the edit would take about " + in_words(needed) +
                             " of memory; the limit (--edit-memory) is " + in_words(limit) + ": ";
+  const auto fits = [&](const JobWorkload& less) { return estimated_bytes(less) <= limit; };
+  const auto refused = [&](const std::string& text, const char* where) {
+    return fail(ErrorCode::too_large, found + text, where);
+  };
   const Advice advice = advice_for(work, params, dataset, limit);
+  const std::vector<Choice> choices = choices_of(work, Need::memory);
+  const Choice* const choice = choice_that_does(choices, work, fits);
   const std::string fewer = "lower params.views to at most " + std::to_string(advice.views);
   const std::string smaller = "lower params.max_image_side to at most " + std::to_string(advice.side);
+  const std::string otherwise = choice != nullptr ? std::string(", or ") + choice->advice : "";
   const bool both = advice.views > 0 && advice.side > 0;
+  const char* const luxury = views_are_the_luxury(work, params) ? "params.views" : "params.max_image_side";
   if (advice.views > 0 && (!both || views_are_the_luxury(work, params)))
-    return fail(ErrorCode::too_large, found + fewer + (both ? ", or " + smaller : ""), "params.views");
-  if (advice.side > 0)
-    return fail(ErrorCode::too_large, found + smaller + (both ? ", or " + fewer : ""), "params.max_image_side");
-  if (bytes_with(work, 1, least_side * least_side) <= limit)
-    return fail(ErrorCode::too_large, found + "lower params.views and params.max_image_side, neither is enough alone",
-                views_are_the_luxury(work, params) ? "params.views" : "params.max_image_side");
-  return fail(ErrorCode::too_large, found + "the scene is too large to be edited here, whatever the parameters are",
-              "scene");
+    return refused(fewer + (both ? ", or " + smaller : "") + otherwise, "params.views");
+  if (advice.side > 0) return refused(smaller + (both ? ", or " + fewer : "") + otherwise, "params.max_image_side");
+  if (choice != nullptr) return refused(choice->advice, choice->where);
+  JobWorkload least = work;
+  least.edit.views = 1, least.edit.view_pixels = least_side * least_side;
+  if (fits(least)) return refused("lower params.views and params.max_image_side, neither is enough alone", luxury);
+  if (!choices.empty() && fits(with_all(choices, least)))
+    return refused(all_advice(choices) + ", and lower params.views and params.max_image_side", choices[0].where);
+  return refused("the scene is too large to be edited here, whatever the parameters are", "scene");
 }
 
 }  // namespace server::edits

@@ -43,7 +43,21 @@ bool uses_diffusion(const edit::Params& params) {
   return params.iterations > 0 && params.corrector == proto::Corrector::sd;
 }
 
-edit::Tools Toolbox::tools() const { return {corrector.get(), perceptual.get(), repainter.get(), repaint_time}; }
+bool uses_lpips(const edit::Params& params) {
+  return params.iterations > 0 && params.perceptual == proto::Perceptual::lpips;
+}
+
+edit::Tools Toolbox::tools() const {
+  return {corrector.get(), perceptual.get(), repainter.get(), repaint_time, perceptual_pixel_seconds};
+}
+
+models::Costs costs_of(const edit::Params& params, const models::Models* models) {
+  models::Costs costs;
+  if (models == nullptr) return costs;
+  if (uses_diffusion(params)) costs.repainter = models->cost(params);
+  if (uses_lpips(params)) costs.perceptual = models->lpips_cost();
+  return costs;
+}
 
 edit::RepaintTime repaint_time_of(const models::RepainterCost& cost) {
   return {cost.training_step, cost.picture, cost.full_strength};
@@ -59,13 +73,15 @@ engine::Result<Toolbox> make_toolbox(const proto::EditRequest& request, const ed
     auto repainter = models->repainter(params, {request.prompt.value_or(""), request.negative_prompt.value_or("")});
     if (!repainter) return engine::propagate(repainter);
     box.repainter = std::move(*repainter);
-    box.repaint_time = repaint_time_of(models->cost(params));
   }
-  if (params.perceptual == proto::Perceptual::lpips && params.iterations > 0) {
+  if (uses_lpips(params)) {
     auto loss = models->lpips();
     if (!loss) return engine::propagate(loss);
     box.perceptual = std::move(*loss);
   }
+  const models::Costs costs = costs_of(params, models);
+  if (costs.repainter) box.repaint_time = repaint_time_of(*costs.repainter);
+  if (costs.perceptual) box.perceptual_pixel_seconds = costs.perceptual->pixel_seconds;
   return box;
 }
 

@@ -39,12 +39,16 @@ namespace server::edits {
 /// Is that a diffusion model?
 [[nodiscard]] bool uses_diffusion(const engine::edit::Params& params);
 
+/// Does its loss compare pictures by a network?
+[[nodiscard]] bool uses_lpips(const engine::edit::Params& params);
+
 /// What one edit works with, by its request.
 struct Toolbox {
   std::unique_ptr<engine::correct::Corrector> corrector;      ///< Null: `none`.
   std::unique_ptr<engine::correct::Repainter> repainter;      ///< Null: the corrector corrects.
   std::unique_ptr<engine::optim::PerceptualLoss> perceptual;  ///< Null: the engine's own.
   engine::edit::RepaintTime repaint_time = {};
+  double perceptual_pixel_seconds = 0;
 
   [[nodiscard]] engine::edit::Tools tools() const;
 };
@@ -56,6 +60,9 @@ struct Toolbox {
 [[nodiscard]] engine::Result<Toolbox> make_toolbox(const proto::EditRequest& request,
                                                    const engine::edit::Params& params, const models::Models* models);
 
+/// What the models that these parameters name take.
+///   models  null: there are none
+[[nodiscard]] models::Costs costs_of(const engine::edit::Params& params, const models::Models* models);
 /// How long a repainter takes, for plans.
 [[nodiscard]] engine::edit::RepaintTime repaint_time_of(const models::RepainterCost& cost);
 

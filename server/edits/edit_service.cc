@@ -183,10 +183,9 @@ struct EditService::Impl {
     const auto cameras = cameras_of(dataset->get());
     const auto& [request, version, preview, warnings] = out.checked;
     const bool corrected = uses_corrector(request.params);
-    std::optional<models::RepainterCost> repainter;
-    if (uses_diffusion(request.params)) repainter = options.models->cost(request.params);
+    const models::Costs costs = costs_of(request.params, options.models);
     out.work = memory_workload_of(version.cloud, request, preview, cameras, corrected, options.pictured_views);
-    add_repainter(out.work, repainter);
+    add_models(out.work, costs);
     // Before frames are rendered to see how long they take.
     if (auto fits = admit(out.work, request.params, cameras, options.memory_bytes); !fits) return propagate(fits);
     const auto info = scenes.find(*asked.scene);
@@ -201,7 +200,7 @@ struct EditService::Impl {
       if (!share) return propagate(share);
       out.work = workload_of(version.cloud, request_there, preview, cameras, corrected, options.pictured_views,
                              *asked.scene, speeds);
-      add_repainter(out.work, repainter);
+      add_models(out.work, costs);
     }
     out.seconds = estimated_seconds(out.work);
     if (auto fits = admit_time(out.work, request.params, cameras, options.longest_seconds); !fits)

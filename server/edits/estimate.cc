@@ -33,6 +33,21 @@ std::vector<scene::Camera> some_virtual_cameras(const scene::GaussianCloud& clou
   return edit::candidate_cameras(cloud, {}, request);
 }
 
+/// Of networks, and of what they compute.
+std::uint64_t model_bytes(const JobWorkload& work) {
+  std::uint64_t networks = 0, computed = 0;
+  if (const auto& repainter = work.models.repainter) {
+    const bool learns = work.edit.first_tuning > 0 || work.edit.later_tuning > 0;
+    networks += repainter->network_bytes;
+    computed = learns ? std::max(repainter->painting_bytes, repainter->learning_bytes) : repainter->painting_bytes;
+  }
+  if (const auto& perceptual = work.models.perceptual) {
+    networks += perceptual->network_bytes;
+    computed = std::max(computed, perceptual->pixel_bytes * work.edit.view_pixels);
+  }
+  return networks + computed;
+}
+
 /// Virtual cameras stand around what is dragged.
 std::string around(const edit::Request& request) {
   std::string place = " around";
@@ -98,11 +113,11 @@ JobWorkload workload_of(const scene::LayeredCloud& version, const edit::Request&
   return work;
 }
 
-void add_repainter(JobWorkload& work, const std::optional<models::RepainterCost>& repainter) {
-  if (!repainter) return;
-  work.edit.repainted = true;
-  work.edit.repaint_time = repaint_time_of(*repainter);
-  work.model_bytes = repainter->bytes;
+void add_models(JobWorkload& work, const models::Costs& costs) {
+  work.models = costs;
+  work.edit.repainted = costs.repainter.has_value();
+  work.edit.repaint_time = costs.repainter ? repaint_time_of(*costs.repainter) : edit::RepaintTime{};
+  work.edit.perceptual_pixel_seconds = costs.perceptual ? costs.perceptual->pixel_seconds : 0;
 }
 
 std::uint64_t measuring_bytes(const JobWorkload& work) {
@@ -136,7 +151,7 @@ std::uint64_t estimated_bytes(const JobWorkload& work) {
   const std::uint64_t history = history_pixel_bytes * (std::uint64_t(work.edit.intervals) + 1);
   const std::uint64_t repainted = work.edit.repainted ? views * (repainted_pixel_bytes + history) * pixels : 0;
   return rows * work.row_bytes + n * frame_row_bytes + (views + frame_pixel_bytes) * pixels + trained + corrected +
-         repainted + work.model_bytes;
+         repainted + model_bytes(work);
 }
 
 }  // namespace server::edits

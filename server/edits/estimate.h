@@ -22,10 +22,10 @@ namespace server::edits {
 /// What the cost of an edit as a job depends on.
 struct JobWorkload {
   engine::edit::Workload edit = {};
-  std::size_t row_bytes = 0;      ///< Of one Gaussian in memory.
-  bool layered = false;           ///< The version is an overlay: it is flattened first.
-  std::size_t copies = 0;         ///< Deformed copies in the result.
-  std::uint64_t model_bytes = 0;  ///< Of the networks that repaint, and of what they compute.
+  std::size_t row_bytes = 0;  ///< Of one Gaussian in memory.
+  bool layered = false;       ///< The version is an overlay: it is flattened first.
+  std::size_t copies = 0;     ///< Deformed copies in the result.
+  models::Costs models = {};  ///< Of its networks: their memory; their time is the edit's.
 };
 
 /// Those of a dataset, in its order; none without one.
@@ -54,8 +54,8 @@ struct JobWorkload {
                                       std::span<const engine::scene::Camera> dataset, bool corrected, int pictured,
                                       const std::string& scene, SpeedLog& log);
 
-/// Adds what a repainter takes, if there is one.
-void add_repainter(JobWorkload& work, const std::optional<models::RepainterCost>& repainter);
+/// Adds what networks take, if there are some.
+void add_models(JobWorkload& work, const models::Costs& costs);
 
 /// Bytes that workload_of() takes for a while, about: those of one frame, as of estimated_bytes().
 ///   work  of this request; memory_workload_of() is enough
@@ -85,7 +85,9 @@ void add_repainter(JobWorkload& work, const std::optional<models::RepainterCost>
 ///   + (row_bytes + 100) N [corrected]           the unedited scene, its trust, and a search tree of it
 ///   + V (52 + 6 (T + 1)) pixels [repainted]     of each view: what was completed, is painted and was painted; the
 ///                                               history, once more as it is written down
-///   + model_bytes                               networks
+///   + network bytes                             of the repainter and of the perceptual loss
+///   + max(painting, learning, pixels perceptual)  what they compute, of which there is one at a time; `learning` where
+///                                               something is learned
 [[nodiscard]] std::uint64_t estimated_bytes(const JobWorkload& work);
 
 }  // namespace server::edits

@@ -10,6 +10,7 @@
 #include "engine/diffusion/repainter.h"
 #include "engine/diffusion/stable_diffusion.h"
 #include "engine/weights/checkpoint.h"
+#include "server/models/lpips_folder.h"
 #include "server/models/models.h"
 
 namespace server::models {
@@ -25,8 +26,11 @@ namespace {
 // So much faster networks are computed by n threads: n to this power. A guess; beyond eight nobody counts on more.
 constexpr double thread_power = 0.7;
 constexpr int most_threads = 8;
-// What networks compute takes beside them, at the size of 1.5: docs/stable-diffusion.md.
-constexpr std::uint64_t computing_bytes = std::uint64_t{1} << 30;
+/// How many times faster than on one thread networks are computed.
+double faster_on(int threads) {
+  if (threads <= 0) threads = std::max(1, int(std::thread::hardware_concurrency()));
+  return std::pow(double(std::min(threads, most_threads)), thread_power);
+}
 
 diffusion::Sampler sampler_of(params::Sampler sampler) {
   switch (sampler) {
@@ -96,19 +100,31 @@ RepainterCost Models::cost(const params::Params& params) const {
   if (!no_sd_.empty()) return {};
   const auto checkpoint = engine::weights::Checkpoint::open(checkpoint_);
   if (!checkpoint) return {};  // it was there when it was looked at; making the repainter will say what is wrong
-  const auto one_thread = diffusion::seconds_of(checkpoint->configs(), options_of(params, {}, threads_));
-  const int threads = threads_ > 0 ? threads_ : std::max(1, int(std::thread::hardware_concurrency()));
-  const double faster = std::pow(double(std::min(threads, most_threads)), thread_power);
-  return {one_thread.training_step / faster, one_thread.picture / faster, one_thread.full_strength / faster,
-          checkpoint_bytes_ + computing_bytes};
+  const diffusion::RepainterOptions options = options_of(params, {}, threads_);
+  const auto one_thread = diffusion::seconds_of(checkpoint->configs(), options);
+  const auto bytes = diffusion::bytes_of(checkpoint->configs(), options);
+  const double faster = faster_on(threads_);
+  return {one_thread.training_step / faster,
+          one_thread.picture / faster,
+          one_thread.full_strength / faster,
+          bytes.networks,
+          bytes.painting,
+          bytes.learning};
 }
 
 Result<std::unique_ptr<engine::optim::PerceptualLoss>> Models::lpips() const {
   if (!no_lpips_.empty()) return fail(ErrorCode::unsupported, no_lpips_, "params.perceptual");
-  auto opened =
-      diffusion::Lpips::open(folder_ / "lpips" / "vgg16.safetensors", folder_ / "lpips" / "vgg_v0.1.safetensors");
-  if (!opened) return propagate(opened);
-  return std::unique_ptr<engine::optim::PerceptualLoss>(std::move(*opened));
+  const auto files = open_lpips(folder_);
+  if (!files) return propagate(files);
+  auto made = diffusion::Lpips::create(*files, threads_);
+  if (!made) return propagate(made);
+  return std::unique_ptr<engine::optim::PerceptualLoss>(std::move(*made));
+}
+
+PerceptualCost Models::lpips_cost() const {
+  if (!no_lpips_.empty()) return {};
+  return {diffusion::lpips_pixel_seconds / faster_on(threads_), diffusion::lpips_network_bytes,
+          diffusion::lpips_pixel_bytes};
 }
 
 }  // namespace server::models

@@ -4,6 +4,8 @@
 #include <utility>
 
 #include "engine/weights/checkpoint.h"
+#include "engine/weights/vocabulary.h"
+#include "server/models/lpips_folder.h"
 
 namespace server::models {
 namespace {
@@ -26,18 +28,6 @@ bool is_there(const fs::path& path) {
   return fs::exists(path, unreachable);
 }
 
-std::uint64_t bytes_below(const fs::path& path) {
-  std::error_code error;
-  if (fs::is_regular_file(path, error)) return fs::file_size(path, error);
-  std::uint64_t sum = 0;
-  for (fs::recursive_directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error)) {
-    std::error_code unreadable;
-    const std::uint64_t size = entry->is_regular_file(unreadable) ? entry->file_size(unreadable) : 0;
-    if (!unreadable) sum += size;
-  }
-  return sum;
-}
-
 Finding look_at_checkpoint(const fs::path& folder, const fs::path& checkpoint) {
   if (checkpoint.empty())
     return {"sd", false,
@@ -52,17 +42,20 @@ Finding look_at_checkpoint(const fs::path& folder, const fs::path& checkpoint) {
   for (const char* file : {"vocab.json", "merges.txt"})
     if (!is_there(opened->tokenizer_folder() / file))
       return {"sd", false, "no tokenizer: " + (opened->tokenizer_folder() / file).string() + " is missing"};
+  const auto vocabulary = weights::read_vocabulary(opened->tokenizer_folder(), opened->is_open_clip(),
+                                                   opened->configs().text_encoder.vocabulary);
+  if (!vocabulary) return {"sd", false, opened->tokenizer_folder().string() + ": " + described(vocabulary.error())};
   return {"sd", true, checkpoint.string()};
 }
 
 Finding look_at_lpips(const fs::path& folder) {
   for (const auto& [name, what] :
-       {std::pair{"vgg16.safetensors", "VGG16 of torchvision"}, {"vgg_v0.1.safetensors", "LPIPS's own weights"}}) {
+       {std::pair{vgg16_file, "VGG16 of torchvision"}, {lpips_file, "LPIPS's own weights"}}) {
     const fs::path file = folder / "lpips" / name;
     if (!is_there(file)) return {"lpips", false, std::string("no ") + what + ": " + file.string() + " is missing"};
-    if (const auto opened = weights::TensorFile::open(file); !opened)
-      return {"lpips", false, file.string() + ": " + described(opened.error())};
   }
+  if (const auto opened = open_lpips(folder); !opened)
+    return {"lpips", false, (folder / "lpips").string() + ": " + described(opened.error())};
   return {"lpips", true, (folder / "lpips").string()};
 }
 
@@ -78,7 +71,6 @@ Models::Models(fs::path folder, int threads)
       if (checkpoint_.empty() && is_there(folder_ / name)) checkpoint_ = folder_ / name;
     findings_ = {look_at_checkpoint(folder_, checkpoint_), look_at_lpips(folder_)};
   }
-  if (findings_[0].usable) checkpoint_bytes_ = bytes_below(checkpoint_);
   const auto why_not = [&](Finding& finding, const std::string& what) -> std::string {
     if (!has_libtorch()) {
       finding = {finding.name, false, without_libtorch + std::string(finding.usable ? "; its files are there" : "")};

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,10 +35,22 @@ struct Prompts {
   std::string negative;  ///< What should not be seen.
 };
 
-/// What a repainter takes on this machine as it usually is, seconds; guessed from the sizes of the networks.
+/// What a repainter takes on this machine as it usually is; guessed from the sizes of the networks.
 struct RepainterCost {
-  double training_step = 0, picture = 0, full_strength = 0;  ///< As in diffusion::RepainterSeconds.
-  std::uint64_t bytes = 0;                                   ///< Of its networks and of what they compute.
+  double training_step = 0, picture = 0, full_strength = 0;  ///< Seconds, as in diffusion::RepainterSeconds.
+  std::uint64_t network_bytes = 0, painting_bytes = 0, learning_bytes = 0;  ///< As in diffusion::RepainterBytes.
+};
+
+/// The same of the loss `lpips`.
+struct PerceptualCost {
+  double pixel_seconds = 0;  ///< Of an evaluation with its gradient, for each pixel of the pictures.
+  std::uint64_t network_bytes = 0, pixel_bytes = 0;
+};
+
+/// What an edit's models take.
+struct Costs {
+  std::optional<RepainterCost> repainter;    ///< Null: there is none.
+  std::optional<PerceptualCost> perceptual;  ///< Null: the engine's own loss, which is no network.
 };
 
 /// Looks at the folder once. Safe to use from several threads; what it makes is for one.
@@ -50,7 +63,7 @@ class Models {
   /// Why an edit cannot have it, in words for clients: they name no folder of this machine. Empty: it can.
   [[nodiscard]] const std::string& no_sd() const { return no_sd_; }
   [[nodiscard]] const std::string& no_lpips() const { return no_lpips_; }
-  /// Each model, for who installs them. Opens checkpoints and looks at the shape of every tensor, but at no numbers.
+  /// Each model, for who installs them. Opens their files and looks at the shape of every tensor, but at no numbers.
   [[nodiscard]] const std::vector<Finding>& findings() const { return findings_; }
 
   /// The corrector `sd`. The networks are opened when they are first asked for, and shared from then on.
@@ -60,9 +73,11 @@ class Models {
                                                                               const Prompts& prompts) const;
   /// What that will take. Zero where there is none.
   [[nodiscard]] RepainterCost cost(const engine::params::Params& params) const;
-  /// The loss `lpips`.
-  ///   errors  unsupported: no_lpips(); those of Lpips::open()
+  /// The loss `lpips`. Its files are read each time.
+  ///   errors  unsupported: no_lpips(); those of weights::LpipsFiles::open() and Lpips::create()
   [[nodiscard]] Result<std::unique_ptr<engine::optim::PerceptualLoss>> lpips() const;
+  /// What that will take. Zero where there is none.
+  [[nodiscard]] PerceptualCost lpips_cost() const;
 
  private:
   struct Loaded;
@@ -73,7 +88,6 @@ class Models {
   int threads_;
   std::string no_sd_, no_lpips_;
   std::vector<Finding> findings_;
-  std::uint64_t checkpoint_bytes_ = 0;
   std::shared_ptr<Loaded> loaded_;  ///< Networks, once they are asked for.
 };
 

@@ -18,6 +18,8 @@ Result<std::unique_ptr<engine::correct::Repainter>> Models::repainter(const engi
 
 RepainterCost Models::cost(const engine::params::Params& /*params*/) const { return {}; }
 
+PerceptualCost Models::lpips_cost() const { return {}; }
+
 Result<std::unique_ptr<engine::optim::PerceptualLoss>> Models::lpips() const {
   return fail(ErrorCode::unsupported, no_lpips_, "params.perceptual");
 }

@@ -44,7 +44,7 @@ TEST(LpipsGolden, ValuesSharesAndGradientsAreTheReferences) {
   }
   const auto linear = weights::TensorFile::open(support::golden_dir() / "lpips_lin/vgg_v0.1.safetensors");
   ASSERT_TRUE(linear);
-  const auto lpips = Lpips::create(file_of(vgg, "vgg16.safetensors"), *linear);
+  const auto lpips = Lpips::create({file_of(vgg, "vgg16.safetensors"), *linear});
   ASSERT_TRUE(lpips) << lpips.error().where;
   std::vector<double> distances;  // of gradients from the references, relative
   for (const std::string name : {"a_noise", "b_random", "c_close", "d_odd_50x70"}) {

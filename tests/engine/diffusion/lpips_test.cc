@@ -1,5 +1,6 @@
 #include "engine/diffusion/lpips.h"
 
+#include <ATen/Parallel.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -24,7 +25,7 @@ std::map<std::string, weights::FloatTensor> even_weights() {
 /// Made once for all tests of a process.
 Lpips& lpips() {
   static const auto made =
-      Lpips::create(file_of(cheap_vgg16(), "vgg16"), file_of(even_weights(), "linear")).value().release();
+      Lpips::create({file_of(cheap_vgg16(), "vgg16"), file_of(even_weights(), "linear")}).value().release();
   return *made;
 }
 
@@ -75,7 +76,7 @@ TEST(Lpips, WhereNoFeatureIsSeenNothingIsDividedByZero) {
   for (auto& [name, tensor] : vgg)
     if (name.ends_with(".bias") && name != "features.0.bias")
       for (float& value : tensor.values) value = -1;
-  const auto blind = Lpips::create(file_of(vgg, "vgg16"), file_of(even_weights(), "linear"));
+  const auto blind = Lpips::create({file_of(vgg, "vgg16"), file_of(even_weights(), "linear")});
   ASSERT_TRUE(blind);
   scene::Image gradient;
   const auto value = (*blind)->evaluate(random_picture(16, 16, 5), random_picture(16, 16, 6), gradient);
@@ -93,11 +94,11 @@ TEST(Lpips, WhatDoesNotFitIsNamed) {
   auto linear = even_weights();
   linear.erase("lin3.model.1.weight");
   const auto vgg = file_of(cheap_vgg16(), "vgg16");
-  EXPECT_EQ(Lpips::create(vgg, file_of(linear, "linear")).error().where, "linear:lin3.model.1.weight");
+  EXPECT_EQ(Lpips::create({vgg, file_of(linear, "linear")}).error().where, "linear:lin3.model.1.weight");
   linear = even_weights();
   linear.at("lin0.model.1.weight").values[7] = std::nanf("");
-  EXPECT_EQ(Lpips::create(vgg, file_of(linear, "linear")).error().where, "linear:lin0.model.1.weight[7]");
-  EXPECT_EQ(Lpips::create(file_of({}, "none"), file_of(linear, "linear")).error().where, "none:features.0.weight");
+  EXPECT_EQ(Lpips::create({vgg, file_of(linear, "linear")}).error().where, "linear:lin0.model.1.weight[7]");
+  EXPECT_EQ(Lpips::create({file_of({}, "none"), file_of(linear, "linear")}).error().where, "none:features.0.weight");
 }
 
 TEST(Lpips, APictureThatIsNotFiniteIsNoDistance) {
@@ -110,6 +111,37 @@ TEST(Lpips, APictureThatIsNotFiniteIsNoDistance) {
     EXPECT_EQ(value.error().code, ErrorCode::internal);
     EXPECT_EQ(value.error().where, "lpips");
   }
+}
+
+TEST(Lpips, EndsBetweenTwoConvolutionsOnTheWayThereAndBack) {
+  const scene::Image picture = random_picture(16, 16, 1), target = random_picture(16, 16, 2);
+  scene::Image gradient;
+  int asked = 0;
+  lpips().ask([&]() -> Result<void> { return ++asked, Result<void>{}; });
+  ASSERT_TRUE(lpips().evaluate(picture, target, gradient));
+  EXPECT_EQ(asked, 3 * 13) << "the target's features, the picture's, and the way back";
+  for (const int last : {1, 13, 14, 26, 27, 33, 39}) {
+    int left = last;
+    lpips().ask([&]() -> Result<void> {
+      if (--left > 0) return {};
+      EXPECT_EQ(left, 0) << "nothing is asked after it";
+      return fail(ErrorCode::cancelled, "enough");
+    });
+    EXPECT_EQ(lpips().evaluate(picture, target, gradient).error().code, ErrorCode::cancelled) << last;
+  }
+  lpips().ask({});
+  EXPECT_TRUE(lpips().evaluate(picture, target, gradient));
+}
+
+TEST(Lpips, ComputesWithAsManyThreadsAsItIsTold) {
+  const int before = at::get_num_threads();
+  const weights::LpipsFiles files{file_of(cheap_vgg16(), "vgg16"), file_of(even_weights(), "linear")};
+  const auto on_two = Lpips::create(files, 2).value();
+  EXPECT_EQ(on_two->identity(), files.digest());
+  scene::Image gradient;
+  ASSERT_TRUE(on_two->evaluate(random_picture(16, 16, 1), random_picture(16, 16, 2), gradient));
+  EXPECT_EQ(at::get_num_threads(), 2);
+  at::set_num_threads(before);
 }
 
 }  // namespace

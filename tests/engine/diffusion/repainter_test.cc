@@ -218,12 +218,26 @@ TEST(StableDiffusionRepainter, OptionsAreCheckedByName) {
 TEST(RepainterSeconds, GrowWithTheNetworksAndWithWhatIsAsked) {
   const weights::Configs full = weights::stable_diffusion_1();
   const RepainterSeconds usual = seconds_of(full, {});
-  // Four times the measured pixels: docs/stable-diffusion.md.
-  EXPECT_NEAR(usual.training_step, 4 * 4 * 5.3, 1);
-  EXPECT_NEAR(usual.full_strength, 20 * 4 * 4.2, 5);
-  EXPECT_NEAR(usual.picture, 4 * 5.9, 0.5);
+  // Those that were measured: docs/stable-diffusion.md.
+  EXPECT_NEAR(usual.training_step, 4 * 29, 1);
+  EXPECT_NEAR(usual.full_strength, 20 * 17, 1);
+  EXPECT_NEAR(usual.picture, 25, 0.1);
   EXPECT_LT(seconds_of(full, {.guidance = 1}).full_strength, 0.6 * usual.full_strength);
   EXPECT_LT(seconds_of(weights::tiny_configs(), {}).training_step, 0.01 * usual.training_step);
+}
+
+TEST(RepainterBytes, GrowWithTheNetworksTheirPicturesAndTheAdapter) {
+  weights::Configs full = weights::stable_diffusion_1();
+  const RepainterBytes usual = bytes_of(full, {});
+  EXPECT_NEAR(double(usual.networks), 4 * 1066.2e6 + 16 * 4 * 0.8e6, 3e6) << "float32, and an adapter of rank 4";
+  EXPECT_GT(usual.learning, usual.painting);
+  const RepainterBytes of_rank_256 = bytes_of(full, {.rank = 256});
+  EXPECT_NEAR(double(of_rank_256.networks - usual.networks), 63 * 16 * 4 * 0.8e6, 3e7);
+  full.unet.sample_side = 128;
+  EXPECT_NEAR(double(bytes_of(full, {}).learning), 4 * double(usual.learning), 1);
+  EXPECT_EQ(bytes_of(full, {}).networks, usual.networks);
+  const weights::Configs tiny = weights::tiny_configs();
+  EXPECT_LT(bytes_of(tiny, {}).networks + bytes_of(tiny, {}).learning, usual.networks / 10);
 }
 
 }  // namespace

@@ -163,27 +163,114 @@ TEST(Admission, ADiffusionModelThatWorksForHoursHasToBeAllowed) {
   Edit edit(50, 512);
   edit.work.edit.first_tuning = 200;
   EXPECT_TRUE(admit_slow(edit.work, false)) << "there is none";
-  add_repainter(edit.work, models::RepainterCost{0.1, 0.1, 1, gib});
+  add_models(edit.work, {models::RepainterCost{0.1, 0.1, 1, gib}, {}});
   EXPECT_TRUE(admit_slow(edit.work, false)) << "of a small one: " << estimated_seconds(edit.work) << " s";
-  add_repainter(edit.work, models::RepainterCost{85, 24, 336, gib});  // of 1.5 on one thread
+  add_models(edit.work, {models::RepainterCost{85, 24, 336, gib}, {}});  // of 1.5 on one thread
   const auto refused = admit_slow(edit.work, false);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::unprocessable);
   EXPECT_EQ(refused.error().where, "allow_slow");
   EXPECT_NE(refused.error().message.find("about 7 hours"), std::string::npos) << refused.error().message;
   EXPECT_TRUE(admit_slow(edit.work, true));
+  Edit by_lpips(50, 512);
+  add_models(by_lpips.work, {{}, models::PerceptualCost{1e-3, gib, 4000}});
+  const auto slow = admit_slow(by_lpips.work, false);
+  ASSERT_FALSE(slow);
+  EXPECT_EQ(slow.error().where, "allow_slow");
+  EXPECT_NE(slow.error().message.find("set params.perceptual to \"msssim\""), std::string::npos)
+      << slow.error().message;
 }
 
 TEST(Admission, CountsTheMemoryOfADiffusionModelAndOfTheHistory) {
   Edit edit(50, 512);
   const std::uint64_t without = estimated_bytes(edit.work);
-  add_repainter(edit.work, std::nullopt);
+  add_models(edit.work, {});
   EXPECT_EQ(estimated_bytes(edit.work), without);
-  add_repainter(edit.work, models::RepainterCost{1, 1, 1, 5 * gib});
+  add_models(edit.work, {models::RepainterCost{1, 1, 1, 4 * gib, gib, 2 * gib}, {}});
   const std::uint64_t of_one_interval = estimated_bytes(edit.work);
   EXPECT_GT(of_one_interval, without + 5 * gib);
+  EXPECT_LT(of_one_interval, without + 6 * gib) << "it learns nothing";
+  edit.work.edit.later_tuning = 1;
+  EXPECT_EQ(estimated_bytes(edit.work), of_one_interval + gib) << "it paints and learns one after the other";
+  edit.work.edit.later_tuning = 0;
   edit.work.edit.intervals = 2;
   EXPECT_GE(estimated_bytes(edit.work), of_one_interval + 50 * 6 * 512 * 512);
+}
+
+TEST(Admission, CountsTheMemoryOfLpipsAtTheSizeOfItsPictures) {
+  Edit edit(50, 512), painted(50, 512);
+  const std::uint64_t without = estimated_bytes(edit.work);
+  const models::PerceptualCost lpips{1e-5, gib, 4096};
+  add_models(edit.work, {{}, lpips});
+  EXPECT_EQ(estimated_bytes(edit.work), without + gib + 4096 * 512 * 512);
+  const models::RepainterCost sd{1, 1, 1, 0, 3 * gib, 0};
+  add_models(edit.work, {sd, lpips});
+  add_models(painted.work, {sd, {}});
+  EXPECT_EQ(estimated_bytes(edit.work), estimated_bytes(painted.work) + gib) << "not both at a time";
+}
+
+/// An edit with networks of `bytes`; `more` are taken to learn, and are LPIPS's.
+Edit with_networks(std::uint64_t bytes, std::uint64_t more) {
+  Edit edit(50, 512);
+  edit.work.edit.first_tuning = 200, edit.work.edit.later_tuning = 50;
+  add_models(edit.work, {models::RepainterCost{10, 10, 100, bytes, 0, more}, models::PerceptualCost{1e-5, more, 0}});
+  return edit;
+}
+
+TEST(Admission, NamesTheNetworkThatAnEditCanDoWithout) {
+  const std::uint64_t rest = estimated_bytes(with_networks(0, 0).work);
+  struct Case {
+    std::uint64_t limit;
+    std::string where, advice;
+  };
+  for (const Case& each : {Case{rest + 7 * gib, "params.perceptual", "set params.perceptual to \"msssim\""},
+                           Case{rest + 4 * gib, "params.corrector", "set params.corrector to \"scene\""},
+                           Case{rest / 2, "params.perceptual", ", and lower params.views and params.max_image_side"}}) {
+    const Edit edit = with_networks(4 * gib, 3 * gib);
+    const auto refused = admit(edit.work, edit.params, {}, each.limit);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().where, each.where) << refused.error().message;
+    EXPECT_NE(refused.error().message.find(each.advice), std::string::npos) << refused.error().message;
+  }
+  Edit learning(50, 512);
+  learning.work.edit.first_tuning = 200;
+  add_models(learning.work, {models::RepainterCost{10, 10, 100, gib, gib, 9 * gib}, {}});
+  const auto refused = admit(learning.work, learning.params, {}, rest + 3 * gib);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().where, "params.tuning_steps") << refused.error().message;
+}
+
+TEST(AdmissionByTime, NamesWhatADiffusionModelTakesLongFor) {
+  Edit edit = timed(50, 512, 100);
+  edit.params = engine::params::filled_in({}, engine::params::Preset::standard);
+  edit.work.edit.first_tuning = 10'000, edit.work.edit.later_tuning = 50;
+  add_models(edit.work, {models::RepainterCost{10, 1, 10, gib, 0, 0}, {}});
+  const double limit = estimated_seconds(edit.work) / 2;
+  const auto learns = admit_time(edit.work, edit.params, {}, limit);
+  ASSERT_FALSE(learns);
+  EXPECT_EQ(learns.error().where, "params.tuning_steps") << learns.error().message;
+  EXPECT_NE(learns.error().message.find("set params.corrector to \"scene\""), std::string::npos)
+      << learns.error().message;
+  edit.work.edit.first_tuning = advised(learns.error().message, "params.tuning_steps");
+  EXPECT_TRUE(admit_time(edit.work, edit.params, {}, limit));
+  ++edit.work.edit.first_tuning;
+  EXPECT_FALSE(admit_time(edit.work, edit.params, {}, limit));
+
+  Edit painting = timed(50, 512, 100);
+  painting.params = edit.params;
+  painting.params.sampling_steps = 500;
+  const auto with_steps = [&](int steps) {
+    add_models(painting.work, {models::RepainterCost{0.1, 1, 2.0 * steps, gib, 0, 0}, {}});
+    return painting.work;
+  };
+  const double less = estimated_seconds(with_steps(500)) / 10;
+  const auto paints = admit_time(with_steps(500), painting.params, {}, less);
+  ASSERT_FALSE(paints);
+  EXPECT_EQ(paints.error().where, "params.sampling_steps") << paints.error().message;
+  const int steps = advised(paints.error().message, "params.sampling_steps");
+  ASSERT_GT(steps, 0);
+  EXPECT_LE(estimated_seconds(with_steps(steps)), less);
+  EXPECT_GT(estimated_seconds(with_steps(steps + 1)), less);
 }
 
 }  // namespace

@@ -45,6 +45,11 @@ TEST(Estimate, GrowsWithEverythingThatTakesMemory) {
       {"pictures", [](JobWorkload& w) { ++w.edit.pictured; }, false},
       {"iterations", [](JobWorkload& w) { w.edit.iterations *= 2; }, false},
       {"corrections", [](JobWorkload& w) { ++w.edit.corrections; }, false},
+      {"a network that compares",
+       [](JobWorkload& w) {
+         add_models(w, {{}, models::PerceptualCost{1e-5, 1, 1}});
+       },
+       true},
       {"picture size", [](JobWorkload& w) { w.edit.view_pixels *= 2; }, true},
       {"a slower machine", [](JobWorkload& w) { w.edit.frame.gaussians *= 2; }, false}};
   for (const Growth& growth : growths) {

@@ -3,8 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
 
 #include "engine/params/params.h"
+#include "engine/weights/lpips_files.h"
 #include "tests/support/data.h"
 
 namespace server::models {
@@ -44,6 +48,7 @@ TEST(Models, WithoutAFolderNothingIsThereAndBothSayWhatItTakes) {
   EXPECT_EQ(none.repainter({}, {}).error().where, "params.corrector");
   EXPECT_EQ(none.lpips().error().where, "params.perceptual");
   EXPECT_EQ(none.cost({}).training_step, 0);
+  EXPECT_EQ(none.lpips_cost().pixel_seconds, 0);
 }
 
 TEST(Models, AnEmptyFolderIsToldWhereFilesGoAndClientsAreNot) {
@@ -75,11 +80,53 @@ TEST(Models, ACheckpointIsFoundLookedAtAndUsed) {
   ASSERT_TRUE(repainter) << repainter.error().message;
   const RepainterCost usual = models.cost(params);
   EXPECT_GT(usual.training_step, 0);
-  EXPECT_GT(usual.bytes, std::uint64_t{1} << 20);
+  EXPECT_GT(usual.network_bytes, std::uint64_t{1} << 20);
+  EXPECT_LT(usual.network_bytes + usual.learning_bytes, std::uint64_t{100} << 20) << "it is a tiny one";
+  params.lora_rank = 64;
+  EXPECT_GT(models.cost(params).network_bytes, usual.network_bytes) << "the adapter is of a higher rank";
   params.sampling_steps = 40;
   EXPECT_NEAR(models.cost(params).full_strength, 2 * usual.full_strength, 1e-9);
   params.sampling_steps = 501;
   EXPECT_EQ(models.repainter(params, {}).error().where, "params.sampling_steps");
+}
+
+TEST(Models, LpipsIsReadyOnlyIfItsFilesHaveEveryTensor) {
+  REQUIRE_SHARED(support::golden_dir() / "lpips_lin");
+  const support::TempDir folder;
+  fs::create_directory(folder.path() / "lpips");
+  const fs::path vgg16 = folder.path() / "lpips/vgg16.safetensors", own = folder.path() / "lpips/vgg_v0.1.safetensors";
+  support::write_file(own, support::read_file(support::golden_dir() / "lpips_lin/vgg_v0.1.safetensors"));
+  const auto finding = [&](const std::string& bytes) {
+    support::write_file(vgg16, bytes);
+    return Models(folder.path()).findings()[1];
+  };
+  const auto zeros = [](bool whole) {
+    std::map<std::string, engine::weights::FloatTensor> tensors;
+    for (const auto& convolution : engine::weights::vgg_convolutions)
+      for (const auto& spec : {engine::weights::vgg_weight(convolution), engine::weights::vgg_bias(convolution)}) {
+        std::size_t count = 1;
+        for (const std::int64_t size : spec.shape) count *= std::size_t(size);
+        if (whole || convolution.place != 28) tensors[spec.name] = {spec.shape, std::vector<float>(count)};
+      }
+    return engine::weights::encode_tensors(tensors);
+  };
+  const std::string part = zeros(false), whole = zeros(true);
+  for (const auto& [bytes, expected] :
+       {std::pair<std::string, std::string>{part, "vgg16.safetensors:features.28.weight"},
+        {whole.substr(0, whole.size() - 1), "vgg16.safetensors:"},
+        {"", "vgg16.safetensors:header"}}) {
+    const Finding found = finding(bytes);
+    EXPECT_FALSE(found.usable);
+    if (found.message.find("libtorch") == std::string::npos) {
+      EXPECT_NE(found.message.find(expected), std::string::npos) << found.message;
+    }
+  }
+  const Finding good = finding(whole);
+  if (good.message.find("libtorch") != std::string::npos) GTEST_SKIP() << good.message;
+  EXPECT_TRUE(good.usable) << good.message;
+  const Models models(folder.path(), 1);
+  EXPECT_EQ(models.lpips().value()->identity().size(), 16u);
+  EXPECT_GT(models.lpips_cost().pixel_seconds, 0);
 }
 
 TEST(Models, WhatIsWrongWithACheckpointIsSaidToWhoInstallsIt) {
