@@ -75,8 +75,8 @@ class Repainter {
 
   /// What it has learned so far, as bytes: a repainter that is given them goes on to the same bytes.
   [[nodiscard]] virtual std::string state() const = 0;
-  /// errors  corrupt_data, invalid_argument: not what a repainter of these settings has learned; `where` is
-  /// "checkpoint"
+  /// errors  corrupt_data, invalid_argument: not what a repainter of these settings has learned; conflict: what it
+  ///         works with is not what it was; `where` is "checkpoint"
   [[nodiscard]] virtual Result<void> restore(std::string_view state) = 0;
 };
 

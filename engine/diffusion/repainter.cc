@@ -254,7 +254,8 @@ Result<std::vector<scene::Image>> StableDiffusionRepainter::repaint(std::span<co
 }
 
 std::string StableDiffusionRepainter::state() const {
-  if (!learned_) return {};
+  const std::string& model = model_.networks().digest;
+  if (!learned_) return weights::encode_tensors({}, {{model_key, model}});
   std::map<std::string, weights::FloatTensor> tensors;
   const AdamW::Moments moments = learned_->optimiser.moments();
   std::size_t k = 0;  // of the tensors that are trained: A and B of each layer, in the order of their names
@@ -265,16 +266,22 @@ std::string StableDiffusionRepainter::state() const {
       tensors.emplace(layer + half + ".square", moments.square[k]);
       ++k;
     }
-  return weights::encode_tensors(tensors, {{steps_key, std::to_string(moments.steps)}});
+  return weights::encode_tensors(tensors, {{model_key, model}, {steps_key, std::to_string(moments.steps)}});
 }
 
 Result<void> StableDiffusionRepainter::restore(std::string_view state) {
   learned_.reset();
-  if (state.empty()) return model_.adapt({});
   std::vector<std::byte> bytes(state.size());
   std::memcpy(bytes.data(), state.data(), state.size());
   auto file = weights::TensorFile::parse(std::move(bytes), "checkpoint");
   if (!file) return fail(ErrorCode::corrupt_data, file.error().message, "checkpoint");
+  const auto model = file->metadata().find(model_key);
+  if (model == file->metadata().end() || model->second != model_.networks().digest)
+    return fail(ErrorCode::conflict,
+                "the files of the diffusion model have changed since the edit began: what it has painted so far does "
+                "not go with what they would paint; submit it again",
+                "checkpoint");
+  if (file->tensors().empty()) return model_.adapt({});
   return guarded("checkpoint", [&]() -> Result<void> {
     auto layers =
         Adapter::fresh(weights::tensors_of(model_.configs().unet), targets, options_.rank, options_.rank, 0).layers();

@@ -78,8 +78,10 @@ class StableDiffusionRepainter final : public correct::Repainter {
   ///   errors  those of StableDiffusion::repaint()
   [[nodiscard]] Result<std::vector<scene::Image>> repaint(std::span<const correct::RepaintTask> tasks, double strength,
                                                           std::uint64_t seed, const correct::Advance& advance) override;
-  /// The adapter and its optimiser, as safetensors; empty as long as nothing was learned.
+  /// The adapter and its optimiser, as safetensors, without tensors as long as nothing was learned; and a digest of the
+  /// model.
   [[nodiscard]] std::string state() const override;
+  /// errors  as of Repainter; conflict: the model is not that of then
   [[nodiscard]] Result<void> restore(std::string_view state) override;
 
  private:

@@ -18,7 +18,7 @@ using working::Members;
 using working::Role;
 
 constexpr std::string_view magic = "SDCHKPNT";
-constexpr std::uint32_t version = 8;
+constexpr std::uint32_t version = 9;
 
 // Each part is written and read by a pair of functions that name the same fields in the same order.
 
@@ -284,6 +284,7 @@ Result<Contents> read_contents(std::span<const std::byte> bytes) {
   read(in, contents.state.report);
   read_list(in, contents.state.history);
   read(in, contents.state.repainter);
+  read(in, contents.state.perceptual);
   if (!in.ok() || in.remaining() != 0) return damaged("its parts do not fit together");
   return contents;
 }
@@ -302,6 +303,7 @@ std::string encode(const State& state) {
   write(out, state.report);
   write_list(out, state.history);
   write(out, state.repainter);
+  write(out, state.perceptual);
   out.write(fnv1a(out.bytes()));
   return std::move(out).take();
 }

@@ -80,6 +80,12 @@ Result<State> next_interval(State state, Edit& edit) {
 /// Where the edit starts: from the state that it goes on from, or from steps 1, 2 and 5.
 Result<State> begin(Edit& edit, std::span<const scene::Camera> cameras, std::optional<State> from) {
   if (from) {
+    if (from->perceptual != edit.perceptual.identity())
+      return fail(
+          ErrorCode::conflict,
+          "the files of the perceptual loss have changed since the edit began: what it has done so far does not "
+          "go with what they would make of the rest; submit it again",
+          "checkpoint");
     if (edit.repainter != nullptr)
       if (auto restored = edit.repainter->restore(from->repainter); !restored) return propagate(restored);
     edit.progress.go_on_after(from->interval);
@@ -95,6 +101,7 @@ Result<State> begin(Edit& edit, std::span<const scene::Camera> cameras, std::opt
   }
   auto state = assign_and_divide(edit);
   if (!state) return state;
+  state->perceptual = edit.perceptual.identity();
   if (edit.observer.assigned) edit.observer.assigned(state->report);
   if (auto found = look_for_views(*state, edit, cameras); !found) return propagate(found);
   return state;

@@ -27,7 +27,8 @@ struct State {
   /// What a repainter has made of views, oldest first: with the views before the edit, which can be rendered again, it
   /// is the history that it learns from. Of each interval the last correction.
   std::vector<correct::HistoryPicture> history = {};
-  std::string repainter = {};  ///< What a repainter has learned (correct::Repainter::state()); empty without one.
+  std::string repainter = {};   ///< What a repainter has learned (correct::Repainter::state()); empty without one.
+  std::string perceptual = {};  ///< Of the perceptual loss (optim::PerceptualLoss::identity()).
 };
 
 /// Could an edit of this scene by this request be in this state? Precondition: validate(request).

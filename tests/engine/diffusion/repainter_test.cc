@@ -101,7 +101,7 @@ TEST(StableDiffusionRepainter, RepaintsEachPictureAroundItsMaskBySeedAndStrength
 TEST(StableDiffusionRepainter, WhatItLearnsChangesWhatItPaintsAndGoesOnFromItsState) {
   const std::vector<RepaintTask> tasks{task(7)};
   const auto undisturbed = tiny();
-  EXPECT_EQ(undisturbed->state(), "");
+  const std::string nothing = undisturbed->state();
   const scene::Image blank = undisturbed->repaint(tasks, 1, 1, go_on).value()[0];
   ASSERT_TRUE(undisturbed->fine_tune(history(), 3, 5, go_on));
   const std::string between = undisturbed->state();
@@ -117,7 +117,7 @@ TEST(StableDiffusionRepainter, WhatItLearnsChangesWhatItPaintsAndGoesOnFromItsSt
   EXPECT_EQ(another->repaint(tasks, 1, 1, go_on).value()[0], some);
   ASSERT_TRUE(another->fine_tune(history(), 2, 6, go_on));
   EXPECT_EQ(another->state(), after) << "the optimiser goes on as well";
-  ASSERT_TRUE(another->restore(""));
+  ASSERT_TRUE(another->restore(nothing));
   EXPECT_EQ(another->repaint(tasks, 1, 1, go_on).value()[0], blank);
 }
 
@@ -144,9 +144,38 @@ TEST(StableDiffusionRepainter, LearnsByItsSeedAndByAllOfTheHistory) {
 
 TEST(StableDiffusionRepainter, NothingIsLearnedInNoStepsOrFromNothing) {
   const auto repainter = tiny();
+  const std::string nothing = repainter->state();
   ASSERT_TRUE(repainter->fine_tune(history(), 0, 5, go_on));
   ASSERT_TRUE(repainter->fine_tune({}, 5, 5, go_on));
-  EXPECT_EQ(repainter->state(), "");
+  EXPECT_EQ(repainter->state(), nothing);
+}
+
+TEST(StableDiffusionRepainter, DoesNotGoOnWhereTheFilesHaveChanged) {
+  const TinyFolder changed;
+  const std::string unet = support::read_file(changed.path() / "unet/diffusion_pytorch_model.safetensors");
+  std::string other_unet = unet;
+  other_unet[other_unet.size() - 3] ^= 1;  // in the last number's mantissa
+  const std::string merges = "#version: 0.2\na t</w>\nb t</w>\n";
+  const std::string noise = R"({"beta_schedule":"scaled_linear","beta_start":0.00085,"beta_end":0.0121})";
+  const auto learned = tiny(), blank = tiny();
+  ASSERT_TRUE(learned->fine_tune(history(), 1, 5, go_on));
+  for (const auto& [file, bytes] :
+       {std::pair<std::string, std::string>{"unet/diffusion_pytorch_model.safetensors", other_unet},
+        {"tokenizer/merges.txt", merges},
+        {"scheduler/scheduler_config.json", noise}}) {
+    const TinyFolder folder;
+    folder.write(file, bytes);
+    const auto repainter =
+        StableDiffusionRepainter::create(StableDiffusion::open(folder.path()).value(), quick).value();
+    for (const std::string& state : {learned->state(), blank->state()}) {
+      const auto restored = repainter->restore(state);
+      ASSERT_FALSE(restored) << file;
+      EXPECT_EQ(restored.error().code, ErrorCode::conflict);
+      EXPECT_EQ(restored.error().where, "checkpoint");
+    }
+  }
+  const auto same = StableDiffusionRepainter::create(StableDiffusion::open(changed.path()).value(), quick).value();
+  EXPECT_TRUE(same->restore(learned->state())) << "the same bytes in another place";
 }
 
 TEST(StableDiffusionRepainter, RefusesAStateThatIsNotItsOwn) {

@@ -267,6 +267,70 @@ TEST(Optimise, AnErrorOfTheLossEndsTheEdit) {
   EXPECT_EQ(outcome.error().where, "loss");
 }
 
+/// Of a network, which takes its time: asks three times within each evaluation.
+class Slow final : public optim::PerceptualLoss {
+ public:
+  explicit Slow(std::string files) : files_(std::move(files)) {}
+  Result<double> evaluate(const scene::Image& rendered, const scene::Image&, scene::Image& v) override {
+    v = scene::Image(rendered.width, rendered.height, 3);
+    ++evaluations;
+    for (int k = 0; k < 3; ++k)
+      if (auto going = going_on(); !going) return propagate(going);
+    return 1.0;
+  }
+  [[nodiscard]] std::string identity() const override { return files_; }
+  int evaluations = 0;
+
+ private:
+  std::string files_;
+};
+
+TEST(Optimise, AStopIsHeardWithinAnEvaluationOfTheLoss) {
+  const Case c;
+  Slow slow("a");
+  std::stop_source stop;
+  Observer observer;
+  observer.stop = stop.get_token();
+  int told = 0;  // with the first evaluation in work: once for the stage, and then by the loss
+  observer.progress = [&](const Progress& progress) {
+    if (progress.stage == Stage::optimise && ++told == 2) stop.request_stop();
+  };
+  const auto outcome = run(c.scene, c.cameras, c.request, {.perceptual = &slow}, observer);
+  ASSERT_FALSE(outcome);
+  EXPECT_EQ(outcome.error().code, ErrorCode::cancelled);
+  EXPECT_EQ(told, 2);
+  EXPECT_EQ(slow.evaluations, 1);
+  scene::Image gradient;
+  EXPECT_TRUE(slow.evaluate(scene::Image(2, 2, 3), scene::Image(2, 2, 3), gradient)) << "nobody is asked any more";
+}
+
+TEST(Optimise, DoesNotGoOnWithAnotherLoss) {
+  Case c;
+  c.request.params.intervals = 2;
+  std::string checkpoint;
+  Observer observer;
+  observer.interval_done = [&](const IntervalDone& done) {
+    if (done.interval == 1) checkpoint = encode(done.state);
+    return Result<void>{};
+  };
+  Slow before("a"), other("b");
+  const auto undisturbed = run(c.scene, c.cameras, c.request, {.perceptual = &before}, observer);
+  ASSERT_TRUE(undisturbed) << undisturbed.error().message;
+  const auto go_on = [&](optim::PerceptualLoss* loss) {
+    return run(c.scene, c.cameras, c.request, {.perceptual = loss}, {}, decode(checkpoint, c.scene, c.request).value());
+  };
+  const auto same = go_on(&before);
+  ASSERT_TRUE(same) << same.error().message;
+  EXPECT_EQ(same->overlay, undisturbed->overlay);
+  for (optim::PerceptualLoss* loss :
+       {static_cast<optim::PerceptualLoss*>(&other), static_cast<optim::PerceptualLoss*>(nullptr)}) {
+    const auto mixed = go_on(loss);
+    ASSERT_FALSE(mixed);
+    EXPECT_EQ(mixed.error().code, ErrorCode::conflict);
+    EXPECT_EQ(mixed.error().where, "checkpoint");
+  }
+}
+
 TEST(Optimise, ExtremeParametersEndInAResultOrInAnErrorThatNamesOne) {
   for (const float extreme : {1e30f, -1e30f, 3e38f, -3e38f}) {
     for (int parameter = 0; parameter < 4; ++parameter) {
