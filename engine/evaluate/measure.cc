@@ -45,6 +45,15 @@ scene::Image true_picture(const Case& the_case, const scene::Camera& camera) {
   return picture(the_case.truth, camera);
 }
 
+/// The views that a case is judged at.
+std::vector<JudgedView> judged_views(const Case& the_case) {
+  if (!the_case.judged.empty()) return the_case.judged;
+  std::vector<JudgedView> views;
+  for (const scene::Camera& camera : the_case.held_out)
+    views.push_back({camera, picture(the_case.truth, camera), judged_regions(the_case, camera)});
+  return views;
+}
+
 /// Depth along the optical axis of what a view shows most of. World units; 0: nothing.
 scene::Image true_depth(const scene::GaussianCloud& truth, const scene::Camera& camera) {
   render::ForwardOptions options;
@@ -143,13 +152,30 @@ Quality judge(std::span<const JudgedView> views, const scene::GaussianCloud& res
 }
 
 Quality judge(const Case& the_case, const scene::GaussianCloud& result) {
-  std::vector<JudgedView> rendered;
-  if (the_case.judged.empty())
-    for (const scene::Camera& camera : the_case.held_out)
-      rendered.push_back({camera, picture(the_case.truth, camera), judged_regions(the_case, camera)});
-  Quality quality = judge(the_case.judged.empty() ? rendered : the_case.judged, result);
+  Quality quality = judge(judged_views(the_case), result);
   quality.miss = miss(the_case, result);
   return quality;
+}
+
+Result<double> perceptual_distance(const Case& the_case, const scene::GaussianCloud& result,
+                                   optim::PerceptualLoss& loss) {
+  double sum = 0;
+  std::size_t seen = 0;
+  scene::Image unused;
+  for (const JudgedView& view : judged_views(the_case)) {
+    const scene::Mask& region = view.regions.edited;
+    if (region.area() == 0) continue;
+    scene::Image is = picture(result, view.camera);
+    for (int c = 0; c < 3; ++c)
+      for (std::size_t i = 0; i < region.data.size(); ++i)
+        if (region.data[i] == 0) is.plane(c)[i] = view.truth.plane(c)[i];
+    const scene::Rect box = scene::bounding_box(region);
+    const auto distance = loss.evaluate(scene::cut_out(is, box), scene::cut_out(view.truth, box), unused);
+    if (!distance) return distance;
+    sum += *distance;
+    ++seen;
+  }
+  return seen > 0 ? sum / double(seen) : 0;
 }
 
 Agreement agreement(const Case& the_case, std::span<const scene::Camera> views,

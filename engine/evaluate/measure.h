@@ -6,8 +6,10 @@
 #include <span>
 #include <vector>
 
+#include "engine/core/result.h"
 #include "engine/evaluate/cases.h"
 #include "engine/evaluate/judged_view.h"
+#include "engine/optim/perceptual.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/gaussian_cloud.h"
 #include "engine/scene/image.h"
@@ -65,6 +67,12 @@ struct RowsOf {
 [[nodiscard]] Quality judge(std::span<const JudgedView> views, const scene::GaussianCloud& result);
 /// Judges `result`, which came of the_case.before.
 [[nodiscard]] Quality judge(const Case& the_case, const scene::GaussianCloud& result);
+
+/// How far what held-out views show of the edited region looks from what they should show: the mean of a perceptual
+/// loss over the views that see it, each on the box around the region, in which all else is as it should be.
+///   errors  those of the loss
+[[nodiscard]] Result<double> perceptual_distance(const Case& the_case, const scene::GaussianCloud& result,
+                                                 optim::PerceptualLoss& loss);
 
 /// How well corrected views of one edit agree where the part has gone: each pixel there, carried to the nearest other
 /// view by the true depth, against what that view shows.

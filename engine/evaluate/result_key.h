@@ -16,6 +16,7 @@ struct ResultOf {
   int pictures = 0;            ///< Views that are shown beside it.
   int threads = 0;             ///< Threads that it is worked out with.
   std::string simd;            ///< Instruction set.
+  std::string lpips;           ///< Identity of the network that judges; empty: none does.
   std::uint64_t program = 0;   ///< checksum_of_program().
 };
 

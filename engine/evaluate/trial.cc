@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iomanip>
 #include <sstream>
+#include <utility>
 
 #include "engine/correct/scene_corrector.h"
 #include "engine/edit/edit.h"
@@ -30,7 +31,8 @@ std::unique_ptr<correct::Corrector> corrector_named(const std::string& name) {
   return nullptr;
 }
 
-Result<CarriedOut> carry_out(const Case& the_case, const edit::Request& request, const std::string& corrector) {
+Result<CarriedOut> carry_out(const Case& the_case, const edit::Request& request, const std::string& corrector,
+                             optim::PerceptualLoss* lpips) {
   MemoryPeak memory;
   const auto own = corrector_named(corrector);
   Agreement corrected_views;
@@ -42,7 +44,9 @@ Result<CarriedOut> carry_out(const Case& the_case, const edit::Request& request,
     memory.forget();
     return {};
   };
-  const auto outcome = edit::run(the_case.before, the_case.cameras, request, {.corrector = own.get()}, observer);
+  edit::Tools tools{.corrector = own.get()};
+  if (request.params.perceptual == params::Perceptual::lpips) tools.perceptual = lpips;
+  const auto outcome = edit::run(the_case.before, the_case.cameras, request, tools, observer);
   if (!outcome) return propagate(outcome);
   memory.note();
   CarriedOut done{.trial = {}, .edited = scene::flatten(the_case.before, outcome->overlay)};
@@ -58,6 +62,13 @@ Result<CarriedOut> carry_out(const Case& the_case, const edit::Request& request,
   trial.intervals = outcome->report.resolved.intervals;
   trial.untouched = judge(the_case, the_case.before);
   trial.result = judge(the_case, done.edited);
+  if (lpips != nullptr)
+    for (const auto& [judged, scene] :
+         {std::pair{&trial.untouched_lpips, &the_case.before}, {&trial.lpips, &std::as_const(done.edited)}}) {
+      const auto distance = perceptual_distance(the_case, *scene, *lpips);
+      if (!distance) return propagate(distance);
+      *judged = *distance;
+    }
   trial.corrected_views = corrected_views;
   add_times(outcome->report.times, trial);
   trial.peak_memory_bytes = memory.bytes();
@@ -85,9 +96,10 @@ Result<void> show_pictures(const Case& the_case, const edit::Request& request, c
 }
 
 std::string trial_table_head() {
-  return "| case | corrector | edited, dB | SSIM | vacated, dB | SSIM | arrived, dB | SSIM | outside, dB | SSIM | miss "
-         "| views agree, dB | s |\n"
-         "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n";
+  return "| case | corrector | edited, dB | SSIM | vacated, dB | SSIM | arrived, dB | SSIM | outside, dB | SSIM | "
+         "LPIPS "
+         "| miss | views agree, dB | s |\n"
+         "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n";
 }
 
 std::string trial_table_row(const Trial& trial) {
@@ -96,7 +108,12 @@ std::string trial_table_row(const Trial& trial) {
   out << "| " << trial.name << " | " << trial.corrector << std::fixed;
   for (const RegionQuality* kind : {&quality.edited, &quality.vacated, &quality.arrived, &quality.outside})
     out << " | " << std::setprecision(2) << kind->psnr_db << " | " << std::setprecision(4) << kind->ssim;
-  out << " | " << std::setprecision(4) << quality.miss << " | " << std::setprecision(2);
+  out << " | " << std::setprecision(4);
+  if (trial.lpips)
+    out << *trial.lpips;
+  else
+    out << "-";
+  out << " | " << quality.miss << " | " << std::setprecision(2);
   if (trial.corrected_views.pixels > 0)
     out << trial.corrected_views.psnr_db;
   else

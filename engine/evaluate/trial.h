@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "engine/edit/request.h"
 #include "engine/evaluate/cases.h"
 #include "engine/evaluate/measure.h"
+#include "engine/optim/perceptual.h"
 #include "engine/scene/gaussian_cloud.h"
 #include "engine/scene/image.h"
 
@@ -34,10 +36,11 @@ struct Trial {
   int intervals = 0;                    ///< T of the edit.
   Quality untouched;                    ///< Quality of the scene before the edit: what doing nothing would come to.
   Quality result;                       ///< Quality of the edited scene.
-  Agreement corrected_views;            ///< Agreement of the views of the last correction.
-  double seconds = 0;                   ///< Time of all stages.
-  std::vector<edit::StageTime> stages;  ///< Without pictures that only the judge asked for.
-  std::uint64_t peak_memory_bytes = 0;  ///< Above what the process held before; without what the judge took.
+  std::optional<double> untouched_lpips, lpips;  ///< perceptual_distance() of both, if there was a network for it.
+  Agreement corrected_views;                     ///< Agreement of the views of the last correction.
+  double seconds = 0;                            ///< Time of all stages.
+  std::vector<edit::StageTime> stages;           ///< Without pictures that only the judge asked for.
+  std::uint64_t peak_memory_bytes = 0;           ///< Above what the process held before; without what the judge took.
   std::vector<std::string> warnings;
 };
 
@@ -49,9 +52,10 @@ struct CarriedOut {
 
 /// Edits the case and judges what comes of it.
 ///   request  that of the case, with the parameters to try
-///   errors   those of edit::run()
+///   lpips    judges, too, and is the edit's loss if that is what its parameters say; null: neither
+///   errors   those of edit::run() and of `lpips`
 [[nodiscard]] Result<CarriedOut> carry_out(const Case& the_case, const edit::Request& request,
-                                           const std::string& corrector);
+                                           const std::string& corrector, optim::PerceptualLoss* lpips = nullptr);
 
 /// Takes in a picture to look at, under the name of its file without an extension.
 using Show = std::function<Result<void>(const std::string& name, const scene::Image& picture)>;

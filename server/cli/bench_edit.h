@@ -21,6 +21,7 @@ struct BenchOptions {
   proto::Params given;                        // over the preset
   std::string scene, dataset, request, name;  // a real capture, there and back
   CaptureOptions captures;
+  std::string model_dir;  // with LPIPS, which judges the cases
   bool small = false, whole_picture = false;
   int pictures = 1;
   ComputeOptions compute;
@@ -30,11 +31,11 @@ struct BenchOptions {
 void apply(const BenchOptions& options, engine::edit::Request& request);
 
 /// Where a result is kept.
-///   scene, dataset  what stands for them, see evaluate::ResultOf
+///   scene, dataset, lpips  what stands for them, see evaluate::ResultOf
 [[nodiscard]] std::filesystem::path cache_file(const BenchOptions& options, const Machine& machine,
                                                const std::string& subject, const std::string& corrector,
                                                const std::string& scene, const std::string& dataset,
-                                               const engine::edit::Request& request);
+                                               const engine::edit::Request& request, const std::string& lpips = {});
 
 /// Writes pictures below the output folder. `options` outlive it.
 [[nodiscard]] engine::evaluate::Show picture_writer(const BenchOptions& options);

@@ -18,6 +18,7 @@
 #include "engine/evaluate/trip_trial.h"
 #include "engine/io/dataset.h"
 #include "engine/io/scene_file.h"
+#include "engine/optim/perceptual.h"
 #include "engine/params/params.h"
 #include "server/cli/bench_captures.h"
 #include "server/cli/bench_edit.h"
@@ -28,6 +29,7 @@
 #include "server/cli/request_file.h"
 #include "server/edits/convert.h"
 #include "server/edits/convert_selection.h"
+#include "server/models/models.h"
 
 namespace server::cli {
 namespace {
@@ -40,13 +42,27 @@ using engine::propagate;
 using nlohmann::ordered_json;
 using std::filesystem::path;
 
+/// The network that judges the cases; null where no folder of models is named.
+Result<std::unique_ptr<engine::optim::PerceptualLoss>> lpips_of(const BenchOptions& options) {
+  if (options.model_dir.empty()) return nullptr;
+  const models::Models models(options.model_dir, options.compute.threads);
+  auto loss = models.lpips();
+  if (loss) return loss;
+  for (const models::Finding& finding : models.findings())  // they name the file, which clients are not told
+    if (finding.name == "lpips" && !finding.usable) loss.error().message = finding.message;
+  loss.error().where = "--model-dir";
+  return loss;
+}
+
 Result<evaluate::Trial> trial_of(const evaluate::Case& the_case, const std::string& corrector,
-                                 const BenchOptions& options, const Machine& machine) {
+                                 const BenchOptions& options, const Machine& machine,
+                                 engine::optim::PerceptualLoss* lpips) {
   edit::Request request = the_case.request;
   apply(options, request);
-  const path file = cache_file(options, machine, the_case.name, corrector, {}, {}, request);
+  const path file = cache_file(options, machine, the_case.name, corrector, {}, {}, request,
+                               lpips != nullptr ? lpips->identity() : "");
   return cached_or_new<evaluate::Trial>(file, [&]() -> Result<evaluate::Trial> {
-    auto done = evaluate::carry_out(the_case, request, corrector);
+    auto done = evaluate::carry_out(the_case, request, corrector, lpips);
     if (!done) return propagate(done);
     const auto pictures = evaluate::show_pictures(the_case, request, corrector, done->edited,
                                                   std::size_t(options.pictures), picture_writer(options));
@@ -61,6 +77,8 @@ Result<void> run_cases(const BenchOptions& options, const Machine& machine, Term
     if (chosen.error().where.empty()) chosen.error().where = "--case, --small";
     return propagate(chosen);
   }
+  const auto lpips = lpips_of(options);
+  if (!lpips) return propagate(lpips);
   std::string table = evaluate::trial_table_head();
   terminal.out << table << std::flush;
   ordered_json all = ordered_json::array();
@@ -68,7 +86,7 @@ Result<void> run_cases(const BenchOptions& options, const Machine& machine, Term
     const auto made = evaluate::make_case(name);
     if (!made) return propagate(made);
     for (const std::string& corrector : options.correctors) {
-      const auto trial = trial_of(*made, corrector, options, machine);
+      const auto trial = trial_of(*made, corrector, options, machine, lpips->get());
       if (!trial) return propagate(trial);
       const std::string row = evaluate::trial_table_row(*trial);
       table += row;
@@ -135,7 +153,9 @@ Result<void> run_trips(const BenchOptions& options, const Machine& machine, Term
 Result<void> run(const BenchOptions& options, Terminal& terminal) {
   edit::Request any;
   apply(options, any);
-  if (auto all = edits::available(any.params, nullptr); !all) return all;
+  const bool by_lpips = any.params.perceptual == proto::Perceptual::lpips && !options.model_dir.empty();
+  if (!by_lpips)  // else lpips_of() says so
+    if (auto all = edits::available(any.params, nullptr); !all) return all;
   if (auto made = make_folder(path(options.out) / "results"); !made) return made;
   return compute(options.compute, [&](const Machine& machine) -> Result<void> {
     if (options.captures.on) return run_captures(options, machine, terminal);
@@ -213,6 +233,13 @@ void add_bench_edit_command(CLI::App& program, Action& action) {
   engine::params::for_each_parameter([&](const auto& parameter) {
     if (parameter.on_wire && parameter.name != "corrector") add_knob(*command, parameter, options->given);
   });
+  CLI::Option* const models =
+      command
+          ->add_option(
+              "--model-dir", options->model_dir,
+              "Folder of pre-trained networks; with those of LPIPS below it (splatdrag models says which files), "
+              "a column of the cases, and --perceptual lpips")
+          ->type_name("DIR");
   command->add_flag("--whole-picture", options->whole_picture, "Without the local mask: everything counts as edited");
   command
       ->add_option("--pictures", options->pictures,
@@ -229,6 +256,7 @@ void add_bench_edit_command(CLI::App& program, Action& action) {
   command->add_option("--name", options->name, "Which request of a file of several")->type_name("NAME");
   capture->needs(dataset)->needs(request)->excludes(captures);
   small->excludes(captures);
+  models->excludes(captures)->excludes(capture);
   add_compute_options(*command, options->compute);
   command->callback([options, &action] { action = [options](Terminal& terminal) { return run(*options, terminal); }; });
 }

@@ -1,6 +1,7 @@
 #include "server/cli/bench_report.h"
 
 #include <fstream>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -24,6 +25,12 @@ ordered_json encode(const evaluate::Quality& quality) {
           {"arrived", encode(quality.arrived)},
           {"outside", encode(quality.outside)},
           {"miss", quality.miss}};
+}
+
+ordered_json encode(const std::optional<double>& number) { return number ? ordered_json(*number) : ordered_json(); }
+
+std::optional<double> number_or_null(const ordered_json& from) {
+  return from.is_null() ? std::nullopt : std::optional(from.get<double>());
 }
 
 ordered_json encode(const std::vector<engine::edit::StageTime>& times) {
@@ -62,6 +69,8 @@ ordered_json encode(const evaluate::Trial& trial) {
           {"intervals", trial.intervals},
           {"untouched", encode(trial.untouched)},
           {"result", encode(trial.result)},
+          {"untouched_lpips", encode(trial.untouched_lpips)},
+          {"lpips", encode(trial.lpips)},
           {"corrected_views_agree", {{"psnr_db", agreement.psnr_db}, {"pixels", agreement.pixels}}},
           {"seconds", trial.seconds},
           {"stages", encode(trial.stages)},
@@ -88,6 +97,8 @@ void decode(const ordered_json& from, evaluate::Trial& trial) {
   from.at("intervals").get_to(trial.intervals);
   decode(from.at("untouched"), trial.untouched);
   decode(from.at("result"), trial.result);
+  trial.untouched_lpips = number_or_null(from.at("untouched_lpips"));
+  trial.lpips = number_or_null(from.at("lpips"));
   from.at("corrected_views_agree").at("psnr_db").get_to(trial.corrected_views.psnr_db);
   from.at("corrected_views_agree").at("pixels").get_to(trial.corrected_views.pixels);
   from.at("seconds").get_to(trial.seconds);

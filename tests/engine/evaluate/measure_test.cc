@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -40,6 +42,31 @@ TEST(Judge, PixelsOfAKindAreThoseOfItsName) {
     EXPECT_FALSE(kinds.vacated.data[i] && kinds.arrived.data[i]);
     EXPECT_TRUE(kinds.edited.data[i] || !(kinds.vacated.data[i] || kinds.arrived.data[i]));
   }
+}
+
+/// The sum of absolute differences.
+class Difference final : public optim::PerceptualLoss {
+ public:
+  Result<double> evaluate(const scene::Image& rendered, const scene::Image& target, scene::Image&) override {
+    if (error) return tl::make_unexpected(*error);
+    double sum = 0;
+    for (std::size_t i = 0; i < target.data.size(); ++i) sum += std::abs(double(rendered.data[i]) - target.data[i]);
+    pixels += target.pixels();
+    ++pictures;
+    return sum;
+  }
+  std::optional<Error> error;
+  std::size_t pixels = 0, pictures = 0;
+};
+
+TEST(PerceptualDistance, LooksAtTheEditedRegionAlone) {
+  Difference loss;
+  EXPECT_EQ(perceptual_distance(speck(), speck().truth, loss).value(), 0);
+  EXPECT_EQ(loss.pictures, speck().held_out.size());
+  EXPECT_LT(loss.pixels, loss.pictures * speck().held_out[0].width * speck().held_out[0].height / 2) << "a box of each";
+  EXPECT_GT(perceptual_distance(speck(), speck().before, loss).value(), 10);
+  loss.error = Error{ErrorCode::internal, "out of order", "loss"};
+  EXPECT_EQ(perceptual_distance(speck(), speck().truth, loss).error().where, "loss");
 }
 
 /// Every view's picture of the truth.

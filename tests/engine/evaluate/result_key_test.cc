@@ -17,6 +17,7 @@ ResultOf sample_of() {
           .pictures = 1,
           .threads = 2,
           .simd = "AVX2",
+          .lpips = {},
           .program = 7};
 }
 
@@ -42,7 +43,8 @@ TEST(ResultKey, IsAnotherWhereAnythingIs) {
   const std::vector<Of> changes{[](auto& of) { of.subject = "speck"; }, [](auto& of) { of.corrector = "none"; },
                                 [](auto& of) { of.scene = "a.ply"; },   [](auto& of) { of.dataset = "a.ply"; },
                                 [](auto& of) { of.pictures = 2; },      [](auto& of) { of.threads = 1; },
-                                [](auto& of) { of.simd = "SSE4"; },     [](auto& of) { of.program = 8; }};
+                                [](auto& of) { of.simd = "SSE4"; },     [](auto& of) { of.program = 8; },
+                                [](auto& of) { of.lpips = "0123"; }};
   for (const Of& change : changes) {
     ResultOf of = sample_of();
     change(of);

@@ -13,6 +13,7 @@ Trial sample() {
   trial.result.arrived = {58, 1, 5};
   trial.result.outside = {38.049, 0.998, 90};
   trial.result.miss = 0.00018;
+  trial.lpips = 0.12345;
   trial.corrected_views = {41.754, 7};
   trial.seconds = 1.26;
   return trial;
@@ -21,14 +22,20 @@ Trial sample() {
 TEST(TrialTable, HasARowForATrial) {
   EXPECT_EQ(
       trial_table_row(sample()),
-      "| slide | scene | 36.36 | 0.9402 | 32.50 | 0.8000 | 58.00 | 1.0000 | 38.05 | 0.9980 | 0.0002 | 41.75 | 1.3 "
-      "|\n");
+      "| slide | scene | 36.36 | 0.9402 | 32.50 | 0.8000 | 58.00 | 1.0000 | 38.05 | 0.9980 | 0.1235 | 0.0002 | 41.75 "
+      "| 1.3 |\n");
 }
 
 TEST(TrialTable, ShowsNoAgreementWhereNoViewWasCorrected) {
   Trial trial = sample();
   trial.corrected_views.pixels = 0;
   EXPECT_NE(trial_table_row(trial).find(" | - | "), std::string::npos) << trial_table_row(trial);
+}
+
+TEST(TrialTable, ShowsNoLpipsWhereThereIsNoNetwork) {
+  Trial trial = sample();
+  trial.lpips.reset();
+  EXPECT_NE(trial_table_row(trial).find("| 0.9980 | - | 0.0002 |"), std::string::npos) << trial_table_row(trial);
 }
 
 TEST(TrialTable, HasAColumnForEachFigure) {

@@ -20,6 +20,7 @@ evaluate::Trial sample_trial() {
   trial.result.arrived = {32.1, 0.75, 9};
   trial.result.outside = {33.1, 1, 10};
   trial.result.miss = 1e-9;
+  trial.lpips = 0.1 + 0.2;  // of the untouched scene nobody has asked
   trial.corrected_views = {40, 11};
   trial.seconds = 0.1 + 0.2;
   trial.stages = {{engine::edit::Stage::views, 0.1}, {engine::edit::Stage::assign, 0.2}};
@@ -34,6 +35,8 @@ TEST(BenchReport, ATrialComesBackAsItWas) {
   decode(nlohmann::ordered_json::parse(written.dump()), read);
   EXPECT_EQ(encode(read).dump(), written.dump());
   EXPECT_EQ(read.seconds, 0.1 + 0.2);
+  EXPECT_EQ(read.lpips, 0.1 + 0.2);
+  EXPECT_EQ(read.untouched_lpips, std::nullopt);
   EXPECT_EQ(read.stages.front().stage, engine::edit::Stage::views);
 }
 
@@ -89,10 +92,10 @@ TEST(BenchReport, HasTheFieldsThatOthersRead) {
   const auto written = encode(sample_trial());
   std::vector<std::string> names;
   for (const auto& [name, value] : written.items()) names.push_back(name);
-  EXPECT_EQ(names,
-            (std::vector<std::string>{"case", "what", "corrector", "textured", "gaussians", "part", "seeds",
-                                      "uncovered", "open", "intervals", "untouched", "result", "corrected_views_agree",
-                                      "seconds", "stages", "peak_memory_bytes", "warnings"}));
+  EXPECT_EQ(names, (std::vector<std::string>{"case", "what", "corrector", "textured", "gaussians", "part", "seeds",
+                                             "uncovered", "open", "intervals", "untouched", "result", "untouched_lpips",
+                                             "lpips", "corrected_views_agree", "seconds", "stages", "peak_memory_bytes",
+                                             "warnings"}));
 }
 
 TEST(CachedResult, IsNotFoundAgain) {
