@@ -2,7 +2,7 @@
 // cancelled. Its weights are random, so nothing is said of what it paints.
 import assert from 'node:assert/strict';
 import { existsSync } from 'node:fs';
-import { copyFile, mkdir, symlink, writeFile } from 'node:fs/promises';
+import { chmod, copyFile, cp, mkdir, readFile, symlink, truncate, writeFile } from 'node:fs/promises';
 import path from 'node:path';
 import { after, before, test } from 'node:test';
 import { summary } from './support/contract.mjs';
@@ -103,6 +103,10 @@ test('without models, sd and lpips are refused with what it takes, and nothing e
 test('models are listed with what is missing and where it goes', { skip }, async () => {
   const { stdout } = await run('models', '--model-dir', models);
   assert.match(stdout, /^sd: ready, .*\nlpips: ready, /);
+  const damaged = temporaryFolder();
+  await cp(path.join(models, 'lpips'), path.join(damaged, 'lpips'), { recursive: true });
+  await truncate(path.join(damaged, 'lpips/vgg16.safetensors'), 1_000_000);
+  await assert.rejects(run('models', '--model-dir', damaged), ({ stdout: text }) => /lpips: .*vgg16\.safetensors:/.test(text));
   const empty = temporaryFolder();
   await assert.rejects(run('models', '--model-dir', empty), ({ stdout: text }) => text.includes(path.join(empty, 'stable-diffusion')) && text.includes('vgg16.safetensors'));
   const { correctors, perceptual } = (await service.client.get('/v1/info')).json();
@@ -152,6 +156,39 @@ test('killed while it learns and while it paints, an edit ends with the same byt
   assert.deepEqual(await bytesOf(await succeeded(id)), expected);
 });
 
+test('killed, and the files of a model changed, an edit says so and does not go on', { skip }, async () => {
+  // Copies: what is shared is not to be written to.
+  const own = temporaryFolder();
+  await cp(path.join(golden, 'tiny_sd'), path.join(own, 'stable-diffusion'), { recursive: true });
+  await cp(path.join(models, 'lpips'), path.join(own, 'lpips'), { recursive: true });
+  const writable = async (file) => {
+    for (const name of [path.dirname(file), file]) await chmod(path.join(own, name), 0o755);
+    return path.join(own, file);
+  };
+  const changed = await Service.start({ args: ['--model-dir', own, '--threads', 1, '--edit-time', '1000d', '--edit-memory', '64GiB'] });
+  try {
+    const { id: there } = await changed.client.upload((await demoScene({ gaussians: 4000, views: 5, size: '96x72', photos: false })).ply);
+    // Without training, too: a repainter that has learned nothing still goes by its files.
+    const long = { ...request.params, intervals: 3, iterations: 3, sampling_steps: 200, tuning_steps: 0, tuning_steps_later: 0, perceptual: 'lpips', max_image_side: 32 };
+    for (const file of ['stable-diffusion/unet/diffusion_pytorch_model.safetensors', 'lpips/vgg_v0.1.safetensors']) {
+      const { id } = await changed.client.submit({ ...request, scene: there, params: long });
+      await changed.client.until(id, (edit) => edit.ended !== null || edit.finished_intervals.length > 0, { every: 5, ...patient });
+      await changed.kill();
+      const place = await writable(file);
+      const bytes = await readFile(place);
+      bytes[bytes.length - 4] ^= 1; // the least place of a number
+      await writeFile(place, bytes);
+      await changed.start();
+      const edit = await changed.client.ended(id, patient);
+      assert.equal(edit.state, 'failed', file);
+      assert.equal(edit.error.where, 'checkpoint');
+      assert.match(edit.error.detail, /files of the .* have changed since the edit began/);
+    }
+  } finally {
+    await changed.stop();
+  }
+});
+
 test('cancelled while it learns or paints, an edit ends at once; stopped, with the interval before', { skip }, async () => {
   // So long that no stage ends by itself while the test looks.
   const long = { tuning_steps: 20_000, tuning_steps_later: 20_000, sampling_steps: 500, strength_initial: 1, strength_final: 1 };
@@ -181,6 +218,30 @@ test('what would take hours has to be allowed, and the estimate tells how long',
   const { id } = await service.client.submit({ ...slow, allow_slow: true });
   await service.client.request('POST', `/v1/edits/${id}/cancel`, { expect: 200 });
   assert.equal((await service.client.ended(id, patient)).state, 'cancelled');
+});
+
+test('lpips judges the cases of a benchmark', { skip }, async () => {
+  const out = temporaryFolder();
+  const { stdout } = await run('bench-edit', '--case', 'speck', '--preset', 'preview', '--corrector', 'none', '--pictures', 0, '--model-dir', models, '--out', out);
+  const [{ lpips, untouched_lpips }] = JSON.parse(await readFile(path.join(out, 'bench.json'))).cases;
+  assert.ok(lpips > 0 && untouched_lpips > 2 * lpips, `${lpips}, before the edit ${untouched_lpips}`);
+  assert.ok(stdout.includes(`| ${lpips.toFixed(4)} |`), stdout);
+});
+
+test('lpips is part of the estimate, and of what a refusal advises', { skip }, async () => {
+  const estimate = async (params, expect = 200) => (await service.client.request('POST', '/v1/edits', {
+    json: { ...request, scene: scene.id, params: { corrector: 'scene', iterations: 1000, views: 5, max_image_side: 96, ...params } }, query: { validate_only: true }, expect })).json();
+  const [without, with_it] = [await estimate({}), await estimate({ perceptual: 'lpips' })];
+  assert.ok(with_it.estimate.seconds > without.estimate.seconds + 10, `${with_it.estimate.seconds} s, without it ${without.estimate.seconds} s`);
+  assert.ok(with_it.estimate.memory_bytes > without.estimate.memory_bytes + 60e6, `${with_it.estimate.memory_bytes}, without it ${without.estimate.memory_bytes}`);
+  const small = await Service.start({ args: ['--model-dir', models, '--threads', 1, '--edit-memory', `${Math.round(without.estimate.memory_bytes / 2 ** 20) + 20}MiB`] });
+  try {
+    const { id } = await small.client.upload((await demoScene({ gaussians: 4000, views: 5, size: '96x72', photos: false })).ply);
+    const refused = (await small.client.request('POST', '/v1/edits', { json: { ...request, scene: id, params: { corrector: 'scene', iterations: 1, views: 5, max_image_side: 96, perceptual: 'lpips' } }, expect: 413 })).json();
+    assert.match(refused.detail, /set params.perceptual to "msssim"/);
+  } finally {
+    await small.stop();
+  }
 });
 
 test('lpips compares what is optimised with what was painted', { skip }, async () => {
