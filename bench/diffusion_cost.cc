@@ -3,8 +3,8 @@
 //
 //   build/release/bench/diffusion_cost [side [what]]     512 pixels unless told otherwise; what has `what` in its name
 //
-// Memory is what a call takes beside what was there before it: the peak is begun anew for each (Linux alone).
-// OMP_NUM_THREADS says how many threads.
+// Memory is what a call takes beside what was there before it: the peak is begun anew for each (Linux alone). The
+// longest block is the longest that a cancel waits, processor time. OMP_NUM_THREADS says how many threads.
 //
 // No weights are needed: the checkpoint is a hole in a file, as long as the real one, and its tensors are zeros. It is
 // made in the folder for temporary files and removed at the end.
@@ -16,6 +16,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -102,17 +103,34 @@ double processor_seconds() {
 
 std::string asked_for;  ///< Of what is measured; empty: all of it.
 
+/// The longest time between two blocks of a network, or between a block and either end of what is measured.
+class LongestBlock {
+ public:
+  void begin() { longest_ = 0, since_ = processor_seconds(); }
+  void note() {
+    const double now = processor_seconds();
+    longest_ = std::max(longest_, now - since_);
+    since_ = now;
+  }
+  [[nodiscard]] double seconds() const { return longest_; }
+
+ private:
+  double longest_ = 0, since_ = 0;
+} longest_block;
+
 void measure(const std::string& what, const std::function<void()>& work) {
   using Clock = std::chrono::steady_clock;
   if (what.find(asked_for) == std::string::npos) return;
   engine::evaluate::MemoryPeak memory;
   const auto begin = Clock::now();
   const double processor_begin = processor_seconds();
+  longest_block.begin();
   work();
+  longest_block.note();
   const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
   memory.note();
-  std::printf("%-40s %8.2f s, %8.2f s of processors; %6.2f GB\n", what.c_str(), seconds,
-              processor_seconds() - processor_begin, double(memory.bytes()) / 1e9);
+  std::printf("%-40s %8.2f s, %8.2f s of processors, %6.2f s the longest block; %6.2f GB\n", what.c_str(), seconds,
+              processor_seconds() - processor_begin, longest_block.seconds(), double(memory.bytes()) / 1e9);
   std::fflush(stdout);
 }
 
@@ -131,6 +149,7 @@ int main(int argc, char** argv) {
     autoencoder.parameters = or_exit(diffusion::Parameters::load(checkpoint, weights::Network::autoencoder));
     text_encoder.parameters = or_exit(diffusion::Parameters::load(checkpoint, weights::Network::text_encoder));
   });
+  for (diffusion::Model* model : {&unet, &autoencoder}) model->before_block = [] { longest_block.note(); };
   asked_for = what;
   measure("digest (zeros)", [&] { (void)or_exit(checkpoint.digest()); });
   const Tensor picture = at::randn({1, 3, side, side}), latents = at::randn({1, 4, side / 8, side / 8});
@@ -164,6 +183,7 @@ int main(int argc, char** argv) {
     });
   }
   const auto lpips = hollow_lpips();
+  lpips->ask([]() -> engine::Result<void> { return longest_block.note(), engine::Result<void>{}; });
   engine::scene::Image one(side, side, 3), other = one, gradient;
   engine::Rng rng(1);
   for (engine::scene::Image* image : {&one, &other})

@@ -66,22 +66,19 @@ struct RepaintTime {
 
 /// What the time of an edit depends on.
 struct Workload {
-  std::size_t gaussians = 0;   ///< N, of the input.
-  std::size_t dragged = 0;     ///< |P_h|
-  double covered = 0.1;        ///< Of a picture, 0 to 1: the box around the dragged part.
-  int intervals = 1;           ///< T
-  int finished = 0;            ///< Of them, before the edit went on from its state.
-  int corrections = 1;         ///< A, of each interval.
-  int iterations = 0;          ///< Of the optimisation, per correction.
-  bool corrected = false;      ///< A corrector works on the views.
-  bool repainted = false;      ///< And a repainter after it.
-  RepaintTime repaint_time;    ///< If it is known.
-  int first_tuning = 0;        ///< Steps of training before the first interval,
-  int later_tuning = 0;        ///< and before each later one.
-  double mean_strength = 0.5;  ///< Of the corrections of an interval.
-  /// Of a perceptual loss that is a network, beside the rest of an iteration, for each pixel of the box around the
-  /// part; seconds where a plan's figures were measured.
-  double perceptual_pixel_seconds = 0;
+  std::size_t gaussians = 0;    ///< N, of the input.
+  std::size_t dragged = 0;      ///< |P_h|
+  double covered = 0.1;         ///< Of a picture, 0 to 1: the box around the dragged part.
+  int intervals = 1;            ///< T
+  int finished = 0;             ///< Of them, before the edit went on from its state.
+  int corrections = 1;          ///< A, of each interval.
+  int iterations = 0;           ///< Of the optimisation, per correction.
+  bool corrected = false;       ///< A corrector works on the views.
+  bool repainted = false;       ///< And a repainter after it.
+  RepaintTime repaint_time;     ///< If it is known.
+  int first_tuning = 0;         ///< Steps of training before the first interval,
+  int later_tuning = 0;         ///< and before each later one.
+  double mean_strength = 0.5;   ///< Of the corrections of an interval.
   bool vacates = true;          ///< The dragged part leaves its place, which is then filled: a move.
   bool selected = false;        ///< A selection says what leaves, and its outskirts may go with it.
   std::size_t candidates = 0;   ///< C: cameras that are compared.
@@ -97,6 +94,9 @@ struct Workload {
   double drag_seconds = 0;    ///< To take it through all intervals.
   double slowness = 1;        ///< Of this machine as it is now: how many times longer work takes than where the plan's
                               ///< figures were measured.
+  /// Of a perceptual loss that is a network, beside the rest of an iteration: for each pixel of the box around the
+  /// part, seconds where a plan's figures were measured.
+  double perceptual_pixel_seconds = 0;
 };
 
 /// One stage of one interval.

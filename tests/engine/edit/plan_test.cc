@@ -280,6 +280,17 @@ TEST(Plan, CostsNoLessThanNothingAndMoreTheMoreThereIsToDo) {
   }
 }
 
+TEST(Plan, HasTheTimeOfAPerceptualLossInEachIterationForThePixelsOfTheBox) {
+  for (const Case& c : cases) {
+    Workload work = c.workload();
+    const double without = seconds_of(plan_of(work));
+    work.perceptual_pixel_seconds = 1e-3, work.slowness = 1;
+    const double box = work.covered * double(work.view_pixels);
+    const int times = (work.intervals - work.finished) * work.corrections * work.iterations;
+    EXPECT_NEAR(seconds_of(plan_of(work)) - without, 1e-3 * box * times, 1e-6 * (1 + box * times)) << c.name;
+  }
+}
+
 // No count of rows tells how long an elastic body is solved for.
 TEST(Plan, HasWhatAPreviewOfTheDragTookWhereTheEditDragsAndAssigns) {
   Workload work = cases[1].workload();
