@@ -74,7 +74,7 @@ Result<StoreCheck> check_store(const fs::path& folder) {
   StoreCheck found;
   std::error_code error;
   if (!fs::exists(folder, error)) return found;
-  const auto lock = FolderLock::take(folder);
+  const auto lock = FolderLock::take(folder, Sharing::alone);
   if (!lock) return propagate(lock);
   std::vector<fs::path> scenes;
   for (auto entry = fs::directory_iterator(folder, error); !error && entry != fs::end(entry); entry.increment(error))

@@ -51,8 +51,8 @@ struct SceneStore::Impl {
   const StoreOptions options;
   BoundedCache memory, files;
   const PublicErrors public_error{{options.folder, real_path(options.scene_root)}};
-  ScratchFolders scratch{options.folder / scratch_name, public_error};
-  Catalogue catalogue{options.folder, options.max_scenes, public_error};
+  ScratchFolders scratch{options.folder / scratch_name, random_nonce() + "-", public_error};
+  Catalogue catalogue{options.folder, options.sharing, options.max_scenes, public_error};
   Previews previews{options, memory, files};
   Versions versions{options, memory, catalogue, previews, scratch, public_error};
   VersionFiles version_files{files, memory, catalogue, previews, versions, public_error};
@@ -73,10 +73,17 @@ struct SceneStore::Impl {
     return info(**manifest);
   }
 
+  void forget(const std::string& id) {
+    previews.forget_all_of(id);
+    memory.forget(id + "/");
+    files.forget(id + "/");
+  }
+
   /// What `work` makes of a scene as it is now.
   template <class Work>
   auto with(const std::string& id, Work work) -> decltype(work(std::declval<const Snapshot&>())) {
     const auto at = catalogue.snapshot(id);
+    if (!at && at.error().code == engine::ErrorCode::not_found) forget(id);  // another process may have removed it
     if (!at) return propagate(at);
     return work(*at);
   }
@@ -88,9 +95,13 @@ SceneStore::~SceneStore() = default;
 Result<std::unique_ptr<SceneStore>> SceneStore::open(const StoreOptions& options) {
   auto impl = std::make_unique<Impl>(options);
   if (auto opened = impl->catalogue.open(); !opened) return propagate(opened);
-  if (auto opened = impl->scratch.open(); !opened) return propagate(opened);
+  if (auto opened = impl->scratch.open(impl->catalogue.is_alone()); !opened) return propagate(opened);
   return std::unique_ptr<SceneStore>(new SceneStore(std::move(impl)));
 }
+
+bool SceneStore::is_alone() const { return impl_->catalogue.is_alone(); }
+
+void SceneStore::let_others_in() { impl_->catalogue.let_others_in(); }
 
 const std::vector<engine::Error>& SceneStore::damaged() const { return impl_->catalogue.damaged(); }
 
@@ -134,9 +145,7 @@ Result<SceneInfo> SceneStore::patch(const std::string& id, const Patch& patch) {
 
 Result<void> SceneStore::remove(const std::string& id) {
   if (auto removed = impl_->catalogue.remove(id); !removed) return removed;
-  impl_->previews.forget_all_of(id);
-  impl_->memory.forget(id + "/");
-  impl_->files.forget(id + "/");
+  impl_->forget(id);
   return {};
 }
 

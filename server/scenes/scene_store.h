@@ -41,6 +41,11 @@ class SceneStore {
   [[nodiscard]] static Result<std::unique_ptr<SceneStore>> open(const StoreOptions& options);
   ~SceneStore();
 
+  /// Whether no other process works in the folder. The first of those who share it is alone until let_others_in(): it
+  /// can put things in order that stand beside the scenes.
+  [[nodiscard]] bool is_alone() const;
+  void let_others_in();
+
   /// Scenes on disk that could not be taken up when the store was opened; their folders are left as they are: somebody
   /// may want to save them.
   [[nodiscard]] const std::vector<engine::Error>& damaged() const;

@@ -1,4 +1,8 @@
 // Which scenes there are: a folder and a manifest each, on disk, and a list of them in memory. Knows no Gaussians.
+//
+// Where several processes share the folder (Sharing::shared), the manifests on disk are what counts: whoever asks for a
+// scene gets it as its manifest says now, which is read again when it is another file than before; and whoever changes
+// one holds the scene's lock between processes, a FileLock of its number in ".writers", while it reads and writes.
 #pragma once
 
 #include <cstddef>
@@ -8,9 +12,11 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "engine/core/file_lock.h"
 #include "engine/core/result.h"
 #include "server/scenes/catalogue/manifest.h"
 #include "server/scenes/disk/disk.h"
@@ -37,6 +43,7 @@ struct CatalogueEntry {
   std::mutex writer;
   // The lock of the catalogue guards what follows.
   ManifestPtr manifest;
+  std::optional<FileStamp> stamp;         ///< Of the manifest's file, if a change of that would show in it.
   std::shared_ptr<Lease> dataset_folder;  ///< Folder of an unpacked dataset; else null.
 };
 
@@ -62,12 +69,17 @@ class Catalogue {
  public:
   /// folder        absolute
   /// public_error  words errors for strangers; outlives this
-  Catalogue(std::filesystem::path folder, std::size_t max_scenes, const PublicErrors& public_error)
-      : folder_(std::move(folder)), max_scenes_(max_scenes), public_error_(public_error) {}
+  Catalogue(std::filesystem::path folder, Sharing sharing, std::size_t max_scenes, const PublicErrors& public_error)
+      : folder_(std::move(folder)), sharing_(sharing), max_scenes_(max_scenes), public_error_(public_error) {}
 
-  /// Makes the folder or takes up what is in it, without what a crash left there.
+  /// Makes the folder or takes up what is in it, without what a crash left there: unless others are at work in it.
   ///   errors  conflict: another process has it; those of file_error(), with full paths
   [[nodiscard]] Result<void> open();
+  /// Whether no other process has the folder: until let_others_in(), where it is shared.
+  [[nodiscard]] bool is_alone() const { return folder_lock_.is_alone(); }
+  void let_others_in() {
+    if (sharing_ == Sharing::shared) folder_lock_.share();
+  }
   /// Scenes that could not be taken up; their folders are left as they are.
   [[nodiscard]] const std::vector<engine::Error>& damaged() const { return damaged_; }
 
@@ -76,13 +88,13 @@ class Catalogue {
 
   /// The scene as it is now.
   ///   errors  not_found: `where` is "scene"
-  [[nodiscard]] Result<Snapshot> snapshot(const std::string& id) const;
+  [[nodiscard]] Result<Snapshot> snapshot(const std::string& id);
   /// Whether the scene has not been removed since. A removal empties the caches of the scene once, before the scene
   /// goes. So whoever has put something into a cache for a snapshot calls this afterwards, and forgets it again if it
   /// is false.
-  [[nodiscard]] bool has(const Snapshot& at) const;
-  [[nodiscard]] std::vector<ManifestPtr> manifests() const;  ///< In the order of ids.
-  [[nodiscard]] std::size_t size() const;
+  [[nodiscard]] bool has(const Snapshot& at);
+  [[nodiscard]] std::vector<ManifestPtr> manifests();  ///< In the order of ids.
+  [[nodiscard]] std::size_t size();
 
   /// Counts a scene that is being added, as long as this lives: a thousand uploads at once do not pass the limit
   /// together.
@@ -115,11 +127,26 @@ class Catalogue {
   [[nodiscard]] Result<void> remove(const std::string& id);
 
  private:
+  /// How a scene is changed: by one at a time, of all processes.
+  struct Writing {
+    std::unique_lock<std::mutex> here;
+    std::optional<engine::FileLock> among_processes;
+  };
+  [[nodiscard]] Result<Writing> begin_to_write(CatalogueEntry& scene);
+  [[nodiscard]] Result<std::optional<engine::FileLock>> lock_out_others(std::uint64_t number) const;
+
   void read_counter();
   void take_up(const std::filesystem::path& folder);
   [[nodiscard]] Result<std::uint64_t> next_number();
+  /// Where others may have changed something: the scene as it is on disk; not_found where it is not.
+  [[nodiscard]] Result<Snapshot> look_again(const std::string& id);
+  /// Looks again at all scenes.
+  void look_around();
+  /// Puts a manifest that was read into the list. The lock is held.
+  [[nodiscard]] Snapshot put(Manifest manifest, std::optional<FileStamp> stamp);
 
   const std::filesystem::path folder_;
+  const Sharing sharing_;
   const std::size_t max_scenes_;
   const PublicErrors& public_error_;
   FolderLock folder_lock_;

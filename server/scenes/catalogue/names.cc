@@ -39,6 +39,11 @@ Result<std::string> name_for(const std::string& given_name, const std::string& f
   return stem.empty() ? "scene" : stem;
 }
 
+std::uint64_t random_number() {
+  std::random_device device;
+  return std::uint64_t(device()) << 32 | device();
+}
+
 std::string random_nonce() {
   std::random_device device;
   constexpr std::string_view digits = "0123456789abcdef";

@@ -1,6 +1,7 @@
 // Names of files and scenes: strangers give them; here they are made fit for folders and messages.
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "engine/core/result.h"
@@ -21,5 +22,6 @@ using engine::Result;
 
 /// 16 random hexadecimal digits: tells things of one name apart that belong to different folders or processes.
 [[nodiscard]] std::string random_nonce();
+[[nodiscard]] std::uint64_t random_number();
 
 }  // namespace server::scenes

@@ -10,12 +10,14 @@
 
 #include "engine/io/read_options.h"
 #include "server/scenes/catalogue/scene_info.h"
+#include "server/scenes/disk/folder_lock.h"
 
 namespace server::scenes {
 
 /// Where the store is and how much it may hold.
 struct StoreOptions {
-  std::filesystem::path folder;                              ///< <data-dir>/scenes
+  std::filesystem::path folder;  ///< <data-dir>/scenes
+  Sharing sharing = Sharing::alone;
   std::filesystem::path scene_root;                          ///< Files may be opened below it; empty: none may.
   std::uint64_t memory_bytes = std::uint64_t{4} << 30;       ///< Budget of clouds, overlays and previews in memory.
   std::uint64_t max_dataset_bytes = std::uint64_t{8} << 30;  ///< Of one dataset, unpacked.

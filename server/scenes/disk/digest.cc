@@ -1,6 +1,5 @@
 #include "server/scenes/disk/digest.h"
 
-#include <sys/stat.h>
 #include <xxhash.h>
 #ifdef __x86_64__
 #include <xxh_x86dispatch.h>  // the same functions by the widest instructions there are: four times as fast
@@ -97,29 +96,20 @@ Result<void> check_digest(const fs::path& file, const std::string& digest, const
   return RunningDigest().check(file, digest, where);
 }
 
-SoundFiles::Stamp SoundFiles::stamp_of(const fs::path& file) {
-  struct stat about {};
-  if (::stat(file.c_str(), &about) != 0) return {};
-  return {about.st_ino,          std::uint64_t(about.st_size), about.st_mtim.tv_sec,
-          about.st_mtim.tv_nsec, about.st_ctim.tv_sec,         about.st_ctim.tv_nsec};
-}
-
 Result<void> SoundFiles::check(const fs::path& file, const std::string& digest, const std::string& where) {
   if (digest.empty()) return {};
   const auto now = std::chrono::steady_clock::now();
-  const Stamp stamp = stamp_of(file);  // before it is read: a change from now on makes it another
+  const auto stamp = stamp_of(file);  // before it is read: a change from now on makes it another
   {
     const std::lock_guard lock(mutex_);
     std::erase_if(found_, [&](const auto& known) { return known.second.until <= now; });
     const auto known = found_.find(file);
-    if (known != found_.end() && known->second.stamp == stamp && known->second.digest == digest) return {};
+    if (known != found_.end() && stamp && *stamp == known->second.stamp && known->second.digest == digest) return {};
   }
   if (auto sound = check_digest(file, digest, where); !sound) return sound;
-  // A change within one tick of the file system's clock would not show in the times.
-  const auto settled = std::chrono::system_clock::now() - std::chrono::seconds(2);
-  if (std::get<4>(stamp) >= std::chrono::system_clock::to_time_t(settled)) return {};
+  if (!stamp || !is_settled(*stamp)) return {};
   const std::lock_guard lock(mutex_);
-  found_[file] = {stamp, digest, now + trust_};
+  found_[file] = {*stamp, digest, now + trust_};
   return {};
 }
 

@@ -11,9 +11,9 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <tuple>
 
 #include "engine/core/result.h"
+#include "server/scenes/disk/disk.h"
 
 namespace server::scenes {
 
@@ -72,13 +72,11 @@ class SoundFiles {
                                    const std::string& where);
 
  private:
-  using Stamp = std::tuple<std::uint64_t, std::uint64_t, std::int64_t, std::int64_t, std::int64_t, std::int64_t>;
   struct Found {
-    Stamp stamp;
+    FileStamp stamp;
     std::string digest;
     std::chrono::steady_clock::time_point until;
   };
-  [[nodiscard]] static Stamp stamp_of(const std::filesystem::path& file);
 
   const std::chrono::seconds trust_;
   std::mutex mutex_;

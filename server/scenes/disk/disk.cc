@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstddef>
 #include <span>
 #include <string>
@@ -64,6 +65,19 @@ Result<void> copy_file(const fs::path& from, const fs::path& to) {
     if (auto written = target->write(part); !written) return written;
   }
   return target->commit();
+}
+
+Result<FileStamp> stamp_of(const fs::path& file) {
+  const engine::FileDescriptor opened(::open(file.c_str(), O_RDONLY | O_CLOEXEC));
+  struct stat about {};
+  if (opened.get() < 0 || ::fstat(opened.get(), &about) != 0) return failed("open", file, errno);
+  const auto in_ns = [](const timespec& time) { return std::int64_t(time.tv_sec) * 1'000'000'000 + time.tv_nsec; };
+  return FileStamp{about.st_ino, std::uint64_t(about.st_size), in_ns(about.st_mtim), in_ns(about.st_ctim)};
+}
+
+bool is_settled(const FileStamp& stamp) {
+  const auto two_seconds_ago = std::chrono::system_clock::now() - std::chrono::seconds(2);
+  return stamp.changed_ns < std::chrono::nanoseconds(two_seconds_ago.time_since_epoch()).count();
 }
 
 std::uint64_t bytes_below(const fs::path& path) {

@@ -29,6 +29,18 @@ using engine::Result;
 /// On disk when this returns; on an error nothing is left.
 [[nodiscard]] Result<void> copy_file(const std::filesystem::path& from, const std::filesystem::path& to);
 
+/// Tells one file of a name from the next one, and from itself once it has been written to. Looks at the file itself,
+/// not at what a network file system remembers of it.
+struct FileStamp {
+  std::uint64_t inode = 0, bytes = 0;
+  std::int64_t written_ns = 0, changed_ns = 0;
+  bool operator==(const FileStamp&) const = default;
+};
+///   errors  those of file_error()
+[[nodiscard]] Result<FileStamp> stamp_of(const std::filesystem::path& file);
+/// Whether a change from now on shows in the stamp: within one tick of the file system's clock it might not.
+[[nodiscard]] bool is_settled(const FileStamp& stamp);
+
 /// Bytes of all regular files below a folder, or of the file itself; 0 for what cannot be read. Follows no link.
 [[nodiscard]] std::uint64_t bytes_below(const std::filesystem::path& path);
 

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <utility>
 
 #include "engine/core/result.h"
@@ -29,19 +30,22 @@ class Scratch {
 class ScratchFolders {
  public:
   /// folder        holds them all
+  /// prefix        of their names; that of another process is another one
   /// public_error  outlives this
-  ScratchFolders(std::filesystem::path folder, const PublicErrors& public_error)
-      : folder_(std::move(folder)), public_error_(public_error) {}
+  ScratchFolders(std::filesystem::path folder, std::string prefix, const PublicErrors& public_error)
+      : folder_(std::move(folder)), prefix_(std::move(prefix)), public_error_(public_error) {}
 
-  /// Makes that folder, without what an earlier process left in it.
-  ///   errors  those of make_folder()
-  [[nodiscard]] Result<void> open();
+  /// Makes that folder.
+  ///   is_alone  no other process uses it: what an earlier one left in it goes
+  ///   errors    those of make_folder()
+  [[nodiscard]] Result<void> open(bool is_alone);
   /// A new, empty folder.
   ///   errors  those of make_folder()
   [[nodiscard]] Result<Scratch> make();
 
  private:
   const std::filesystem::path folder_;
+  const std::string prefix_;
   const PublicErrors& public_error_;
   std::atomic<std::uint64_t> last_{0};
 };

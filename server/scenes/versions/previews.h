@@ -27,7 +27,10 @@ class Previews {
  public:
   /// All outlive this.
   Previews(const StoreOptions& options, BoundedCache& memory, BoundedCache& files)
-      : options_(options), memory_(memory), files_(files) {}
+      : options_(options), memory_(memory), files_(files) {
+    // Two processes must not both call something "p000001" that a client may ask either of them for.
+    if (options.sharing == Sharing::shared) last_ = random_number() % 1'000'000'000'000;
+  }
 
   /// Forgets the previews whose time is over.
   void expire();

@@ -58,8 +58,9 @@ Result<VersionFile> VersionFiles::written(const Snapshot& at, const std::string&
   const auto write = [&]() -> Result<BoundedCache::CachedObject> {
     const fs::path folder = at.scene->folder->path() / "files";
     if (auto status = make_folder(folder); !status) return public_error_(status);
-    // A name of its own: one of the same version that was dropped may be about to be removed.
-    const fs::path path = folder / (version + "-" + std::to_string(++last_) + "." + extension);
+    // A name of its own: one of the same version that was dropped, or that another process has made, is removed on its
+    // own.
+    const fs::path path = folder / (version + "-" + process_nonce_ + "-" + std::to_string(++last_) + "." + extension);
     const std::uint64_t flat_bytes = engine::scene::memory_bytes(*loaded->cloud.base) +
                                      (loaded->cloud.overlay ? engine::scene::memory_bytes(*loaded->cloud.overlay) : 0);
     const auto reservation = memory_.reserve(flat_bytes);

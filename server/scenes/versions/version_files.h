@@ -6,6 +6,7 @@
 #include <string>
 
 #include "server/scenes/catalogue/catalogue.h"
+#include "server/scenes/catalogue/names.h"
 #include "server/scenes/catalogue/scene_info.h"
 #include "server/scenes/disk/bounded_cache.h"
 #include "server/scenes/disk/digest.h"
@@ -42,6 +43,7 @@ class VersionFiles {
   Versions& versions_;
   const PublicErrors& public_error_;
   SoundFiles sound_files_;
+  const std::string process_nonce_ = random_nonce();
   std::atomic<std::uint64_t> last_{0};
 };
 
