@@ -26,10 +26,12 @@ Queue::~Queue() { store_.watch({}); }
 
 Result<std::unique_ptr<Queue>> Queue::open(Store& store, const QueueOptions& options) {
   if (auto made = create_folder(options.folder); !made) return propagate(made);
-  auto findings = reconcile(store, options.folder);
-  if (!findings) return propagate(findings);
   std::unique_ptr<Queue> queue(new Queue(store, options));
-  queue->findings_ = std::move(*findings);
+  if (!options.others_are_at_work) {
+    auto findings = reconcile(store, options.folder);
+    if (!findings) return propagate(findings);
+    queue->findings_ = std::move(*findings);
+  }
   store.watch([changed = queue.get()] { changed->bump_revision(); });
   return queue;
 }

@@ -19,6 +19,9 @@ namespace engine::jobs {
 struct QueueOptions {
   std::filesystem::path folder;  ///< Holds one folder per job that needs one, named by its id. Nothing else uses it.
   std::size_t max_queued = 32;   ///< Jobs that may wait. A choice.
+  /// Other processes work with the same jobs already: notes and records change at any moment, and are not held against
+  /// each other.
+  bool others_are_at_work = false;
   Retention retention = {};
 };
 
@@ -26,8 +29,9 @@ struct QueueOptions {
 /// Errors are those of Store, unless said otherwise.
 class Queue {
  public:
-  /// Makes the folder and holds the store against the notes in it (notes.h): what the store has lost is put back, what
-  /// the notes lack is noted. The folder of a cancelled job goes; one that neither knows stays.
+  /// Makes the folder and holds the store against the notes in it (notes.h), unless others are at work: what the store
+  /// has lost is put back, what the notes lack is noted. The folder of a cancelled job goes; one that neither knows
+  /// stays.
   ///   store   outlives the queue
   ///   errors  no_space, unavailable; those of Store
   [[nodiscard]] static Result<std::unique_ptr<Queue>> open(Store& store, const QueueOptions& options);

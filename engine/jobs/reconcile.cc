@@ -1,5 +1,6 @@
 #include "engine/jobs/reconcile.h"
 
+#include <chrono>
 #include <limits>
 #include <optional>
 #include <string>
@@ -88,6 +89,10 @@ class Reconciliation {
 
   Result<void> put_back(Job job) {
     const bool has_ended = is_final(job.state);
+    // How often it was claimed is lost. Whoever holds an earlier claim must not hold one again: seconds count up faster
+    // than claims do.
+    const auto seconds = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
+    job.claim_number = seconds.time_since_epoch().count();
     if (!has_ended) {
       job.state = JobState::queued;
       job.finished_intervals = last_checkpoint(folder_ / job.id);

@@ -8,6 +8,7 @@
 
 #include "engine/core/atomic_file.h"
 #include "engine/jobs/durable_file.h"
+#include "engine/jobs/notes.h"
 #include "engine/jobs/running_job.h"
 
 namespace engine::jobs {
@@ -195,10 +196,10 @@ void Worker::keep_claims(std::chrono::milliseconds lease) {
     if (!running || running->lost) continue;
     const auto renewed = queue_.store_.renew(running->id, running->claim);
     if (renewed) {
-      store_has_answered();
+      claim_is_kept();
       running->heed(*renewed);
     } else if (!running->ends && !running->is_over(renewed.error())) {
-      set_trouble(renewed.error());
+      claim_cannot_be_kept(renewed.error());
       period = std::min(often, options_.retry_period);
     }
   }
@@ -212,6 +213,19 @@ std::optional<Error> Worker::trouble() const {
 void Worker::set_trouble(std::optional<Error> error) {
   const std::lock_guard lock(mutex_);
   trouble_ = std::move(error);
+  is_trouble_of_claim_ = false;
+}
+
+void Worker::claim_cannot_be_kept(Error error) {
+  const std::lock_guard lock(mutex_);
+  trouble_ = std::move(error);
+  is_trouble_of_claim_ = true;
+}
+
+void Worker::claim_is_kept() {
+  store_has_answered();
+  const std::lock_guard lock(mutex_);
+  if (is_trouble_of_claim_) trouble_.reset();
 }
 
 void Worker::store_has_answered() {
@@ -288,15 +302,14 @@ Result<JobResult> Worker::call(JobContext& context) const {
   }
 }
 
-Result<void> Worker::try_to_record_end(const std::string& id, const Change& change) {
+Result<Job> Worker::try_to_record_end(const std::string& id, const Change& change) {
   const std::lock_guard lock(queue_.ends_mutex_);
   auto job = queue_.store_.apply(id, change);
   // It may have been recorded before, and only the answer been lost.
   if (!job && job.error().code == ErrorCode::conflict)
     if (auto known = queue_.store_.find(id); known && is_final(known->state) && known->claim_number == change.claim)
       job = std::move(known);
-  if (!job) return propagate(job);
-  if (!is_final(job->state)) return {};
+  if (!job || !is_final(job->state)) return job;
   queue_.note_end(*job);
   if (job->state == JobState::cancelled) {
     std::error_code ignored;
@@ -304,7 +317,10 @@ Result<void> Worker::try_to_record_end(const std::string& id, const Change& chan
   } else {
     remove_files(queue_.folder_of(id), checkpoint_prefix);
   }
-  return {};
+  // Another process may have removed the record before this one had put the note and the files away.
+  if (const auto record = queue_.store_.find(id); !record && record.error().code == ErrorCode::not_found)
+    remove_traces(queue_.options_.folder, id);
+  return job;
 }
 
 void Worker::record_end(Queue::RunningJob& running, const Change& change) {
@@ -313,6 +329,7 @@ void Worker::record_end(Queue::RunningJob& running, const Change& change) {
   while (!running.lost) {
     const auto last_revision = queue_.revision();
     const auto recorded = try_to_record_end(running.id, change);
+    if (recorded && is_final(recorded->state) && options_.ended) options_.ended(*recorded);
     if (recorded || running.is_over(recorded.error())) return;
     set_trouble(recorded.error());
     // A failed job's own files may be what took the last bytes.

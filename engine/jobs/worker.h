@@ -41,6 +41,9 @@ struct WorkerOptions {
   std::chrono::milliseconds retry_period{1000};     ///< Time to wait after an error of the store.
   /// So often an idle worker looks at a store that others use, too, whether or not it has heard from them.
   std::chrono::milliseconds poll_period{2000};
+  /// Is told of each job whose end this worker has recorded, right after that: what a job has made may now be shown, or
+  /// is to be dropped. Not told where the process dies in between. Empty: nobody is.
+  std::function<void(const Job&)> ended = {};
 };
 
 /// A running job as its function sees it. All of it may be called from any thread, except save_checkpoint(): by one
@@ -49,6 +52,8 @@ class JobContext {
  public:
   [[nodiscard]] const std::string& id() const { return job_.id; }
   [[nodiscard]] const std::string& payload() const { return job_.payload; }
+  /// Number of the claim under which this attempt is made; no other attempt has it.
+  [[nodiscard]] std::int64_t claim() const { return job_.claim_number; }
   /// The progress that was published last before this attempt; empty at the first one.
   [[nodiscard]] const std::string& earlier_progress() const { return job_.progress; }
   /// The folder for files of the job; they live as long as its record, or until it is cancelled. Absent before the
@@ -135,20 +140,23 @@ class Worker {
   [[nodiscard]] Result<JobResult> call(JobContext& context) const;
   void record_end(Queue::RunningJob& running, const Change& change);
   /// Once: the record, then the note and the files beside it.
-  [[nodiscard]] Result<void> try_to_record_end(const std::string& id, const Change& change);
+  [[nodiscard]] Result<Job> try_to_record_end(const std::string& id, const Change& change);
   void keep_claims(std::chrono::milliseconds lease);
   /// Whether there is still something to renew when the period is over.
   [[nodiscard]] bool wait_to_renew(std::chrono::milliseconds period);
   void set_trouble(std::optional<Error> error);
   void store_has_answered();  ///< Ends the trouble of one that could not be reached.
+  void claim_cannot_be_kept(Error error);
+  void claim_is_kept();  ///< Ends the trouble of one that could not be.
   void set_current(std::shared_ptr<Queue::RunningJob> running);
 
   Queue& queue_;
   const JobFunction function_;
   const WorkerOptions options_;
   std::atomic<bool> draining_ = false;
-  mutable std::mutex mutex_;  ///< Guards the four below.
+  mutable std::mutex mutex_;  ///< Guards the five below.
   std::optional<Error> trouble_;
+  bool is_trouble_of_claim_ = false;  ///< It came from keep_claims().
   std::shared_ptr<Queue::RunningJob> current_;
   bool out_of_time_ = false;
   bool has_ended_ = false;  ///< Its last claim is over.

@@ -102,6 +102,26 @@ TEST_F(NotesTest, BringBackAStoreThatWasLost) {
   EXPECT_TRUE(queue->findings().empty()) << queue->findings()[0].message;
 }
 
+TEST_F(NotesTest, NobodyHoldsAClaimAgainThatWasLostWithTheStore) {
+  const std::string id = submit("x");
+  for (std::int64_t claim = 1; claim <= 2; ++claim) {
+    ASSERT_EQ(value(store->claim())->claim_number, claim);
+    value(store->apply(id, {.event = Event::release, .claim = claim}));
+  }
+  lose_store();
+  const auto claimed = value(store->claim());
+  EXPECT_GT(claimed->claim_number, 2);
+  EXPECT_EQ(code_of(store->apply(id, {.event = Event::succeed, .claim = 1})), ErrorCode::conflict);
+}
+
+TEST_F(NotesTest, AreLeftAloneWhileOthersAreAtWork) {
+  const std::string id = submit("x");
+  queue.reset();
+  fs::remove(jobs / (id + ".job"));
+  queue = value(Queue::open(*store, {.folder = jobs, .others_are_at_work = true}));
+  EXPECT_FALSE(fs::exists(jobs / (id + ".job"))) << "another process is just writing it, say";
+}
+
 TEST_F(NotesTest, KeepTheNumberOfARemovedJob) {
   for (int i = 0; i < 3; ++i) submit("x");
   for (const char* id : {"e000003", "e000001", "e000002"}) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -33,6 +34,44 @@ class Gate {
 
  private:
   std::counting_semaphore<> semaphore_{0};
+};
+
+/// A store between whose functions something happens, and whose claims have to be renewed often.
+class Between final : public Store {
+ public:
+  explicit Between(Store& store) : store_(store) {}
+  std::function<void(const Change&)> after_apply = [](const Change&) {};
+  std::function<std::optional<Error>()> instead_of_renew = [] { return std::nullopt; };
+
+  using Store::submit;
+  Result<Submission> submit(const NewJob& job, std::size_t max_queued, const Witness& witness) override {
+    return store_.submit(job, max_queued, witness);
+  }
+  Result<void> check_room(std::size_t max_queued) override { return store_.check_room(max_queued); }
+  Result<void> restore(const Job& job) override { return store_.restore(job); }
+  Result<Job> find(const std::string& id) override { return store_.find(id); }
+  Result<std::optional<Job>> find_key(const std::string& key) override { return store_.find_key(key); }
+  Result<std::vector<Job>> list(const Filter& filter) override { return store_.list(filter); }
+  Result<std::optional<Job>> claim() override { return store_.claim(); }
+  [[nodiscard]] std::optional<std::chrono::milliseconds> lease() const override { return 30ms; }
+  Result<JobState> renew(const std::string& id, std::int64_t claim) override {
+    if (auto error = instead_of_renew()) return tl::make_unexpected(std::move(*error));
+    return store_.renew(id, claim);
+  }
+  Result<bool> should_make_way(const std::string& id, std::chrono::milliseconds left) override {
+    return store_.should_make_way(id, left);
+  }
+  Result<Job> apply(const std::string& id, const Change& change) override {
+    auto job = store_.apply(id, change);
+    after_apply(change);
+    return job;
+  }
+  Result<void> remove(const std::string& id) override { return store_.remove(id); }
+  Result<std::vector<std::string>> expire(const Retention& retention) override { return store_.expire(retention); }
+  void watch(std::function<void()> news) override { store_.watch(std::move(news)); }
+
+ private:
+  Store& store_;
 };
 
 tl::unexpected<Error> interrupted() { return fail(ErrorCode::cancelled, "interrupted"); }
@@ -480,6 +519,69 @@ TEST_P(WorkerTest, NothingIsLeftOfAJobThatIsRemovedTheMomentItEnds) {
     for (const auto& left : fs::directory_iterator(dir.path() / "jobs"))
       EXPECT_FALSE(left.path().filename().string().starts_with(id)) << left.path();
   }
+}
+
+TEST_P(WorkerTest, NothingIsLeftOfAJobThatAnotherProcessRemovesTheMomentItEnds) {
+  Between between(*store);
+  between.after_apply = [&](const Change& change) {
+    if (change.event == Event::succeed) (void)store->remove("e000001");
+  };
+  queue = open_queue(between, dir.path());
+  const std::string id = submit();
+  start([](JobContext& context) -> Result<JobResult> {
+    value(context.save_checkpoint(1, "one"));
+    return JobResult{};
+  });
+  wait_for(*queue, submit("next", "b"), [](const Job& job) { return is_final(job.state); });
+  EXPECT_FALSE(fs::exists(folder(id)));
+  EXPECT_FALSE(fs::exists(dir.path() / "jobs" / (id + ".job"))) << "it would be taken for lost";
+  worker.reset();
+  queue.reset();
+}
+
+TEST_P(WorkerTest, TellsOfEachJobOnceItsEndIsRecorded) {
+  std::vector<std::string> told;
+  WorkerOptions options;
+  options.ended = [&](const Job& job) {
+    EXPECT_EQ(value(store->find(job.id)).state, job.state);
+    told.push_back(job.result + std::string(to_string(job.state)));
+  };
+  for (const char* payload : {"well", "badly"}) submit(payload);
+  worker = std::make_unique<Worker>(
+      *queue,
+      [](JobContext& context) -> Result<JobResult> {
+        if (context.payload() == "badly") return fail(ErrorCode::not_found, "no");
+        return JobResult{.text = "done, "};
+      },
+      options);
+  wait_for_end(*queue, "e000002");
+  worker.reset();
+  EXPECT_EQ(told, (std::vector<std::string>{"done, succeeded", "failed"}));
+}
+
+TEST_P(WorkerTest, AClaimThatCanBeKeptAgainIsNoTroubleAnyMore) {
+  Between between(*store);
+  std::atomic<int> refusals = 0;
+  between.instead_of_renew = [&]() -> std::optional<Error> {
+    if (++refusals > 3) return std::nullopt;
+    return Error{ErrorCode::no_space, "the disk of the store is full", {}};
+  };
+  queue = open_queue(between, dir.path());
+  submit();
+  start([this](JobContext&) -> Result<JobResult> {
+    gate.pass();
+    return JobResult{};
+  });
+  const auto deadline = std::chrono::steady_clock::now() + patience;
+  const auto wait_until = [&](auto condition) {
+    while (!condition() && std::chrono::steady_clock::now() < deadline) std::this_thread::sleep_for(100us);
+    return condition();
+  };
+  EXPECT_TRUE(wait_until([&] { return worker->trouble() || refusals > 3; }));
+  EXPECT_TRUE(wait_until([&] { return refusals > 3 && !worker->trouble(); })) << worker->trouble()->message;
+  gate.open();
+  worker.reset();
+  queue.reset();
 }
 
 TEST_P(WorkerTest, ExpiresEndedJobsAsItWorks) {
