@@ -267,15 +267,16 @@ class Run {
     keeper_.enter(JobStage::publish);
     // A process that was halted for long may not know yet that another has the edit now.
     if (auto held = context_.confirm_claim(); !held) return held;
-    const auto hold = workshop_.results.lock(context_.id());
-    // Asked once it can no longer be cancelled in between: a cancelled edit leaves no version.
     if (context_.cancel_token().stop_requested())
       return fail(ErrorCode::cancelled, context_.id() + " was interrupted before its result was published");
-    const auto version = workshop_.scenes.add_version(scene_id(), version_number(), context_.id(), outcome.overlay);
-    if (!version) return propagate(version);
+    workshop_.settle_results();
+    const auto made =
+        workshop_.scenes.make_version(scene_id(), version_number(), context_.id(), context_.claim(), outcome.overlay);
+    if (!made) return propagate(made);
+    made_ = scenes::to_text(*made);
     const edit::Report& report = outcome.report;
     proto::EditRecord& record = keeper_.record();
-    record.result_version = *version;
+    record.result_version = made->version.version;
     record.gaussians = {report.input_gaussians, report.output_gaussians, report.removed, report.copies,
                         report.changeable,      report.crumbs,           report.relit};
     record.uncovered = to_uncovered(report.uncovered);
@@ -304,21 +305,13 @@ class Run {
   GivenUp given_up_ = GivenUp::no;
   std::stop_source out_of_time_;  ///< Ends an attempt; fires with the context's token, too.
   bool stopped_early_ = false;
+  std::string made_;
 
  public:
-  [[nodiscard]] bool stopped_early() const { return stopped_early_; }
+  [[nodiscard]] JobResult result() const { return {.text = made_, .stopped_early = stopped_early_}; }
 };
 
 }  // namespace
-
-std::optional<int> version_made_by(const scenes::SceneStore& scenes, const std::string& scene,
-                                   const std::string& edit) {
-  const auto info = scenes.find(scene);
-  if (!info) return std::nullopt;
-  for (const scenes::VersionInfo& version : info->versions)
-    if (version.edit == edit) return version.version;
-  return std::nullopt;
-}
 
 Result<JobResult> carry_out(JobContext& context, const Workshop& workshop) {
   yield_to_others();
@@ -329,7 +322,7 @@ Result<JobResult> carry_out(JobContext& context, const Workshop& workshop) {
       return propagate(done);
     }
     log(workshop, spdlog::level::info, context, "done");
-    return JobResult{.text = {}, .stopped_early = run.stopped_early()};
+    return run.result();
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::too_large,
                 "the edit needs more memory than this machine has left: choose smaller radii, fewer views or a smaller "

@@ -10,7 +10,6 @@
 #include "engine/jobs/worker.h"
 #include "engine/optim/perceptual.h"
 #include "proto/edit_status.h"
-#include "server/edits/named_locks.h"
 #include "server/models/models.h"
 #include "server/scenes/scene_store.h"
 
@@ -20,8 +19,6 @@ namespace server::edits {
 struct Workshop {
   scenes::SceneStore& scenes;
   engine::WorkArena& arena;
-  /// An edit locks its id alone while it publishes its result; whoever cancels it shares the lock.
-  NamedLocks& results;
   spdlog::logger* logger = nullptr;  ///< May be null.
   int pictured_views = 4;            ///< Of each interval.
   /// The loss inside masks of edits that name no network; null: the engine's own.
@@ -33,15 +30,13 @@ struct Workshop {
   /// far off. 0: never.
   double outlived_seconds = 0;
   const models::Models* models = nullptr;  ///< Null: there are none.
+  /// Settles what earlier edits have made (results.h): called before this one's version gets its number.
+  std::function<void()> settle_results = [] {};
 };
 
-/// The version of a scene that an edit has made; nothing if it has not made one.
-[[nodiscard]] std::optional<int> version_made_by(const scenes::SceneStore& scenes, const std::string& scene,
-                                                 const std::string& edit);
-
-/// Carries out the job whose payload is an edit request with scene and version; its progress is a proto::EditRecord.
-/// Goes on after the last checkpoint. Where that cannot be used, it begins again, to the same bytes. The thread is
-/// given a low priority by the operating system, for good.
+/// Carries out the job whose payload is an edit request with scene and version; its progress is a proto::EditRecord,
+/// its result what take_in_result() wants. Goes on after the last checkpoint. Where that cannot be used, it begins
+/// again, to the same bytes. The thread is given a low priority by the operating system, for good.
 ///   errors  those of the engine, with their addresses; of the scene store; no_space, unavailable: a picture or a
 ///           checkpoint cannot be written; too_large: out of memory, or of time with no interval finished; cancelled:
 ///           as of JobContext::save_checkpoint()

@@ -6,6 +6,8 @@
 #include <utility>
 
 #include "engine/core/fair_semaphore.h"
+#include "engine/core/file_lock.h"
+#include "engine/core/numbers.h"
 #include "engine/edit/handles.h"
 #include "engine/edit/preview.h"
 #include "engine/edit/workload.h"
@@ -20,6 +22,7 @@
 #include "server/edits/interval_pictures.h"
 #include "server/edits/named_locks.h"
 #include "server/edits/records.h"
+#include "server/edits/results.h"
 #include "server/edits/speed_log.h"
 #include "server/edits/status.h"
 #include "server/scenes/disk/public_errors.h"
@@ -40,7 +43,9 @@ constexpr std::size_t all_jobs = 1'000'000;
 constexpr double outlived = 2;
 /// So long an edit waits for others to be measured: as long as for memory. A choice.
 constexpr auto measured_within = std::chrono::seconds(10);
-constexpr auto result_is_recorded_within = std::chrono::seconds(2);
+/// So long a change of a scene waits for edits that are being accepted, and those for it, in other processes. A choice:
+/// an edit is mostly accepted within one.
+constexpr auto others_are_done_within = std::chrono::seconds(10);
 
 double seconds_since(steady_clock::time_point start) {
   return std::chrono::duration<double>(steady_clock::now() - start).count();
@@ -53,10 +58,6 @@ Result<jobs::Job> about_edit(Result<jobs::Job> job, const std::string& id) {
     job.error().message = "there is no edit \"" + id + "\"; ended ones are removed after a while";
   if (job.error().where == id) job.error().where = "edit";
   return job;
-}
-
-Result<proto::EditStatus> shown(const Result<jobs::Job>& job) {
-  return job.map([](const jobs::Job& known) { return status_of(known); });
 }
 
 /// The request with the scene and version it is about always there: what a job's payload says.
@@ -166,11 +167,56 @@ struct EditService::Impl {
     queue = std::move(opened->queue);
     for (const engine::Error& finding : queue->findings())
       if (options.logger != nullptr) options.logger->log(spdlog::level::warn, finding.message);
+    settle_results(scenes, *queue);
+    if (options.role == Role::front) return {};
+    const Workshop workshop{.scenes = scenes,
+                            .arena = arena,
+                            .logger = options.logger,
+                            .pictured_views = options.pictured_views,
+                            .perceptual = options.perceptual,
+                            .timed = options.timed,
+                            .outlived_seconds = outlived * options.longest_seconds,
+                            .models = options.models,
+                            .settle_results = [this] { settle_results(scenes, *queue); }};
+    jobs::WorkerOptions working;
+    working.ended = [this](const jobs::Job& job) {
+      (void)settled(job);  // where that cannot be now, it is when somebody asks for the edit
+      if (job.state != jobs::JobState::succeeded) drop_results(scenes, job.id);
+    };
     worker.emplace(
-        *queue, [workshop = Workshop{scenes, arena, results, options.logger, options.pictured_views, options.perceptual,
-                                     options.timed, outlived * options.longest_seconds, options.models}](
-                    jobs::JobContext& context) { return carry_out(context, workshop); });
+        *queue, [workshop](jobs::JobContext& context) { return carry_out(context, workshop); }, working);
     return {};
+  }
+
+  /// The record as others see it: an edit has succeeded once its version is one of its scene.
+  jobs::Job settled(jobs::Job job) {
+    if (take_in_result(scenes, job)) return job;
+    job.state = jobs::JobState::running;
+    job.ended.reset();
+    return job;
+  }
+  Result<proto::EditStatus> shown(const Result<jobs::Job>& job) {
+    return job.map([this](const jobs::Job& known) { return status_of(settled(known)); });
+  }
+
+  /// Keeps an edit that is accepted and a change of its scene apart, in all processes.
+  struct Hold {
+    NamedLocks::Lock here;
+    std::optional<engine::FileLock> among_processes;
+  };
+  Result<Hold> hold(const std::string& scene, engine::LockKind kind) {
+    const bool alone = kind == engine::LockKind::alone;
+    auto here = alone ? scenes_in_use.lock(scene) : scenes_in_use.lock_shared(scene);
+    if (options.role == Role::all) return Hold{std::move(here), std::nullopt};
+    auto lock = engine::FileLock::take(options.folder / "scenes_in_use", engine::number_of_id('s', scene).value_or(0),
+                                       kind, others_are_done_within);
+    if (lock) return Hold{std::move(here), std::move(*lock)};
+    if (lock.error().code != ErrorCode::busy)
+      return tl::make_unexpected(scenes::without_folder(lock.error(), options.folder));
+    return fail(ErrorCode::conflict,
+                alone ? "an edit of this scene is just being accepted: wait for its end"
+                      : "this scene is just being changed: try again",
+                scene);
   }
 
   /// A request that can be carried out here, and what will be: errors as submit().
@@ -220,29 +266,17 @@ struct EditService::Impl {
     return known;
   }
 
-  /// An edit that has its result can no longer be cancelled, though its record may not say so yet.
-  Result<jobs::Job> refuse_to_cancel(const std::string& id) {
-    const auto deadline = steady_clock::now() + result_is_recorded_within;
-    for (auto seen = queue->revision(); steady_clock::now() < deadline;
-         seen = queue->wait_for_change(seen, std::chrono::milliseconds(100))) {
-      const auto job = queue->find(id);
-      if (!job || jobs::is_final(job->state)) break;
-    }
-    return fail(ErrorCode::conflict, id + " has its result already: it stays as it is", "edit");
-  }
-
   scenes::SceneStore& scenes;
   const ServiceOptions options;
   Selections own_selections;
   Selections& selections;
   engine::WorkArena arena;
   NamedLocks scenes_in_use;  ///< By scene: shared while an edit of it is accepted, alone in while_idle().
-  NamedLocks results;        ///< By edit; see Workshop.
   engine::FairSemaphore measuring{{.patience = measured_within}, "edits"};  ///< Of whoever uses `speeds`.
   SpeedLog speeds;
   std::unique_ptr<jobs::Store> records;
   std::unique_ptr<jobs::Queue> queue;
-  std::optional<jobs::Worker> worker;  ///< Last: it uses all of the above until it ends.
+  std::optional<jobs::Worker> worker;  ///< Of whoever is no front. Last: it uses all of the above until it ends.
 };
 
 EditService::EditService(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -261,17 +295,18 @@ Result<EditService::Submission> EditService::submit(const proto::EditRequest& re
   jobs::NewJob job{.lane = *asked->scene, .payload = proto::to_json(*asked), .idempotency_key = idempotency_key};
   const auto earlier = impl_->earlier(idempotency_key, job);
   if (!earlier) return propagate(earlier);
-  if (*earlier) return Submission{status_of(**earlier), false};
+  if (*earlier) return Submission{status_of(impl_->settled(**earlier)), false};
   // Before any work is done for a request that there is no place for.
   if (auto room = impl_->queue->check_room(); !room) return propagate(room);
-  const auto hold = impl_->scenes_in_use.lock_shared(*asked->scene);
+  const auto hold = impl_->hold(*asked->scene, engine::LockKind::shared);
+  if (!hold) return propagate(hold);
   const auto admitted = impl_->admitted(*asked);
   if (!admitted) return propagate(admitted);
   if (auto fits = admit_slow(admitted->work, asked->allow_slow); !fits) return propagate(fits);
   job.expected = in_milliseconds(admitted->seconds);
   const auto submission = impl_->queue->submit(job);
   if (!submission) return propagate(submission);
-  return Submission{status_of(submission->job), submission->created};
+  return Submission{status_of(impl_->settled(submission->job)), submission->created};
 }
 
 Result<proto::EditEstimate> EditService::estimate(const proto::EditRequest& request) {
@@ -323,7 +358,7 @@ Result<proto::Preview> EditService::preview(const proto::EditRequest& request) {
 }
 
 Result<proto::EditStatus> EditService::find(const std::string& id) {
-  return shown(about_edit(impl_->queue->find(id), id));
+  return impl_->shown(about_edit(impl_->queue->find(id), id));
 }
 
 Result<std::vector<proto::EditStatus>> EditService::list(const Filter& filter) {
@@ -335,28 +370,23 @@ Result<std::vector<proto::EditStatus>> EditService::list(const Filter& filter) {
     const auto job = impl_->queue->find(listed.id);                  // a list has no payloads
     if (!job && job.error().code == ErrorCode::not_found) continue;  // removed meanwhile
     if (!job) return propagate(job);
-    edits.push_back(status_of(*job));
+    edits.push_back(status_of(impl_->settled(*job)));
   }
   return edits;
 }
 
 Result<proto::EditStatus> EditService::stop(const std::string& id) {
-  return shown(about_edit(impl_->queue->stop(id), id));
+  return impl_->shown(about_edit(impl_->queue->stop(id), id));
 }
 
 Result<proto::EditStatus> EditService::cancel(const std::string& id) {
-  const auto job = about_edit(impl_->queue->find(id), id);
-  if (!job) return propagate(job);
-  {
-    const auto hold = impl_->results.lock_shared(id);
-    if (jobs::is_final(job->state) || !version_made_by(impl_->scenes, job->lane, id))
-      return shown(about_edit(impl_->queue->cancel(id), id));
-  }
-  return shown(impl_->refuse_to_cancel(id));
+  return impl_->shown(about_edit(impl_->queue->cancel(id), id));
 }
 
 Result<void> EditService::remove(const std::string& id) {
-  if (const auto job = about_edit(impl_->queue->find(id), id); !job) return propagate(job);
+  const auto job = about_edit(impl_->queue->find(id), id);
+  if (!job) return propagate(job);
+  if (auto taken = take_in_result(impl_->scenes, *job); !taken) return taken;  // its result stays, without the record
   auto removed = impl_->queue->remove(id);
   if (!removed && removed.error().where == id) removed.error().where = "edit";
   return removed;
@@ -395,7 +425,8 @@ Result<std::string> EditService::interval_picture(const std::string& id, int int
 }
 
 Result<void> EditService::while_idle(const std::string& scene, const std::function<Result<void>()>& change) {
-  const auto hold = impl_->scenes_in_use.lock(scene);
+  const auto hold = impl_->hold(scene, engine::LockKind::alone);
+  if (!hold) return propagate(hold);
   const auto active = impl_->queue->list({.lane = scene, .active_only = true, .limit = 1});
   if (!active) return propagate(active);
   if (!active->empty())
@@ -411,7 +442,8 @@ Result<void> EditService::remove_scene(const std::string& scene) {
 }
 
 Result<void> EditService::remove_version(const std::string& scene, const std::string& version) {
-  const auto hold = impl_->scenes_in_use.lock(scene);
+  const auto hold = impl_->hold(scene, engine::LockKind::alone);
+  if (!hold) return propagate(hold);
   const auto active = impl_->queue->list({.lane = scene, .active_only = true, .limit = all_jobs});
   if (!active) return propagate(active);
   for (const jobs::Job& listed : *active) {
@@ -419,9 +451,7 @@ Result<void> EditService::remove_version(const std::string& scene, const std::st
     if (!job && job.error().code == ErrorCode::not_found) continue;
     if (!job) return propagate(job);
     const auto request = proto::parse_edit_request(job->payload);
-    const auto made = version_made_by(impl_->scenes, scene, job->id);
-    if (!jobs::is_final(job->state) && ((request && std::to_string(request->version.value_or(0)) == version) ||
-                                        (made && std::to_string(*made) == version)))
+    if (!jobs::is_final(job->state) && request && std::to_string(request->version.value_or(0)) == version)
       return fail(ErrorCode::conflict,
                   job->id + ", an edit of this version, is " + std::string(to_string(job->state)) +
                       ": cancel it, or wait for its end",
@@ -449,7 +479,12 @@ std::optional<double> EditService::seconds_until_room() {
 }
 
 std::optional<engine::Error> EditService::trouble() const {
-  auto trouble = impl_->worker->trouble();
+  std::optional<engine::Error> trouble;
+  if (impl_->worker) {
+    trouble = impl_->worker->trouble();
+  } else if (const auto room = impl_->queue->check_room(); !room && room.error().code != ErrorCode::busy) {
+    trouble = room.error();
+  }
   if (trouble) trouble = scenes::without_folder(std::move(*trouble), impl_->options.folder);
   return trouble;
 }
@@ -474,6 +509,8 @@ double EditService::oldest_queued_seconds() {
   return oldest;
 }
 
-void EditService::drain(std::chrono::milliseconds grace) { impl_->worker->drain(grace); }
+void EditService::drain(std::chrono::milliseconds grace) {
+  if (impl_->worker) impl_->worker->drain(grace);
+}
 
 }  // namespace server::edits

@@ -30,7 +30,15 @@ namespace server::edits {
 
 using engine::Result;
 
+/// What of the service a process is.
+enum class Role {
+  all,    ///< All of it, alone.
+  front,  ///< Answers requests, and carries no edits out. There may be others of either kind over one data folder.
+  worker  ///< Carries edits out.
+};
+
 struct ServiceOptions {
+  Role role = Role::all;           ///< Others than `all` need a store in a database, and a shared store of scenes.
   std::filesystem::path folder;    ///< <data-dir>/edits: job records and what running edits need.
   std::string store = {};          ///< Database with the records (PostgresOptions::address); empty: a file here.
   std::chrono::seconds lease{30};  ///< How long a claim of an edit lasts there that is not renewed.
@@ -60,7 +68,8 @@ struct ServiceOptions {
 /// Safe to call from any thread.
 class EditService {
  public:
-  /// Takes up what was left unfinished.
+  /// Takes up what was left unfinished: where other processes are at work already, once they have been silent for a
+  /// lease.
   ///   scenes  outlives the service
   ///   errors  corrupt_data: the records of edits are damaged or lost (the message says how to go on); conflict: they
   ///           are kept elsewhere, or are another data folder's; unavailable, no_space; those of PostgresStore::open()

@@ -1,5 +1,5 @@
 // Locks by name: they keep work on the same thing apart without a mutex across it. An edit being accepted for a scene
-// and that scene being removed, say, or a result being published and its edit being cancelled.
+// and that scene being removed, say.
 #pragma once
 
 #include <condition_variable>

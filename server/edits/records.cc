@@ -41,11 +41,12 @@ struct Known {
   std::int64_t used_numbers = 0;
   bool must_exist = false;
   int max_deaths = 3;
+  std::chrono::seconds lease = ServiceOptions().lease;
+  Role role = Role::all;
 };
 
 ///   store  as of ServiceOptions
-Result<std::unique_ptr<jobs::Store>> open_store(const fs::path& folder, const std::string& store,
-                                                std::chrono::seconds lease, const Known& known) {
+Result<std::unique_ptr<jobs::Store>> open_store(const fs::path& folder, const std::string& store, const Known& known) {
   if (store.empty())
     return jobs::SqliteStore::open({.folder = folder,
                                     .used_numbers = known.used_numbers,
@@ -53,7 +54,8 @@ Result<std::unique_ptr<jobs::Store>> open_store(const fs::path& folder, const st
                                     .max_deaths = known.max_deaths});
   auto database = database_of(folder, store);
   if (!database) return propagate(database);
-  database->lease = lease;
+  database->alone = known.role == Role::all;
+  database->lease = known.lease;
   database->used_numbers = known.used_numbers;
   database->must_exist = known.must_exist;
   database->max_deaths = known.max_deaths;
@@ -119,7 +121,7 @@ Result<void> check_copy(const fs::path& folder, const jobs::Traces& traces, Reco
     if (!error) fs::create_directory(notes / id, error);
   if (error) return tl::make_unexpected(engine::file_error(error.value(), "write", copy->path()));
   const Known known{.must_exist = !traces.notes.empty(), .max_deaths = 0};
-  const auto opened = open_queue(open_store(copy->path(), {}, {}, known), {.folder = notes});
+  const auto opened = open_queue(open_store(copy->path(), {}, known), {.folder = notes});
   if (!opened && opened.error().code != ErrorCode::corrupt_data && opened.error().code != ErrorCode::unsupported)
     return propagate(opened);
   if (!opened) {
@@ -143,12 +145,20 @@ Result<OpenRecords> open_records(const scenes::SceneStore& scenes, const Service
   const auto traces = jobs::find_traces(jobs_folder(options.folder));
   if (!traces) return propagate(traces);
   const std::int64_t highest = std::max(traces->highest_number, highest_edit(scenes));
-  auto opened = open_queue(
-      open_store(options.folder, options.store, options.lease,
-                 {.used_numbers = highest, .must_exist = highest > 0, .max_deaths = options.attempts}),
-      {.folder = jobs_folder(options.folder), .max_queued = options.max_queued, .retention = options.retention});
+  auto store = open_store(options.folder, options.store,
+                          {.used_numbers = highest,
+                           .must_exist = highest > 0,
+                           .max_deaths = options.attempts,
+                           .lease = options.lease,
+                           .role = options.role});
+  // Once the database knows this folder by its id, the folder has to keep it.
+  if (std::error_code ignored; !store && !had_database && !in_file)
+    fs::remove(options.folder / folder_id_name, ignored);
+  auto opened = open_queue(std::move(store), {.folder = jobs_folder(options.folder),
+                                              .max_queued = options.max_queued,
+                                              .others_are_at_work = !scenes.is_alone(),
+                                              .retention = options.retention});
   if (opened) return opened;
-  if (std::error_code ignored; !had_database && !in_file) fs::remove(options.folder / folder_id_name, ignored);
   if (opened.error().code == ErrorCode::corrupt_data)
     opened.error().message +=
         in_file ? "; put back a copy of it, or have it made again from the notes beside the edits, by splatdrag admin "
@@ -183,8 +193,7 @@ Result<Rebuilt> rebuild_records(const scenes::SceneStore& scenes, const fs::path
   const auto traces = jobs::find_traces(jobs_folder(folder));
   if (!traces) return propagate(traces);
   const Known known{.used_numbers = std::max(traces->highest_number, highest_edit(scenes))};
-  const auto opened =
-      open_queue(open_store(folder, store, ServiceOptions().lease, known), {.folder = jobs_folder(folder)});
+  const auto opened = open_queue(open_store(folder, store, known), {.folder = jobs_folder(folder)});
   if (!opened) return propagate(opened);
   rebuilt.findings = opened->queue->findings();
   return rebuilt;

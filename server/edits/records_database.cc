@@ -53,8 +53,7 @@ Result<jobs::PostgresOptions> database_of(const fs::path& folder, const std::str
   const fs::path data = fs::absolute(folder, error).parent_path();
   return jobs::PostgresOptions{.address = address,
                                .owner = std::move(*id),
-                               .owner_for_people = "data folder " + name_of_this_host() + ":" + data.string(),
-                               .alone = true};
+                               .owner_for_people = "data folder " + name_of_this_host() + ":" + data.string()};
 }
 
 }  // namespace server::edits

@@ -54,7 +54,7 @@ struct SceneStore::Impl {
   ScratchFolders scratch{options.folder / scratch_name, random_nonce() + "-", public_error};
   Catalogue catalogue{options.folder, options.sharing, options.max_scenes, public_error};
   Previews previews{options, memory, files};
-  Versions versions{options, memory, catalogue, previews, scratch, public_error};
+  Versions versions{options, memory, catalogue, previews, public_error};
   VersionFiles version_files{files, memory, catalogue, previews, versions, public_error};
   Datasets datasets{options, memory, catalogue, scratch, public_error};
   Uploads uploads{options, memory, catalogue, scratch, public_error};
@@ -187,10 +187,18 @@ Result<LoadedVersion> SceneStore::load(const std::string& id, const std::string&
   return impl_->with(id, [&](const Snapshot& at) { return impl_->versions.load(at, version); });
 }
 
-Result<int> SceneStore::add_version(const std::string& id, int parent, const std::string& edit,
-                                    const Overlay& overlay) {
-  return impl_->with(id, [&](const Snapshot& at) { return impl_->versions.add(at, parent, edit, overlay); });
+Result<MadeVersion> SceneStore::make_version(const std::string& id, int parent, const std::string& edit,
+                                             std::int64_t attempt, const Overlay& overlay) {
+  return impl_->with(id, [&](const Snapshot& at) { return impl_->versions.make(at, parent, edit, attempt, overlay); });
 }
+
+Result<int> SceneStore::take_in(const std::string& id, const MadeVersion& made) {
+  return impl_->with(id, [&](const Snapshot& at) { return impl_->versions.take_in(at, made); });
+}
+
+std::vector<std::string> SceneStore::made_versions() const { return impl_->versions.made(); }
+
+void SceneStore::discard_made(const std::string& made) { impl_->versions.discard(made); }
 
 Result<VersionInfo> SceneStore::find_version(const std::string& id, const std::string& version) const {
   return impl_->with(id, [&](const Snapshot& at) { return Versions::find(at, version); });

@@ -7,6 +7,7 @@
 //                           dataset.<n>/      cameras and photos, unpacked from a zip file
 //                           dataset.<n>.xxh3  the digests of its files
 //                           files/            versions as files for download; a cache
+//     <data-dir>/scenes/.made/<edit>-<n>      what attempt n at an edit has made, until it is a version
 //
 // A manifest is written last, to a temporary name, synced and renamed: what it does not name is not there, and is
 // removed at the next start. It holds the digest of each file that it names and of itself; a file is held against its
@@ -25,6 +26,7 @@
 #include "engine/core/vec.h"
 #include "engine/io/dataset.h"
 #include "engine/scene/overlay.h"
+#include "server/scenes/catalogue/manifest.h"
 #include "server/scenes/catalogue/scene_info.h"
 #include "server/scenes/catalogue/store_options.h"
 #include "server/scenes/disk/scratch.h"
@@ -102,10 +104,19 @@ class SceneStore {
   ///   errors  not_found; busy: it does not fit the memory budget beside what is in use; too_large: it alone does not;
   ///           those of io
   [[nodiscard]] Result<LoadedVersion> load(const std::string& id, const std::string& version);
-  /// A new version, durable when this returns. Called again for the same edit, it gives back the version made before.
+  /// Writes down what an edit has made, durable when this returns. Nobody sees it before it is taken in: whether it
+  /// becomes a version is for others to say (server/edits). For an edit whose version the scene has it tells of that.
+  ///   attempt  tells this attempt at the edit from all others
   ///   overlay  over the parent
-  [[nodiscard]] Result<int> add_version(const std::string& id, int parent, const std::string& edit,
-                                        const engine::scene::Overlay& overlay);
+  ///   errors   those of load(); no_space
+  [[nodiscard]] Result<MadeVersion> make_version(const std::string& id, int parent, const std::string& edit,
+                                                 std::int64_t attempt, const engine::scene::Overlay& overlay);
+  /// Makes that a version of its scene, durable when this returns: its number. Nothing where that was done before, by
+  /// whatever process, even if the version has been deleted since.
+  [[nodiscard]] Result<int> take_in(const std::string& id, const MadeVersion& made);
+  /// What was made and not taken in, by the names of its files: "<edit>-<attempt>".
+  [[nodiscard]] std::vector<std::string> made_versions() const;
+  void discard_made(const std::string& made);
   /// What is known of a version, as find() has it among all of its scene. A preview is none.
   ///   errors  not_found
   [[nodiscard]] Result<VersionInfo> find_version(const std::string& id, const std::string& version) const;

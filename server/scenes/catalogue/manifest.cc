@@ -292,7 +292,48 @@ std::string text_of(const Manifest& manifest) {
   return text + std::string(before_own_digest) + digest + "\"\n}\n";
 }
 
+/// What `decode` makes of JSON text, or what is wrong with it.
+///   file  its name, for the error's address
+template <class Decode>
+auto decoded(std::string_view text, const std::string& file, Decode decode) -> Result<decltype(decode(json()))> {
+  try {
+    return decode(json::parse(text));
+  } catch (const Wrong& wrong) {
+    return fail(ErrorCode::corrupt_data, wrong.what, file + ":" + wrong.where);
+  } catch (const json::parse_error& failure) {
+    return fail(ErrorCode::corrupt_data, "not valid JSON: it goes wrong at byte " + std::to_string(failure.byte), file);
+  } catch (const json::exception&) {
+    return fail(ErrorCode::corrupt_data, "not valid JSON: a number is too large to be represented", file);
+  }
+}
+
 }  // namespace
+
+std::string to_text(const MadeVersion& made) {
+  ordered_json out = encoded(made.version, made.memory_bytes, made.digest);
+  out["file"] = made.file;
+  return out.dump();
+}
+
+Result<MadeVersion> parse_made_version(const std::string& text) {
+  return decoded(text, "result", [](const json& document) {
+    const Object in(
+        document, "",
+        {"version", "parent", "edit", "name", "created", "gaussians", "disk_bytes", "memory_bytes", "xxh3", "file"});
+    MadeVersion made;
+    made.version.version = in.whole("version", 1, most_versions);
+    made.version.parent = in.whole("parent", 0, made.version.version - 1);
+    made.version.edit = in.text("edit");
+    made.version.created = in.time("created");
+    made.version.gaussians = in.count("gaussians");
+    made.version.disk_bytes = in.count("disk_bytes");
+    made.memory_bytes = in.count("memory_bytes");
+    made.digest = in.digest("xxh3");
+    made.file = in.text("file");
+    if (made.file.find('/') != std::string::npos) throw Wrong{"expected a file's name", in.address("file")};
+    return made;
+  });
+}
 
 std::optional<std::size_t> place_of(const Manifest& manifest, int version) {
   const auto& versions = manifest.scene.versions;
@@ -306,15 +347,7 @@ Result<Manifest> read_manifest(const std::filesystem::path& folder) {
   if (!bytes) return propagate(bytes);
   const std::string file = (folder.filename() / manifest_name).string();
   const std::string_view text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
-  try {
-    return decode(json::parse(text), text);
-  } catch (const Wrong& wrong) {
-    return fail(ErrorCode::corrupt_data, wrong.what, file + ":" + wrong.where);
-  } catch (const json::parse_error& failure) {
-    return fail(ErrorCode::corrupt_data, "not valid JSON: it goes wrong at byte " + std::to_string(failure.byte), file);
-  } catch (const json::exception&) {
-    return fail(ErrorCode::corrupt_data, "not valid JSON: a number is too large to be represented", file);
-  }
+  return decoded(text, file, [&](const json& document) { return decode(document, text); });
 }
 
 Result<void> write_manifest(const std::filesystem::path& folder, const Manifest& manifest) {

@@ -37,6 +37,21 @@ struct Manifest {
   int next_version = 1;                             ///< Never used twice: a name stands for the same bytes for ever.
 };
 
+/// What an edit has made and what becomes a version of its scene, once it is taken in: a file outside of the scene's
+/// folder, and all that the manifest will say of it.
+struct MadeVersion {
+  VersionInfo
+      version;       ///< Without a name. Its number is the next one, unless another edit's version is taken in first.
+  std::string file;  ///< Its name; "": the version is one of the scene already.
+  std::string digest;
+  std::uint64_t memory_bytes = 0;
+};
+
+/// As JSON text, and back.
+///   errors  corrupt_data: it is not what to_text() writes
+[[nodiscard]] std::string to_text(const MadeVersion& made);
+[[nodiscard]] Result<MadeVersion> parse_made_version(const std::string& text);
+
 /// Where a version stands in the lists of a manifest; nothing where there is none of that number (any more).
 [[nodiscard]] std::optional<std::size_t> place_of(const Manifest& manifest, int version);
 

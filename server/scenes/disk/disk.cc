@@ -53,6 +53,13 @@ Result<void> move_durably(const fs::path& from, const fs::path& to) {
   return engine::sync_folder(from.parent_path());
 }
 
+Result<void> link_durably(const fs::path& from, const fs::path& to) {
+  remove_quietly(to);
+  if (::link(from.c_str(), to.c_str()) != 0)
+    return errno == ENOENT ? failed("link to", from, errno) : scenes::copy_file(from, to);
+  return engine::sync_folder(to.parent_path());
+}
+
 Result<void> copy_file(const fs::path& from, const fs::path& to) {
   const auto source = io::InputFile::open(from);
   if (!source) return propagate(source);

@@ -25,6 +25,10 @@ using engine::Result;
 /// Renames within a file system and waits until both folders know it. What is moved is on disk already.
 [[nodiscard]] Result<void> move_durably(const std::filesystem::path& from, const std::filesystem::path& to);
 
+/// Gives a file that is on disk a second name, and waits until that is, too; what had the name before is replaced. A
+/// copy where the file system has no such names.
+[[nodiscard]] Result<void> link_durably(const std::filesystem::path& from, const std::filesystem::path& to);
+
 /// A new file with the bytes of another one, which may grow or shrink meanwhile: what was there at some time is copied.
 /// On disk when this returns; on an error nothing is left.
 [[nodiscard]] Result<void> copy_file(const std::filesystem::path& from, const std::filesystem::path& to);

@@ -1,8 +1,10 @@
 #include "server/scenes/versions/versions.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <system_error>
 #include <utility>
 
 #include "engine/core/atomic_file.h"
@@ -195,51 +197,80 @@ Result<Versions::OverBase> Versions::over_base(const Snapshot& at, int parent, c
   return OverBase{std::make_shared<const Overlay>(std::move(composed)), bytes, below.base, std::move(*reservation)};
 }
 
-Result<int> Versions::add(const Snapshot& at, int parent, const std::string& edit, const Overlay& overlay) {
-  if (const auto before = made_by(edit, *at.manifest)) return *before;
+Result<MadeVersion> Versions::make(const Snapshot& at, int parent, const std::string& edit, std::int64_t attempt,
+                                   const Overlay& overlay) {
+  MadeVersion made;
+  made.version.version = at.manifest->next_version;
+  made.version.parent = parent;
+  made.version.edit = edit;
+  made.version.created = options_.clock();
+  if (const auto before = made_by(edit, *at.manifest)) {
+    made.version.version = *before;
+    return made;
+  }
   auto composed = over_base(at, parent, overlay);
   if (!composed) return propagate(composed);
   const Overlay& rows = *composed->overlay;
-  const auto staging = scratch_.make();
-  if (!staging) return propagate(staging);
-  const fs::path staged = staging->folder() / "overlay", folder = at.scene->folder->path();
-  if (auto written = io::write_overlay(staged, rows, *composed->base); !written)
-    return public_error_(written, staging->folder());
-  const auto digest = digest_of_file(staged);
-  if (!digest) return public_error_(digest, staging->folder());
-  int number = 0;
+  const fs::path folder = folder_of_made();
+  if (auto ready = make_folder(folder); !ready) return public_error_(ready);
+  made.file = edit + "-" + std::to_string(attempt);
+  const fs::path file = folder / made.file;
+  if (auto written = io::write_overlay(file, rows, *composed->base); !written) return public_error_(written, folder);
+  auto digest = digest_of_file(file);
+  if (!digest) return public_error_(digest, folder);
+  made.digest = std::move(*digest);
+  made.version.gaussians = composed->base->size() - rows.removed.size() + rows.added();
+  made.version.disk_bytes = bytes_below(file);
+  made.memory_bytes = composed->bytes;
+  return made;
+}
+
+Result<int> Versions::take_in(const Snapshot& at, const MadeVersion& made) {
+  int number = made.version.version;
+  const fs::path waiting = folder_of_made() / made.file, folder = at.scene->folder->path();
+  const auto is_waiting = [&] {
+    std::error_code ignored;
+    return !made.file.empty() && fs::exists(waiting, ignored);
+  };
+  if (!is_waiting()) return number;
   const auto changed = catalogue_.change(at, [&](Manifest& manifest) -> Result<void> {
-    if (const auto before = made_by(edit, manifest)) {  // by another thread meanwhile
+    // By another thread or process meanwhile; or killed after its manifest was written.
+    if (const auto before = made_by(made.version.edit, manifest)) {
       number = *before;
       return {};
     }
-    // A version made from one that is gone would be refused at the next start, with its scene.
-    if (!place_of(manifest, parent))
-      return fail(ErrorCode::not_found,
-                  "version " + std::to_string(parent) + " of scene " + at.scene->id + " was deleted meanwhile",
-                  "version");
-    number = manifest.next_version++;
+    if (!is_waiting()) return {};
+    number = std::max(number, manifest.next_version);
     const fs::path file = folder / overlay_name(number);
     if (auto ready = make_folder(file.parent_path()); !ready) return public_error_(ready);
-    if (auto moved = move_durably(staged, file); !moved) return public_error_(moved, staging->folder());
+    // Its first name goes once the manifest names the second: a process may be killed in between.
+    if (auto linked = link_durably(waiting, file); !linked) return public_error_(linked, folder);
     if (auto synced = engine::sync_folder(folder); !synced) return public_error_(synced);
-    manifest.scene.versions.push_back({.version = number,
-                                       .parent = parent,
-                                       .edit = edit,
-                                       .name = {},
-                                       .created = options_.clock(),
-                                       .gaussians = composed->base->size() - rows.removed.size() + rows.added(),
-                                       .disk_bytes = bytes_below(file)});
-    manifest.overlay_memory_bytes.push_back(composed->bytes);
-    manifest.overlay_digests.push_back(*digest);
+    manifest.next_version = number + 1;
+    VersionInfo version = made.version;
+    version.version = number;
+    if (!place_of(manifest, *version.parent)) version.parent = 0;  // it was deleted meanwhile, as remove() would say
+    manifest.scene.versions.push_back(std::move(version));
+    manifest.overlay_memory_bytes.push_back(made.memory_bytes);
+    manifest.overlay_digests.push_back(made.digest);
     return {};
   });
   if (!changed) return propagate(changed);
-  memory_.put(cached_name(at.scene->id, number), {composed->overlay, composed->bytes},
-              std::move(composed->reservation));
-  forget_if_removed(at, number);
+  discard(made.file);
   return number;
 }
+
+std::vector<std::string> Versions::made() const {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (auto entry = fs::directory_iterator(folder_of_made(), error); !error && entry != fs::end(entry);
+       entry.increment(error))
+    names.push_back(entry->path().filename());
+  std::ranges::sort(names);
+  return names;
+}
+
+void Versions::discard(const std::string& made) const { remove_quietly(folder_of_made() / made); }
 
 Result<VersionInfo> Versions::rename(const Snapshot& at, const std::string& version, const std::string& name) {
   const auto number = known_version(at, version);

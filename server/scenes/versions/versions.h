@@ -1,8 +1,11 @@
 // Versions in memory: read from disk when somebody asks for one, and new ones made.
 #pragma once
 
+#include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "engine/io/scene_file.h"
 #include "engine/scene/overlay.h"
@@ -10,7 +13,6 @@
 #include "server/scenes/catalogue/store_options.h"
 #include "server/scenes/disk/bounded_cache.h"
 #include "server/scenes/disk/digest.h"
-#include "server/scenes/disk/scratch.h"
 #include "server/scenes/versions/previews.h"
 
 namespace server::scenes {
@@ -20,13 +22,8 @@ class Versions {
  public:
   /// All outlive this.
   Versions(const StoreOptions& options, BoundedCache& memory, Catalogue& catalogue, Previews& previews,
-           ScratchFolders& scratch, const PublicErrors& public_error)
-      : options_(options),
-        memory_(memory),
-        catalogue_(catalogue),
-        previews_(previews),
-        scratch_(scratch),
-        public_error_(public_error) {}
+           const PublicErrors& public_error)
+      : options_(options), memory_(memory), catalogue_(catalogue), previews_(previews), public_error_(public_error) {}
 
   /// Version 0 with its file's layout. Errors as load().
   [[nodiscard]] Result<std::shared_ptr<const engine::io::SceneFile>> base(const Snapshot& at);
@@ -37,12 +34,20 @@ class Versions {
 
   /// Whether a version that was there then is there now.
   [[nodiscard]] bool has(const Snapshot& at, const std::string& version) const;
-  /// A new version, durable when this returns: its number. Called again for the same edit, it gives back the one made
-  /// before.
+  /// Writes down what becomes a version of the scene when it is taken in, and not before: durable when this returns.
+  /// For an edit whose version is one of the scene already it tells of that.
+  ///   attempt  tells this attempt at the edit from all others, whose files are their own
   ///   overlay  over the parent
-  ///   errors   those of load() and write_manifest()
-  [[nodiscard]] Result<int> add(const Snapshot& at, int parent, const std::string& edit,
-                                const engine::scene::Overlay& overlay);
+  ///   errors   those of load() and write_overlay()
+  [[nodiscard]] Result<MadeVersion> make(const Snapshot& at, int parent, const std::string& edit, std::int64_t attempt,
+                                         const engine::scene::Overlay& overlay);
+  /// Makes it a version of the scene, durable when this returns: its number. Nothing where that was done before, by
+  /// whatever process, even if the version has been deleted since.
+  ///   errors  those of write_manifest(); not_found: the scene is gone
+  [[nodiscard]] Result<int> take_in(const Snapshot& at, const MadeVersion& made);
+  /// What was made and has not been taken in: names of files, "<edit>-<attempt>".
+  [[nodiscard]] std::vector<std::string> made() const;
+  void discard(const std::string& made) const;
   /// What is known of a version. A preview is none.
   ///   errors  not_found
   [[nodiscard]] static Result<VersionInfo> find(const Snapshot& at, const std::string& version);
@@ -58,6 +63,7 @@ class Versions {
   [[nodiscard]] Result<Preview> add_preview(const Snapshot& at, int parent, const engine::scene::Overlay& overlay);
 
  private:
+  [[nodiscard]] std::filesystem::path folder_of_made() const { return options_.folder / ".made"; }
   /// An overlay over version 0, and the memory reserved for it until the cache counts it.
   struct OverBase {
     std::shared_ptr<const engine::scene::Overlay> overlay;
@@ -81,7 +87,6 @@ class Versions {
   BoundedCache& memory_;
   Catalogue& catalogue_;
   Previews& previews_;
-  ScratchFolders& scratch_;
   const PublicErrors& public_error_;
 };
 

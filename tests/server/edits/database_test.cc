@@ -75,6 +75,141 @@ TEST_F(DatabaseTest, AnEditThatAnotherHasTakenOverPublishesNothing) {
   EXPECT_EQ(database->run("SELECT claimed FROM splatdrag.jobs"), "t");
 }
 
+TEST_F(DatabaseTest, AnEditThatAnotherTakesOverAfterItHasAskedPublishesNothingEither) {
+  auto service = value(open(store));
+  // It is told that it still holds the edit, and is halted right then for longer than its claim lasts.
+  database->run(
+      "CREATE FUNCTION take_over() RETURNS trigger LANGUAGE plpgsql AS "
+      "$$BEGIN NEW.claim_number := OLD.claim_number + 1; RETURN NEW; END$$; "
+      "CREATE TRIGGER take_over BEFORE UPDATE OF lease_until ON splatdrag.jobs FOR EACH ROW "
+      "WHEN (OLD.place = 'interval 2, publish' AND NEW.claim_number = OLD.claim_number AND OLD.claim_number = 1 "
+      "AND NEW.lease_until <> OLD.lease_until) EXECUTE FUNCTION take_over()");
+  const std::string id = value(service->submit(move_ball(scene), "")).status.id;
+  const auto deadline = std::chrono::steady_clock::now() + patience;
+  while (scenes->made_versions().empty()) {
+    ASSERT_LT(std::chrono::steady_clock::now(), deadline) << "it did not come to make its version";
+    std::this_thread::sleep_for(1ms);
+  }
+  service->drain(patience);
+  EXPECT_EQ(versions(), 1u);
+  EXPECT_EQ(value(service->find(id)).state, "running") << "it is the other's";
+  service.reset();
+  service = value(open(store));
+  EXPECT_EQ(wait_for_end(*service, id).state, "succeeded");
+  EXPECT_EQ(versions(), 2u);
+  EXPECT_TRUE(scenes->made_versions().empty()) << "what the halted one had made is dropped";
+}
+
+TEST_F(DatabaseTest, AFolderThatTheDatabaseKnowsKeepsItsId) {
+  fs::create_directories(edits);
+  fs::create_symlink("nowhere", edits / "jobs");  // no folder can be made there
+  ASSERT_FALSE(open(store));
+  fs::remove(edits / "jobs");
+  EXPECT_TRUE(open(store)) << "with another id it were another's";
+}
+
+/// Several processes over one folder and one database: here, as many stores of scenes and services.
+class RolesTest : public DatabaseTest {
+ protected:
+  struct Process {
+    std::unique_ptr<scenes::SceneStore> scenes;
+    std::unique_ptr<EditService> service;
+  };
+  void SetUp() override {
+    DatabaseTest::SetUp();
+    if (IsSkipped()) return;
+    scenes.reset();
+    front = start(Role::front);
+  }
+  [[nodiscard]] Process start(Role role) const {
+    Process process;
+    process.scenes = value(scenes::SceneStore::open(
+        {.folder = dir.path() / "scenes", .sharing = scenes::Sharing::shared, .scene_root = {}}));
+    process.service = value(EditService::open(
+        *process.scenes,
+        {.role = role, .folder = edits, .store = store, .lease = 60s, .pictured_views = 2, .threads = 1}));
+    process.scenes->let_others_in();
+    return process;
+  }
+  std::string submit(const proto::EditRequest& request) { return value(front.service->submit(request, "")).status.id; }
+  Process front;
+};
+
+TEST_F(RolesTest, AFrontAnswersForWhatWorkersDo) {
+  const std::string id = submit(move_ball(scene));
+  EXPECT_EQ(value(front.service->find(id)).state, "queued") << "nobody works yet";
+  const Process one = start(Role::worker), other = start(Role::front);
+  EXPECT_EQ(wait_for_end(*front.service, id).state, "succeeded");
+  EXPECT_EQ(value(front.service->find(id)).result_version, 1);
+  for (const Process* process : {static_cast<const Process*>(&front), &one, &other}) {
+    EXPECT_EQ(value(process->scenes->find(scene)).versions.size(), 2u);
+    EXPECT_EQ(version_bytes(*process->scenes, scene, 1), version_bytes(*front.scenes, scene, 1));
+    EXPECT_FALSE(process->service->trouble());
+  }
+  value(other.service->remove_version(scene, "1"));
+  EXPECT_EQ(value(front.service->find(id)).state, "succeeded");
+  EXPECT_EQ(value(front.scenes->find(scene)).versions.size(), 1u) << "it does not come back";
+}
+
+TEST_F(RolesTest, WhatIsAskedAtAFrontReachesTheWorker) {
+  const Process worker = start(Role::worker);
+  const std::string stopped = submit(move_ball_for_long(scene));
+  wait_for_interval(*front.service, stopped);
+  value(front.service->stop(stopped));
+  EXPECT_TRUE(wait_for_end(*front.service, stopped).stopped_early);
+  const std::string cancelled = submit(move_ball_for_long(scene));
+  wait_for_interval(*front.service, cancelled);
+  value(front.service->cancel(cancelled));
+  EXPECT_EQ(wait_for_end(*front.service, cancelled).state, "cancelled");
+  EXPECT_EQ(value(front.scenes->find(scene)).versions.size(), 2u) << "that of the stopped one";
+}
+
+TEST_F(RolesTest, AWorkerThatIsDrainedHandsItsEditOnAtACheckpoint) {
+  Process leaves = start(Role::worker);
+  const std::string id = submit(move_ball_slowly(scene));
+  wait_for_interval(*front.service, id);
+  leaves.service->drain(patience);
+  const auto left = value(front.service->find(id));
+  ASSERT_EQ(left.state, "running");
+  EXPECT_EQ(database->run("SELECT claimed::text || deaths FROM splatdrag.jobs"), "false0");
+  const Process stays = start(Role::worker);  // the lease is a minute
+  const auto end = wait_for_end(*front.service, id);
+  EXPECT_EQ(end.state, "succeeded");
+  EXPECT_GE(left.finished_intervals.size(), 1u);
+  EXPECT_EQ(database->run("SELECT claim_number::text || ' ' || deaths FROM splatdrag.jobs"), "2 0");
+
+  const std::string undisturbed = submit(move_ball_slowly(scene));
+  EXPECT_EQ(wait_for_end(*front.service, undisturbed).state, "succeeded");
+  EXPECT_EQ(version_bytes(*front.scenes, scene, 1), version_bytes(*front.scenes, scene, 2));
+}
+
+TEST_F(RolesTest, NobodyTakesAnEditFromOneThatIsAtWork) {
+  const Process worker = start(Role::worker);
+  const std::string id = submit(move_ball_slowly(scene));
+  wait_for_interval(*front.service, id);
+  const Process later = start(Role::worker), front_of_later = start(Role::front);
+  EXPECT_EQ(wait_for_end(*front.service, id).state, "succeeded");
+  EXPECT_EQ(database->run("SELECT claim_number::text || ' ' || deaths FROM splatdrag.jobs"), "1 0");
+}
+
+TEST_F(RolesTest, NoAcceptedEditLosesItsSceneToAnotherFront) {
+  const Process other = start(Role::front);
+  const std::string id = submit(move_ball(scene));
+  EXPECT_EQ(code_of(other.service->remove_scene(scene)), ErrorCode::conflict);
+  value(other.service->cancel(id));
+  value(other.service->remove_scene(scene));
+  EXPECT_EQ(code_of(front.service->submit(move_ball(scene), "")), ErrorCode::not_found);
+}
+
+TEST_F(RolesTest, WhoWantsToBeAloneIsKeptOut) {
+  const support::TempDir copy;
+  fs::create_directories(copy.path() / "edits");
+  fs::copy_file(edits / "folder_id", copy.path() / "edits/folder_id");
+  const auto scenes_there = open_scenes(copy.path());
+  EXPECT_EQ(code_of(EditService::open(*scenes_there, {.folder = copy.path() / "edits", .store = store})),
+            ErrorCode::unavailable);
+}
+
 TEST_F(DatabaseTest, BelongsToOneDataFolder) {
   finished_edit(store);
   const support::TempDir elsewhere;

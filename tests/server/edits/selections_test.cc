@@ -45,7 +45,7 @@ TEST_F(SelectionsTest, GiveTheSameIdForTheSameOperationsOnTheSameGaussians) {
 
 TEST_F(SelectionsTest, BelongToTheirVersion) {
   Selections selections(*store, small());
-  ASSERT_TRUE(store->add_version(id, 0, "e1", scenes::small_edit(cloud_of(id, "0"))));
+  ASSERT_TRUE(add_version(*store, id, 0, "e1", scenes::small_edit(cloud_of(id, "0"))));
   const auto before = value(selections.make(version("0"), rows(0, 2)));
   const auto after = value(selections.make(version("1"), rows(0, 2)));
   EXPECT_NE(before->id, after->id);

@@ -24,8 +24,8 @@ struct DamageTest : StoreFixture {
   std::string add_whole(std::uint64_t seed) {
     const std::string id = add(40, seed);
     const auto cloud = random_cloud(40, 1, seed);
-    EXPECT_TRUE(store->add_version(id, 0, "e00000" + std::to_string(2 * seed), small_edit(cloud)));
-    EXPECT_TRUE(store->add_version(id, 0, "e00000" + std::to_string(2 * seed + 1), small_edit(cloud, 2)));
+    EXPECT_TRUE(add_version(*store, id, 0, "e00000" + std::to_string(2 * seed), small_edit(cloud)));
+    EXPECT_TRUE(add_version(*store, id, 0, "e00000" + std::to_string(2 * seed + 1), small_edit(cloud, 2)));
     write_zip(temp.path() / "data.zip", {{"transforms.json", transforms_json()}, {"images/notes.txt", "of no use"}});
     const auto put = store->put_dataset_zip(id, temp.path() / "data.zip", "data.zip");
     EXPECT_TRUE(put) << put.error().message;

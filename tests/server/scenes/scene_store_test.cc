@@ -108,7 +108,7 @@ TEST_F(SceneStoreTest, CountsIdsUpAndUsesNoneTwice) {
 TEST_F(SceneStoreTest, KeepsEverythingAcrossARestart) {
   const std::string id = add(60, 4, 3);
   const auto base = cloud_of(id, "0");
-  ASSERT_EQ(store->add_version(id, 0, "e000001", small_edit(base)).value(), 1);
+  ASSERT_EQ(add_version(*store, id, 0, "e000001", small_edit(base)).value(), 1);
   ASSERT_TRUE(store->patch(id, {"table", engine::DVec3(0, 0, 1)}));
   const auto before = store->find(id).value();
   const std::string key = store->load(id, "1")->key;
@@ -135,7 +135,7 @@ TEST_F(SceneStoreTest, KeepsChainsOfVersionsAsOneOverlayEach) {
     const int parent = v == 3 ? 1 : v;  // the last one goes back and takes another way
     const Overlay overlay = small_edit(expected[std::size_t(parent)], 0.5f + float(v));
     expected.push_back(flatten(expected[std::size_t(parent)], overlay));
-    ASSERT_EQ(store->add_version(id, parent, "e" + std::to_string(v), overlay).value(), v + 1);
+    ASSERT_EQ(add_version(*store, id, parent, "e" + std::to_string(v), overlay).value(), v + 1);
   }
   for (const bool restarted : {false, true}) {
     if (restarted) open();
@@ -153,18 +153,19 @@ TEST_F(SceneStoreTest, KeepsChainsOfVersionsAsOneOverlayEach) {
 TEST_F(SceneStoreTest, MakesOneVersionForOneEdit) {
   const std::string id = add();
   const Overlay overlay = small_edit(cloud_of(id, "0"));
-  EXPECT_EQ(store->add_version(id, 0, "e000001", overlay).value(), 1);
-  EXPECT_EQ(store->add_version(id, 0, "e000001", overlay).value(), 1);
+  EXPECT_EQ(add_version(*store, id, 0, "e000001", overlay).value(), 1);
+  EXPECT_EQ(add_version(*store, id, 0, "e000001", overlay).value(), 1);
   open();
-  EXPECT_EQ(store->add_version(id, 0, "e000001", overlay).value(), 1);
-  EXPECT_EQ(store->add_version(id, 0, "e000002", overlay).value(), 2);
+  EXPECT_EQ(add_version(*store, id, 0, "e000001", overlay).value(), 1);
+  EXPECT_EQ(add_version(*store, id, 0, "e000002", overlay).value(), 2);
 }
 
 TEST_F(SceneStoreTest, DeletesAVersionAndNothingOfThoseMadeFromIt) {
   const std::string id = add();
   for (int v = 0; v < 3; ++v)
-    ASSERT_EQ(*store->add_version(id, v, "e00000" + std::to_string(v + 1), small_edit(cloud_of(id, std::to_string(v)))),
-              v + 1);
+    ASSERT_EQ(
+        *add_version(*store, id, v, "e00000" + std::to_string(v + 1), small_edit(cloud_of(id, std::to_string(v)))),
+        v + 1);
   const auto bytes_of = [&](const std::string& version) {
     const auto file = store->file(id, version, FileFormat::ply);
     return file ? support::read_file(file->path) : file.error().message;
@@ -196,12 +197,12 @@ TEST_F(SceneStoreTest, DeletesAVersionAndNothingOfThoseMadeFromIt) {
   EXPECT_GT(held->cloud.size(), 0u) << "whoever holds it keeps it";
   ASSERT_TRUE(store->remove_version(id, "3"));
   open();
-  EXPECT_EQ(*store->add_version(id, 2, "e000009", small_edit(cloud_of(id, "2"))), 4) << "no number is used twice";
+  EXPECT_EQ(*add_version(*store, id, 2, "e000009", small_edit(cloud_of(id, "2"))), 4) << "no number is used twice";
 }
 
 TEST_F(SceneStoreTest, CallsAVersionByANameThatOutlivesARestart) {
   const std::string id = add();
-  ASSERT_TRUE(store->add_version(id, 0, "e000001", small_edit(cloud_of(id, "0"))));
+  ASSERT_TRUE(add_version(*store, id, 0, "e000001", small_edit(cloud_of(id, "0"))));
   const auto renamed = store->rename_version(id, "1", "ball on the right");
   ASSERT_TRUE(renamed) << renamed.error().message;
   EXPECT_EQ(renamed->name, "ball on the right");
@@ -218,7 +219,7 @@ TEST_F(SceneStoreTest, CallsAVersionByANameThatOutlivesARestart) {
 
 TEST_F(SceneStoreTest, DeletesNoVersionThatOthersNeedOrThatIsNone) {
   const std::string id = add();
-  ASSERT_TRUE(store->add_version(id, 0, "e000001", small_edit(cloud_of(id, "0"))));
+  ASSERT_TRUE(add_version(*store, id, 0, "e000001", small_edit(cloud_of(id, "0"))));
   const auto preview = store->add_preview(id, 0, small_edit(cloud_of(id, "0")));
   ASSERT_TRUE(preview);
   EXPECT_EQ(store->remove_version(id, "0").error().code, ErrorCode::conflict);
@@ -232,7 +233,8 @@ TEST_F(SceneStoreTest, DeletesNoVersionThatOthersNeedOrThatIsNone) {
 TEST_F(SceneStoreTest, AVersionThatIsDeletedWhileOthersReadItIsThereOrNot) {
   const std::string id = add();
   for (int round = 0; round < 20; ++round) {
-    const int version = *store->add_version(id, 0, "e0000" + std::to_string(10 + round), small_edit(cloud_of(id, "0")));
+    const int version =
+        *add_version(*store, id, 0, "e0000" + std::to_string(10 + round), small_edit(cloud_of(id, "0")));
     const std::string name = std::to_string(version);
     open();  // nothing of it is in memory
     std::vector<std::thread> readers;
@@ -249,41 +251,74 @@ TEST_F(SceneStoreTest, AVersionThatIsDeletedWhileOthersReadItIsThereOrNot) {
   }
 }
 
-TEST_F(SceneStoreTest, AVersionWhoseParentIsDeletedMeanwhileIsNotMade) {
-  const std::string id = add(20'000);  // so that its overlays take a while to write
-  const GaussianCloud cloud = cloud_of(id, "0");
-  int refused = 0;
-  for (int round = 0; round < 200 && refused < 3; ++round) {
-    const auto parent = store->add_version(id, 0, "e1" + std::to_string(10'000 + round), small_edit(cloud));
-    ASSERT_TRUE(parent);
-    std::thread remover([&] {
-      std::this_thread::sleep_for(std::chrono::microseconds(300 * (round % 20)));
-      EXPECT_TRUE(store->remove_version(id, std::to_string(*parent)));
-    });
-    const auto made =
-        store->add_version(id, *parent, "e2" + std::to_string(10'000 + round), small_edit(cloud_of(id, "0"), 2));
-    remover.join();
-    if (!made) {
-      EXPECT_EQ(made.error().code, ErrorCode::not_found) << made.error().message;
-      EXPECT_EQ(made.error().where, "version");
-      ++refused;
-    }
-    const auto info = store->find(id);
-    ASSERT_TRUE(info);
-    std::set<int> there;
-    for (const auto& version : info->versions) there.insert(version.version);
-    for (const auto& version : info->versions)
-      ASSERT_TRUE(!version.parent || there.contains(*version.parent)) << version.version << " in round " << round;
-  }
+TEST_F(SceneStoreTest, WhatAnEditHasMadeIsNoVersionUntilItIsTakenIn) {
+  const std::string id = add();
+  const auto made = store->make_version(id, 0, "e000001", 1, small_edit(cloud_of(id, "0")));
+  ASSERT_TRUE(made);
+  EXPECT_EQ(store->find(id)->versions.size(), 1u);
+  EXPECT_EQ(store->made_versions(), std::vector<std::string>{"e000001-1"});
+  open();  // it waits for as long as it takes
+  EXPECT_EQ(store->take_in(id, parse_made_version(to_text(*made)).value()).value(), 1);
+  EXPECT_TRUE(store->made_versions().empty());
+  EXPECT_EQ(cloud_of(id, "1"), flatten(cloud_of(id, "0"), small_edit(cloud_of(id, "0"))));
+  EXPECT_EQ(store->find(id)->versions[1].created, made->version.created);
+  ASSERT_TRUE(store->remove_version(id, "1"));
+  EXPECT_EQ(store->take_in(id, *made).value(), 1);
+  EXPECT_EQ(store->find(id)->versions.size(), 1u) << "what was deleted does not come back";
+}
+
+TEST_F(SceneStoreTest, WhatIsTakenInIsThereOnceWhereverThatWasCutShort) {
+  const std::string id = add();
+  const auto overlay = small_edit(cloud_of(id, "0"));
+  const auto made = store->make_version(id, 0, "e000001", 1, overlay);
+  fs::create_directories(options.folder / id / "versions");
+  fs::create_hard_link(options.folder / ".made/e000001-1", options.folder / id / "versions/1.overlay");
+  EXPECT_EQ(store->take_in(id, *made).value(), 1) << "cut short before the manifest was written";
+  fs::create_hard_link(options.folder / id / "versions/1.overlay", options.folder / ".made/e000001-1");
   open();
-  EXPECT_TRUE(store->find(id)) << "it is taken up again";
+  EXPECT_EQ(store->take_in(id, *made).value(), 1) << "cut short after that";
+  EXPECT_TRUE(store->made_versions().empty());
+  EXPECT_EQ(store->find(id)->versions.size(), 2u);
+  const auto second = store->make_version(id, 0, "e000001", 2, overlay);
+  EXPECT_EQ(second->version.version, 1) << "the edit has its version";
+  EXPECT_EQ(store->take_in(id, *second).value(), 1);
+}
+
+TEST_F(SceneStoreTest, AVersionWhoseParentIsDeletedMeanwhileIsSaidToBeMadeFromTheUpload) {
+  const std::string id = add();
+  ASSERT_EQ(add_version(*store, id, 0, "e1", small_edit(cloud_of(id, "0"))).value(), 1);
+  const auto made = store->make_version(id, 1, "e2", 1, small_edit(cloud_of(id, "1")));
+  const auto expected = flatten(cloud_of(id, "1"), small_edit(cloud_of(id, "1")));
+  ASSERT_TRUE(store->remove_version(id, "1"));
+  EXPECT_EQ(store->take_in(id, *made).value(), 2);
+  open();
+  EXPECT_EQ(store->find(id)->versions[1].parent, 0);
+  EXPECT_EQ(cloud_of(id, "2"), expected);
+}
+
+TEST_F(SceneStoreTest, AVersionOfASceneThatIsGoneIsNotTakenIn) {
+  const std::string id = add();
+  const auto made = store->make_version(id, 0, "e1", 1, small_edit(cloud_of(id, "0")));
+  ASSERT_TRUE(store->remove(id));
+  EXPECT_EQ(store->take_in(id, *made).error().code, ErrorCode::not_found);
+  store->discard_made("e1-1");
+  EXPECT_TRUE(store->made_versions().empty());
+}
+
+TEST(MadeVersion, ThatMakesNoSenseIsNamed) {
+  EXPECT_EQ(parse_made_version("{").error().code, ErrorCode::corrupt_data);
+  MadeVersion made;
+  made.version.version = 3, made.version.parent = 1;
+  made.digest = "0123456789abcdef";
+  made.file = "../scene.json";
+  EXPECT_EQ(parse_made_version(to_text(made)).error().where, "result:file");
 }
 
 TEST_F(SceneStoreTest, NeverKeepsAPoisonedVersion) {
   const std::string id = add();
   Overlay overlay = small_edit(cloud_of(id, "0"));
   overlay.rows.mean.x[0] = std::numeric_limits<float>::infinity();
-  EXPECT_EQ(store->add_version(id, 0, "e1", overlay).error().code, ErrorCode::internal);
+  EXPECT_EQ(add_version(*store, id, 0, "e1", overlay).error().code, ErrorCode::internal);
   EXPECT_EQ(store->add_preview(id, 0, overlay).error().code, ErrorCode::internal);
   EXPECT_EQ(store->find(id)->versions.size(), 1u);
 }
@@ -296,8 +331,8 @@ TEST_F(SceneStoreTest, UndoGivesTheInputBackByteForByte) {
   support::write_file(temp.path() / "in.ply", bytes);
   const std::string id = store->add_upload(temp.path() / "in.ply", "chair.ply", "")->id;
   const auto base = store->load(id, "0")->cloud.base;
-  ASSERT_TRUE(store->add_version(id, 0, "e1", small_edit(*base)));
-  ASSERT_TRUE(store->add_version(id, 0, "e2", engine::scene::no_change(*base)));
+  ASSERT_TRUE(add_version(*store, id, 0, "e1", small_edit(*base)));
+  ASSERT_TRUE(add_version(*store, id, 0, "e2", engine::scene::no_change(*base)));
   const auto original = store->file(id, "0", FileFormat::ply);
   ASSERT_TRUE(original);
   EXPECT_EQ(support::read_file(original->path), bytes);
@@ -315,7 +350,7 @@ TEST_F(SceneStoreTest, UndoGivesTheInputBackByteForByte) {
 
 TEST_F(SceneStoreTest, WritesEveryFormatOnDemandAndOnce) {
   const std::string id = add();
-  ASSERT_TRUE(store->add_version(id, 0, "e1", small_edit(cloud_of(id, "0"))));
+  ASSERT_TRUE(add_version(*store, id, 0, "e1", small_edit(cloud_of(id, "0"))));
   for (const auto& [format, name] : engine::names<FileFormat>) {
     const auto file = store->file(id, "1", format);
     ASSERT_TRUE(file) << file.error().message;
@@ -339,7 +374,7 @@ TEST_F(SceneStoreTest, AnEditedSceneKeepsWhatItsFileSaidBesideItsGaussians) {
   const auto added = store->add_upload(temp.path() / "in", "chair.spz", "");
   ASSERT_TRUE(added);
   open();  // and a restart in between
-  ASSERT_TRUE(store->add_version(added->id, 0, "e1", small_edit(cloud_of(added->id, "0"))));
+  ASSERT_TRUE(add_version(*store, added->id, 0, "e1", small_edit(cloud_of(added->id, "0"))));
   const auto file = store->file(added->id, "1", FileFormat::spz);
   ASSERT_TRUE(file);
   const auto read = engine::io::read_scene(file->path);
@@ -353,7 +388,7 @@ TEST_F(SceneStoreTest, RemovesWrittenFilesThatNobodyReads) {
   options.file_cache_bytes = 1;
   open();
   const std::string id = add();
-  ASSERT_TRUE(store->add_version(id, 0, "e1", small_edit(cloud_of(id, "0"))));
+  ASSERT_TRUE(add_version(*store, id, 0, "e1", small_edit(cloud_of(id, "0"))));
   {
     const auto ply = store->file(id, "1", FileFormat::ply), splat = store->file(id, "1", FileFormat::splat);
     ASSERT_TRUE(ply && splat);
@@ -365,7 +400,7 @@ TEST_F(SceneStoreTest, RemovesWrittenFilesThatNobodyReads) {
 
 TEST_F(SceneStoreTest, RemovesWhatACrashLeftBehind) {
   const std::string id = add();
-  ASSERT_TRUE(store->add_version(id, 0, "e1", small_edit(cloud_of(id, "0"))));
+  ASSERT_TRUE(add_version(*store, id, 0, "e1", small_edit(cloud_of(id, "0"))));
   const fs::path folder = options.folder / id;
   store.reset();
   support::write_file(folder / "versions" / "2.overlay", "half of it");
@@ -388,7 +423,7 @@ TEST_F(SceneStoreTest, RemovesWhatACrashLeftBehind) {
 
 TEST_F(SceneStoreTest, LeavesADamagedSceneAloneAndSaysSo) {
   const std::string good = add(), bad = add(), gone = add(), half = add();
-  ASSERT_TRUE(store->add_version(half, 0, "e1", small_edit(cloud_of(half, "0"))));
+  ASSERT_TRUE(add_version(*store, half, 0, "e1", small_edit(cloud_of(half, "0"))));
   store.reset();
   fs::remove(options.folder / half / "scene.json");  // as in a backup that was restored in part
   support::write_file(options.folder / bad / "scene.json", "{");
@@ -514,7 +549,7 @@ TEST_F(SceneStoreTest, SaysWhatThereIsNot) {
     EXPECT_EQ(loaded.error().where, "version");
     EXPECT_FALSE(store->file(id, version, FileFormat::ply));
   }
-  EXPECT_EQ(store->add_version(id, 3, "e1", Overlay{}).error().where, "version");
+  EXPECT_EQ(add_version(*store, id, 3, "e1", Overlay{}).error().where, "version");
 }
 
 TEST_F(SceneStoreTest, ChangesNameAndUp) {
@@ -534,7 +569,7 @@ TEST_F(SceneStoreTest, ChangesNameAndUp) {
 
 TEST_F(SceneStoreTest, RemovesASceneButNotFromThoseWhoHoldIt) {
   const std::string id = add();
-  ASSERT_TRUE(store->add_version(id, 0, "e1", small_edit(cloud_of(id, "0"))));
+  ASSERT_TRUE(add_version(*store, id, 0, "e1", small_edit(cloud_of(id, "0"))));
   const auto held = store->load(id, "1").value();
   auto file = store->file(id, "1", FileFormat::ply).value();
   auto original = store->file(id, "0", FileFormat::ply).value();
@@ -586,7 +621,7 @@ TEST_F(SceneStoreTest, PreviewsOverAVersionAndKeepsFewOfThem) {
   options.max_previews = 2;
   open();
   const std::string id = add();
-  ASSERT_TRUE(store->add_version(id, 0, "e1", small_edit(cloud_of(id, "0"))));
+  ASSERT_TRUE(add_version(*store, id, 0, "e1", small_edit(cloud_of(id, "0"))));
   const auto parent = cloud_of(id, "1");
   const auto first = store->add_preview(id, 1, small_edit(parent, 3)).value();
   EXPECT_EQ(cloud_of(id, first.version), flatten(parent, small_edit(parent, 3)));
@@ -603,7 +638,7 @@ TEST_F(SceneStoreTest, PreviewsOverAVersionAndKeepsFewOfThem) {
 
 TEST_F(SceneStoreTest, GivesEveryVersionAKeyOfItsOwn) {
   const std::string first = add(), second = add();
-  ASSERT_TRUE(store->add_version(first, 0, "e1", small_edit(cloud_of(first, "0"))));
+  ASSERT_TRUE(add_version(*store, first, 0, "e1", small_edit(cloud_of(first, "0"))));
   std::set<std::string> keys{store->load(first, "0")->key, store->load(first, "1")->key, store->load(second, "0")->key};
   store.reset();
   fs::remove_all(options.folder);
@@ -736,7 +771,7 @@ TEST_F(SceneStoreTest, SaysThatTheDiskIsFullAndHarmsNothing) {
   const auto code = [](const auto& result) { return result ? ErrorCode::internal : result.error().code; };
   {
     const support::FullDisk full(6000);
-    EXPECT_EQ(code(store->add_version(id, 0, "e1", large)), ErrorCode::no_space);
+    EXPECT_EQ(code(add_version(*store, id, 0, "e1", large)), ErrorCode::no_space);
     EXPECT_EQ(code(store->add_path("table.ply", "")), ErrorCode::no_space);
     EXPECT_EQ(code(store->put_dataset_zip(id, temp.path() / "data.zip", "data.zip")), ErrorCode::no_space);
     EXPECT_EQ(code(store->file(id, "0", FileFormat::splat)), ErrorCode::no_space);
@@ -749,7 +784,7 @@ TEST_F(SceneStoreTest, SaysThatTheDiskIsFullAndHarmsNothing) {
   EXPECT_EQ(store->find(id)->name, "chair");
   fs::remove(options.folder / id / "files");
   EXPECT_EQ(entries(options.folder / id), before);
-  EXPECT_EQ(store->add_version(id, 0, "e1", large).value(), 1) << "once there is room again";
+  EXPECT_EQ(add_version(*store, id, 0, "e1", large).value(), 1) << "once there is room again";
   open();
   EXPECT_EQ(cloud_of(id, "0"), base);
   EXPECT_EQ(store->list().size(), 1u);
@@ -789,7 +824,7 @@ TEST_F(SceneStoreTest, StaysWholeUnderThreadsThatAddLoadAndRemove) {
       const auto added = store->add_upload(in, "chair.ply", "");
       ASSERT_TRUE(added) << added.error().message;
       const std::string edit = "e" + std::to_string(seed) + "-" + std::to_string(round);
-      ASSERT_TRUE(store->add_version(id, 0, edit, small_edit(base)));
+      ASSERT_TRUE(add_version(*store, id, 0, edit, small_edit(base)));
       const auto loaded = store->load(id, std::to_string(1 + round));
       if (loaded) {
         EXPECT_EQ(loaded->cloud.size(), 200u);
@@ -811,14 +846,15 @@ TEST_F(SceneStoreTest, StaysWholeUnderThreadsThatAddLoadAndRemove) {
   EXPECT_EQ(store->list().size(), 1u);
   EXPECT_EQ(store->find(id)->versions.size(), 13u);
   EXPECT_LE(store->usage().memory_bytes, options.memory_bytes);
-  EXPECT_EQ(entries(options.folder).size(), 4u) << "the lock, the counter, the scratch folder, one scene";
+  EXPECT_EQ(entries(options.folder).size(), 5u)
+      << "the lock, the counter, the scratch folder, that of what is made, one scene";
 }
 
 TEST_F(SceneStoreTest, TwoThreadsThatPublishOneEditMakeOneVersion) {
   const std::string id = add();
   const Overlay overlay = small_edit(cloud_of(id, "0"));
-  std::thread one([&] { EXPECT_EQ(store->add_version(id, 0, "e1", overlay).value(), 1); });
-  std::thread two([&] { EXPECT_EQ(store->add_version(id, 0, "e1", overlay).value(), 1); });
+  std::thread one([&] { EXPECT_EQ(add_version(*store, id, 0, "e1", overlay).value(), 1); });
+  std::thread two([&] { EXPECT_EQ(add_version(*store, id, 0, "e1", overlay).value(), 1); });
   one.join();
   two.join();
   EXPECT_EQ(store->find(id)->versions.size(), 2u);

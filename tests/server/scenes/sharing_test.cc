@@ -42,7 +42,7 @@ TEST_F(SharingTest, WhatOneHasDoneTheOtherSees) {
   EXPECT_EQ(store->find(id)->name, "seat");
   ASSERT_TRUE(store->patch(id, {.name = "sofa", .up = {}})) << "and it is changed from there";
   EXPECT_EQ(other->find(id)->name, "sofa");
-  ASSERT_EQ(store->add_version(id, 0, "e000001", small_edit(cloud_of(id, "0"))).value(), 1);
+  ASSERT_EQ(add_version(*store, id, 0, "e000001", small_edit(cloud_of(id, "0"))).value(), 1);
   EXPECT_EQ(store->load(id, "1")->key, other->load(id, "1")->key) << "entity tags are the same";
   EXPECT_EQ(cloud_of(id, "1"), engine::scene::flatten(other->load(id, "1")->cloud));
   ASSERT_TRUE(other->remove_version(id, "1"));
@@ -89,7 +89,7 @@ TEST_F(SharingTest, NoChangeIsLost) {
   const std::string id = add();
   const auto edit = [&](SceneStore& with, const std::string& letter) {
     for (int i = 0; i < 10; ++i) {
-      EXPECT_TRUE(with.add_version(id, 0, letter + std::to_string(i), small_edit(cloud_of(id, "0"))));
+      EXPECT_TRUE(add_version(with, id, 0, letter + std::to_string(i), small_edit(cloud_of(id, "0"))));
       EXPECT_TRUE(with.patch(id, {.name = letter, .up = {}}));
     }
   };

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <zip.h>
 
+#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <initializer_list>
@@ -79,6 +80,15 @@ inline Overlay small_edit(const GaussianCloud& cloud, float lift = 1) {
   engine::scene::append_rows(overlay.rows, cloud, rows);
   overlay.rows.mean.y[0] += lift;
   return overlay;
+}
+
+/// A version as an edit makes it; its number.
+inline Result<int> add_version(SceneStore& store, const std::string& id, int parent, const std::string& edit,
+                               const Overlay& overlay) {
+  static std::atomic<std::int64_t> attempts = 0;
+  const auto made = store.make_version(id, parent, edit, ++attempts, overlay);
+  if (!made) return engine::propagate(made);
+  return store.take_in(id, *made);
 }
 
 /// What stands under which name in a zip file.

@@ -78,7 +78,7 @@ TEST_F(RenderRoutes, TagPicturesOfAnotherProgramDifferently) {
 
 TEST_F(RenderRoutes, TagDifferentPicturesDifferently) {
   const std::string id = add_wall();
-  ASSERT_TRUE(store->add_version(id, 0, "e1", scenes::small_edit(cloud_of(id, "0"))));
+  ASSERT_TRUE(add_version(*store, id, 0, "e1", scenes::small_edit(cloud_of(id, "0"))));
   std::set<std::string> tags;
   const auto tag = [&](const std::string& version, const std::string& name, const std::string& value) {
     FakeCall request = from_front(about(id, version));
@@ -99,7 +99,7 @@ TEST_F(RenderRoutes, TagDifferentPicturesDifferently) {
 
 TEST_F(RenderRoutes, GiveTheSameBytesWhateverIsInMemory) {
   const std::string id = add_wall();
-  ASSERT_TRUE(store->add_version(id, 0, "e1", scenes::small_edit(cloud_of(id, "0"))));
+  ASSERT_TRUE(add_version(*store, id, 0, "e1", scenes::small_edit(cloud_of(id, "0"))));
   FakeCall request = from_front(about(id, "1"));
   request.in_query["format"] = "png";
   const auto before = call("GET", render_path, request);
@@ -138,7 +138,7 @@ TEST_F(RenderRoutes, ShowDepthAndAlphaAndWhatAVersionChanged) {
     if (base.mean.x[i] < -0.05f) left.push_back(i);
   edit.changed = left;
   engine::scene::append_rows(edit.rows, base, left);
-  ASSERT_TRUE(store->add_version(id, 0, "e1", edit));
+  ASSERT_TRUE(add_version(*store, id, 0, "e1", edit));
   const auto picture = [&](const std::string& version, const std::string& what, const std::string& format) {
     FakeCall request = from_front(about(id, version));
     request.in_query["what"] = what, request.in_query["format"] = format;
@@ -399,7 +399,7 @@ TEST_F(RenderRoutes, TintWhatIsSelectedInAnEditedVersion) {
   edit.changed = last;
   last.push_back(5);
   engine::scene::append_rows(edit.rows, base, last);
-  ASSERT_TRUE(store->add_version(id, 0, "e1", edit));
+  ASSERT_TRUE(add_version(*store, id, 0, "e1", edit));
   write(temp.path() / "merged.ply", cloud_of(id, "1"));
   const std::string merged = store->add_upload(temp.path() / "merged.ply", "merged.ply", "")->id;
   const auto picture = [&](const std::string& scene, const std::string& version) {

@@ -86,7 +86,7 @@ TEST_F(SceneRoutes, TellOfAVersionWhatItsSceneTellsOfIt) {
   const std::string id = add_wall();
   engine::scene::Overlay removal;
   removal.removed = {3, 5};
-  ASSERT_TRUE(store->add_version(id, 0, "e000001", removal));
+  ASSERT_TRUE(add_version(*store, id, 0, "e000001", removal));
   const json scene = json::parse(call("GET", "/v1/scenes/{id}", about(id))->body);
   FakeCall request = about(id);
   for (const char* version : {"0", "1"}) {
