@@ -24,13 +24,15 @@ using service::ServeOptions;
 
 /// What the command line says beyond what the service needs to know.
 struct ServeCommandOptions : ServeOptions {
-  std::string log_level = "info", log_format = "json";
+  std::string log_level = "info", log_format = "json", role = "all";
   ComputeOptions compute;
 };
 
 Result<void> run(const ServeCommandOptions& given, Terminal& terminal) {
   service::EndSignals signals(/*hangup=*/!given.token_file.empty());  // before any thread is started
   ServeOptions options = given;
+  options.edits.role = engine::value_named<edits::Role>(given.role).value_or(edits::Role::all);
+  if (const auto checked = service::check_role(options); !checked) return checked;
   const auto format = given.log_format == "text" ? http::LogFormat::text : http::LogFormat::json;
   const auto logger = http::make_logger(terminal.err, given.log_level, format);
   if (!logger) return propagate(logger);
@@ -179,6 +181,12 @@ void add_serve_command(CLI::App& program, Action& action) {
   const auto options = std::make_shared<ServeCommandOptions>();
   add_http_options(*command, options->http, options->access);
   add_store_options(*command, *options);
+  command
+      ->add_option("--role", options->role,
+                   "With --store: a front, which answers requests, or a worker, which carries edits out, of any number "
+                   "over one data folder that all of them see; or all of the service, alone")
+      ->check(CLI::IsMember({"all", "front", "worker"}))
+      ->type_name("ROLE");
   command
       ->add_option(
           "--token-file", options->token_file,

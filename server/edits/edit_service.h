@@ -4,6 +4,7 @@
 
 #include <spdlog/logger.h>
 
+#include <array>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -16,6 +17,7 @@
 #include <vector>
 
 #include "engine/core/memory_budget.h"
+#include "engine/core/names.h"
 #include "engine/core/parallel.h"
 #include "engine/core/result.h"
 #include "engine/jobs/queue.h"
@@ -36,6 +38,10 @@ enum class Role {
   front,  ///< Answers requests, and carries no edits out. There may be others of either kind over one data folder.
   worker  ///< Carries edits out.
 };
+constexpr auto names_of(Role) {
+  using engine::Name;
+  return std::array{Name{Role::all, "all"}, Name{Role::front, "front"}, Name{Role::worker, "worker"}};
+}
 
 struct ServiceOptions {
   Role role = Role::all;           ///< Others than `all` need a store in a database, and a shared store of scenes.

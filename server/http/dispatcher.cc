@@ -109,7 +109,7 @@ tl::expected<void, Refusal> Dispatcher::check_into(CheckedRequest& request, cons
   const Route* const route = request.match.route;
   if (route == nullptr && !request.match.allow.empty())
     return refuse(405, "method_not_allowed", "this address takes " + request.match.allow);
-  if (route == nullptr) return refuse(404, "not_found", "there is no such address in this service");
+  if (route == nullptr) return refuse(404, "not_found", routes_.of_others());
   const auto query = parse_query(head.query);
   if (!query) return tl::make_unexpected(refusal_of(query.error()));
   for (const auto& [name, value] : *query) {

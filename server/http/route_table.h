@@ -28,6 +28,7 @@ class RouteTable {
   /// before one that it leaves open.
   [[nodiscard]] RouteMatch find(std::string_view method, const std::vector<std::string>& segments) const;
   [[nodiscard]] const std::vector<Route>& routes() const { return router_.routes(); }
+  [[nodiscard]] const std::string& of_others() const { return router_.of_others(); }
 
  private:
   Router router_;

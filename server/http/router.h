@@ -128,9 +128,13 @@ class Router {
  public:
   void add(Route route) { routes_.push_back(std::move(route)); }
   [[nodiscard]] const std::vector<Route>& routes() const { return routes_; }
+  /// What those are told who ask for an address that no route has.
+  void say_of_others(std::string sentence) { of_others_ = std::move(sentence); }
+  [[nodiscard]] const std::string& of_others() const { return of_others_; }
 
  private:
   std::vector<Route> routes_;
+  std::string of_others_ = "there is no such address in this service";
 };
 
 }  // namespace server::http

@@ -147,6 +147,7 @@ void share_out(ServeOptions& options, spdlog::logger& logger) {
   options.scenes.folder = options.data_dir / "scenes";
   options.scenes.program_release = SPLATDRAG_VERSION;
   options.scenes.preview_lifetime = std::chrono::seconds(options.preview_seconds);
+  if (options.edits.role != edits::Role::all) options.scenes.sharing = scenes::Sharing::shared;
   options.edits.folder = options.data_dir / "edits";
   options.edits.lease = std::chrono::seconds(options.lease_seconds);
   options.edits.threads = options.threads;
@@ -176,6 +177,14 @@ Result<void> check_token(ServeOptions& options, spdlog::logger& logger) {
   return {};
 }
 
+Result<void> check_role(const ServeOptions& options) {
+  if (options.edits.role == edits::Role::all || !options.edits.store.empty()) return {};
+  return engine::fail(ErrorCode::invalid_argument,
+                      "fronts and workers find each other by a database: give its address by --store "
+                      "postgresql://...; without one, a service does all by itself (--role all)",
+                      "--role");
+}
+
 Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& logger, std::ostream& out) {
   share_out(options, logger);
   share_descriptors(options.http.lobby.max_connections, logger);
@@ -203,13 +212,16 @@ Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& lo
   options.edits.selections = &selections;
   auto edits = edits::EditService::open(**scenes, options.edits);
   if (!edits) return propagate(edits);
+  (*scenes)->let_others_in();
   SceneViews views(**scenes);
   http::AccessGuard guard(options.access);
   add_gauges(metrics, **scenes, **edits, renders, options.data_dir);
   Readiness readiness(options.data_dir, [&] { return (*edits)->trouble(); });
-  http::Router router =
-      routes::all_routes({**scenes, **edits, selections, options.edit_limits, renders, views, guard, metrics,
-                          service_info(options, models), [&] { return readiness.trouble(); }});
+  const auto trouble = [&] { return readiness.trouble(); };
+  http::Router router = options.edits.role == edits::Role::worker
+                            ? routes::worker_routes(metrics, trouble)
+                            : routes::all_routes({**scenes, **edits, selections, options.edit_limits, renders, views,
+                                                  guard, metrics, service_info(options, models), trouble});
   auto server = http::HttpServer::start(options.http, std::move(router), guard, metrics, logger);
   if (!server) return propagate(server);
   out << "splatdrag " << SPLATDRAG_VERSION << " is listening on " << (*server)->url() << '\n' << std::flush;
@@ -218,6 +230,7 @@ Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& lo
              {"version", std::string(SPLATDRAG_VERSION)},
              {"simd", options.simd},
              {"threads", std::int64_t{options.threads_here}},
+             {"role", std::string(engine::name_of(options.edits.role))},
              {"data_dir", options.data_dir.string()}});
   std::string signal = signals.wait();
   for (; signal == "SIGHUP"; signal = signals.wait()) reload_token(options.token_file, guard, logger);

@@ -45,6 +45,10 @@ struct ServeOptions {
 ///   errors  those of read_token(); invalid_argument: a host that others can reach, no token, and not `insecure`
 [[nodiscard]] engine::Result<void> check_token(ServeOptions& options, spdlog::logger& logger);
 
+/// Whether the process can be what it is to be.
+///   errors  invalid_argument: a front or a worker without a database
+[[nodiscard]] engine::Result<void> check_role(const ServeOptions& options);
+
 /// Serves until a signal comes, then lets what runs come to its end.
 ///   out     gets the line that says where the service listens
 ///   errors  unavailable: another service has the data folder; those of the parts

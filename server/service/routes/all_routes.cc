@@ -4,7 +4,6 @@
 #include "server/service/routes/render_routes.h"
 #include "server/service/routes/scene_events.h"
 #include "server/service/routes/scene_routes.h"
-#include "server/service/routes/system_routes.h"
 
 namespace server::service::routes {
 
@@ -24,6 +23,15 @@ http::Router all_routes(const RouteDependencies& dependencies) {
   if (!trouble) trouble = [&edits = dependencies.edits] { return edits.trouble(); };
   add_system_routes(router, {dependencies.guard, dependencies.metrics, dependencies.info, std::move(trouble),
                              page_files(), contract_files().front().bytes});
+  return router;
+}
+
+http::Router worker_routes(const http::Metrics& metrics, const Trouble& trouble) {
+  http::Router router;
+  add_health_routes(router, metrics, trouble);
+  router.say_of_others(
+      "this process is a worker (--role worker): it carries edits out, and answers /healthz, /readyz and /metrics "
+      "alone; ask a front");
   return router;
 }
 

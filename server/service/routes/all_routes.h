@@ -1,9 +1,6 @@
 // All routes of the service: what proto/openapi.yaml describes.
 #pragma once
 
-#include <functional>
-#include <optional>
-
 #include "proto/service_info.h"
 #include "server/edits/edit_service.h"
 #include "server/edits/selections.h"
@@ -13,6 +10,7 @@
 #include "server/scenes/scene_store.h"
 #include "server/service/render_service.h"
 #include "server/service/routes/edit_routes.h"
+#include "server/service/routes/system_routes.h"
 #include "server/service/scene_views.h"
 
 namespace server::service::routes {
@@ -29,10 +27,14 @@ struct RouteDependencies {
   http::Metrics& metrics;
   proto::ServiceInfo info;
   /// What keeps the service from working, if anything does; empty: what keeps edits from it.
-  std::function<std::optional<engine::Error>()> trouble = {};
+  Trouble trouble = {};
 };
 
 /// A router with every path of the contract, and the files of the page.
 [[nodiscard]] http::Router all_routes(const RouteDependencies& dependencies);
+
+/// A router of a process that carries edits out and answers nobody but those who look after it.
+///   metrics  outlives the router
+[[nodiscard]] http::Router worker_routes(const http::Metrics& metrics, const Trouble& trouble);
 
 }  // namespace server::service::routes

@@ -87,22 +87,26 @@ void add_session(http::Router& router, http::AccessGuard& guard) {
 
 }  // namespace
 
-void add_system_routes(http::Router& router, const SystemRouteDependencies& dependencies) {
+void add_health_routes(http::Router& router, const http::Metrics& metrics, const Trouble& trouble) {
   const auto healthy = [](const Call&) -> Result<Reply> { return Reply::json(R"({"status":"ok"})"); };
   router.add({"GET", "/healthz", healthy, Body::none, {}, Access::open, /*vital=*/true});
-  const auto ready = [trouble = dependencies.trouble](const Call&) -> Result<Reply> {
+  const auto ready = [trouble](const Call&) -> Result<Reply> {
     if (const auto error = trouble())
       return engine::fail(engine::ErrorCode::unavailable, "the service cannot work: " + error->message, error->where);
     return Reply::json(R"({"ready":true})");
   };
   router.add({"GET", "/readyz", ready, Body::none, {}, Access::open, /*vital=*/true});
-  const auto metrics = [&metrics = dependencies.metrics](const Call&) -> Result<Reply> {
+  const auto numbers = [&metrics](const Call&) -> Result<Reply> {
     Reply reply;
     reply.media_type = http::Metrics::media_type;
     reply.body = metrics.text();
     return reply;
   };
-  get(router, "/metrics", metrics, Access::protected_);
+  get(router, "/metrics", numbers, Access::protected_);
+}
+
+void add_system_routes(http::Router& router, const SystemRouteDependencies& dependencies) {
+  add_health_routes(router, dependencies.metrics, dependencies.trouble);
   const auto contract = [bytes = dependencies.contract, etag = http::etag_of(dependencies.contract)](
                             const Call&) -> Result<Reply> { return file_reply("openapi.yaml", bytes, etag); };
   get(router, "/openapi.yaml", contract, Access::protected_);

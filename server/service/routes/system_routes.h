@@ -15,17 +15,24 @@
 
 namespace server::service::routes {
 
+/// What keeps the service from working, if anything does.
+using Trouble = std::function<std::optional<engine::Error>()>;
+
 /// What these routes work with.
 struct SystemRouteDependencies {
   http::AccessGuard& guard;  ///< Outlives the router, as the metrics do.
   const http::Metrics& metrics;
   proto::ServiceInfo info;
-  std::function<std::optional<engine::Error>()> trouble;  ///< What keeps the service from working, if anything does.
-  std::vector<EmbeddedFile> page;                         ///< "index.html" is also "/".
-  std::string_view contract;                              ///< openapi.yaml
+  Trouble trouble;
+  std::vector<EmbeddedFile> page;  ///< "index.html" is also "/".
+  std::string_view contract;       ///< openapi.yaml
 };
 
-/// Adds these routes.
+/// Adds /healthz, /readyz and /metrics.
+///   metrics  outlives the router
+void add_health_routes(http::Router& router, const http::Metrics& metrics, const Trouble& trouble);
+
+/// Adds all of these routes.
 void add_system_routes(http::Router& router, const SystemRouteDependencies& dependencies);
 
 }  // namespace server::service::routes

@@ -109,6 +109,16 @@ TEST_F(Serve, SaysWhereItListensAndEndsWellWhenToldTo) {
   }
 }
 
+TEST_F(Serve, RefusesToBeAFrontOrAWorkerWithoutADatabase) {
+  for (const char* role : {"front", "worker"}) {
+    Program program(first_, arguments({"--role", role}));
+    EXPECT_EQ(program.wait(), 2);
+    EXPECT_NE(program.err().find("fronts and workers find each other by a database"), std::string::npos)
+        << program.err();
+  }
+  EXPECT_FALSE(std::filesystem::exists(data_.path() / "data")) << "nothing has been made";
+}
+
 TEST_F(Serve, LeavesFilesTheirShareOfFewDescriptors) {
   const rlimit few{300, 300};
   Program program(first_, arguments({"--log-format", "text"}), &few);

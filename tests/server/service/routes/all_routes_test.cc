@@ -5,6 +5,7 @@
 #include <set>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include "server/service/embedded_files.h"
 #include "tests/support/data.h"
@@ -57,6 +58,15 @@ TEST(AllRoutes, AreThoseOfTheContract) {
   const auto operations = operations_of(contract_files().front().bytes);
   EXPECT_GT(operations.size(), 20u) << "the contract is not read rightly";
   EXPECT_EQ(routes, operations);
+}
+
+TEST(WorkerRoutes, TellOfItsHealthAndWhereElseToAsk) {
+  const http::Metrics metrics;
+  const http::Router router = worker_routes(metrics, [] { return std::nullopt; });
+  std::vector<std::string> paths;
+  for (const http::Route& route : router.routes()) paths.push_back(route.path);
+  EXPECT_EQ(paths, (std::vector<std::string>{"/healthz", "/readyz", "/metrics"}));
+  EXPECT_NE(router.of_others().find("ask a front"), std::string::npos);
 }
 
 }  // namespace
