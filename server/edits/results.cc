@@ -26,7 +26,9 @@ Result<void> take_in_result(scenes::SceneStore& scenes, const jobs::Job& job) {
   const auto made = scenes::parse_made_version(job.result);
   if (!made) return {};  // of a release whose edits made their versions themselves
   const auto taken = scenes.take_in(job.lane, *made);
-  if (taken || taken.error().code == ErrorCode::not_found) return {};
+  if (taken) return {};
+  const auto scene = scenes.find(job.lane);  // a file that is not found may be another reason
+  if (!scene && scene.error().code == ErrorCode::not_found) return {};
   return propagate(taken);
 }
 

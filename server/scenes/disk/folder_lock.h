@@ -25,7 +25,7 @@ class FolderLock {
   ///   errors  conflict: another process has it, and does not share it; those of file_error()
   [[nodiscard]] static engine::Result<FolderLock> take(
       const std::filesystem::path& folder, Sharing sharing,
-      std::chrono::milliseconds patience = std::chrono::milliseconds(30'000));
+      std::chrono::milliseconds patience = std::chrono::milliseconds(10'000));
   [[nodiscard]] bool is_alone() const { return is_alone_; }
   /// Lets others in.
   void share();

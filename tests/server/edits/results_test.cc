@@ -38,8 +38,8 @@ class ResultsTest : public testing::Test {
 
   support::TempDir dir;
   std::unique_ptr<scenes::SceneStore> scenes = open_scenes(dir.path());
-  std::unique_ptr<jobs::SqliteStore> store = jobs::open_store(dir.path());
-  std::unique_ptr<jobs::Queue> queue = jobs::open_queue(*store, dir.path());
+  std::unique_ptr<jobs::SqliteStore> store = jobs::open_store(dir.path() / "edits");
+  std::unique_ptr<jobs::Queue> queue = jobs::open_queue(*store, dir.path() / "edits");
   std::string scene = add_ball(*scenes, dir.path());
   std::shared_ptr<const engine::scene::GaussianCloud> base = value(scenes->load(scene, "0")).cloud.base;
 };
@@ -94,6 +94,23 @@ TEST_F(ResultsTest, VersionsOfEditsThatFollowEachOtherAreInTheirOrder) {
   succeed(second);
   value(take_in_result(*scenes, value(store->find(second.id))));
   EXPECT_EQ(value(scenes->find_version(scene, "2")).edit, second.id);
+}
+
+TEST_F(ResultsTest, AnEditHasSucceededOnceItsVersionIsThere) {
+  const Edit edit = begin();
+  succeed(edit);
+  queue.reset();
+  store.reset();
+  const auto in_the_way = dir.path() / "scenes" / scene / "versions";
+  support::write_file(in_the_way, "no folder");
+  const auto service = open_service(*scenes, dir.path());
+  const auto seen = value(service->find(edit.id));
+  EXPECT_EQ(seen.state, "running");
+  EXPECT_FALSE(seen.ended);
+  EXPECT_FALSE(service->remove(edit.id)) << "what it has made would be lost";
+  std::filesystem::remove(in_the_way);
+  EXPECT_EQ(value(service->find(edit.id)).state, "succeeded");
+  EXPECT_EQ(versions(), 2u);
 }
 
 TEST_F(ResultsTest, TheResultOfAnEditWhoseSceneIsGoneIsDropped) {
