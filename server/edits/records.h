@@ -5,7 +5,8 @@
 //                      jobs/         a note and a folder for each edit (engine/jobs/notes.h)
 //
 // What edits read and make lies in the data folder, too: a service may carry out only those of its own folder. So a
-// database belongs to one folder, a folder keeps its records in one place, and one service has them open at a time.
+// database belongs to one folder, and a folder keeps its records in one place. One service has them open alone, or the
+// fronts and workers of one do together (Role).
 #pragma once
 
 #include <cstddef>
@@ -26,7 +27,8 @@ struct OpenRecords {
   std::unique_ptr<engine::jobs::Store> records;
   std::unique_ptr<engine::jobs::Queue> queue;  ///< Of `records`.
 };
-/// Ids go on above all that a record, a note, a folder or a version of a scene tells of.
+/// Where others are at work already (SceneStore::is_alone()), notes and records are not held against each other. Ids go
+/// on above all that a record, a note, a folder or a version of a scene tells of.
 ///   errors  corrupt_data: the records are damaged, or absent although there have been edits; the message says how to
 ///           go on. conflict: the database is another folder's, or this folder's records are in one and it is not
 ///           given. Those of jobs::Store, PostgresStore::open() and Queue::open().
