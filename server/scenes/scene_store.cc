@@ -96,6 +96,7 @@ Result<std::unique_ptr<SceneStore>> SceneStore::open(const StoreOptions& options
   auto impl = std::make_unique<Impl>(options);
   if (auto opened = impl->catalogue.open(); !opened) return propagate(opened);
   if (auto opened = impl->scratch.open(impl->catalogue.is_alone()); !opened) return propagate(opened);
+  if (impl->catalogue.is_alone()) impl->versions.remove_half_made();
   return std::unique_ptr<SceneStore>(new SceneStore(std::move(impl)));
 }
 

@@ -265,9 +265,19 @@ std::vector<std::string> Versions::made() const {
   std::error_code error;
   for (auto entry = fs::directory_iterator(folder_of_made(), error); !error && entry != fs::end(entry);
        entry.increment(error))
-    names.push_back(entry->path().filename());
+    if (std::string name = entry->path().filename(); !name.starts_with(engine::temporary_prefix))
+      names.push_back(std::move(name));
   std::ranges::sort(names);
   return names;
+}
+
+void Versions::remove_half_made() const {
+  std::error_code error;
+  std::vector<fs::path> found;
+  for (auto entry = fs::directory_iterator(folder_of_made(), error); !error && entry != fs::end(entry);
+       entry.increment(error))
+    if (entry->path().filename().string().starts_with(engine::temporary_prefix)) found.push_back(entry->path());
+  for (const fs::path& file : found) remove_quietly(file);
 }
 
 void Versions::discard(const std::string& made) const { remove_quietly(folder_of_made() / made); }

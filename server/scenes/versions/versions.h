@@ -48,6 +48,8 @@ class Versions {
   /// What was made and has not been taken in: names of files, "<edit>-<attempt>".
   [[nodiscard]] std::vector<std::string> made() const;
   void discard(const std::string& made) const;
+  /// Removes what killed processes left half-written among it. Only while no other process is at work.
+  void remove_half_made() const;
   /// What is known of a version. A preview is none.
   ///   errors  not_found
   [[nodiscard]] static Result<VersionInfo> find(const Snapshot& at, const std::string& version);

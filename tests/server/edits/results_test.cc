@@ -96,6 +96,17 @@ TEST_F(ResultsTest, VersionsOfEditsThatFollowEachOtherAreInTheirOrder) {
   EXPECT_EQ(value(scenes->find_version(scene, "2")).edit, second.id);
 }
 
+TEST_F(ResultsTest, WhatAnotherWorkerIsJustWritingIsLeftAlone) {
+  (void)begin();
+  const auto half = dir.path() / "scenes/.made/.splatdrag-7-0.tmp";
+  support::write_file(half, "half a version");
+  settle_results(*scenes, *queue);
+  EXPECT_TRUE(std::filesystem::exists(half));
+  scenes.reset();
+  scenes = open_scenes(dir.path());
+  EXPECT_FALSE(std::filesystem::exists(half)) << "nobody is at work: it was killed";
+}
+
 TEST_F(ResultsTest, AnEditHasSucceededOnceItsVersionIsThere) {
   const Edit edit = begin();
   succeed(edit);
