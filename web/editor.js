@@ -98,7 +98,7 @@ const OF_THE_VERSION = { comparing: false, compareWith: null, preview: null, pro
 
 // What outlives a reload: as it is; and all, of which open() puts back what still fits the scene.
 const LASTING_KEYS = [
-  ...["region", "mode", "preset", "crumbs", "shadow", "settle", "prompt", "negative_prompt", "params", "autoPreview", "layer", "tab"],
+  ...["region", "mode", "preset", "crumbs", "shadow", "prompt", "negative_prompt", "params", "autoPreview", "layer", "tab"],
   ...["constraint", "gizmo", "frame", "thingMode", "selectTool", "selectDepth", "brushRadius", "tinted", "draftOnRelease", "drafts"],
 ];
 const STORED_KEYS = ["pose", "version", "handles", "selection", "viewName", ...LASTING_KEYS];

@@ -69,11 +69,11 @@ function radiusGiven({ radius, grip = null }, selection) {
 /** What of the screen decides how a preview looks: two equal texts, the same preview. It shows where Gaussians go, so of
  *  the `parameters` that the service describes those of the motion count, and any that it does not describe. */
 export function previewKey(request, parameters = []) {
-  const { handles, selection, attach, crumbs, mode, region, params = {}, preset, scene, version } = request; // healing shows later
+  const { handles, selection, attach, crumbs, settle, mode, region, params = {}, preset, scene, version } = request; // healing shows later
   const others = new Set(parameters.filter(({ part }) => part !== "motion").map(({ name }) => name));
   const motion = Object.entries(params).filter(([name]) => !others.has(name));
   motion.sort(([a], [b]) => (a < b ? -1 : 1));
-  return JSON.stringify({ scene, version, handles, selection, attach, crumbs, mode, region, preset, motion });
+  return JSON.stringify({ scene, version, handles, selection, attach, crumbs, settle, mode, region, preset, motion });
 }
 
 /** "max_image_side" as a person reads it. */

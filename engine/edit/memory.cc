@@ -57,11 +57,12 @@ const std::vector<std::uint32_t>& Memory::crumbs_of(const scene::LayeredCloud& s
       .rows;
 }
 
-const select::Stance& Memory::stance_of(const scene::LayeredCloud& scene, std::span<const std::uint32_t> part,
-                                        std::span<const select::Touch> touches, std::span<const std::uint32_t> moved) {
+const select::Stance& Memory::stance_of(const scene::LayeredCloud& scene, const Array3& means,
+                                        std::span<const std::uint32_t> part, std::span<const select::Touch> touches,
+                                        std::span<const std::uint32_t> moved) {
   return find_or_make(
       stances_, [&](const select::Stance& stance) { return stance.is_of(part, moved); },
-      [&] { return select::Stance(scene, part, touches, moved); },
+      [&] { return select::Stance(scene, means, part, touches, moved); },
       [](const select::Stance& stance) { return stance.size(); });
 }
 

@@ -26,7 +26,8 @@ class Memory {
                                                             std::span<const std::uint32_t> selected);
   /// The stance that select::Stance's constructor makes of these.
   ///   touches  of contact_of() for `part` and `moved`
-  [[nodiscard]] const select::Stance& stance_of(const scene::LayeredCloud& scene, std::span<const std::uint32_t> part,
+  [[nodiscard]] const select::Stance& stance_of(const scene::LayeredCloud& scene, const Array3& means,
+                                                std::span<const std::uint32_t> part,
                                                 std::span<const select::Touch> touches,
                                                 std::span<const std::uint32_t> moved);
   /// The body that deform::Body's constructor makes of these.

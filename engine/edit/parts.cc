@@ -79,18 +79,24 @@ void draw_out(const scene::LayeredCloud& scene, std::span<const std::uint32_t> r
       {attachment.group, way, repeat->step, std::move(repeat->tile), std::move(repeat->depth)});
 }
 
+/// Is what is selected set down, where it stands on something?
+bool settles(const Request& request) {
+  return request.settle == Settle::automatic && request.selected && request.mode == Mode::move;
+}
+
 /// Of a part that goes as one piece: where its handles go, so that it arrives standing as it stands.
-///   drags  of all handles
-///   own    those of the part, without anchors that hold nothing
-void set_down(const scene::LayeredCloud& scene, const select::Stance& stance, std::span<const deform::Drag> drags,
-              std::span<const deform::Drag> own, deform::Attachment& attachment, Parts& parts) {
-  const auto motion = settled(deform::nearest_motion(own, attachment.group, attachment.scales), own,
-                              [&](const deform::RigidMotion& with) { return stance.after(scene, with); });
-  if (!motion) return;
-  for (std::size_t i = 0; i < drags.size(); ++i) {
-    if (drags[i].group != attachment.group || drags[i].anchor) continue;
-    parts.corrected.push_back({i, (*motion)(drags[i].source)});
-    attachment.settled = std::max(attachment.settled, glm::distance(parts.corrected.back().target, drags[i].target));
+///   own  handles of the part
+void set_down(const scene::LayeredCloud& scene, const Array3& means, const select::Stance& stance,
+              std::span<const std::size_t> own, std::span<const deform::Drag> drags, deform::Attachment& attachment,
+              Parts& parts) {
+  std::vector<deform::Drag> asked;
+  for (const std::size_t handle : own) asked.push_back(drags[handle]);
+  const auto targets = settled(asked, attachment.scales,
+                               [&](const deform::RigidMotion& motion) { return stance.after(scene, means, motion); });
+  if (!targets) return;
+  for (std::size_t k = 0; k < own.size(); ++k) {
+    parts.corrected.push_back({own[k], (*targets)[k]});
+    attachment.settled = std::max(attachment.settled, glm::distance((*targets)[k], asked[k].target));
   }
 }
 
@@ -112,6 +118,7 @@ Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> 
   for (const auto& [group, rows] : rows_of_group) {
     const double length = longest_edge(means, rows);
     std::vector<deform::Drag> own;
+    std::vector<std::size_t> handles;
     for (std::size_t i = 0; i < drags.size(); ++i) {
       if (drags[i].group != group) continue;
       const double away = distance_to(means, rows, drags[i].source);
@@ -119,7 +126,7 @@ Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> 
         parts.idle.push_back(i);
         continue;
       }
-      own.push_back(drags[i]);
+      own.push_back(drags[i]), handles.push_back(i);
       if (!drags[i].anchor && away > length) parts.astray.push_back({i, away});
     }
     if (own.empty()) continue;  // anchors alone, and none of them near: nothing moves
@@ -136,8 +143,9 @@ Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> 
     if (request.mode == Mode::extend) draw_out(scene, rows, contact.touches, own, request.attach, attachment, parts);
     if (attachment.how == How::held || attachment.how == How::drawn_out)
       hold(means, rows, contact.touches, own, attachment, parts);
-    if (attachment.how == How::one_piece && request.settle == Settle::automatic)
-      set_down(scene, memory.stance_of(scene, rows, contact.touches, dragged), drags, own, attachment, parts);
+    if (attachment.how == How::one_piece && settles(request))
+      set_down(scene, means, memory.stance_of(scene, means, rows, contact.touches, dragged), handles, drags, attachment,
+               parts);
     parts.attachments.push_back(std::move(attachment));
   }
   std::sort(parts.rim.begin(), parts.rim.end());

@@ -68,7 +68,6 @@ Result<void> validate_motion(const Request& request) {
     if (request.handles[i].scale) return invalid("a handle scales what it grips" + only, where + ".scale");
   }
   if (request.attach != Attach::automatic) return invalid("what holds a part can be chosen" + only, "attach");
-  if (request.settle != Settle::automatic) return invalid("a part is set down" + only, "settle");
   return {};
 }
 
@@ -82,6 +81,16 @@ Result<void> validate_what_goes_along(const Request& request, Choice choice, con
   if (!request.selected) return invalid(asked + "is about " + about + ": select what moves, or leave this out", where);
   if (request.mode == Mode::extend)
     return invalid(asked + "is about what a part leaves behind; with mode \"extend\" it does not leave", where);
+  return {};
+}
+
+/// Only what is selected and moved is set down.
+Result<void> validate_settle(const Request& request) {
+  if (request.settle == Settle::automatic) return {};
+  if (!request.selected)
+    return invalid("\"off\" is about what is selected: select what moves, or leave this out", "settle");
+  if (request.mode != Mode::move || request.params.interpolation != Interpolation::arap)
+    return invalid("a part is set down only with mode \"move\" and params.interpolation \"arap\"", "settle");
   return {};
 }
 
@@ -120,6 +129,7 @@ Result<void> validate(const Request& request) {
   if (auto valid = validate_what_goes_along(request, request.shadow, "the shadow of what is selected", "shadow");
       !valid)
     return valid;
+  if (auto valid = validate_settle(request); !valid) return valid;
   if (auto valid = validate_ascending(request.healed, "heal"); !valid) return valid;
   if (auto valid = validate_motion(request); !valid) return valid;
   if (request.region)

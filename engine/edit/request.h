@@ -56,7 +56,7 @@ struct Request {
   std::optional<std::vector<std::uint32_t>> selected;
   Crumbs crumbs = Crumbs::move;              ///< Of `selected`, in a move or a removal; else there are none.
   ShadowOfPart shadow = ShadowOfPart::move;  ///< Of `selected`, where it leaves its place as a whole.
-  Settle settle = Settle::automatic;         ///< Of `selected`, where it moves as one piece.
+  Settle settle = Settle::automatic;         ///< Of `selected`, in a move as one piece.
   /// Rows of the scene that are made anew although cameras saw them, strictly ascending: a stain, a painted shadow.
   /// Only with a corrector, and where what is dragged leaves its place; dragged rows among them count where they were.
   std::vector<std::uint32_t> healed;

@@ -1,7 +1,6 @@
 #include "engine/select/footing.h"
 
 #include <algorithm>
-#include <array>
 #include <cassert>
 #include <cmath>
 #include <iterator>
@@ -31,9 +30,10 @@ constexpr double on_plane = 0.4;       // share of what is near the feet, by wei
 constexpr double other_way = 0.7;      // cosine of 45 degrees: no support of a crown turns further along a way
 constexpr double same_way = 0.985;     // cosine of 10 degrees: of a flat floor, found twice, 2 or 3
 constexpr std::size_t least_touching = 5;
-constexpr std::size_t least_points = 12, most_points = 1500, most_rows = 4000,
-                      most_feet = 500;  // more of them tell no more
-constexpr int guesses = 150;            // with 0.4 on the plane, a tenth of which hits it three times
+constexpr std::size_t least_points = 12;
+// More of them tell no more: of a plane's points to guess by, rows of the part and around it, feet.
+constexpr std::size_t most_points = 1500, most_rows = 4000, most_rest = 20'000, most_feet = 500;
+constexpr int guesses = 150;  // with 0.4 on the plane, a tenth of which hits it three times
 constexpr int refinements = 5, rounds = 2;
 constexpr double shows = 0.1;  // opacity of a row that says where a part ends
 
@@ -64,11 +64,16 @@ double weight_of(std::span<const Point> points) {
                          [](double sum, const Point& point) { return sum + point.weight; });
 }
 
-/// Of planes through three of the points the one that most of them are on.
+/// Of planes through three of the points, drawn by their weights, the one that most of them are on.
 ///   towards  its normal, but for 45 degrees and its sign; zero: any
 std::optional<Plane> guess(std::span<const Point> points, DVec3 towards) {
+  std::vector<double> up_to;
+  for (const Point& point : points) up_to.push_back((up_to.empty() ? 0 : up_to.back()) + point.weight);
   Rng rng(0);
-  const auto any = [&] { return points[rng.below(std::uint32_t(points.size()))].at; };
+  const auto any = [&] {
+    const auto drawn = std::ranges::upper_bound(up_to, double(rng.uniform()) * up_to.back());
+    return points[std::min(std::size_t(drawn - up_to.begin()), points.size() - 1)].at;
+  };
   const std::size_t stride = 1 + points.size() / most_points;
   std::optional<Plane> best;
   double most = 0;
@@ -86,7 +91,8 @@ std::optional<Plane> guess(std::span<const Point> points, DVec3 towards) {
 }
 
 /// The plane that enough of the points are on, by the least squares of those, the closer the more.
-std::optional<Plane> plane_by(std::span<const Point> points, DVec3 towards = DVec3(0.0)) {
+///   towards  as above; the normal is on that side
+std::optional<Plane> plane_by(std::span<const Point> points, DVec3 towards) {
   if (points.size() < least_points) return std::nullopt;
   std::optional<Plane> plane = guess(points, towards);
   if (!plane) return std::nullopt;
@@ -112,6 +118,7 @@ std::optional<Plane> plane_by(std::span<const Point> points, DVec3 towards = DVe
     spread = std::sqrt(axes.s.y);
   }
   if (spread < least_spread || weight_on(points, *plane) < on_plane * weight_of(points)) return std::nullopt;
+  if (glm::dot(plane->normal, towards) < 0) plane->normal = -plane->normal;
   return plane;
 }
 
@@ -165,16 +172,16 @@ std::vector<Point> near(std::span<const Point> rest, std::span<const DVec3> feet
   return out;
 }
 
-/// A part and what stays around it, at one end of its way.
-class End {
+/// The rows that say where a part ends, at one end of its way.
+class Posture {
  public:
-  /// In units of the part, at least one place.
-  End(std::vector<DVec3> places, std::vector<Point> rest) : places_(std::move(places)), rest_(std::move(rest)) {
-    for (const DVec3& place : places_) middle_ += place / double(places_.size());
-  }
+  explicit Posture(std::vector<DVec3> places) : places_(std::move(places)) {}
 
-  [[nodiscard]] Plane facing(Plane plane) const {
-    if (plane.height(middle_) < 0) plane.normal = -plane.normal;
+  [[nodiscard]] const std::vector<DVec3>& places() const { return places_; }
+  [[nodiscard]] Plane below(Plane plane) const {
+    DVec3 middle(0.0);
+    for (const DVec3& place : places_) middle += place / double(places_.size());
+    if (plane.height(middle) < 0) plane.normal = -plane.normal;
     return plane;
   }
   [[nodiscard]] std::vector<DVec3> feet(DVec3 up) const {
@@ -187,14 +194,12 @@ class End {
                          [&](DVec3 place) { return glm::dot(place, up) <= *lowest + band; });
     return out;
   }
-  [[nodiscard]] std::vector<Point> near(std::span<const DVec3> feet) const { return select::near(rest_, feet); }
-  [[nodiscard]] std::vector<Point> near_feet(DVec3 up) const { return near(feet(up)); }
   /// The plane by the feet as they are above a plane that faces about the same way.
-  [[nodiscard]] std::optional<Plane> settled_on(Plane plane) const {
+  [[nodiscard]] std::optional<Plane> settled_on(Plane plane, std::span<const Point> rest) const {
     for (int k = 0; k < rounds; ++k) {
-      const std::optional<Plane> next = plane_by(near_feet(plane.normal), plane.normal);
+      const std::optional<Plane> next = plane_by(near(rest, feet(plane.normal)), plane.normal);
       if (!next) return std::nullopt;
-      plane = facing(*next);
+      plane = *next;
     }
     return plane;
   }
@@ -206,25 +211,30 @@ class End {
   }
 
  private:
-  std::vector<DVec3> places_;
-  std::vector<Point> rest_;
-  DVec3 middle_{0.0};
+  std::vector<DVec3> places_;  ///< In units of the part; at least one.
 };
 
 double opacity_of(const scene::GaussianCloud& cloud, std::size_t row) {
   return double(render::opacity<float>(cloud.opacity_logit[row]));
 }
 
-/// What of the rest is around a part. Weighed by opacity and width.
-std::vector<Point> rest_around(const scene::LayeredCloud& scene, std::span<const std::uint32_t> moved, const Box& box,
-                               const Units& units) {
-  const Array3 means = scene::means(scene);
+/// Every so many of them, so that no more than `most` are left.
+template <class T>
+std::vector<T> thinned(const std::vector<T>& all, std::size_t most) {
+  std::vector<T> out;
+  for (std::size_t k = 0; k < all.size(); k += 1 + all.size() / most) out.push_back(all[k]);
+  return out;
+}
+
+/// Some of what stays around a part. Weighed by opacity and width.
+std::vector<Point> rest_around(const scene::LayeredCloud& scene, const Array3& means,
+                               std::span<const std::uint32_t> moved, const Box& box, const Units& units) {
   std::vector<std::uint32_t> rows;
   for (std::uint32_t row = 0; row < means.size(); ++row)
     if (box.reaches(units.of(DVec3(means.get(row)))) && !std::ranges::binary_search(moved, row)) rows.push_back(row);
-  const scene::GaussianCloud cloud = scene::gather(scene, rows);
+  const scene::GaussianCloud cloud = scene::gather(scene, thinned(rows, most_rest));
   std::vector<Point> out;
-  for (std::size_t k = 0; k < rows.size(); ++k) {
+  for (std::size_t k = 0; k < cloud.size(); ++k) {
     const DVec3 log_scale(cloud.log_scale.get(k));
     const double thinnest = std::min({log_scale.x, log_scale.y, log_scale.z});
     const double width = std::exp((log_scale.x + log_scale.y + log_scale.z - thinnest) / 2) / units.extent;
@@ -233,70 +243,64 @@ std::vector<Point> rest_around(const scene::LayeredCloud& scene, std::span<const
   return out;
 }
 
-/// Some of the rows that say where a part ends: all of them do where it hardly shows.
-std::vector<DVec3> places_of(const scene::GaussianCloud& part, const Units& units) {
-  const auto show = std::ranges::count_if(part.opacity_logit,
-                                          [](float logit) { return double(render::opacity<float>(logit)) >= shows; });
-  const std::size_t stride = 1 + std::size_t(show > 0 ? show : std::ptrdiff_t(part.size())) / most_rows;
-  std::vector<DVec3> out;
-  std::size_t k = 0;
-  for (std::size_t row = 0; row < part.size(); ++row)
-    if ((show == 0 || opacity_of(part, row) >= shows) && k++ % stride == 0)
-      out.push_back(units.of(DVec3(part.mean.get(row))));
-  return out;
+/// Where the rows are that say where a part ends, world units: all of them do where it hardly shows.
+std::vector<DVec3> shown_places(const scene::GaussianCloud& part) {
+  std::vector<DVec3> all, shown;
+  for (std::size_t row = 0; row < part.size(); ++row) {
+    all.emplace_back(part.mean.get(row));
+    if (opacity_of(part, row) >= shows) shown.push_back(all.back());
+  }
+  return shown.empty() ? all : shown;
 }
 
 }  // namespace
 
 struct Stance::Before {
   Units units;
-  std::vector<DVec3> places;  ///< Of some rows of the part, in its units.
-  End end;
+  Posture part;
   Plane plane;                   ///< That it stands on.
   std::vector<Point> near_feet;  ///< What stays, by its feet.
 };
 
-Stance::Stance(const scene::LayeredCloud& scene, std::span<const std::uint32_t> part, std::span<const Touch> touches,
-               std::span<const std::uint32_t> moved)
+Stance::Stance(const scene::LayeredCloud& scene, const Array3& means, std::span<const std::uint32_t> part,
+               std::span<const Touch> touches, std::span<const std::uint32_t> moved)
     : part_(part.begin(), part.end()), moved_(moved.begin(), moved.end()) {
   assert(!part.empty() && touches.size() == part.size());
-  const scene::GaussianCloud cloud = scene::gather(scene, part);
-  std::vector<DVec3> all, touching;
-  for (std::size_t k = 0; k < part.size(); ++k) {
-    all.emplace_back(cloud.mean.get(k));
-    if (touches[k] != Touch::nothing) touching.push_back(all.back());
-  }
-  const Box world(all);
-  const Units units{(world.low + world.high) / 2.0, glm::distance(world.low, world.high)};
-  if (touching.size() < least_touching || !(units.extent > 0)) return;
-  for (auto* places : {&all, &touching})
-    for (DVec3& place : *places) place = units.of(place);
+  std::vector<DVec3> places = shown_places(scene::gather(scene, part)), touching;
+  const Box box(places);
+  const Units units{(box.low + box.high) / 2.0, glm::distance(box.low, box.high)};
+  if (!(units.extent > 0)) return;
+  for (DVec3& place : places) place = units.of(place);
+  for (std::size_t k = 0; k < part.size(); ++k)
+    if (touches[k] != Touch::nothing) touching.push_back(units.of(DVec3(means.get(part[k]))));
+  if (touching.size() < least_touching) return;
 
-  std::vector<DVec3> places = places_of(cloud, units);
-  End end(places, rest_around(scene, moved, Box(all), units));
-  std::optional<Plane> plane = plane_by(end.near(touching));
-  if (plane) plane = end.settled_on(end.facing(*plane));
+  const std::vector<Point> rest = rest_around(scene, means, moved, Box(places), units);
+  Posture posture(thinned(places, most_rows));
+  std::optional<Plane> plane = plane_by(near(rest, touching), DVec3(0.0));
+  if (plane) plane = posture.settled_on(posture.below(*plane), rest);
   if (!plane) return;
-  std::vector<Point> near_feet = end.near_feet(plane->normal);
-  before_ =
-      std::make_shared<const Before>(Before{units, std::move(places), std::move(end), *plane, std::move(near_feet)});
+  std::vector<Point> near_feet = near(rest, posture.feet(plane->normal));
+  before_ = std::make_shared<const Before>(Before{units, std::move(posture), *plane, std::move(near_feet)});
 }
 
-std::optional<Footings> Stance::after(const scene::LayeredCloud& scene,
+std::optional<Footings> Stance::after(const scene::LayeredCloud& scene, const Array3& means,
                                       const std::function<DVec3(DVec3)>& motion) const {
   if (!before_) return std::nullopt;
-  const auto& [units, places, before, there, near_before] = *before_;
+  const auto& [units, before, there, near_before] = *before_;
   std::vector<DVec3> arrived;
-  for (const DVec3& place : places) arrived.push_back(units.of(motion(units.world(place))));
-  std::vector<Point> rest = rest_around(scene, moved_, Box(arrived), units);
-  const End end(std::move(arrived), std::move(rest));
-  const std::optional<Plane> here = end.settled_on(there);
+  for (const DVec3& place : before.places()) arrived.push_back(units.of(motion(units.world(place))));
+  const std::vector<Point> rest = rest_around(scene, means, moved_, Box(arrived), units);
+  const Posture after(std::move(arrived));
+  const std::optional<Plane> here = after.settled_on(there, rest);
   if (!here) return std::nullopt;
   if (glm::dot(there.normal, here->normal) >= same_way)
-    if (const auto one = common_plane(near_before, end.near_feet(here->normal), here->normal))
-      return Footings{before.footing(before.facing(*one), units), end.footing(end.facing(*one), units)};
-  return Footings{before.footing(there, units), end.footing(*here, units)};
+    if (const auto one = common_plane(near_before, near(rest, after.feet(here->normal)), here->normal))
+      return Footings{before.footing(*one, units), after.footing(*one, units)};
+  return Footings{before.footing(there, units), after.footing(*here, units)};
 }
+
+std::size_t Stance::size() const { return part_.size() + moved_.size() + (before_ ? before_->near_feet.size() : 0); }
 
 bool Stance::is_of(std::span<const std::uint32_t> part, std::span<const std::uint32_t> moved) const {
   return std::ranges::equal(part_, part) && std::ranges::equal(moved_, moved);

@@ -17,7 +17,7 @@ namespace engine::select {
 
 /// The surface by the feet of a part: a plane, about, as far as they reach.
 struct Footing {
-  DVec3 normal{0.0};  ///< Unit, to the side where the part is.
+  DVec3 normal{0.0};  ///< Unit, to the side where the part is before its way.
   DVec3 foot{0.0};    ///< The middle of the feet, world units.
   double height = 0;  ///< Of that middle above the surface, world units; below zero where it is sunk in.
 };
@@ -31,20 +31,22 @@ struct Footings {
 /// Feet are what is lowest of the part above the surface: so a ball that rolls has others when it arrives.
 class Stance {
  public:
-  /// Some 10 ms where 10,000 rows are around the part; half of that for each motion.
+  /// Some 10 ms where 10,000 rows are around the part, of which it looks at 20,000 at most; half of that for each
+  /// motion. Both look over all means.
+  ///   means    of the scene
   ///   part     rows of the scene, ascending, at least one (asserted)
   ///   touches  [part] of contact_of()
   ///   moved    all rows that move, ascending: no surface of theirs counts
-  Stance(const scene::LayeredCloud& scene, std::span<const std::uint32_t> part, std::span<const Touch> touches,
-         std::span<const std::uint32_t> moved);
+  Stance(const scene::LayeredCloud& scene, const Array3& means, std::span<const std::uint32_t> part,
+         std::span<const Touch> touches, std::span<const std::uint32_t> moved);
 
   /// Nothing where the part touches too little, or what is by its feet is no plane at one of the ends.
-  ///   scene   that of the constructor
-  ///   motion  of world units
-  [[nodiscard]] std::optional<Footings> after(const scene::LayeredCloud& scene,
+  ///   scene, means  those of the constructor
+  ///   motion        of world units
+  [[nodiscard]] std::optional<Footings> after(const scene::LayeredCloud& scene, const Array3& means,
                                               const std::function<DVec3(DVec3)>& motion) const;
 
-  [[nodiscard]] std::size_t size() const { return part_.size(); }  ///< Rows of the part.
+  [[nodiscard]] std::size_t size() const;  ///< Rows and points that it keeps.
   /// Would the constructor make the same of these? What touches follows from them.
   [[nodiscard]] bool is_of(std::span<const std::uint32_t> part, std::span<const std::uint32_t> moved) const;
 

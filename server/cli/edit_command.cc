@@ -145,6 +145,10 @@ void summarise(std::ostream& out, const Destination& to, const EditReport& repor
       << " new ones\n";
   for (std::size_t i = 0; i < edit.handles.size(); ++i)
     out << "handle " << i + 1 << ": " << edit.handles[i].gaussians << " Gaussians\n";
+  for (const edit::Attachment& part : edit.parts)
+    if (part.settled > 0)
+      out << "set down on what it stands on, " << part.settled
+          << " from where handles ask (settle \"off\" follows them)\n";
   // In mode `remove` those that go along with the part are removed with it.
   const bool removed = report.request.crumbs == proto::Crumbs::remove || report.request.mode == proto::Mode::remove;
   if (edit.crumbs > 0)

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+
 #include "tests/proto/examples.h"
 
 namespace proto {
@@ -26,6 +28,7 @@ EditRecord full_record() {
   record.timings = {{"assign", 0.125}, {"mask", 2}};
   record.gaussians = GaussianCounts{1, 2, 3, 4, 5, 6, 7};
   record.uncovered = {{"0001.jpg", 0.25, 0.125, {{0.5, 0.25, 0.75, 1}}}, {"0002.jpg", 0.5, 0, {}}};
+  record.parts = {{1, "one_piece", "it only stands next to what stays", 0.25}};
   record.warnings = {"careful"};
   record.result_version = 7;
   record.simd = "AVX2";
@@ -42,6 +45,15 @@ TEST(EditRecord, ComesBackAsItWasWritten) {
   EXPECT_EQ(back->request, full_record().request);
   EXPECT_EQ(back->gaussians->changeable, 5u);
   EXPECT_EQ(to_json(*back), text) << "every field";
+}
+
+TEST(EditRecord, OfAnEarlierVersionHasNoPartThatIsSetDown) {
+  nlohmann::json written = nlohmann::json::parse(to_json(full_record()));
+  written.at("parts").at(0).erase(3);
+  const auto back = parse_edit_record(written.dump());
+  ASSERT_TRUE(back) << back.error().message;
+  EXPECT_EQ(back->parts.at(0).why, "it only stands next to what stays");
+  EXPECT_EQ(back->parts.at(0).settled, 0);
 }
 
 TEST(EditRecord, OfARemovalOfWhatIsSelectedComesBackWithoutItsSelection) {

@@ -352,6 +352,23 @@ TEST(Preview, SetsDownTheSameInSeveralIntervals) {
   const auto outcome = preview(plain(block.cloud), block.request);
   ASSERT_TRUE(outcome);
   EXPECT_NEAR(glm::distance(way_of(block, *outcome), DVec3(0.9, 0, 0)), 0, 1e-4);
+  block.request.params.iterations = 0;
+  for (const int intervals : {1, 3}) {
+    block.request.params.intervals = intervals;
+    expect_as_run(plain(block.cloud), block.request);
+  }
+}
+
+TEST(Preview, SetsDownTheSameWhatItRemembers) {
+  BlockScene block = lifted_by_slip();
+  Memory memory;
+  const auto first = preview(plain(block.cloud), block.request, memory);
+  *block.request.handles[0].target += DVec3(0.1, 0.01, 0);
+  const auto second = preview(plain(block.cloud), block.request, memory),
+             alone = preview(plain(block.cloud), block.request);
+  ASSERT_TRUE(first && second && alone);
+  EXPECT_EQ(second->overlay, alone->overlay);
+  EXPECT_NE(second->overlay, first->overlay);
 }
 
 TEST(Preview, LeavesInTheAirWhatIsLifted) {

@@ -93,11 +93,15 @@ TEST(ValidateRequest, CrumbsAreBesideASelectionAndGoWhereAPartLeaves) {
 TEST(ValidateRequest, OnlyABodyIsSetDown) {
   Request request = good();
   request.settle = Settle::off;
-  request.params.interpolation = Interpolation::rigid;
-  ASSERT_FALSE(validate(request));
-  EXPECT_EQ(validate(request).error().where, "settle");
   request.params.interpolation = Interpolation::arap;
+  const auto is_refused = [&] { return !validate(request) && validate(request).error().where == "settle"; };
+  EXPECT_TRUE(is_refused()) << "nothing is selected";
+  request.selected = {1, 2};
   EXPECT_TRUE(validate(request));
+  request.params.interpolation = Interpolation::rigid;
+  EXPECT_TRUE(is_refused());
+  request.params.interpolation = Interpolation::arap, request.mode = Mode::extend;
+  EXPECT_TRUE(is_refused());
 }
 
 TEST(ValidateRequest, WhatIsRemovedGoesNowhere) {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <memory>
-#include <numbers>
+#include <optional>
 #include <vector>
 
 #include "engine/core/rng.h"
@@ -20,9 +20,9 @@ constexpr int side = 6;  // rows of a block along its edges
 /// A block of 0.5 on what is around it, y up; its lowest rows touch that.
 class Standing {
  public:
-  explicit Standing(DVec3 foot, double unit = 1) : unit_(unit) {
+  explicit Standing(DVec3 foot, double unit = 1, int layers = side) : unit_(unit) {
     for (int x = 0; x < side; ++x)
-      for (int y = 0; y < side; ++y)
+      for (int y = 0; y < layers; ++y)
         for (int z = 0; z < side; ++z) {
           const DVec3 place(x - 0.5 * (side - 1), y + 0.5, z - 0.5 * (side - 1));
           part_.push_back(std::uint32_t(cloud_.size()));
@@ -30,7 +30,14 @@ class Standing {
           add(foot + spacing * place);
         }
   }
-  void add(DVec3 at) { add_at(cloud_, Vec3(unit_ * at), 4, float(std::log(0.5 * spacing * unit_))); }
+  void add(DVec3 at, float opacity_logit = 4) {
+    add_at(cloud_, Vec3(unit_ * at), opacity_logit, float(std::log(0.5 * spacing * unit_)));
+  }
+  void add_to_part(DVec3 at, float opacity_logit) {
+    part_.push_back(std::uint32_t(cloud_.size()));
+    touches_.push_back(Touch::nothing);
+    add(at, opacity_logit);
+  }
   /// A floor over x from `from` to `to`, as high as `height` says.
   void add_floor(double from, double to, const std::function<double(DVec2)>& height) {
     for (double x = from; x < to; x += spacing)
@@ -45,7 +52,9 @@ class Standing {
 
   [[nodiscard]] std::optional<Footings> after(const std::function<DVec3(DVec3)>& motion) const {
     const scene::LayeredCloud scene{std::make_shared<const scene::GaussianCloud>(cloud_), nullptr};
-    return Stance(scene, part_, touches_, part_).after(scene, [&](DVec3 at) { return unit_ * motion(at / unit_); });
+    return Stance(scene, cloud_.mean, part_, touches_, part_).after(scene, cloud_.mean, [&](DVec3 at) {
+      return unit_ * motion(at / unit_);
+    });
   }
   [[nodiscard]] std::optional<Footings> after(DVec3 shift) const {
     return after([&](DVec3 place) { return place + shift; });
@@ -66,7 +75,7 @@ Standing on_a_floor(double unit = 1) {
   return block;
 }
 
-TEST(Stance, TellHowFarAPartIsOffTheFloorItIsMovedAlong) {
+TEST(Stance, TellsHowFarAPartIsOffTheFloorItIsMovedAlong) {
   const auto footings = on_a_floor().after({1.2, 0.03, 0.1});
   ASSERT_TRUE(footings);
   EXPECT_NEAR(footings->before.normal.y, 1, 1e-6);
@@ -75,7 +84,7 @@ TEST(Stance, TellHowFarAPartIsOffTheFloorItIsMovedAlong) {
   EXPECT_NEAR(glm::distance(footings->after.foot - footings->before.foot, DVec3(1.2, 0.03, 0.1)), 0, 1e-6);
 }
 
-TEST(Stance, AreTheSameInAnyUnits) {
+TEST(Stance, IsTheSameInAnyUnits) {
   for (const double unit : {1e-3, 1e3}) {
     const auto footings = on_a_floor(unit).after({1.2, 0.03, 0.1});
     ASSERT_TRUE(footings) << unit;
@@ -83,7 +92,7 @@ TEST(Stance, AreTheSameInAnyUnits) {
   }
 }
 
-TEST(Stance, LookAtTheSurfaceAmongWhatNobodyHasSeenBelowIt) {
+TEST(Stance, LooksAtTheSurfaceAmongWhatNobodyHasSeenBelowIt) {
   Standing block = on_a_floor();
   block.lies_below(0.4, 300);
   const auto footings = block.after({1.2, -0.04, 0});
@@ -92,7 +101,30 @@ TEST(Stance, LookAtTheSurfaceAmongWhatNobodyHasSeenBelowIt) {
   EXPECT_NEAR(footings->after.height - footings->before.height, -0.04, 0.01);
 }
 
-TEST(Stance, OfASlopeAreAlongIt) {
+TEST(Stance, OfAThinPartThatSinksBelowTheFloorIsOnItsUpperSide) {
+  Standing board(DVec3(0.0), 1, 1);
+  board.add_floor(-1.5, 3, level);
+  const auto footings = board.after({1.2, -0.12, 0});  // it was 0.05 above the floor
+  ASSERT_TRUE(footings);
+  EXPECT_NEAR(footings->after.normal.y, 1, 1e-6);
+  EXPECT_NEAR(footings->before.height, 0.05, 1e-6);
+  EXPECT_NEAR(footings->after.height, -0.07, 1e-6);
+}
+
+TEST(Stance, LooksPastWhatHardlyShows) {
+  Standing block = on_a_floor();
+  Rng rng(3);
+  const auto in_the_way = [&] {
+    return DVec3(rng.uniform(-0.5f, 1.7f), rng.uniform(0, 0.2f), rng.uniform(-0.5f, 0.5f));
+  };
+  for (int k = 0; k < 20'000; ++k) block.add(in_the_way(), -9);
+  block.add_to_part({0, 40, 0}, -5);  // a floater that a mask has caught
+  const auto footings = block.after({1.2, 0.03, 0.1});
+  ASSERT_TRUE(footings);
+  EXPECT_NEAR(footings->after.height - footings->before.height, 0.03, 1e-3);
+}
+
+TEST(Stance, IsOnASlopeAlongIt) {
   Standing block(DVec3(0.0));
   block.add_floor(-1.5, 0.8, level);
   block.add_floor(0.8, 3, [](DVec2 at) { return 0.3 * (at.x - 0.8); });
@@ -103,7 +135,7 @@ TEST(Stance, OfASlopeAreAlongIt) {
   EXPECT_NEAR(footings->after.normal.x / footings->after.normal.y, -0.3, 0.02);
 }
 
-TEST(Stance, OfABallThatRollsOverACrownAreWhereItTouches) {
+TEST(Stance, OfABallThatRollsOverACrownIsWhereItTouches) {
   constexpr double crown = 2, radius = 0.3;
   scene::GaussianCloud cloud;
   std::vector<std::uint32_t> part;
@@ -123,7 +155,7 @@ TEST(Stance, OfABallThatRollsOverACrownAreWhereItTouches) {
     for (double z = -1; z < 1; z += 0.06) add_at(cloud, Vec3(at(angle, crown) + DVec3(0, 0, z)), 4, std::log(0.03f));
   const scene::LayeredCloud scene{std::make_shared<const scene::GaussianCloud>(cloud), nullptr};
   const DQuat turn = glm::angleAxis(-rolled, DVec3(0, 0, 1));
-  const auto footings = Stance(scene, part, touches, part).after(scene, [&](DVec3 point) {
+  const auto footings = Stance(scene, cloud.mean, part, touches, part).after(scene, cloud.mean, [&](DVec3 point) {
     return at(way, crown + radius + miss) + turn * (point - at(0, crown + radius));
   });
   ASSERT_TRUE(footings);
@@ -132,7 +164,7 @@ TEST(Stance, OfABallThatRollsOverACrownAreWhereItTouches) {
   EXPECT_NEAR(footings->after.height - footings->before.height, miss, 0.005);
 }
 
-TEST(Stance, AreNoneWhereNothingIsStoodOn) {
+TEST(Stance, IsNoneWhereNothingIsStoodOn) {
   EXPECT_FALSE(on_a_floor().after({1.2, 1.5, 0})) << "in the air";
   EXPECT_FALSE(on_a_floor().after({1e30, 0, 0})) << "beyond everything";
   EXPECT_FALSE(Standing(DVec3(0.0)).after({0.1, 0, 0})) << "alone";
@@ -146,12 +178,12 @@ TEST(Stance, AreNoneWhereNothingIsStoodOn) {
   EXPECT_FALSE(in_a_heap.after({1.2, 0, 0})) << "no plane is in a heap";
 }
 
-TEST(Stance, AreNoneWhereAllIsInOnePlace) {
+TEST(Stance, IsNoneWhereAllIsInOnePlace) {
   scene::GaussianCloud cloud = cloud_at({{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {1, 0, 0}});
   const scene::LayeredCloud scene{std::make_shared<const scene::GaussianCloud>(cloud), nullptr};
   const std::vector<std::uint32_t> part{0, 1, 2, 3, 4, 5};
-  const Stance stance(scene, part, std::vector(6, Touch::stands), part);
-  EXPECT_FALSE(stance.after(scene, [](DVec3) { return DVec3(1, 0, 0); }));
+  const Stance stance(scene, cloud.mean, part, std::vector(6, Touch::stands), part);
+  EXPECT_FALSE(stance.after(scene, cloud.mean, [](DVec3) { return DVec3(1, 0, 0); }));
 }
 
 }  // namespace

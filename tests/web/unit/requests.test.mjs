@@ -82,6 +82,11 @@ test("crumbs and what holds a part go with a selection, from files as from the s
   const read = only(JSON.stringify(asked));
   assert.deepEqual([read.crumbs, read.attach], ["keep", "held"]);
   assert.deepEqual(partOf("crumbs"), { part: "crumbs" });
+  const unsettled = requestOf({ ...state, settle: "off" });
+  assert.equal(unsettled.settle, "off");
+  assert.notEqual(previewKey(unsettled), previewKey(asked), "a preview shows it");
+  assert.equal(requestOf({ ...state, settle: "off", mode: "remove" }).settle, undefined, "it arrives nowhere");
+  assert.deepEqual(partOf("settle"), { part: "settle" });
   refused({ ...asked, crumbs: "eat" }, "crumbs");
   refused({ ...asked, attach: "glued" }, "attach");
 });
