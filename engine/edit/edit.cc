@@ -102,6 +102,7 @@ Result<State> begin(Edit& edit, std::span<const scene::Camera> cameras, std::opt
   auto state = assign_and_divide(edit);
   if (!state) return state;
   state->perceptual = edit.perceptual.identity();
+  if (edit.repainter != nullptr) state->repainter = edit.repainter->state();
   if (edit.observer.assigned) edit.observer.assigned(state->report);
   if (auto found = look_for_views(*state, edit, cameras); !found) return propagate(found);
   return state;

@@ -225,6 +225,24 @@ TEST(EditWithARepainter, GoesOnAfterAnIntervalToTheSameBytes) {
   }
 }
 
+TEST(EditWithARepainter, GoesOnAfterAnIntervalInWhichItHadNothingToLearn) {
+  BlockScene block = small_block();
+  block.request.params.intervals = 2;
+  block.request.handles[0].target = block.request.handles[0].source;
+  std::optional<State> after_first;
+  Observer observer;
+  observer.interval_done = [&](const IntervalDone& done) {
+    if (done.interval == 1) after_first = done.state;
+    return Result<void>{};
+  };
+  Student student;
+  EXPECT_EQ(repainted(block, student, observer).overlay, scene::no_change(block.cloud));
+  ASSERT_TRUE(after_first);
+  EXPECT_FALSE(Student().restore("")) << "otherwise this shows nothing";
+  Student another;
+  EXPECT_EQ(repainted(block, another, {}, after_first).overlay, scene::no_change(block.cloud));
+}
+
 TEST(EditWithARepainter, WhatCannotBeTakenUpAgainIsAnError) {
   BlockScene block = small_block();
   block.request.params.intervals = 2;
