@@ -62,7 +62,7 @@ struct EditRequest {
   std::optional<Preset> preset;                     ///< None: standard.
   std::optional<std::string> prompt;                ///< For a corrector that reads one.
   std::optional<std::string> negative_prompt = {};  ///< The same: what should not be seen.
-  bool allow_slow = false;                          ///< A diffusion model may work for hours.
+  bool allow_slow = false;                          ///< Its networks, of `sd` or of `lpips`, may work for hours.
   std::vector<Handle> handles;                      ///< 1 to max_handles
   std::optional<Selection> selection;               ///< What moves. None: the handles' spheres.
   std::optional<Selection> heal = {};               ///< What is made anew although it was seen.
