@@ -77,17 +77,25 @@ Result<State> next_interval(State state, Edit& edit) {
   return state;
 }
 
+/// Ends here what is done, or is to keep what there is. Before the first interval there is nothing to keep.
+bool is_enough(const State& state, const Observer& observer) {
+  if (state.interval >= state.report.resolved.intervals) return true;
+  return state.interval > 0 && observer.keep && observer.keep();
+}
+
+/// The networks of an edit that goes on, as they were after its last interval.
+Result<void> take_up_networks(const State& from, Edit& edit) {
+  if (from.perceptual != edit.perceptual.identity())
+    return fail(ErrorCode::conflict,
+                "the files of the perceptual loss have changed since the edit began: what it has done so far does not "
+                "go with what they would make of the rest; submit it again",
+                "checkpoint");
+  return edit.repainter != nullptr ? edit.repainter->restore(from.repainter) : Result<void>{};
+}
+
 /// Where the edit starts: from the state that it goes on from, or from steps 1, 2 and 5.
 Result<State> begin(Edit& edit, std::span<const scene::Camera> cameras, std::optional<State> from) {
   if (from) {
-    if (from->perceptual != edit.perceptual.identity())
-      return fail(
-          ErrorCode::conflict,
-          "the files of the perceptual loss have changed since the edit began: what it has done so far does not "
-          "go with what they would make of the rest; submit it again",
-          "checkpoint");
-    if (edit.repainter != nullptr)
-      if (auto restored = edit.repainter->restore(from->repainter); !restored) return propagate(restored);
     edit.progress.go_on_after(from->interval);
     if (auto going = edit.progress.enter(Stage::assign, from->interval); !going) return propagate(going);
     const auto taken = assign(edit.input, edit.request);
@@ -185,10 +193,11 @@ Result<Outcome> run(const scene::GaussianCloud& scene, std::span<const scene::Ca
             ProgressMeter(observer, work_ahead(scene, request, tools, observer, from ? from->interval : 0),
                           from ? from->report.times : std::vector<StageTime>())};
   const Asked asked(edit);
+  const bool was_enough = from && is_enough(*from, observer);
+  if (from && !was_enough)  // else nothing is left for networks to do
+    if (auto taken = take_up_networks(*from, edit); !taken) return propagate(taken);
   Result<State> state = begin(edit, cameras, std::move(from));
-  const auto is_enough = [&] { return state->interval > 0 && observer.keep && observer.keep(); };
-  while (state && state->interval < state->report.resolved.intervals && !is_enough())
-    state = next_interval(std::move(*state), edit);
+  while (state && !was_enough && !is_enough(*state, observer)) state = next_interval(std::move(*state), edit);
   if (!state) return propagate(state);
   return finish(std::move(*state), edit);
 }

@@ -49,7 +49,7 @@ struct Outcome {
 ///   errors   invalid_argument (validate; a camera: `where` is "cameras[3].fx"), unprocessable (a handle without
 ///            Gaussians: `where` names it; nothing would be left: `where` is "handles"), cancelled, internal (a value
 ///            that is not finite came up while optimising: `where` is "gaussian[12].opacity", by the input's row),
-///            conflict (`from` came of other weights: `where` is "checkpoint");
+///            conflict (`from` came of other weights, and intervals are left to do: `where` is "checkpoint");
 ///            those of the tools and of the observer
 /// A drag that moves nothing gives the scene back, byte for byte.
 /// Deterministic: same inputs, same bytes, for any number of threads, whether it is resumed or not.

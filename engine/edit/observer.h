@@ -61,8 +61,9 @@ struct Observer {
   std::function<Result<void>(const Moment&)> moment;
   std::size_t pictured = 0;  ///< Views that `moment` makes pictures of, the first ones: what its time depends on.
   std::function<Result<void>(const IntervalDone&)> interval_done;
-  std::function<bool()> keep;  ///< Asked after every interval but the last: end here, with what there is?
-  std::stop_token stop;        ///< Asked between stages and iterations: the edit then ends with ErrorCode::cancelled.
+  /// Asked after every interval but the last, and by an edit that goes on after one: end here, with what there is?
+  std::function<bool()> keep;
+  std::stop_token stop;  ///< Asked between stages and iterations: the edit then ends with ErrorCode::cancelled.
 };
 
 }  // namespace engine::edit

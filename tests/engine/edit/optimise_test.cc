@@ -331,6 +331,34 @@ TEST(Optimise, DoesNotGoOnWithAnotherLoss) {
   }
 }
 
+TEST(Optimise, AnotherLossIsNoMatterWhereNothingIsLeftToDo) {
+  Case c;
+  c.request.params.intervals = 2;
+  std::map<int, std::string> checkpoints;
+  Observer observer;
+  observer.interval_done = [&](const IntervalDone& done) {
+    checkpoints[done.interval] = encode(done.state);
+    return Result<void>{};
+  };
+  Slow before("a"), other("b");
+  const auto undisturbed = run(c.scene, c.cameras, c.request, {.perceptual = &before}, observer);
+  ASSERT_TRUE(undisturbed) << undisturbed.error().message;
+  const auto end = [&](int interval, const Observer& asked) {
+    return run(c.scene, c.cameras, c.request, {.perceptual = &other}, asked,
+               decode(checkpoints.at(interval), c.scene, c.request).value());
+  };
+  const auto done = end(2, {});
+  ASSERT_TRUE(done) << done.error().message;
+  EXPECT_EQ(done->overlay, undisturbed->overlay);
+  Observer keeping;
+  keeping.keep = [] { return true; };
+  const auto kept = end(1, keeping);
+  ASSERT_TRUE(kept) << kept.error().message;
+  EXPECT_TRUE(kept->stopped_early);
+  keeping.keep = [] { return false; };
+  EXPECT_EQ(end(1, keeping).error().code, ErrorCode::conflict);
+}
+
 TEST(Optimise, ExtremeParametersEndInAResultOrInAnErrorThatNamesOne) {
   for (const float extreme : {1e30f, -1e30f, 3e38f, -3e38f}) {
     for (int parameter = 0; parameter < 4; ++parameter) {

@@ -260,6 +260,9 @@ TEST(EditWithARepainter, WhatCannotBeTakenUpAgainIsAnError) {
   strange.repainter = "of another one";
   Student another;
   EXPECT_EQ(attempt(block, another, {}, strange).error().where, "checkpoint");
+  Observer keeping;
+  keeping.keep = [] { return true; };
+  EXPECT_TRUE(repainted(block, another, keeping, strange).stopped_early) << "it has nothing to paint any more";
   const std::vector<std::pair<const char*, void (*)(HistoryPicture&)>> changes{
       {"a view that there is not", [](HistoryPicture& p) { p.view = 3; }},
       {"an interval that is not finished", [](HistoryPicture& p) { p.interval = 2; }},
