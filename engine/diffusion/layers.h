@@ -24,7 +24,8 @@ struct Model {
   bool recomputes = true;  ///< In training, transformers are computed again on the way back (recompute.h).
 };
 
-/// A layer, or a part of a network, by its name. Lives as long as its model.
+/// A layer, or a part of a network, by its name. The model must outlive it, and copies of it that gradients keep until
+/// the way back is over.
 class Layer {
  public:
   explicit Layer(const Model& model, std::string name = {}) : model_(&model), name_(std::move(name)) {}

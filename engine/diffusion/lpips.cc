@@ -72,7 +72,7 @@ struct Lpips::Network {
   std::vector<Tensor> linear;  ///< [1, C, 1, 1] of each depth.
 
   /// Of each depth, of unit length.
-  ///   ask  called before each convolution, on the way back as well
+  ///   ask  called before each convolution, on the way back as well, which what it refers to must outlive
   [[nodiscard]] std::vector<Tensor> features(const Tensor& input, const std::function<void()>& ask) const {
     std::vector<Tensor> all;
     Tensor hidden = drawn_out(input);

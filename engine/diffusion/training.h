@@ -25,6 +25,7 @@ struct NoisyBatch {
 [[nodiscard]] Tensor noisy_latents(const weights::NoiseConfig& noise, const NoisyBatch& batch);
 
 /// The mean squared difference between the noise and what the network takes for it; a single number, with a gradient.
+/// `unet` and `configs` must outlive the way back (predict_noise()).
 /// Throws what libtorch throws: add_gradient() turns it into an error.
 [[nodiscard]] Tensor denoising_loss(const Model& unet, const weights::Configs& configs, const NoisyBatch& batch);
 

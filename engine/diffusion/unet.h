@@ -10,7 +10,8 @@
 
 namespace engine::diffusion {
 
-/// The noise that it sees in noisy latents.
+/// The noise that it sees in noisy latents. With gradients, `model` and `config` must outlive the way back, on which
+/// transformers are computed again.
 ///   latents    [B, 4, h, w]; h and w are multiples of 2^(levels - 1)
 ///   timesteps  [B] int64, 0 to 999: how noisy they are
 ///   context    [B, 77, context_width]: encode_text()
