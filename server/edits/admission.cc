@@ -229,9 +229,11 @@ engine::Result<void> admit_slow(const JobWorkload& work, bool allowed) {
   if (allowed || (!repainted && !by_lpips)) return {};
   const double needed = estimated_seconds(work);
   if (needed <= slow_seconds) return {};
+  const std::string networks = std::string(repainted ? "the diffusion model" : "") +
+                               (repainted && by_lpips ? " and " : "") +
+                               (by_lpips ? "the network of the perceptual loss" : "");
   return fail(ErrorCode::unprocessable,
-              std::string(repainted ? "the diffusion model" : "the network of the perceptual loss") +
-                  " would work for about " + time_in_words(needed) +
+              "the edit, with " + networks + ", would take about " + time_in_words(needed) +
                   " on this machine: say \"allow_slow\": true to have it do so, or lower params.views, " +
                   (repainted ? "params.tuning_steps, params.sampling_steps or " : "params.max_image_side or ") +
                   "params.iterations" + (by_lpips ? ", or set params.perceptual to \"msssim\"" : ""),
