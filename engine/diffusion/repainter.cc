@@ -66,7 +66,8 @@ double numbers_in(const weights::TensorSpec& tensor) {
 }
 
 double latents_of(const weights::Configs& configs) {
-  return double(configs.unet.sample_side) * configs.unet.sample_side;
+  const double side = double(weights::picture_side(configs)) / configs.autoencoder.pixels_per_latent();
+  return side * side;
 }
 
 tl::unexpected<Error> of_another(const std::string& what) {
@@ -156,10 +157,7 @@ Result<std::unique_ptr<StableDiffusionRepainter>> StableDiffusionRepainter::crea
   return std::unique_ptr<StableDiffusionRepainter>(new StableDiffusionRepainter(std::move(model), options));
 }
 
-int StableDiffusionRepainter::side() const {
-  const weights::Configs& all = model_.configs();
-  return nearest_multiple(double(all.unet.sample_side) * all.autoencoder.pixels_per_latent(), model_.side_multiple());
-}
+int StableDiffusionRepainter::side() const { return weights::picture_side(model_.configs()); }
 
 void StableDiffusionRepainter::use_threads() const {
   if (options_.threads > 0) at::set_num_threads(options_.threads);

@@ -260,6 +260,12 @@ int side_multiple(const Configs& configs) {
   return configs.autoencoder.pixels_per_latent() << (configs.unet.channels.size() - 1);
 }
 
+int picture_side(const Configs& configs) {
+  const int trained = configs.unet.sample_side * configs.autoencoder.pixels_per_latent();
+  const int multiple = side_multiple(configs);
+  return std::max(1, (trained + multiple / 2) / multiple) * multiple;
+}
+
 Result<void> validate(const Configs& configs) {
   const auto too_large = [](int pixels, const char* field) {
     return fail(ErrorCode::unsupported,
@@ -273,7 +279,7 @@ Result<void> validate(const Configs& configs) {
                     " numbers, of which the UNet takes " + std::to_string(configs.unet.context_width),
                 "unet/config.json:cross_attention_dim");
   if (side_multiple(configs) > max_picture_side) return too_large(side_multiple(configs), "block_out_channels");
-  const int side = configs.unet.sample_side * configs.autoencoder.pixels_per_latent();
+  const int side = picture_side(configs);
   if (side > max_picture_side) return too_large(side, "sample_size");
   return {};
 }

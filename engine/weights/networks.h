@@ -80,6 +80,10 @@ constexpr int max_picture_side = 1 << 10;
 /// Sides of pictures are multiples of this: 64 for 1.x and 2.x. Each level of either network halves them once more.
 [[nodiscard]] int side_multiple(const Configs& configs);
 
+/// Pixels along the longer side of pictures as networks are shown them: the multiple of side_multiple() nearest to what
+/// the UNet was trained on, at least one. 512 for 1.x and 2.x-base.
+[[nodiscard]] int picture_side(const Configs& configs);
+
 /// Do networks of these configurations fit each other, and what they are shown into max_picture_side?
 ///   errors  corrupt_data, unsupported; `where` is the field
 [[nodiscard]] Result<void> validate(const Configs& configs);

@@ -265,6 +265,11 @@ TEST(RepainterBytes, GrowWithTheNetworksTheirPicturesAndTheAdapter) {
   full.unet.sample_side = 128;
   EXPECT_NEAR(double(bytes_of(full, {}).learning), 4 * double(usual.learning), 1);
   EXPECT_EQ(bytes_of(full, {}).networks, usual.networks);
+  full.unet.sample_side = 1;
+  full.unet.channels.resize(8, 1280), full.unet.heads.resize(8, 8);
+  full.unet.down_attends.resize(8, false), full.unet.up_attends.resize(8, true);
+  ASSERT_EQ(weights::picture_side(full), 1024) << "that of its levels, not of what it was trained on";
+  EXPECT_NEAR(double(bytes_of(full, {}).learning), 4 * double(usual.learning), 1);
   const weights::Configs tiny = weights::tiny_configs();
   EXPECT_LT(bytes_of(tiny, {}).networks + bytes_of(tiny, {}).learning, usual.networks / 10);
 }

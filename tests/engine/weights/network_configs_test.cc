@@ -162,7 +162,11 @@ TEST(NetworkConfigs, PicturesThatNobodyHasMemoryForAreRefused) {
   EXPECT_TRUE(validate(configs));
   configs.unet.sample_side = 128;
   EXPECT_TRUE(validate(configs)) << "1,024 pixels";
-  configs.unet.sample_side = 129;
+  configs.unet.sample_side = 131;
+  EXPECT_EQ(picture_side(configs), 1024) << "1,048 are shown as the nearest multiple of 64";
+  EXPECT_TRUE(validate(configs));
+  configs.unet.sample_side = 132;
+  EXPECT_EQ(picture_side(configs), 1088);
   EXPECT_EQ(validate(configs).error().where, "unet/config.json:sample_size");
   configs = {};
   configs.unet.context_width = 767;
@@ -171,6 +175,7 @@ TEST(NetworkConfigs, PicturesThatNobodyHasMemoryForAreRefused) {
   configs.unet.sample_side = 1;
   configs.unet.channels.assign(8, 320);
   EXPECT_EQ(side_multiple(configs), 1024);
+  EXPECT_EQ(picture_side(configs), 1024) << "no smaller picture has so many levels";
   EXPECT_TRUE(validate(configs));
   configs.autoencoder.channels.assign(5, 128);
   EXPECT_EQ(validate(configs).error().where, "unet/config.json:block_out_channels") << "multiples of 2,048 pixels";
