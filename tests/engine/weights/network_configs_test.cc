@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cctype>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -121,12 +122,19 @@ TEST(NetworkConfigs, SizesThatCannotBeAreNamed) {
   EXPECT_EQ(refused("{").code, ErrorCode::corrupt_data);
 }
 
+/// The name of the field that the value at `at` is in.
+std::string key_at(const std::string& json, std::size_t at) {
+  const std::size_t end = json.rfind("\":", at), begin = json.rfind('"', end - 1) + 1;
+  return json.substr(begin, end - begin);
+}
+
 /// Every number of a file, in place of it what no network has.
 TEST(NetworkConfigs, NoNumberIsBelieved) {
   const std::vector<std::string> numbers{
       "0",    "-1",   "1.5",   "1e400", "-1e400", "2147483648", "1e18", "9223372036854775808",
       "null", "true", "\"4\"", "{}",    "[[]]"};
   int refused_ones = 0;
+  std::set<std::string> accepted;
   const auto look = [&](auto parse, const std::string& file, const std::string& usual) {
     ASSERT_TRUE(parse(bytes_of(usual), file)) << usual;
     for (std::size_t at = 0; at < usual.size(); ++at) {
@@ -137,7 +145,10 @@ TEST(NetworkConfigs, NoNumberIsBelieved) {
       for (const std::string& number : numbers) {
         const std::string json = usual.substr(0, at) + number + usual.substr(end);
         const auto config = parse(bytes_of(json), file);
-        if (config) continue;  // null is "as usual", and some may be 0
+        if (config) {
+          accepted.insert(file + ":" + key_at(usual, at) + " " + number);
+          continue;
+        }
         EXPECT_TRUE(config.error().where.starts_with(file)) << json << ": " << config.error().where;
         ++refused_ones;
       }
@@ -155,6 +166,15 @@ TEST(NetworkConfigs, NoNumberIsBelieved) {
       parse_noise_config, "noise",
       R"({"beta_schedule":"scaled_linear","beta_start":0.00085,"beta_end":0.012,"num_train_timesteps":1000,"steps_offset":1})");
   EXPECT_GT(refused_ones, 250);
+  std::set<std::string> allowed{"noise:steps_offset 0", "text:layer_norm_eps 1.5", "unet:norm_eps 1.5",
+                                "vae:scaling_factor 1.5"};
+  for (const char* as_usual :  // what is absent is as the libraries have it
+       {"noise:num_train_timesteps", "noise:steps_offset", "text:hidden_size", "text:intermediate_size",
+        "text:layer_norm_eps", "text:max_position_embeddings", "text:num_hidden_layers", "text:vocab_size",
+        "unet:cross_attention_dim", "unet:layers_per_block", "unet:norm_eps", "unet:sample_size",
+        "vae:layers_per_block", "vae:scaling_factor"})
+    allowed.insert(std::string(as_usual) + " null");
+  EXPECT_EQ(accepted, allowed);
 }
 
 TEST(NetworkConfigs, PicturesThatNobodyHasMemoryForAreRefused) {
