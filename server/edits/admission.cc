@@ -1,11 +1,12 @@
 #include "server/edits/admission.h"
 
 #include <algorithm>
-#include <array>
+#include <cstddef>
 #include <cstdio>
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace server::edits {
@@ -111,20 +112,28 @@ std::vector<Choice> choices_of(const JobWorkload& work, Need need) {
   return choices;
 }
 
-/// The first choice with which alone the edit fits; null: there is none.
-template <class Fits>
-const Choice* choice_that_does(const std::vector<Choice>& choices, const JobWorkload& work, Fits fits) {
-  for (const Choice& choice : choices) {
-    JobWorkload less = work;
-    choice.make(less);
-    if (fits(less)) return &choice;
-  }
-  return nullptr;
-}
-
 JobWorkload with_all(const std::vector<Choice>& choices, JobWorkload work) {
   for (const Choice& choice : choices) choice.make(work);
   return work;
+}
+
+/// The choices with which together the edit fits: the fewest first ones that do, without those of them that do nothing
+/// for it. None: all together do not. They go together since memory is a largest of several: one alone may change
+/// nothing.
+template <class Fits>
+std::vector<Choice> choices_that_do(const std::vector<Choice>& choices, const JobWorkload& work, Fits fits) {
+  std::vector<Choice> made;
+  for (const Choice& choice : choices) {
+    made.push_back(choice);
+    if (!fits(with_all(made, work))) continue;
+    for (std::size_t k = made.size() - 1; k-- > 0;) {  // the last one is needed
+      std::vector<Choice> fewer = made;
+      fewer.erase(fewer.begin() + std::ptrdiff_t(k));
+      if (fits(with_all(fewer, work))) made = std::move(fewer);
+    }
+    return made;
+  }
+  return {};
 }
 
 /// "set A, set B and set C"
@@ -205,13 +214,13 @@ engine::Result<void> admit_time(const JobWorkload& work, const Params& params,
   };
   const auto fits = [&](const JobWorkload& less) { return estimated_seconds(less) <= limit; };
   const std::vector<Choice> choices = choices_of(work, Need::time);
-  const Choice* const choice = choice_that_does(choices, work, fits);
+  const std::vector<Choice> that_fit = choices_that_do(choices, work, fits);
   if (!that_do.empty())
     return fail(ErrorCode::too_large,
                 found + advice(that_do[0]) + (that_do.size() > 1 ? ", or " + advice(that_do[1]) : "") +
-                    (choice != nullptr ? std::string(", or ") + choice->advice : ""),
+                    (that_fit.empty() ? "" : ", or " + all_advice(that_fit)),
                 address(that_do[0]));
-  if (choice != nullptr) return fail(ErrorCode::too_large, found + choice->advice, choice->where);
+  if (!that_fit.empty()) return fail(ErrorCode::too_large, found + all_advice(that_fit), that_fit[0].where);
   if (fits(least))
     return fail(ErrorCode::too_large,
                 found + "lower " + address(levers[0]) + " and " + address(levers[1]) + ", one alone is not enough",
@@ -252,16 +261,16 @@ engine::Result<void> admit(const JobWorkload& work, const Params& params,
   };
   const Advice advice = advice_for(work, params, dataset, limit);
   const std::vector<Choice> choices = choices_of(work, Need::memory);
-  const Choice* const choice = choice_that_does(choices, work, fits);
+  const std::vector<Choice> that_fit = choices_that_do(choices, work, fits);
   const std::string fewer = "lower params.views to at most " + std::to_string(advice.views);
   const std::string smaller = "lower params.max_image_side to at most " + std::to_string(advice.side);
-  const std::string otherwise = choice != nullptr ? std::string(", or ") + choice->advice : "";
+  const std::string otherwise = that_fit.empty() ? "" : ", or " + all_advice(that_fit);
   const bool both = advice.views > 0 && advice.side > 0;
   const char* const luxury = views_are_the_luxury(work, params) ? "params.views" : "params.max_image_side";
   if (advice.views > 0 && (!both || views_are_the_luxury(work, params)))
     return refused(fewer + (both ? ", or " + smaller : "") + otherwise, "params.views");
   if (advice.side > 0) return refused(smaller + (both ? ", or " + fewer : "") + otherwise, "params.max_image_side");
-  if (choice != nullptr) return refused(choice->advice, choice->where);
+  if (!that_fit.empty()) return refused(all_advice(that_fit), that_fit[0].where);
   JobWorkload least = work;
   least.edit.views = 1, least.edit.view_pixels = least_side * least_side;
   if (fits(least)) return refused("lower params.views and params.max_image_side, neither is enough alone", luxury);

@@ -16,9 +16,9 @@ namespace server::edits {
 ///   work     of these parameters; memory_workload_of() is enough
 ///   dataset  its cameras; none: virtual ones
 ///   limit    bytes; 0: none
-///   errors   too_large: the message says how far to lower which parameter, or which network to do without, and `where`
-///            is it: "params.views", "params.max_image_side", "params.perceptual", "params.tuning_steps" or
-///            "params.corrector"; "scene" where nothing would do
+///   errors   too_large: the message says how far to lower which parameter, or which networks to do without, and
+///            `where` is the first: "params.views", "params.max_image_side", "params.perceptual", "params.tuning_steps"
+///            or "params.corrector"; "scene" where nothing would do
 [[nodiscard]] engine::Result<void> admit(const JobWorkload& work, const engine::params::Params& params,
                                          std::span<const engine::scene::Camera> dataset, std::uint64_t limit);
 

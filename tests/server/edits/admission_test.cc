@@ -227,7 +227,10 @@ TEST(Admission, NamesTheNetworkThatAnEditCanDoWithout) {
     std::string where, advice;
   };
   for (const Case& each : {Case{rest + 7 * gib, "params.perceptual", "set params.perceptual to \"msssim\""},
-                           Case{rest + 4 * gib, "params.corrector", "set params.corrector to \"scene\""},
+                           Case{rest + 4 * gib, "params.perceptual",
+                                ": set params.perceptual to \"msssim\" and set params.tuning_steps and "
+                                "params.tuning_steps_later to 0"},
+                           Case{rest + 3 * gib, "params.corrector", ": set params.corrector to \"scene\""},
                            Case{rest / 2, "params.perceptual", ", and lower params.views and params.max_image_side"}}) {
     const Edit edit = with_networks(4 * gib, 3 * gib);
     const auto refused = admit(edit.work, edit.params, {}, each.limit);
@@ -241,6 +244,24 @@ TEST(Admission, NamesTheNetworkThatAnEditCanDoWithout) {
   const auto refused = admit(learning.work, learning.params, {}, rest + 3 * gib);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().where, "params.tuning_steps") << refused.error().message;
+}
+
+TEST(Admission, NamesTheChoicesThatOnlyTogetherAreEnough) {
+  Edit edit(50, 512);
+  edit.work.edit.first_tuning = 200;
+  add_models(edit.work, {models::RepainterCost{10, 10, 100, 0, 0, 8 * gib},
+                         models::PerceptualCost{1e-5, 0, 8 * gib / edit.work.edit.view_pixels}});
+  const std::uint64_t limit = estimated_bytes(edit.work) - 7 * gib;  // it learns and compares one after the other
+  const auto refused = edit.admitted(limit);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().where, "params.perceptual");
+  EXPECT_TRUE(refused.error().message.ends_with(
+      ": set params.perceptual to \"msssim\" and set params.tuning_steps and params.tuning_steps_later to 0"))
+      << refused.error().message;
+  add_models(edit.work, {edit.work.models.repainter, {}});
+  EXPECT_FALSE(edit.admitted(limit));
+  edit.work.edit.first_tuning = 0;
+  EXPECT_TRUE(edit.admitted(limit));
 }
 
 TEST(AdmissionByTime, NamesWhatADiffusionModelTakesLongFor) {
