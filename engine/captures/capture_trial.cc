@@ -132,8 +132,9 @@ Result<CaptureOutcome> carry_out(const ReadyCase& ready, const edit::Request& re
   CaptureTrial& trial = out.trial;
   trial.trial = std::move(done->trial);
   trial.is_test = ready.is_test, trial.by = ready.grasp.by, trial.said = ready.said;
-  trial.deformed = evaluate::judge(ready.judged, deformed);
-  trial.ceiling = evaluate::judge(ready.judged, ready.ceiling);
+  const evaluate::JudgedViews views(ready.judged);
+  trial.deformed = evaluate::judge(views, deformed);
+  trial.ceiling = evaluate::judge(views, ready.ceiling);
   trial.untouched_beyond_db = beyond_db(ready, ready.judged.before);
   trial.deformed_beyond_db = beyond_db(ready, deformed);
   trial.result_beyond_db = beyond_db(ready, out.edited);

@@ -45,15 +45,6 @@ scene::Image true_picture(const Case& the_case, const scene::Camera& camera) {
   return picture(the_case.truth, camera);
 }
 
-/// The views that a case is judged at.
-std::vector<JudgedView> judged_views(const Case& the_case) {
-  if (!the_case.judged.empty()) return the_case.judged;
-  std::vector<JudgedView> views;
-  for (const scene::Camera& camera : the_case.held_out)
-    views.push_back({camera, picture(the_case.truth, camera), judged_regions(the_case, camera)});
-  return views;
-}
-
 /// Depth along the optical axis of what a view shows most of. World units; 0: nothing.
 scene::Image true_depth(const scene::GaussianCloud& truth, const scene::Camera& camera) {
   render::ForwardOptions options;
@@ -139,6 +130,12 @@ JudgedRegions judged_regions(const Case& the_case, const scene::Camera& camera) 
   return judged_regions({the_case.before, the_case.part_before}, {the_case.truth, the_case.part}, camera);
 }
 
+JudgedViews::JudgedViews(const Case& the_case) : case_(the_case) {
+  if (!the_case.judged.empty()) return;
+  for (const scene::Camera& camera : the_case.held_out)
+    rendered_.push_back({camera, picture(the_case.truth, camera), judged_regions(the_case, camera)});
+}
+
 Quality judge(std::span<const JudgedView> views, const scene::GaussianCloud& result) {
   RegionQualitySum edited, vacated, arrived, outside;
   for (const JudgedView& view : views) {
@@ -151,18 +148,18 @@ Quality judge(std::span<const JudgedView> views, const scene::GaussianCloud& res
   return {edited.quality(), vacated.quality(), arrived.quality(), outside.quality(), 0};
 }
 
-Quality judge(const Case& the_case, const scene::GaussianCloud& result) {
-  Quality quality = judge(judged_views(the_case), result);
-  quality.miss = miss(the_case, result);
+Quality judge(const JudgedViews& views, const scene::GaussianCloud& result) {
+  Quality quality = judge(views.all(), result);
+  quality.miss = miss(views.of(), result);
   return quality;
 }
 
-Result<double> perceptual_distance(const Case& the_case, const scene::GaussianCloud& result,
+Result<double> perceptual_distance(std::span<const JudgedView> views, const scene::GaussianCloud& result,
                                    optim::PerceptualLoss& loss) {
   double sum = 0;
   std::size_t seen = 0;
   scene::Image unused;
-  for (const JudgedView& view : judged_views(the_case)) {
+  for (const JudgedView& view : views) {
     const scene::Mask& region = view.regions.edited;
     if (region.area() == 0) continue;
     scene::Image is = picture(result, view.camera);

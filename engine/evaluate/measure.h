@@ -63,15 +63,28 @@ struct RowsOf {
 [[nodiscard]] JudgedRegions judged_regions(RowsOf before, RowsOf after, const scene::Camera& camera);
 [[nodiscard]] JudgedRegions judged_regions(const Case& the_case, const scene::Camera& camera);
 
+/// The views that a case is judged at: its own, or else rendered from its truth, which takes a while. The case must
+/// outlive it.
+class JudgedViews {
+ public:
+  explicit JudgedViews(const Case& the_case);
+  [[nodiscard]] const Case& of() const { return case_; }
+  [[nodiscard]] std::span<const JudgedView> all() const { return case_.judged.empty() ? rendered_ : case_.judged; }
+
+ private:
+  const Case& case_;
+  std::vector<JudgedView> rendered_;
+};
+
 /// Judges `result` at these views; `miss` is not known.
 [[nodiscard]] Quality judge(std::span<const JudgedView> views, const scene::GaussianCloud& result);
-/// Judges `result`, which came of the_case.before.
-[[nodiscard]] Quality judge(const Case& the_case, const scene::GaussianCloud& result);
+/// Judges `result`, which came of the case's `before`.
+[[nodiscard]] Quality judge(const JudgedViews& views, const scene::GaussianCloud& result);
 
 /// How far what held-out views show of the edited region looks from what they should show: the mean of a perceptual
 /// loss over the views that see it, each on the box around the region, in which all else is as it should be.
 ///   errors  those of the loss
-[[nodiscard]] Result<double> perceptual_distance(const Case& the_case, const scene::GaussianCloud& result,
+[[nodiscard]] Result<double> perceptual_distance(std::span<const JudgedView> views, const scene::GaussianCloud& result,
                                                  optim::PerceptualLoss& loss);
 
 /// How well corrected views of one edit agree where the part has gone: each pixel there, carried to the nearest other

@@ -60,12 +60,13 @@ Result<CarriedOut> carry_out(const Case& the_case, const edit::Request& request,
   trial.seeds = outcome->report.seeds;
   for (const edit::Uncovered& view : outcome->report.uncovered) trial.uncovered += view.area, trial.open += view.open;
   trial.intervals = outcome->report.resolved.intervals;
-  trial.untouched = judge(the_case, the_case.before);
-  trial.result = judge(the_case, done.edited);
+  const JudgedViews views(the_case);
+  trial.untouched = judge(views, the_case.before);
+  trial.result = judge(views, done.edited);
   if (lpips != nullptr)
     for (const auto& [judged, scene] :
          {std::pair{&trial.untouched_lpips, &the_case.before}, {&trial.lpips, &std::as_const(done.edited)}}) {
-      const auto distance = perceptual_distance(the_case, *scene, *lpips);
+      const auto distance = perceptual_distance(views.all(), *scene, *lpips);
       if (!distance) return propagate(distance);
       *judged = *distance;
     }

@@ -17,8 +17,23 @@ const Case& speck() {
   return made;
 }
 
+const JudgedViews& views() {
+  static const JudgedViews made(speck());
+  return made;
+}
+
+TEST(JudgedViews, OfACaseThatHasItsOwnAreThose) {
+  Case the_case;
+  the_case.held_out.resize(2);
+  the_case.judged.resize(2);
+  const JudgedViews own(the_case);
+  EXPECT_EQ(own.all().data(), the_case.judged.data()) << "not copied";
+  ASSERT_EQ(views().all().size(), speck().held_out.size());
+  EXPECT_EQ(views().all()[0].truth.data, picture(speck().truth, speck().held_out[0]).data);
+}
+
 TEST(Judge, TheTruthIsPerfect) {
-  const Quality quality = judge(speck(), speck().truth);
+  const Quality quality = judge(views(), speck().truth);
   for (const RegionQuality& likeness : {quality.edited, quality.vacated, quality.arrived, quality.outside}) {
     EXPECT_GT(likeness.pixels, 100u);
     EXPECT_EQ(likeness.psnr_db, 100);
@@ -28,7 +43,7 @@ TEST(Judge, TheTruthIsPerfect) {
 }
 
 TEST(Judge, DoingNothingIsRightOutsideAndWrongInside) {
-  const Quality quality = judge(speck(), speck().before);
+  const Quality quality = judge(views(), speck().before);
   EXPECT_GT(quality.outside.psnr_db, 45);
   EXPECT_LT(quality.edited.psnr_db, 25);
   EXPECT_LT(quality.arrived.psnr_db, 20);
@@ -61,12 +76,12 @@ class Difference final : public optim::PerceptualLoss {
 
 TEST(PerceptualDistance, LooksAtTheEditedRegionAlone) {
   Difference loss;
-  EXPECT_EQ(perceptual_distance(speck(), speck().truth, loss).value(), 0);
+  EXPECT_EQ(perceptual_distance(views().all(), speck().truth, loss).value(), 0);
   EXPECT_EQ(loss.pictures, speck().held_out.size());
   EXPECT_LT(loss.pixels, loss.pictures * speck().held_out[0].width * speck().held_out[0].height / 2) << "a box of each";
-  EXPECT_GT(perceptual_distance(speck(), speck().before, loss).value(), 10);
+  EXPECT_GT(perceptual_distance(views().all(), speck().before, loss).value(), 10);
   loss.error = Error{ErrorCode::internal, "out of order", "loss"};
-  EXPECT_EQ(perceptual_distance(speck(), speck().truth, loss).error().where, "loss");
+  EXPECT_EQ(perceptual_distance(views().all(), speck().truth, loss).error().where, "loss");
 }
 
 /// Every view's picture of the truth.

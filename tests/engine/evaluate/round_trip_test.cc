@@ -29,7 +29,7 @@ TEST(RoundTrip, WhatIsOnlyDeformedComesBackAsItWas) {
   EXPECT_GT(trip->outside.psnr_db, 60);
   EXPECT_GE(trip->cameras.size(), 3u);
   EXPECT_GT(trip->seconds, 0);
-  EXPECT_LT(judge(slide(), trip->halfway).miss, 0.01) << "half-way it was elsewhere";
+  EXPECT_LT(judge(JudgedViews(slide()), trip->halfway).miss, 0.01) << "half-way it was elsewhere";
 }
 
 TEST(RoundTrip, WhatIsSelectedComesBackAsItWas) {

@@ -41,7 +41,7 @@ TEST(Trial, SaysWhatAnEditCameTo) {
   EXPECT_EQ(trial.gaussians, speck().before.size());
   EXPECT_EQ(trial.part, speck().part_before.size());
   EXPECT_GT(trial.result.edited.psnr_db, trial.untouched.edited.psnr_db + 5);
-  EXPECT_EQ(trial.result.edited.psnr_db, judge(speck(), done->edited).edited.psnr_db);
+  EXPECT_EQ(trial.result.edited.psnr_db, judge(JudgedViews(speck()), done->edited).edited.psnr_db);
   EXPECT_GT(trial.corrected_views.pixels, 0u);
   double sum = 0;
   for (const edit::StageTime& stage : trial.stages) sum += stage.seconds;
