@@ -36,6 +36,16 @@ class DatabaseTest : public testing::Test {
     return id;
   }
 
+  /// Fails with these words where it goes on being so.
+  template <class Condition>
+  static void wait_while(Condition is_so, const char* failure) {
+    const auto deadline = std::chrono::steady_clock::now() + patience;
+    while (is_so()) {
+      ASSERT_LT(std::chrono::steady_clock::now(), deadline) << failure;
+      std::this_thread::sleep_for(1ms);
+    }
+  }
+
   support::TempDir dir;
   fs::path edits = dir.path() / "edits";
   std::unique_ptr<scenes::SceneStore> scenes = open_scenes(dir.path());
@@ -63,11 +73,8 @@ TEST_F(DatabaseTest, AnEditThatAnotherHasTakenOverPublishesNothing) {
       "CREATE TRIGGER take_over BEFORE UPDATE ON splatdrag.jobs FOR EACH ROW "
       "WHEN (NEW.place = 'interval 2, publish' AND OLD.place <> NEW.place) EXECUTE FUNCTION take_over()");
   const std::string id = value(service->submit(move_ball(scene), "")).status.id;
-  const auto deadline = std::chrono::steady_clock::now() + patience;
-  while (database->run("SELECT claim_number FROM splatdrag.jobs") != "2") {
-    ASSERT_LT(std::chrono::steady_clock::now(), deadline) << "it did not come to publish";
-    std::this_thread::sleep_for(1ms);
-  }
+  ASSERT_NO_FATAL_FAILURE(wait_while([&] { return database->run("SELECT claim_number FROM splatdrag.jobs") != "2"; },
+                                     "it did not come to publish"));
   service->drain(patience);
   EXPECT_EQ(versions(), 1u);
   const auto status = value(service->find(id));
@@ -85,11 +92,8 @@ TEST_F(DatabaseTest, AnEditThatAnotherTakesOverAfterItHasAskedPublishesNothingEi
       "WHEN (OLD.place = 'interval 2, publish' AND NEW.claim_number = OLD.claim_number AND OLD.claim_number = 1 "
       "AND NEW.lease_until <> OLD.lease_until) EXECUTE FUNCTION take_over()");
   const std::string id = value(service->submit(move_ball(scene), "")).status.id;
-  const auto deadline = std::chrono::steady_clock::now() + patience;
-  while (scenes->made_versions().empty()) {
-    ASSERT_LT(std::chrono::steady_clock::now(), deadline) << "it did not come to make its version";
-    std::this_thread::sleep_for(1ms);
-  }
+  ASSERT_NO_FATAL_FAILURE(
+      wait_while([&] { return scenes->made_versions().empty(); }, "it did not come to make its version"));
   service->drain(patience);
   EXPECT_EQ(versions(), 1u);
   EXPECT_EQ(value(service->find(id)).state, "running") << "it is the other's";
