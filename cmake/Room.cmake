@@ -26,6 +26,18 @@ if(SPLATDRAG_SANITIZE)
   add_link_options(-fsanitize=${SPLATDRAG_SANITIZE})
 endif()
 
+# How tests are compiled, which run about once for each time that they are: so that compiling takes little.
+add_library(splatdrag_test_options INTERFACE)
+target_link_libraries(splatdrag_test_options INTERFACE splatdrag_warnings)
+target_compile_options(splatdrag_test_options INTERFACE $<$<CONFIG:Release>:-O1>)
+if(SPLATDRAG_SANITIZE)
+  # These of UBSan's checks take two fifths of a test's compile time, and find what AddressSanitizer finds, too, or what
+  # the room's own sources are checked for.
+  target_compile_options(splatdrag_test_options INTERFACE -fno-sanitize=null,alignment,object-size,vptr)
+endif()
+# Without it ccache does not tell one precompiled header from another, and compiles anew.
+target_compile_options(splatdrag_test_options INTERFACE $<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess>)
+
 set_property(GLOBAL PROPERTY SPLATDRAG_ARROWS "")
 
 function(splatdrag_tests target label folder library)
@@ -34,16 +46,12 @@ function(splatdrag_tests target label folder library)
   endif()
   list(TRANSFORM ARGN PREPEND ${CMAKE_SOURCE_DIR}/tests/${folder}/)
   add_executable(${target} ${ARGN})
-  target_link_libraries(${target} PRIVATE ${library} splatdrag_test_support splatdrag_warnings GTest::gtest_main)
+  target_link_libraries(${target} PRIVATE ${library} splatdrag_test_support splatdrag_test_options GTest::gtest_main)
+  target_precompile_headers(${target} REUSE_FROM splatdrag_test_headers)
   if(NOT TARGET all_${label})
     add_custom_target(all_${label})
   endif()
   add_dependencies(all_${label} ${target})
-  if(SPLATDRAG_SANITIZE)
-    # These of UBSan's checks take two fifths of a test's compile time, and find what AddressSanitizer finds, too, or what
-    # the room's own sources are checked for.
-    target_compile_options(${target} PRIVATE -fno-sanitize=null,alignment,object-size,vptr)
-  endif()
   if(SPLATDRAG_SANITIZE OR label STREQUAL "served")
     # To start a program under a sanitizer takes longer than most tests do: one process for all of a program's. Those of
     # repair and edit take half an hour on a machine that others use.
