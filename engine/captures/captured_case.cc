@@ -21,7 +21,7 @@ namespace {
 
 // These figures are choices, and part of the definition of the cases: whoever changes one cannot compare results with
 // docs/captures.md any more.
-constexpr std::uint64_t seed = 11;  // of all that is random in a case
+constexpr std::uint64_t seed = 11;  // of all that is random in a case, but for what differs between takes
 constexpr float spacing = 0.018f;   // between Gaussians of a true surface, world units: a pixel or so of a photo
 // What moves less than this counts as standing still: less than a pixel of a photo. World units.
 constexpr double least_motion = 0.01;
@@ -38,8 +38,9 @@ constexpr const char* kind = "captured case";  // as errors call it
 // Purposes of derived_seed().
 constexpr std::uint32_t for_cameras = 21, for_photos = 22, for_points = 23, for_handles = 24, for_clicks = 25;
 
-std::uint64_t seed_for(std::uint32_t purpose, std::uint32_t number = 0) {
-  return derived_seed(seed, {purpose, number, 0, 0});
+/// The first take has the stream that was there before there were others.
+std::uint64_t seed_for(std::uint32_t take, std::uint32_t purpose, std::uint32_t number = 0) {
+  return derived_seed(seed, {purpose, number, take - first_take, 0});
 }
 
 std::vector<std::uint32_t> range(std::size_t first, std::size_t last) {
@@ -182,7 +183,7 @@ void place_handles(const Plan& plan, CapturedCase& out) {
   Pointing point_at(out);
   for (std::size_t h = 0; h < plan.grips.size(); ++h) {
     const Grip& grip = plan.grips[h];
-    Rng rng(seed_for(for_handles), h);
+    Rng rng(seed_for(out.take, for_handles), h);
     edit::Handle handle{
         .source = point_at(grip.near, 0, rng), .target = std::nullopt, .radius = grip.radius, .group = 0};
     if (!grip.anchor) {
@@ -197,19 +198,19 @@ void place_clicks(const ClickPlan& plan, CapturedCase& out) {
   Pointing point_at(out);
   std::uint64_t number = 0;
   const auto click = [&](DVec3 near) {
-    Rng rng(seed_for(for_clicks), number++);
+    Rng rng(seed_for(out.take, for_clicks), number++);
     return point_at(near, click_noise_px, rng);
   };
   for (const DVec3& near : plan.inside) out.clicks.inside.push_back(click(near));
   for (const DVec3& near : plan.outside) out.clicks.outside.push_back(click(near));
 }
 
-CapturedCase carry_out(const std::string& name, const Plan& plan) {
+CapturedCase carry_out(const std::string& name, std::uint32_t take, const Plan& plan) {
   CapturedCase out;
-  out.name = name, out.what = plan.what, out.said = plan.said;
+  out.name = name, out.take = take, out.what = plan.what, out.said = plan.said;
   out.is_test = plan.is_test, out.textured = plan.textured;
-  out.cameras = photo_cameras(plan.orbit, seed_for(for_cameras));
-  HeldOut held_out = held_out_cameras(plan.orbit, seed_for(for_cameras));
+  out.cameras = photo_cameras(plan.orbit, seed_for(take, for_cameras));
+  HeldOut held_out = held_out_cameras(plan.orbit, seed_for(take, for_cameras));
   out.held_out = std::move(held_out.within);
   out.beyond = held_out.beyond.size();
   for (scene::Camera& camera : held_out.beyond) out.held_out.push_back(std::move(camera));
@@ -231,17 +232,17 @@ Result<std::vector<std::string>> choose_captured_cases(const std::vector<std::st
   return evaluate::choose_names(known_plans(), names, kind);
 }
 
-Result<CapturedCase> make_captured_case(const std::string& name) {
+Result<CapturedCase> make_captured_case(const std::string& name, std::uint32_t take) {
   const auto known = evaluate::find_case(known_plans(), name, kind);
   if (!known) return propagate(known);
-  return carry_out(name, (*known)->make());
+  return carry_out(name, take, (*known)->make());
 }
 
 Capture capture(const CapturedCase& the_case, Side side) {
   const scene::GaussianCloud& cloud = side == Side::before ? the_case.before : the_case.after;
   const auto number = std::uint32_t(side);
-  return {take_photos(cloud, the_case.cameras, the_case.sensor, seed_for(for_photos, number)),
-          sparse_points(cloud, the_case.cameras, the_case.points, seed_for(for_points, number))};
+  return {take_photos(cloud, the_case.cameras, the_case.sensor, seed_for(the_case.take, for_photos, number)),
+          sparse_points(cloud, the_case.cameras, the_case.points, seed_for(the_case.take, for_points, number))};
 }
 
 }  // namespace engine::captures

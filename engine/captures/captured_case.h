@@ -34,9 +34,13 @@ struct Capture {
   std::vector<fit::ColoredPoint> points;
 };
 
+/// The take that constants are chosen on.
+inline constexpr std::uint32_t first_take = 1;
+
 /// One such edit. Rows are indices.
 struct CapturedCase {
-  std::string name, what, said;  ///< See Plan.
+  std::string name, what, said;     ///< See Plan.
+  std::uint32_t take = first_take;  ///< Takes differ in all that chance decides for people: see make_captured_case().
   /// Its figures are reported and never used to choose a constant: those of the engine are chosen on the others.
   bool is_test = false;
   bool textured = true;
@@ -68,8 +72,10 @@ struct CapturedCase {
 [[nodiscard]] Result<std::vector<std::string>> choose_captured_cases(const std::vector<std::string>& names);
 
 /// Makes the case of that name. The same bytes every time, for any number of threads.
+///   take    first_take or more. Another take is the same scene and the same wish, but the photos are taken from other
+///           places, with other noise and exposures, and the errors of handles and clicks are others.
 ///   errors  not_found: no case of that name; the message lists them
-[[nodiscard]] Result<CapturedCase> make_captured_case(const std::string& name);
+[[nodiscard]] Result<CapturedCase> make_captured_case(const std::string& name, std::uint32_t take = first_take);
 
 /// Which of the two scenes is photographed. Noise, exposures and points of one have nothing to do with the other's.
 enum class Side { before, after };

@@ -74,7 +74,7 @@ Result<std::vector<captures::CaptureTrial>> trials_of(const std::vector<std::str
   terminal.out << captures::capture_table_head() << std::flush;
   std::vector<captures::CaptureTrial> trials;
   for (const std::string& name : names) {
-    const auto made = captures::make_captured_case(name);
+    const auto made = captures::make_captured_case(name, options.captures.take);
     if (!made) return propagate(made);
     const auto trained = captures::train(*made, captures::training_options(options.captures.fit_iterations), cache);
     if (!trained) return propagate(trained);
@@ -129,6 +129,14 @@ CLI::Option* add_capture_options(CLI::App& command, CaptureOptions& options) {
       ->needs(on)
       ->check(CLI::Range(1, 1'000'000))
       ->type_name("N");
+  command
+      .add_option(
+          "--take", options.take,
+          "Which photos and which errors of the hand: those of the first take are what constants are chosen on; "
+          "other takes have others, of the same scenes and the same wishes")
+      ->needs(on)
+      ->check(CLI::Range(1, 1'000'000))
+      ->type_name("N");
   return on;
 }
 
@@ -170,6 +178,7 @@ Result<void> run_captures(const BenchOptions& options, const Machine& machine, T
   }
   ordered_json report = settings(options, machine);
   report["fit_iterations"] = options.captures.fit_iterations;
+  report["take"] = options.captures.take;
   report["captures"] = std::move(all);
   if (auto saved = write_json(path(options.out) / "captures.json", report); !saved) return saved;
   if (auto saved = write_text(path(options.out) / "captures.md", table); !saved) return saved;

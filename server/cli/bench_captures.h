@@ -1,10 +1,12 @@
 // splatdrag bench-edit --captures: edits whose right result is known, of scenes that are trained from photographs.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
 
+#include "engine/captures/captured_case.h"
 #include "server/cli/compute.h"
 #include "server/cli/options.h"
 
@@ -20,6 +22,7 @@ struct CaptureOptions {
   std::vector<std::string> by{"balls",   "bare",  "click",     "clicks",
                               "looking", "masks", "wide_masks"};  ///< Names of captures::known_grasps().
   int fit_iterations = 1500;
+  std::uint32_t take = engine::captures::first_take;
 };
 
 /// Adds them.

@@ -52,7 +52,9 @@ constexpr const char* how =
     "shown**:\n"
     "  by what the photos show, without the undersides and insides that nobody has seen.\n"
     "- **over bare** (of means): *edited*, beside that of bare balls on the same cases.\n"
-    "- **set**: constants may be chosen on `choose`, and never on `test`.\n\n";
+    "- **set**: constants may be chosen on `choose`, and never on `test`. That holds for the first take: other photos "
+    "and\n"
+    "  other errors of the hand (`--take 2` and so on) are all for testing.\n\n";
 
 /// What an edit gains over the same by bare balls, dB of the edited region. Nothing where those were not tried.
 std::optional<double> gain_over_bare_balls(std::span<const CaptureTrial> trials, const CaptureTrial& one) {
@@ -153,7 +155,9 @@ std::string captures_page(std::span<const CaptureTrial> trials, const BenchOptio
     for (const std::string& by : options.captures.by) out << " --by " << by;
   if (options.captures.fit_iterations != CaptureOptions{}.fit_iterations)
     out << " --fit-iterations " << options.captures.fit_iterations;
-  out << " --out out/captures --page docs/captures.md\n\non " << machine.threads << " threads, " << machine.simd
+  if (options.captures.take != CaptureOptions{}.take) out << " --take " << options.captures.take;
+  out << " --out out/captures --page " << (options.captures.page.empty() ? "docs/captures.md" : options.captures.page)
+      << "\n\non " << machine.threads << " threads, " << machine.simd
       << ". Trained scenes are kept (`--cache`): the first run takes longer.\n\n"
       << how << engine::captures::capture_table_head();
   double fits = 0;

@@ -59,6 +59,18 @@ TEST(CapturedCases, WithShadowsDifferByTheseAlone) {
   EXPECT_LT(darkest(shadowed.after, plain.after, arrived), 0.7) << "it has gone along";
 }
 
+TEST(CapturedCases, AnotherTakeIsTheSameWishBySomebodyElse) {
+  const CapturedCase &first = made("mug"), second = make_captured_case("mug", 2).value();
+  EXPECT_EQ(make_captured_case("mug", first_take)->handles[0].target, first.handles[0].target);
+  EXPECT_EQ(second.name, first.name);
+  EXPECT_NE(second.handles[0].target, first.handles[0].target);
+  EXPECT_LT(glm::distance(*second.handles[0].target, *first.handles[0].target), 0.1)
+      << "it is meant to go to one place";
+  EXPECT_NE(second.clicks.inside[0], first.clicks.inside[0]);
+  EXPECT_NE(second.cameras[1].translation, first.cameras[1].translation);
+  EXPECT_NE(capture(second, Side::before).photos[0].rgb, capture(first, Side::before).photos[0].rgb);
+}
+
 TEST(CapturedCases, AreTheSameForAnyThreads) {
   Result<CapturedCase> one, four;
   Capture photos_of_one, photos_of_four;

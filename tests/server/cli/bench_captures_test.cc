@@ -92,6 +92,13 @@ TEST(CapturesPage, TellsTheSetsApartAndNamesWhatIsMissing) {
   ASSERT_NE(missing, std::string::npos) << page;
   EXPECT_NE(page.find("`rod`", missing), std::string::npos);
   EXPECT_EQ(page.find("`mug`", missing), std::string::npos);
+  EXPECT_EQ(page.find("--take"), page.rfind("--take")) << "only what it says of the sets";
+}
+
+TEST(CapturesPage, OfAnotherTakeSaysWhich) {
+  BenchOptions options;
+  options.captures.take = 3;
+  EXPECT_NE(captures_page({}, options, {}).find(" --take 3 --out"), std::string::npos);
 }
 
 TEST(CapturesPage, OfAllCasesMissesNone) {
