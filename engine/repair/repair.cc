@@ -110,6 +110,16 @@ std::string size_text(const scene::Image& picture) {
   return size_text(picture.width, picture.height, picture.channels);
 }
 
+/// The share of these rows that lie in the picture; 1 where there are none.
+double share_in_picture(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
+                        const scene::Camera& view) {
+  if (rows.empty()) return 1;
+  const auto within = std::ranges::count_if(rows, [&](std::uint32_t row) {
+    return pixel_in_picture(view, view.cam_from_world(cloud.mean.get(row))).has_value();
+  });
+  return double(within) / double(rows.size());
+}
+
 /// What the repainter has made of a picture, within the mask; towards its rim it fades into what was there.
 void lay_in(const scene::Image& repainted, const scene::Mask& mask, scene::Image& picture) {
   const std::vector<int> depth = correct::depth_within(mask);
@@ -301,7 +311,9 @@ Result<Repair::Telling> Repair::most_telling_view(const WorkingScene& working, c
     // Of a picture that shows little else nobody could say how it goes on.
     const double around = 1 - double(vacated_[v].area()) / double(vacated_[v].data.size());
     const scene::Image closed = closing(working, rows, v, surfaces.inverse_depth);
-    const double shown = around * around * double(shown_by(surfaces.inverse_depth) + shown_by(closed));
+    // Nor of one whose border cuts the place off: what is beyond it says how the other half goes on.
+    const double whole = share_in_picture(original_, open_, views_[v]);
+    const double shown = whole * around * around * double(shown_by(surfaces.inverse_depth) + shown_by(closed));
     if (shown > most) most = shown, best = {v, std::move(surfaces)};
     if (auto going = looked(); !going) return propagate(going);
   }

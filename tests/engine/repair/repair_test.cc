@@ -530,6 +530,17 @@ TEST(Repair, GoesOutwardFromTheViewThatShowsMostOfTheHoleAndTellsHowFarItIs) {
         << k << ": beside one that is done";
 }
 
+TEST(Repair, BeginsWithAViewWhoseBorderDoesNotCutTheHoleOff) {
+  // The fourth view is nearer than the others and shows more of the hole, but half of that is beyond its border.
+  BlockScene block;
+  scene::Camera& near = block.cameras[3];
+  near.fx *= 1.6, near.fy *= 1.6;
+  near.cx -= near.pixel_from_cam(near.cam_from_world(block.request.handles[0].source)).x;
+  Moved moved(std::move(block));
+  ASSERT_TRUE(moved.correct());
+  EXPECT_NE(moved.corrector.of_views()[0].examples[0], 3u);
+}
+
 TEST(Repair, EndsWithTheErrorOfTheCorrectorOrOfWhoeverIsTold) {
   Moved failing;
   failing.corrector.answer = [](const correct::CorrectionTask&) -> Result<scene::Image> {
