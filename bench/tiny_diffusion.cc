@@ -1,8 +1,8 @@
 // Trains a tiny latent diffusion model from nothing on pictures of made-up rooms, so that the corrector `sd` can be
 // tried where no weights are to be had. What it writes is a folder as `--model-dir` has it:
 //
-//   build/release/bench/tiny_diffusion --out models --minutes 60
-//   build/release/bench/repaint_quality --model models/stable-diffusion
+//   OMP_NUM_THREADS=1 build/release/bench/tiny_diffusion --out models --minutes 60
+//   OMP_NUM_THREADS=1 build/release/bench/repaint_quality --model models/stable-diffusion
 //   build/release/splatdrag bench-edit --model-dir models --corrector none --corrector sd --out out
 //
 // The rooms it learns from hold things of engine/procedural in arrangements of their own; neither the demo scene nor a
@@ -172,7 +172,9 @@ weights::Configs tiny_configs(const Options& options) {
   configs.autoencoder.layers_per_block = 1;
   configs.autoencoder.norm_groups = 8;
   configs.autoencoder.scaling_factor = 1;  // until it is measured
-  configs.unet.sample_side = options.side / configs.autoencoder.pixels_per_latent();
+  // Edits show the networks pictures twice as long as what they learn from: what shrinks on its way to them is lost,
+  // and convolutions do not mind the size.
+  configs.unet.sample_side = 2 * options.side / configs.autoencoder.pixels_per_latent();
   configs.text_encoder.width = 32;
   configs.text_encoder.feed_forward_width = 64;
   configs.text_encoder.layers = 2;

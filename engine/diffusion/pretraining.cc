@@ -6,9 +6,11 @@
 #include <ATen/ops/cat.h>
 #include <ATen/ops/empty.h>
 
+#include <algorithm>
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <cstdio>
 #include <functional>
 #include <map>
 #include <system_error>
@@ -83,16 +85,14 @@ std::string number_of(double value) {
 }
 
 std::string json_of(const weights::UNetConfig& config) {
-  const auto block = [](const char* way) {
-    return [way](bool attends) {
-      return (attends ? std::string("CrossAttn") : std::string()) + way + (attends ? "Block2D" : "Block2D");
-    };
+  const auto block = [](bool attends, const char* way) {
+    return (attends ? "CrossAttn" : "") + std::string(way) + "Block2D";
   };
   const std::size_t levels = config.channels.size();
   return "{\"_class_name\":\"UNet2DConditionModel\",\"in_channels\":4,\"out_channels\":4,\"block_out_channels\":" +
          list_of(config.channels) + ",\"attention_head_dim\":" + list_of(config.heads) +
-         ",\"down_block_types\":" + names_of(levels, [&](auto i) { return block("Down")(config.down_attends[i]); }) +
-         ",\"up_block_types\":" + names_of(levels, [&](auto i) { return block("Up")(config.up_attends[i]); }) +
+         ",\"down_block_types\":" + names_of(levels, [&](auto i) { return block(config.down_attends[i], "Down"); }) +
+         ",\"up_block_types\":" + names_of(levels, [&](auto i) { return block(config.up_attends[i], "Up"); }) +
          ",\"layers_per_block\":" + std::to_string(config.layers_per_block) +
          ",\"cross_attention_dim\":" + std::to_string(config.context_width) +
          ",\"norm_num_groups\":" + std::to_string(config.norm_groups) + ",\"norm_eps\":" + number_of(config.norm_eps) +
