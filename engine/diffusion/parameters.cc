@@ -51,6 +51,12 @@ Result<Parameters> Parameters::load(const weights::Checkpoint& checkpoint, weigh
   });
 }
 
+Parameters::Parameters(const std::map<std::string, Tensor>& tensors) {
+  auto kept = std::make_shared<Tensors>();
+  kept->by_name.insert(tensors.begin(), tensors.end());
+  tensors_ = std::move(kept);
+}
+
 const Tensor& Parameters::at(const std::string& name) const {
   assert(contains(name));
   return tensors_->by_name.at(name);

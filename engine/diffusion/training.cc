@@ -71,6 +71,11 @@ AdamW::AdamW(AdamW&&) noexcept = default;
 AdamW& AdamW::operator=(AdamW&&) noexcept = default;
 AdamW::~AdamW() = default;
 
+void AdamW::set_learning_rate(double learning_rate) {
+  state_->options.learning_rate = learning_rate;
+  assert(validate(state_->options));
+}
+
 void AdamW::clear_gradients() {
   for (Tensor& parameter : state_->parameters) parameter.mutable_grad().reset();
 }

@@ -47,6 +47,8 @@ class AdamW {
   AdamW& operator=(AdamW&&) noexcept;
   ~AdamW();
 
+  /// Of the steps from now on. Precondition: as validate() asks.
+  void set_learning_rate(double learning_rate);
   void clear_gradients();
   /// Norm of all gradients together, as of the last backward().
   [[nodiscard]] double gradient_norm() const;

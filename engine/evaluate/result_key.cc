@@ -52,7 +52,8 @@ void add(const edit::Params& values, Fields& fields) {
 
 std::string result_key(const ResultOf& of, const edit::Request& request) {
   Fields fields;
-  for (const std::string* text : {&of.subject, &of.corrector, &of.scene, &of.dataset, &of.simd, &of.lpips})
+  for (const std::string* text :
+       {&of.subject, &of.corrector, &of.scene, &of.dataset, &of.simd, &of.lpips, &of.repainter})
     fields.add(*text);
   fields.add(of.pictures);
   fields.add(of.threads);

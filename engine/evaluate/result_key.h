@@ -17,6 +17,7 @@ struct ResultOf {
   int threads = 0;             ///< Threads that it is worked out with.
   std::string simd;            ///< Instruction set.
   std::string lpips;           ///< Identity of the network that judges; empty: none does.
+  std::string repainter;       ///< What it knew before it learned (correct::Repainter::state()); empty: there is none.
   std::uint64_t program = 0;   ///< checksum_of_program().
 };
 

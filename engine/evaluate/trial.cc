@@ -32,9 +32,10 @@ std::unique_ptr<correct::Corrector> corrector_named(const std::string& name) {
 }
 
 Result<CarriedOut> carry_out(const Case& the_case, const edit::Request& request, const std::string& corrector,
-                             optim::PerceptualLoss* lpips) {
+                             optim::PerceptualLoss* lpips, correct::Repainter* repainter) {
   MemoryPeak memory;
-  const auto own = corrector_named(corrector);
+  // What is repainted is completed before, as in edits of the service.
+  const auto own = corrector_named(repainter != nullptr ? "scene" : corrector);
   Agreement corrected_views;
   edit::Observer observer;
   observer.moment = [&](const edit::Moment& moment) -> Result<void> {
@@ -44,7 +45,7 @@ Result<CarriedOut> carry_out(const Case& the_case, const edit::Request& request,
     memory.forget();
     return {};
   };
-  edit::Tools tools{.corrector = own.get()};
+  edit::Tools tools{.corrector = own.get(), .repainter = repainter};
   if (request.params.perceptual == params::Perceptual::lpips) tools.perceptual = lpips;
   const auto outcome = edit::run(the_case.before, the_case.cameras, request, tools, observer);
   if (!outcome) return propagate(outcome);

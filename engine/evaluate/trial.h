@@ -11,6 +11,7 @@
 
 #include "engine/core/result.h"
 #include "engine/correct/corrector.h"
+#include "engine/correct/repainter.h"
 #include "engine/edit/report.h"
 #include "engine/edit/request.h"
 #include "engine/evaluate/cases.h"
@@ -51,11 +52,14 @@ struct CarriedOut {
 };
 
 /// Edits the case and judges what comes of it.
-///   request  that of the case, with the parameters to try
-///   lpips    judges, too, and is the edit's loss if that is what its parameters say; null: neither
-///   errors   those of edit::run() and of `lpips`
+///   request    that of the case, with the parameters to try
+///   corrector  by its name; of a repainter, which comes after `scene`, that of the repainter
+///   lpips      judges, too, and is the edit's loss if that is what its parameters say; null: neither
+///   repainter  one that has learned nothing yet; null: there is none
+///   errors     those of edit::run(), of `lpips` and of `repainter`
 [[nodiscard]] Result<CarriedOut> carry_out(const Case& the_case, const edit::Request& request,
-                                           const std::string& corrector, optim::PerceptualLoss* lpips = nullptr);
+                                           const std::string& corrector, optim::PerceptualLoss* lpips = nullptr,
+                                           correct::Repainter* repainter = nullptr);
 
 /// Takes in a picture to look at, under the name of its file without an extension.
 using Show = std::function<Result<void>(const std::string& name, const scene::Image& picture)>;

@@ -31,7 +31,7 @@ void apply(const BenchOptions& options, edit::Request& request) {
 
 path cache_file(const BenchOptions& options, const Machine& machine, const std::string& subject,
                 const std::string& corrector, const std::string& scene, const std::string& dataset,
-                const edit::Request& request, const std::string& lpips) {
+                const edit::Request& request, const std::string& lpips, const std::string& repainter) {
   static const std::uint64_t program = evaluate::checksum_of_program();
   const std::string key = evaluate::result_key({.subject = subject,
                                                 .corrector = corrector,
@@ -41,6 +41,7 @@ path cache_file(const BenchOptions& options, const Machine& machine, const std::
                                                 .threads = machine.threads,
                                                 .simd = machine.simd,
                                                 .lpips = lpips,
+                                                .repainter = repainter,
                                                 .program = program},
                                                request);
   return path(options.out) / "results" / (key + ".json");

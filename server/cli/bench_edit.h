@@ -21,7 +21,7 @@ struct BenchOptions {
   proto::Params given;                        // over the preset
   std::string scene, dataset, request, name;  // a real capture, there and back
   CaptureOptions captures;
-  std::string model_dir;  // with LPIPS, which judges the cases
+  std::string model_dir;  // with LPIPS, which judges the cases, and the diffusion model of `sd`
   bool small = false, whole_picture = false;
   int pictures = 1;
   ComputeOptions compute;
@@ -31,11 +31,12 @@ struct BenchOptions {
 void apply(const BenchOptions& options, engine::edit::Request& request);
 
 /// Where a result is kept.
-///   scene, dataset, lpips  what stands for them, see evaluate::ResultOf
+///   scene, dataset, lpips, repainter  what stands for them, see evaluate::ResultOf
 [[nodiscard]] std::filesystem::path cache_file(const BenchOptions& options, const Machine& machine,
                                                const std::string& subject, const std::string& corrector,
                                                const std::string& scene, const std::string& dataset,
-                                               const engine::edit::Request& request, const std::string& lpips = {});
+                                               const engine::edit::Request& request, const std::string& lpips = {},
+                                               const std::string& repainter = {});
 
 /// Writes pictures below the output folder. `options` outlive it.
 [[nodiscard]] engine::evaluate::Show picture_writer(const BenchOptions& options);

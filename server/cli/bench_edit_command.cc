@@ -42,27 +42,41 @@ using engine::propagate;
 using nlohmann::ordered_json;
 using std::filesystem::path;
 
-/// The network that judges the cases; null where no folder of models is named.
-Result<std::unique_ptr<engine::optim::PerceptualLoss>> lpips_of(const BenchOptions& options) {
-  if (options.model_dir.empty()) return nullptr;
-  const models::Models models(options.model_dir, options.compute.threads);
-  auto loss = models.lpips();
-  if (loss) return loss;
-  for (const models::Finding& finding : models.findings())  // they name the file, which clients are not told
-    if (finding.name == "lpips" && !finding.usable) loss.error().message = finding.message;
-  loss.error().where = "--model-dir";
-  return loss;
+bool repaints(const BenchOptions& options) { return std::ranges::count(options.correctors, "sd") > 0; }
+
+/// What was made of a model, or why there is none, in words that name its file, which clients are not told.
+template <class Made>
+Result<Made> named(Result<Made> made, const models::Models& models, const std::string& name) {
+  if (made) return made;
+  for (const models::Finding& finding : models.findings())
+    if (finding.name == name && !finding.usable) made.error().message = finding.message;
+  made.error().where = "--model-dir";
+  return made;
+}
+
+/// The network that judges the cases; null where no folder of models is named, or it is named for `sd` alone.
+Result<std::unique_ptr<engine::optim::PerceptualLoss>> lpips_of(const BenchOptions& options,
+                                                                const models::Models& models) {
+  const bool is_loss = options.given.perceptual == proto::Perceptual::lpips;
+  if (options.model_dir.empty() || (!models.no_lpips().empty() && repaints(options) && !is_loss)) return nullptr;
+  return named(models.lpips(), models, "lpips");
 }
 
 Result<evaluate::Trial> trial_of(const evaluate::Case& the_case, const std::string& corrector,
-                                 const BenchOptions& options, const Machine& machine,
+                                 const BenchOptions& options, const Machine& machine, const models::Models& models,
                                  engine::optim::PerceptualLoss* lpips) {
   edit::Request request = the_case.request;
   apply(options, request);
+  std::unique_ptr<engine::correct::Repainter> repainter;
+  if (corrector == "sd") {
+    auto made = named(models.repainter(request.params, {}), models, "sd");
+    if (!made) return propagate(made);
+    repainter = std::move(*made);
+  }
   const path file = cache_file(options, machine, the_case.name, corrector, {}, {}, request,
-                               lpips != nullptr ? lpips->identity() : "");
+                               lpips != nullptr ? lpips->identity() : "", repainter ? repainter->state() : "");
   return cached_or_new<evaluate::Trial>(file, [&]() -> Result<evaluate::Trial> {
-    auto done = evaluate::carry_out(the_case, request, corrector, lpips);
+    auto done = evaluate::carry_out(the_case, request, corrector, lpips, repainter.get());
     if (!done) return propagate(done);
     const auto pictures = evaluate::show_pictures(the_case, request, corrector, done->edited,
                                                   std::size_t(options.pictures), picture_writer(options));
@@ -77,7 +91,8 @@ Result<void> run_cases(const BenchOptions& options, const Machine& machine, Term
     if (chosen.error().where.empty()) chosen.error().where = "--case, --small";
     return propagate(chosen);
   }
-  const auto lpips = lpips_of(options);
+  const models::Models models(options.model_dir, options.compute.threads);
+  const auto lpips = lpips_of(options, models);
   if (!lpips) return propagate(lpips);
   std::string table = evaluate::trial_table_head();
   terminal.out << table << std::flush;
@@ -86,7 +101,7 @@ Result<void> run_cases(const BenchOptions& options, const Machine& machine, Term
     const auto made = evaluate::make_case(name);
     if (!made) return propagate(made);
     for (const std::string& corrector : options.correctors) {
-      const auto trial = trial_of(*made, corrector, options, machine, lpips->get());
+      const auto trial = trial_of(*made, corrector, options, machine, models, lpips->get());
       if (!trial) return propagate(trial);
       const std::string row = evaluate::trial_table_row(*trial);
       table += row;
@@ -151,6 +166,9 @@ Result<void> run_trips(const BenchOptions& options, const Machine& machine, Term
 }
 
 Result<void> run(const BenchOptions& options, Terminal& terminal) {
+  if (repaints(options) && options.model_dir.empty())
+    return engine::fail(engine::ErrorCode::invalid_argument, "sd needs --model-dir, and works on the cases alone",
+                        "--corrector");
   edit::Request any;
   apply(options, any);
   const bool by_lpips = any.params.perceptual == proto::Perceptual::lpips && !options.model_dir.empty();
@@ -222,8 +240,10 @@ void add_bench_edit_command(CLI::App& program, Action& action) {
                    "worked out again")
       ->required()
       ->type_name("DIR");
-  command->add_option("--corrector", options->correctors, "Which; may be repeated, harmonic is a baseline")
-      ->check(CLI::IsMember({"none", "harmonic", "scene"}))
+  command
+      ->add_option("--corrector", options->correctors,
+                   "Which; may be repeated, harmonic is a baseline, sd needs --model-dir")
+      ->check(CLI::IsMember({"none", "harmonic", "scene", "sd"}))
       ->default_str("scene")
       ->type_name("NAME");
   command->add_option("--preset", options->preset, "Whose parameters, where none are given here")
@@ -237,8 +257,8 @@ void add_bench_edit_command(CLI::App& program, Action& action) {
       command
           ->add_option(
               "--model-dir", options->model_dir,
-              "Folder of pre-trained networks; with those of LPIPS below it (splatdrag models says which files), "
-              "a column of the cases, and --perceptual lpips")
+              "Folder of pre-trained networks (splatdrag models says which files): those of LPIPS for a column of the "
+              "cases and --perceptual lpips, a diffusion model for --corrector sd")
           ->type_name("DIR");
   command->add_flag("--whole-picture", options->whole_picture, "Without the local mask: everything counts as edited");
   command

@@ -18,6 +18,7 @@ ResultOf sample_of() {
           .threads = 2,
           .simd = "AVX2",
           .lpips = {},
+          .repainter = {},
           .program = 7};
 }
 
@@ -44,7 +45,7 @@ TEST(ResultKey, IsAnotherWhereAnythingIs) {
                                 [](auto& of) { of.scene = "a.ply"; },   [](auto& of) { of.dataset = "a.ply"; },
                                 [](auto& of) { of.pictures = 2; },      [](auto& of) { of.threads = 1; },
                                 [](auto& of) { of.simd = "SSE4"; },     [](auto& of) { of.program = 8; },
-                                [](auto& of) { of.lpips = "0123"; }};
+                                [](auto& of) { of.lpips = "0123"; },    [](auto& of) { of.repainter = "4567"; }};
   for (const Of& change : changes) {
     ResultOf of = sample_of();
     change(of);

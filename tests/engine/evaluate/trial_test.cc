@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "engine/evaluate/trip_trial.h"
+#include "tests/engine/edit/student.h"
 
 namespace engine::evaluate {
 namespace {
@@ -54,6 +55,15 @@ TEST(Trial, HasNoAgreementWithoutACorrection) {
   ASSERT_TRUE(done) << done.error().message;
   EXPECT_EQ(done->trial.corrected_views.pixels, 0u);
   EXPECT_EQ(done->trial.seeds, 0u);
+}
+
+TEST(Trial, ARepainterRepaintsWhatTheSceneCorrectorHasCompleted) {
+  edit::Student student;
+  const auto done = carry_out(speck(), quick_request(3), "sd", nullptr, &student);
+  ASSERT_TRUE(done) << done.error().message;
+  EXPECT_EQ(done->trial.corrector, "sd");
+  EXPECT_FALSE(student.asked.empty());
+  EXPECT_GT(done->trial.seeds, 0u) << "nothing was completed before";
 }
 
 TEST(Trial, HandsTheErrorOfAnEditOn) {

@@ -142,6 +142,7 @@ TEST(Program, RefusesWrongOptionsOfCaptures) {
   refused({"--captures", "--fit-iterations", "nan"}, 2, "--fit-iterations");
   refused({"--captures", "--cache", out, "--case", "slide"}, 3, "no captured case \"slide\"");
   refused({"--case", "mug"}, 3, "no case \"mug\"");
+  refused({"--case", "slide", "--corrector", "sd"}, 2, "--model-dir");
   refused({"--captures", "--cache", file}, 2, "file");
   refused({"--captures", "--cache", file + "/below"}, 2, "file");
   refused({"--captures", "--cache", out, "--page", (folder.path() / "none" / "page.md").string()}, 3, "none");
