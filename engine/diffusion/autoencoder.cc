@@ -4,11 +4,14 @@
 #include <ATen/core/Tensor.h>
 #include <ATen/ops/cat.h>
 #include <ATen/ops/constant_pad_nd.h>
+#include <ATen/ops/empty.h>
 #include <ATen/ops/silu.h>
 
 #include <array>
 #include <utility>
 #include <vector>
+
+#include "engine/diffusion/pictures.h"
 
 namespace engine::diffusion {
 namespace {
@@ -58,6 +61,13 @@ Tensor encode_moments(const Model& model, const weights::AutoencoderConfig& conf
 Tensor sample_latents(const weights::AutoencoderConfig& config, const Tensor& moments, const Tensor& noise) {
   const std::vector<Tensor> parts = moments.chunk(2, 1);
   return (parts[0] + (parts[1] * 0.5).exp() * noise) * config.scaling_factor;
+}
+
+Tensor sample_latents(const weights::AutoencoderConfig& config, const Tensor& moments, Rng& rng) {
+  // A tensor of its own: means cut out of the moments of one picture are contiguous, and would be written over.
+  Tensor noise = at::empty({moments.size(0), config.latent_channels, moments.size(2), moments.size(3)}, at::kFloat);
+  for (float& value : numbers_of(noise)) value = rng.normal();
+  return sample_latents(config, moments, noise);
 }
 
 Tensor decode_latents(const Model& model, const weights::AutoencoderConfig& config, const Tensor& latents) {

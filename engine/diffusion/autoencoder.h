@@ -3,6 +3,7 @@
 // Welling 2014, "Auto-encoding variational Bayes" (means and variances).
 #pragma once
 
+#include "engine/core/rng.h"
 #include "engine/diffusion/layers.h"
 #include "engine/diffusion/tensor.h"
 #include "engine/weights/networks.h"
@@ -20,6 +21,8 @@ namespace engine::diffusion {
 ///   noise    [B, 4, h, w], normal
 [[nodiscard]] Tensor sample_latents(const weights::AutoencoderConfig& config, const Tensor& moments,
                                     const Tensor& noise);
+/// The same with noise that is drawn.
+[[nodiscard]] Tensor sample_latents(const weights::AutoencoderConfig& config, const Tensor& moments, Rng& rng);
 
 /// The picture of scaled latents, [B, 3, H, W], about -1 to 1, not clamped.
 [[nodiscard]] Tensor decode_latents(const Model& model, const weights::AutoencoderConfig& config,

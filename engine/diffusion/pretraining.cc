@@ -46,7 +46,8 @@ bool ends_without_effect(const std::string& layer) {
          layer == "conv_out";
 }
 
-/// Random numbers for a tensor, spread as libtorch spreads them for its layers; norms begin as no change.
+/// Random numbers for a tensor: uniform, so that what comes out of a layer varies as much as what goes in (LeCun et al.
+/// 1998, "Efficient backprop", section 4.6); biases are zero, and norms begin as no change.
 weights::FloatTensor fresh(const weights::TensorSpec& spec, Rng rng) {
   const std::size_t dot = spec.name.rfind('.');
   const std::string layer = spec.name.substr(0, dot), part = spec.name.substr(dot + 1);
@@ -61,7 +62,7 @@ weights::FloatTensor fresh(const weights::TensorSpec& spec, Rng rng) {
   } else if (layer.ends_with("_embedding") && spec.name.starts_with("text_model.")) {
     fill_normal(tensor.values, rng);
   } else if (part == "weight" && !ends_without_effect(layer)) {
-    const float most = float(std::sqrt(3.0 / double(fan_in)));  // unit variance in, unit variance out
+    const float most = float(std::sqrt(3.0 / double(fan_in)));
     for (float& value : tensor.values) value = rng.uniform(-most, most);
   }
   return tensor;
@@ -196,10 +197,9 @@ struct Pretraining::State {
   [[nodiscard]] Drawn drawn(std::span<const scene::Image> pictures, Rng rng) const {
     const at::NoGradGuard no_gradients;
     const Tensor moments = encode_moments(autoencoder, configs.autoencoder, batch_of(pictures));
-    Tensor of_latents = moments.narrow(1, 0, configs.autoencoder.latent_channels).contiguous();
-    Tensor noise = at::empty(of_latents.sizes(), at::kFloat);
-    for (Tensor* normal : {&of_latents, &noise})
-      for (float& value : numbers_of(*normal)) value = rng.normal();
+    const Tensor latents = sample_latents(configs.autoencoder, moments, rng);
+    Tensor noise = at::empty(latents.sizes(), at::kFloat);
+    for (float& value : numbers_of(noise)) value = rng.normal();
     const auto count = std::int64_t(pictures.size());
     Tensor timesteps = at::empty({count}, at::kLong);
     std::vector<Tensor> contexts;
@@ -208,9 +208,10 @@ struct Pretraining::State {
       const float part = (float(i) + rng.uniform()) / float(count);
       const int last = configs.noise.training_steps - 1;
       timesteps.data_ptr<std::int64_t>()[i] = std::min(int(part * float(configs.noise.training_steps)), last);
-      contexts.push_back(i % 2 == 0 ? with_prompt : without_prompt);
+      // By chance, not in turns: then either guidance would be learned at some of the times alone.
+      contexts.push_back(rng.below(2) == 0 ? with_prompt : without_prompt);
     }
-    return {sample_latents(configs.autoencoder, moments, of_latents), noise, timesteps, at::cat(contexts)};
+    return {latents, noise, timesteps, at::cat(contexts)};
   }
 };
 
@@ -259,7 +260,7 @@ Result<AutoencoderLoss> Pretraining::autoencoder_step(std::span<const scene::Ima
     const Tensor shown = batch_of(pictures), moments = encode_moments(state_->autoencoder, config, shown);
     const Tensor mean = moments.narrow(1, 0, config.latent_channels),
                  log_variance = moments.narrow(1, config.latent_channels, config.latent_channels);
-    const Tensor noise = normal_like(mean, state_->random(Purpose::autoencoder, state_->autoencoder_steps++));
+    const Tensor noise = normal_like(mean, state_->random(Purpose::autoencoder, state_->autoencoder_steps));
     const Tensor off = decode_latents(state_->autoencoder, config, sample_latents(config, moments, noise)) - shown;
     const Tensor absolute = off.abs().mean(), squares = off.pow(2).mean();
     const Tensor divergence = (mean.pow(2) + log_variance.exp() - log_variance - 1).mean() * 0.5;
@@ -271,7 +272,9 @@ Result<AutoencoderLoss> Pretraining::autoencoder_step(std::span<const scene::Ima
   });
   if (!added) return propagate(added);
   state_->autoencoder_optimiser.set_learning_rate(learning_rate);
-  if (auto stepped = take_step(state_->autoencoder_optimiser, *added); !stepped) return propagate(stepped);
+  if (auto stepped = take_step(state_->autoencoder_optimiser, *added, "pretraining"); !stepped)
+    return propagate(stepped);
+  ++state_->autoencoder_steps;
   return losses;
 }
 
@@ -286,6 +289,7 @@ Result<scene::Image> Pretraining::through_autoencoder(const scene::Image& pictur
 }
 
 Result<double> Pretraining::scale_latents(std::span<const scene::Image> pictures) {
+  assert(!pictures.empty());
   return guarded("pretraining", [&]() -> Result<double> {
     const at::NoGradGuard no_gradients;
     weights::AutoencoderConfig& config = state_->configs.autoencoder;
@@ -299,6 +303,8 @@ Result<double> Pretraining::scale_latents(std::span<const scene::Image> pictures
       count += double(mean.numel());
     }
     const double variance = squares / count - (sum / count) * (sum / count);
+    if (!std::isfinite(variance))
+      return fail(ErrorCode::internal, "the latents of the pictures are not finite", "latents");
     if (!(variance > 1e-12)) return fail(ErrorCode::internal, "the latents of all pictures are the same", "latents");
     return config.scaling_factor = 1 / std::sqrt(variance);
   });
@@ -307,9 +313,12 @@ Result<double> Pretraining::scale_latents(std::span<const scene::Image> pictures
 Result<double> Pretraining::unet_step(std::span<const scene::Image> pictures, double learning_rate) {
   state_->unet_optimiser.set_learning_rate(learning_rate);
   return guarded("pretraining", [&]() -> Result<double> {
-    const State::Drawn drawn = state_->drawn(pictures, state_->random(Purpose::unet, state_->unet_steps++));
-    return training_step(state_->unet, state_->configs,
-                         {&drawn.latents, &drawn.noise, &drawn.timesteps, &drawn.context}, state_->unet_optimiser);
+    const State::Drawn drawn = state_->drawn(pictures, state_->random(Purpose::unet, state_->unet_steps));
+    auto loss =
+        training_step(state_->unet, state_->configs, {&drawn.latents, &drawn.noise, &drawn.timesteps, &drawn.context},
+                      state_->unet_optimiser, "pretraining");
+    if (loss) ++state_->unet_steps;
+    return loss;
   });
 }
 
@@ -324,30 +333,32 @@ Result<double> Pretraining::unet_loss(std::span<const scene::Image> pictures, st
 }
 
 Result<void> Pretraining::write(const path& folder) const {
-  const weights::Configs& configs = state_->configs;
-  const auto tensors = [&](Network network) {
-    std::map<std::string, weights::FloatTensor> values;
-    for (const auto& [name, tensor] : state_->tensors.at(network)) values.emplace(name, values_of(tensor));
-    return weights::encode_tensors(values);
-  };
-  const std::array<std::pair<const char*, std::string>, 9> files{
-      {{"unet/config.json", json_of(configs.unet)},
-       {"vae/config.json", json_of(configs.autoencoder)},
-       {"text_encoder/config.json", json_of(configs.text_encoder)},
-       {"scheduler/scheduler_config.json", json_of(configs.noise)},
-       {"tokenizer/vocab.json", json_of(state_->vocabulary)},
-       {"tokenizer/merges.txt", "#version: 0.2\n"},
-       {"unet/diffusion_pytorch_model.safetensors", tensors(Network::unet)},
-       {"vae/diffusion_pytorch_model.safetensors", tensors(Network::autoencoder)},
-       {"text_encoder/model.safetensors", tensors(Network::text_encoder)}}};
-  for (const auto& [name, bytes] : files) {
-    const path file = folder / name;
-    std::error_code failed;
-    std::filesystem::create_directories(file.parent_path(), failed);
-    if (failed) return fail(ErrorCode::unavailable, "cannot make the folder: " + failed.message(), name);
-    if (auto written = write_file(file, std::as_bytes(std::span(bytes))); !written) return written;
-  }
-  return {};
+  return guarded("pretraining", [&]() -> Result<void> {
+    const weights::Configs& configs = state_->configs;
+    const auto tensors = [&](Network network) {
+      std::map<std::string, weights::FloatTensor> values;
+      for (const auto& [name, tensor] : state_->tensors.at(network)) values.emplace(name, values_of(tensor));
+      return weights::encode_tensors(values);
+    };
+    const std::array<std::pair<const char*, std::string>, 9> files{
+        {{"unet/config.json", json_of(configs.unet)},
+         {"vae/config.json", json_of(configs.autoencoder)},
+         {"text_encoder/config.json", json_of(configs.text_encoder)},
+         {"scheduler/scheduler_config.json", json_of(configs.noise)},
+         {"tokenizer/vocab.json", json_of(state_->vocabulary)},
+         {"tokenizer/merges.txt", "#version: 0.2\n"},
+         {"unet/diffusion_pytorch_model.safetensors", tensors(Network::unet)},
+         {"vae/diffusion_pytorch_model.safetensors", tensors(Network::autoencoder)},
+         {"text_encoder/model.safetensors", tensors(Network::text_encoder)}}};
+    for (const auto& [name, bytes] : files) {
+      const path file = folder / name;
+      std::error_code failed;
+      std::filesystem::create_directories(file.parent_path(), failed);
+      if (failed) return fail(ErrorCode::unavailable, "cannot make the folder: " + failed.message(), name);
+      if (auto written = write_file(file, std::as_bytes(std::span(bytes))); !written) return written;
+    }
+    return {};
+  });
 }
 
 }  // namespace engine::diffusion

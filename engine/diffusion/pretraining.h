@@ -18,7 +18,7 @@
 namespace engine::diffusion {
 
 struct PretrainingOptions {
-  std::string prompt;               ///< Of every picture. Each second picture is learned without a prompt.
+  std::string prompt;               ///< Of every picture. Half the pictures are learned without a prompt, by chance.
   double divergence_weight = 1e-4;  ///< Of the latents' divergence from a normal distribution, beside a pixel's error.
   double weight_decay = 1e-4;       ///< Of AdamW.
   std::uint64_t seed = 0;           ///< Same seed, same bytes, at a fixed number of libtorch's threads.
@@ -44,16 +44,17 @@ class Pretraining {
   ~Pretraining();
 
   /// A step of the autoencoder.
-  ///   pictures  [3], 0 to 1, all of one size, a multiple of side_multiple()
-  ///   errors    internal: the loss is not finite, and nothing has changed; too_large
+  ///   pictures  at least one; [3], 0 to 1, all of one size, a multiple of side_multiple()
+  ///   errors    internal: the loss or a gradient is not finite, and no step was taken: the next draws the same noise;
+  ///             too_large
   [[nodiscard]] Result<AutoencoderLoss> autoencoder_step(std::span<const scene::Image> pictures, double learning_rate);
   /// The picture as the autoencoder gives it back, of means.
   [[nodiscard]] Result<scene::Image> through_autoencoder(const scene::Image& picture) const;
 
-  /// Sets the scaling factor so that latents of these pictures have unit variance: between the autoencoder's steps and
-  /// the UNet's.
+  /// Sets the scaling factor so that latents of these pictures have unit variance, of at least one: between the
+  /// autoencoder's steps and the UNet's.
   ///   returns  the factor
-  ///   errors   internal: the latents do not differ at all; too_large
+  ///   errors   internal: the latents do not differ at all, or are not finite; too_large
   [[nodiscard]] Result<double> scale_latents(std::span<const scene::Image> pictures);
 
   /// A step of the UNet, on fresh noise at fresh time steps. Returns its loss (denoising_loss()).
@@ -65,7 +66,7 @@ class Pretraining {
   [[nodiscard]] const weights::Configs& configs() const;
 
   /// The checkpoint as it is now, as a folder of diffusers: what is there is replaced, file by file.
-  ///   errors  those of write_file(); unavailable: the folder cannot be made
+  ///   errors  those of write_file(); unavailable: the folder cannot be made; too_large: memory
   [[nodiscard]] Result<void> write(const std::filesystem::path& folder) const;
 
  private:

@@ -93,9 +93,7 @@ Result<void> validate(const RepaintOptions& options, const weights::NoiseConfig&
   return validate(options.sampling, noise);
 }
 
-Result<scene::Image> StableDiffusion::repaint(const scene::Image& picture, const RepaintOptions& options,
-                                              const Advance& advance) const {
-  const weights::Configs& all = networks_->configs;
+Result<void> StableDiffusion::check(const scene::Image& picture) const {
   const int multiple = side_multiple();
   if (picture.channels != 3 || picture.width < 1 || picture.height < 1 || picture.width % multiple != 0 ||
       picture.height % multiple != 0)
@@ -109,6 +107,25 @@ Result<scene::Image> StableDiffusion::repaint(const scene::Image& picture, const
                 "picture");
   if (const auto at = first_not_finite(picture.data))
     return fail(ErrorCode::invalid_argument, "not a finite number", "picture[" + std::to_string(*at) + "]");
+  return {};
+}
+
+Result<scene::Image> StableDiffusion::through_autoencoder(const scene::Image& picture) const {
+  if (const auto checked = check(picture); !checked) return propagate(checked);
+  return guarded("repaint", [&]() -> Result<scene::Image> {
+    const at::NoGradGuard no_gradients;
+    const weights::AutoencoderConfig& config = networks_->configs.autoencoder;
+    const Model autoencoder{.parameters = networks_->autoencoder};
+    const Tensor moments = encode_moments(autoencoder, config, as_tensor(picture));
+    const Tensor means = moments.narrow(1, 0, config.latent_channels) * config.scaling_factor;
+    return as_picture(decode_latents(autoencoder, config, means));
+  });
+}
+
+Result<scene::Image> StableDiffusion::repaint(const scene::Image& picture, const RepaintOptions& options,
+                                              const Advance& advance) const {
+  const weights::Configs& all = networks_->configs;
+  if (const auto checked = check(picture); !checked) return propagate(checked);
   if (const auto valid = validate(options, all.noise); !valid) return propagate(valid);
 
   return guarded("repaint", [&]() -> Result<scene::Image> {

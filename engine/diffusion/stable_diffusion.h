@@ -55,17 +55,21 @@ class StableDiffusion {
   ///   advance  asked before each call of a network, and within it before each block; may be empty
   ///   returns  of the same size, within 0 to 1
   ///   errors   invalid_argument (`where`: picture, a place in it that is not finite, or the name of an option); those
-  ///   of
-  ///            `advance`; too_large (more than max_repaint_pixels, which is said before anything is allocated; a
+  ///            of `advance`; too_large (more than max_repaint_pixels, which is said before anything is allocated; a
   ///            prompt; memory); internal: what the networks make of it is not finite
   [[nodiscard]] Result<scene::Image> repaint(const scene::Image& picture, const RepaintOptions& options,
                                              const Advance& advance = {}) const;
+
+  /// The picture as the autoencoder gives it back, of means, without noise: what repainting loses at any rate.
+  ///   errors  those of repaint() that are the picture's; too_large (memory); internal
+  [[nodiscard]] Result<scene::Image> through_autoencoder(const scene::Image& picture) const;
 
   struct Networks;  ///< networks.h: for this room.
   [[nodiscard]] const Networks& networks() const { return *networks_; }
 
  private:
   struct Adapters;
+  [[nodiscard]] Result<void> check(const scene::Image& picture) const;
   std::shared_ptr<const Networks> networks_;
   std::shared_ptr<const Adapters> adapters_;
 };

@@ -121,8 +121,9 @@ void AdamW::restore(const Moments& moments) {
   }
 }
 
-Result<double> add_gradient(const Model& unet, const weights::Configs& configs, const NoisyBatch& batch, double share) {
-  return guarded("fine_tune", [&]() -> Result<double> {
+Result<double> add_gradient(const Model& unet, const weights::Configs& configs, const NoisyBatch& batch, double share,
+                            const std::string& where) {
+  return guarded(where, [&]() -> Result<double> {
     const at::AutoGradMode gradients(true);
     const Tensor loss = denoising_loss(unet, configs, batch);
     const double value = loss.item<double>();
@@ -131,22 +132,22 @@ Result<double> add_gradient(const Model& unet, const weights::Configs& configs, 
   });
 }
 
-Result<void> take_step(AdamW& optimiser, double loss) {
-  return guarded("fine_tune", [&]() -> Result<void> {
-    // A poisoned gradient must not reach the adapter, which would carry it into every picture from then on.
+Result<void> take_step(AdamW& optimiser, double loss, const std::string& where) {
+  return guarded(where, [&]() -> Result<void> {
+    // A poisoned gradient must not reach the parameters, which would carry it into every picture from then on.
     if (!std::isfinite(loss) || !std::isfinite(optimiser.gradient_norm()))
-      return fail(ErrorCode::internal, "the loss of fine-tuning, or its gradient, is not finite", "fine_tune");
+      return fail(ErrorCode::internal, "the loss of training, or its gradient, is not finite", where);
     optimiser.step();
     return {};
   });
 }
 
 Result<double> training_step(const Model& unet, const weights::Configs& configs, const NoisyBatch& batch,
-                             AdamW& optimiser) {
+                             AdamW& optimiser, const std::string& where) {
   optimiser.clear_gradients();
-  const auto loss = add_gradient(unet, configs, batch, 1);
+  const auto loss = add_gradient(unet, configs, batch, 1, where);
   if (!loss) return loss;
-  if (auto stepped = take_step(optimiser, *loss); !stepped) return propagate(stepped);
+  if (auto stepped = take_step(optimiser, *loss, where); !stepped) return propagate(stepped);
   return loss;
 }
 

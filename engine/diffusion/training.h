@@ -4,6 +4,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "engine/core/result.h"
@@ -70,18 +71,19 @@ class AdamW {
 
 /// Adds the gradient of `share` times the loss to those of the parameters: batches that do not fit into memory, or
 /// whose pictures are not of one size, are learned from one after the other.
+///   where    of errors, of this and the functions below
 ///   returns  the loss
 ///   errors   too_large; internal
 [[nodiscard]] Result<double> add_gradient(const Model& unet, const weights::Configs& configs, const NoisyBatch& batch,
-                                          double share);
+                                          double share, const std::string& where = "fine_tune");
 /// A step by the gradients that were added, of losses whose sum is `loss`.
 ///   errors   internal: the loss or a gradient is not finite, and nothing has changed
-[[nodiscard]] Result<void> take_step(AdamW& optimiser, double loss);
+[[nodiscard]] Result<void> take_step(AdamW& optimiser, double loss, const std::string& where = "fine_tune");
 
 /// One step: loss, gradients, and AdamW.
 ///   returns  the loss before the step
-///   errors   internal: the loss is not finite, and nothing has changed; too_large
+///   errors   internal: the loss or a gradient is not finite, and nothing has changed; too_large
 [[nodiscard]] Result<double> training_step(const Model& unet, const weights::Configs& configs, const NoisyBatch& batch,
-                                           AdamW& optimiser);
+                                           AdamW& optimiser, const std::string& where = "fine_tune");
 
 }  // namespace engine::diffusion

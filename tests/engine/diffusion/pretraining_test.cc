@@ -1,5 +1,7 @@
 #include "engine/diffusion/pretraining.h"
 
+#include <ATen/core/Tensor.h>
+#include <ATen/ops/empty.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,6 +10,8 @@
 
 #include "engine/core/finite.h"
 #include "engine/core/rng.h"
+#include "engine/diffusion/autoencoder.h"
+#include "engine/diffusion/pictures.h"
 #include "engine/diffusion/repainter.h"
 #include "engine/diffusion/stable_diffusion.h"
 #include "tests/engine/weights/samples.h"
@@ -76,6 +80,34 @@ TEST(Pretraining, TwentyStepsSeeNoiseInUnseenPictures) {
   EXPECT_NEAR(before, 1, 0.1) << "it begins with no noise seen at all";
   for (int step = 0; step < 20; ++step) ASSERT_TRUE(model.unet_step(slopes(4, 200 + std::uint64_t(step)), 1e-2));
   EXPECT_LT(model.unet_loss(unseen, 1).value(), 0.95 * before);
+}
+
+TEST(Pretraining, LatentsOfOnePictureAreDrawnAroundItsMeans) {
+  const weights::AutoencoderConfig config{.scaling_factor = 1};
+  // At the least variance: of means 7, only sevens are drawn. Means of one picture are contiguous within its moments.
+  Tensor moments = at::empty({1, 8, 2, 3}, at::kFloat);
+  for (float& value : numbers_of(moments)) value = -30;
+  for (float& value : numbers_of(moments).first(24)) value = 7;
+  Rng rng(1);
+  Tensor latents = sample_latents(config, moments, rng);
+  for (const float value : numbers_of(latents)) EXPECT_NEAR(value, 7, 1e-4);
+  for (const float value : numbers_of(moments).first(24)) EXPECT_EQ(value, 7);
+}
+
+TEST(Pretraining, WhatIsNotFiniteIsNamedAndTakesNoStep) {
+  auto poisoned = slopes(1, 1);
+  poisoned.front().data[5] = std::nanf("");
+  Pretraining model = begun(), other = begun();
+  const auto step = model.autoencoder_step(poisoned, 1e-2);
+  ASSERT_FALSE(step);
+  EXPECT_EQ(step.error().where, "pretraining");
+  const auto scaled = model.scale_latents(poisoned);
+  ASSERT_FALSE(scaled);
+  EXPECT_NE(scaled.error().message.find("not finite"), std::string::npos) << scaled.error().message;
+  ASSERT_FALSE(model.unet_step(poisoned, 1e-2));
+  const auto good = slopes(4, 2);
+  EXPECT_EQ(model.autoencoder_step(good, 1e-2)->absolute, other.autoencoder_step(good, 1e-2)->absolute);
+  EXPECT_EQ(model.unet_step(good, 1e-2).value(), other.unet_step(good, 1e-2).value()) << "of the same noise";
 }
 
 TEST(Pretraining, LatentsOfScaledPicturesHaveUnitVariance) {

@@ -22,6 +22,17 @@ scene::Image picture() {
 
 const RepaintOptions few_steps = {.prompt = "a hat", .guidance = 2, .sampling = {.steps = 3}};
 
+TEST(StableDiffusion, ThroughTheAutoencoderThereIsNoChance) {
+  const TinyFolder folder;
+  const StableDiffusion sd = StableDiffusion::open(folder.path()).value();
+  const auto back = sd.through_autoencoder(picture());
+  ASSERT_TRUE(back) << back.error().message;
+  EXPECT_EQ(back->width, 16);
+  EXPECT_EQ(back->height, 8);
+  EXPECT_EQ(*back, sd.through_autoencoder(picture()).value());
+  EXPECT_FALSE(sd.through_autoencoder(scene::Image(15, 8, 3))) << "not a multiple of 8";
+}
+
 TEST(StableDiffusion, RepaintsWithEverySampler) {
   const TinyFolder folder;
   const auto sd = StableDiffusion::open(folder.path());
