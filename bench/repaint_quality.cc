@@ -8,10 +8,12 @@
 //  - strewn: of all things but walls and floor one Gaussian of three lies about within a few hand's breadths;
 //  - frayed: of the small things two of five are lost, the others moved and stretched;
 //  - carried: its ball was dragged; where it stood there is a hole, and its old shadow, as no camera has seen beneath.
-// Pictures of the scene at a third of the cameras are repainted as an edit does it, after an adapter has learned from
-// pictures of what was there before, at the other cameras. Judged within the masks, against the true picture: the torn
-// picture as it is; what the autoencoder makes of it, without noise, and of the true picture, which is what is lost at
-// any rate; and what is repainted, by strength.
+// Pictures of the scene at a third of the cameras are repainted as an edit does it; with --tuning after an adapter has
+// learned from pictures of what was there before, at the other cameras. Judged within the masks, against the true
+// picture: the torn picture as it is; what the autoencoder makes of it, without noise and without a step, and of the
+// true picture, which is what is lost at any rate; and what is repainted, by strength.
+#include <ATen/Parallel.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
@@ -28,6 +30,7 @@
 
 #include "engine/core/rng.h"
 #include "engine/correct/repainter.h"
+#include "engine/diffusion/pictures.h"
 #include "engine/diffusion/repainter.h"
 #include "engine/diffusion/stable_diffusion.h"
 #include "engine/evaluate/measure.h"
@@ -35,6 +38,7 @@
 #include "engine/mask/mask.h"
 #include "engine/procedural/demo_scene.h"
 #include "engine/scene/image.h"
+#include "engine/weights/networks.h"
 
 namespace {
 
@@ -169,6 +173,19 @@ void print(const std::string& tear, const std::string& what, std::span<const Jud
   std::fflush(stdout);
 }
 
+/// The picture as the autoencoder gives it back, cut out around the mask and scaled as for repainting.
+scene::Image through_autoencoder(const diffusion::StableDiffusion& model, const scene::Image& picture,
+                                 const scene::Mask& mask) {
+  const diffusion::Crop crop =
+      diffusion::crop_around(scene::bounding_box(mask), picture.width, picture.height,
+                             engine::weights::picture_side(model.configs()), model.side_multiple());
+  const scene::Image shown = diffusion::resized(scene::cut_out(picture, crop.part), crop.width, crop.height);
+  scene::Image back = picture;
+  scene::paste(diffusion::resized(or_exit(model.through_autoencoder(shown)), crop.part.width(), crop.part.height()),
+               crop.part, back);
+  return back;
+}
+
 void judge(const Options& options, const diffusion::StableDiffusion& model, const Tear& tear) {
   std::vector<correct::HistoryPicture> history;
   std::vector<Judged> views;
@@ -189,7 +206,18 @@ void judge(const Options& options, const diffusion::StableDiffusion& model, cons
     tasks.push_back(views.back().task);
     untouched.push_back(torn);
   }
+  if (views.empty()) {
+    std::fprintf(stderr, "error: no picture that is to be repainted shows what is %s (--views)\n", tear.name.c_str());
+    std::exit(1);
+  }
   print(tear.name, "as it is", views, untouched);
+  std::vector<scene::Image> of_torn, of_whole;
+  for (const Judged& view : views) {
+    of_torn.push_back(through_autoencoder(model, view.task.picture, view.task.mask));
+    of_whole.push_back(through_autoencoder(model, view.truth, view.task.mask));
+  }
+  print(tear.name, "autoencoder", views, of_torn);
+  print(tear.name, "autoencoder, of the true picture", views, of_whole);
   const auto advance = [](double) { return engine::Result<void>{}; };
   for (const double guidance : options.guidances) {
     const auto repainter = or_exit(diffusion::StableDiffusionRepainter::create(
@@ -197,17 +225,6 @@ void judge(const Options& options, const diffusion::StableDiffusion& model, cons
                 .sampling = {diffusion::Sampler::dpmpp2m, options.sampling_steps},
                 .learning_rate = options.learning_rate,
                 .threads = options.threads}));
-    const double least = 1.0 / options.sampling_steps;
-    // One step at the least noise is what the autoencoder makes of a picture.
-    if (guidance == options.guidances.front()) {
-      std::vector<scene::Image> whole;
-      for (const Judged& view : views) whole.push_back(view.truth);
-      print(tear.name, "autoencoder", views, or_exit(repainter->repaint(tasks, least, 1, advance)));
-      std::vector<correct::RepaintTask> of_whole;
-      for (const Judged& view : views) of_whole.push_back({view.truth, view.task.mask});
-      print(tear.name, "autoencoder, of the true picture", views,
-            or_exit(repainter->repaint(of_whole, least, 1, advance)));
-    }
     int learned = 0;
     for (const int steps : options.tuning) {
       or_exit(repainter->fine_tune(history, steps - learned, 7 + std::uint64_t(learned), advance));
@@ -247,22 +264,38 @@ int main(int argc, char** argv) {
   program.add_option("--model", options.model, "A checkpoint")->required()->check(CLI::ExistingPath);
   program.add_option("--pictures", options.pictures, "Folder for pictures: torn, repainted, true")
       ->check(CLI::ExistingDirectory);
-  program.add_option("--views", options.views, "Of which a third is repainted, at least 3")->capture_default_str();
-  program.add_option("--width", options.width, "Pixels")->capture_default_str();
-  program.add_option("--height", options.height, "Pixels")->capture_default_str();
-  program.add_option("--lost", options.lost, "Share of Gaussians that a riddled scene has not")->capture_default_str();
-  program.add_option("--learning-rate", options.learning_rate, "Of the tuning")->capture_default_str();
-  program.add_option("--sampling-steps", options.sampling_steps, "At strength 1")->capture_default_str();
+  program.add_option("--views", options.views, "Of which a third is repainted")
+      ->check(CLI::Range(3, 1000))
+      ->capture_default_str();
+  program.add_option("--width", options.width, "Pixels")->check(CLI::Range(16, 1024))->capture_default_str();
+  program.add_option("--height", options.height, "Pixels")->check(CLI::Range(16, 1024))->capture_default_str();
+  program.add_option("--lost", options.lost, "Share of Gaussians that a riddled scene has not")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  program.add_option("--learning-rate", options.learning_rate, "Of the tuning")
+      ->check(CLI::Range(1e-9, 1.0))
+      ->capture_default_str();
+  program.add_option("--sampling-steps", options.sampling_steps, "At strength 1")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
   program
       .add_option("--repeats", options.repeats,
                   "Each picture is the mean of as many, each of its own noise: what an "
                   "edit's optimisation makes of views that differ")
+      ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  program.add_option("--tuning", options.tuning, "Steps of the adapter, ascending")->capture_default_str();
-  program.add_option("--strength", options.strengths)->capture_default_str();
-  program.add_option("--guidance", options.guidances)->capture_default_str();
-  program.add_option("--threads", options.threads, "Of libtorch")->capture_default_str();
+  program.add_option("--tuning", options.tuning, "Steps of the adapter, ascending")
+      ->check(CLI::Range(0, 1'000'000))
+      ->capture_default_str();
+  program.add_option("--strength", options.strengths)->check(CLI::Range(0.0, 1.0))->capture_default_str();
+  program.add_option("--guidance", options.guidances)->check(CLI::Range(1.0, 100.0))->capture_default_str();
+  program.add_option("--threads", options.threads, "Of libtorch")->check(CLI::PositiveNumber)->capture_default_str();
   CLI11_PARSE(program, argc, argv);
+  if (!std::ranges::is_sorted(options.tuning)) {
+    std::fprintf(stderr, "error: expected steps that ascend (--tuning)\n");
+    return 1;
+  }
+  at::set_num_threads(options.threads);
   const diffusion::StableDiffusion model = or_exit(diffusion::StableDiffusion::open(options.model));
   std::printf("| tear | what | PSNR in the mask, dB | SSIM |\n| --- | --- | ---: | ---: |\n");
   for (const Tear& tear : {riddled(options), strewn(options), frayed(options), carried(options)})

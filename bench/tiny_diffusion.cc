@@ -73,24 +73,30 @@ void or_exit(const engine::Result<void>& result) {
 
 Vec3 any_colour(Rng& rng) {
   const auto level = [&] { return 30 + int(rng.below(211)); };
-  return procedural::srgb(level(), level(), level());
+  const int red = level(), green = level(), blue = level();  // one after the other: arguments have no order
+  return procedural::srgb(red, green, blue);
 }
 
 /// A thing on the table, or hanging over it.
 std::vector<procedural::Object> any_thing(Rng& rng, std::uint64_t seed) {
-  const procedural::Placement place{
-      {rng.uniform(-1.5f, 1.5f), rng.below(4) == 0 ? -rng.uniform(0, 0.6f) : 0.0f, rng.uniform(-0.85f, 0.85f)},
-      rng.uniform(0, 6.28f)};
+  // What is drawn has a name or stands in braces, which have an order, as the arguments of a function do not.
+  const float x = rng.uniform(-1.5f, 1.5f), y = rng.below(4) == 0 ? -rng.uniform(0, 0.6f) : 0.0f,
+              z = rng.uniform(-0.85f, 0.85f);
+  const procedural::Placement place{{x, y, z}, rng.uniform(0, 6.28f)};
   switch (rng.below(8)) {
-    case 0:
-      return {procedural::make_ball(place, rng.uniform(0.14f, 0.32f), any_colour(rng), any_colour(rng))};
+    case 0: {
+      const float radius = rng.uniform(0.14f, 0.32f);
+      const Vec3 one = any_colour(rng), other = any_colour(rng);
+      return {procedural::make_ball(place, radius, one, other)};
+    }
     case 1:
       return {procedural::make_mug(place)};
     case 2:
       return {procedural::make_apple(place, rng.uniform(0.12f, 0.2f))};
-    case 3:
-      return {procedural::make_book(place, {rng.uniform(0.5f, 1.0f), rng.uniform(0.08f, 0.2f), rng.uniform(0.4f, 0.7f)},
-                                    any_colour(rng))};
+    case 3: {
+      const float width = rng.uniform(0.5f, 1.0f), height = rng.uniform(0.08f, 0.2f), depth = rng.uniform(0.4f, 0.7f);
+      return {procedural::make_book(place, {width, height, depth}, any_colour(rng))};
+    }
     case 4: {
       procedural::Plant plant = procedural::make_plant(place, 12 + int(rng.below(24)), seed);
       return {procedural::make_pot(place), std::move(plant.object)};
@@ -111,7 +117,7 @@ std::vector<procedural::Object> any_thing(Rng& rng, std::uint64_t seed) {
       return rings;
     }
     default: {
-      const Vec3 size(rng.uniform(0.15f, 0.6f), rng.uniform(0.12f, 0.5f), rng.uniform(0.15f, 0.6f));
+      const Vec3 size{rng.uniform(0.15f, 0.6f), rng.uniform(0.12f, 0.5f), rng.uniform(0.15f, 0.6f)};
       const procedural::Material material =
           rng.below(3) == 0 ? procedural::plain(any_colour(rng), 0.1f) : procedural::cloth_cover(any_colour(rng));
       return {{"crate", place, procedural::box({0, 0, 0}, size, material, 2)}};
@@ -124,9 +130,11 @@ std::vector<scene::Image> pictures_of_room(const Options& options, int room) {
   Rng rng(options.seed, 1000 + std::uint64_t(room));
   const std::uint64_t seed = options.seed * 1000 + std::uint64_t(room);
   std::vector<procedural::Object> objects{procedural::make_room(-1.5f), procedural::make_table({}, {3.7f, 1.5f, 2.1f})};
-  for (std::uint32_t prints = rng.below(3); prints > 0; --prints)
-    objects.push_back(procedural::make_framed_print({{rng.uniform(-1.3f, 1.3f), -rng.uniform(0.7f, 1.7f), 1.4f}, 0},
-                                                    rng.uniform(0.8f, 1.6f), rng.uniform(0.6f, 1.1f)));
+  for (std::uint32_t prints = rng.below(3); prints > 0; --prints) {
+    const float x = rng.uniform(-1.3f, 1.3f), y = -rng.uniform(0.7f, 1.7f);
+    const float width = rng.uniform(0.8f, 1.6f), height = rng.uniform(0.6f, 1.1f);
+    objects.push_back(procedural::make_framed_print({{x, y, 1.4f}, 0}, width, height));
+  }
   for (int things = 5 + int(rng.below(5)); things > 0; --things)
     for (procedural::Object& object : any_thing(rng, seed)) objects.push_back(std::move(object));
   const procedural::Light light =
@@ -157,7 +165,7 @@ std::vector<scene::Image> any_crops(const std::vector<scene::Image>& pictures, i
   return crops;
 }
 
-/// Networks that learn something within an hour on one thread. Two pixels a latent: with four, what the autoencoder
+/// Networks that learn something in an hour on one thread. Two pixels a latent: with four, what the autoencoder
 /// loses of a picture is more than most tears take from it.
 weights::Configs tiny_configs(const Options& options) {
   weights::Configs configs = weights::stable_diffusion_1();
@@ -300,8 +308,11 @@ int main(int argc, char** argv) {
   program.add_option("--autoencoder-share", options.autoencoder_share, "Of those, for the autoencoder")
       ->check(CLI::Range(0.01, 0.99))
       ->capture_default_str();
-  program.add_option("--autoencoder-steps", options.autoencoder_steps, "In place of minutes: same steps, same bytes");
-  program.add_option("--unet-steps", options.unet_steps, "In place of minutes");
+  program
+      .add_option("--autoencoder-steps", options.autoencoder_steps,
+                  "In place of minutes: same steps, seed and --threads, same bytes")
+      ->check(CLI::NonNegativeNumber);
+  program.add_option("--unet-steps", options.unet_steps, "In place of minutes")->check(CLI::NonNegativeNumber);
   program.add_option("--rooms", options.rooms, "To learn from")->check(CLI::PositiveNumber)->capture_default_str();
   program.add_option("--views", options.views, "Of each room")->check(CLI::PositiveNumber)->capture_default_str();
   program.add_option("--batch", options.batch, "Pictures of a step; twice as many as long as they are small")
@@ -309,11 +320,17 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   program.add_option("--side", options.side, "Pixels along a side of a picture, a multiple of 16")
       ->check(CLI::Range(16, 512))
+      ->check(CLI::Validator(
+          [](std::string& text) { return std::stoi(text) % 16 == 0 ? std::string() : "expected a multiple of 16"; },
+          "MULTIPLE OF 16"))
       ->capture_default_str();
   program.add_option("--save-minutes", options.save_minutes, "Between two writings of the checkpoint")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  program.add_option("--seed", options.seed, "Of all that is left to chance")->capture_default_str();
+  program
+      .add_option("--seed", options.seed,
+                  "Of all that is left to chance; the same one gives the same bytes with the same --threads")
+      ->capture_default_str();
   program.add_option("--threads", threads, "Of libtorch")->check(CLI::PositiveNumber)->capture_default_str();
   CLI11_PARSE(program, argc, argv);
   at::set_num_threads(threads);
