@@ -54,11 +54,14 @@ Result<Made> named(Result<Made> made, const models::Models& models, const std::s
   return made;
 }
 
-/// The network that judges the cases; null where no folder of models is named, or it is named for `sd` alone.
+/// The network that judges the cases; null where no folder of models is named, or it is named for `sd` alone and has
+/// nothing of LPIPS. What is there and damaged is an error.
 Result<std::unique_ptr<engine::optim::PerceptualLoss>> lpips_of(const BenchOptions& options,
                                                                 const models::Models& models) {
   const bool is_loss = options.given.perceptual == proto::Perceptual::lpips;
-  if (options.model_dir.empty() || (!models.no_lpips().empty() && repaints(options) && !is_loss)) return nullptr;
+  const bool absent = std::ranges::any_of(
+      models.findings(), [](const models::Finding& finding) { return finding.name == "lpips" && finding.absent; });
+  if (options.model_dir.empty() || (absent && repaints(options) && !is_loss)) return nullptr;
   return named(models.lpips(), models, "lpips");
 }
 
@@ -91,7 +94,7 @@ Result<void> run_cases(const BenchOptions& options, const Machine& machine, Term
     if (chosen.error().where.empty()) chosen.error().where = "--case, --small";
     return propagate(chosen);
   }
-  const models::Models models(options.model_dir, options.compute.threads);
+  const models::Models models(options.model_dir, machine.threads);
   const auto lpips = lpips_of(options, models);
   if (!lpips) return propagate(lpips);
   std::string table = evaluate::trial_table_head();

@@ -34,7 +34,8 @@ Finding look_at_checkpoint(const fs::path& folder, const fs::path& checkpoint) {
             "no checkpoint: put a folder of Stable Diffusion 1.x or 2.x-base as diffusers writes it at " +
                 (folder / "stable-diffusion").string() + ", or one file at " +
                 (folder / "stable-diffusion.safetensors").string() + " with its tokenizer at " +
-                (folder / "tokenizer").string()};
+                (folder / "tokenizer").string(),
+            true};
   const auto opened = weights::Checkpoint::open(checkpoint);
   if (!opened) return {"sd", false, checkpoint.string() + ": " + described(opened.error())};
   if (const auto whole = opened->check(); !whole)
@@ -52,7 +53,9 @@ Finding look_at_lpips(const fs::path& folder) {
   for (const auto& [name, what] :
        {std::pair{vgg16_file, "VGG16 of torchvision"}, {lpips_file, "LPIPS's own weights"}}) {
     const fs::path file = folder / "lpips" / name;
-    if (!is_there(file)) return {"lpips", false, std::string("no ") + what + ": " + file.string() + " is missing"};
+    if (!is_there(file))
+      return {"lpips", false, std::string("no ") + what + ": " + file.string() + " is missing",
+              !is_there(folder / "lpips" / vgg16_file) && !is_there(folder / "lpips" / lpips_file)};
   }
   if (const auto opened = open_lpips(folder); !opened)
     return {"lpips", false, (folder / "lpips").string() + ": " + described(opened.error())};
@@ -65,7 +68,7 @@ Models::Models(fs::path folder, int threads)
     : folder_(std::move(folder)), threads_(threads), loaded_(nothing_loaded()) {
   if (folder_.empty()) {
     for (const char* name : {"sd", "lpips"})
-      findings_.push_back({name, false, "no folder of models is named: give --model-dir"});
+      findings_.push_back({name, false, "no folder of models is named: give --model-dir", true});
   } else {
     for (const char* name : {"stable-diffusion", "stable-diffusion.safetensors"})
       if (checkpoint_.empty() && is_there(folder_ / name)) checkpoint_ = folder_ / name;
@@ -73,7 +76,8 @@ Models::Models(fs::path folder, int threads)
   }
   const auto why_not = [&](Finding& finding, const std::string& what) -> std::string {
     if (!has_libtorch()) {
-      finding = {finding.name, false, without_libtorch + std::string(finding.usable ? "; its files are there" : "")};
+      finding = {finding.name, false, without_libtorch + std::string(finding.usable ? "; its files are there" : ""),
+                 finding.absent};
       return without_libtorch;
     }
     if (finding.usable) return {};

@@ -27,6 +27,7 @@ struct Finding {
   std::string name;  ///< As a request names it: "sd", "lpips".
   bool usable = false;
   std::string message;  ///< Of a usable one: what it is. Else what is missing and where it goes; names folders.
+  bool absent = false;  ///< None of its files is there.
 };
 
 /// What a repainter is asked for beside the parameters.

@@ -3,11 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "engine/params/params.h"
+#include "server/models/models.h"
 #include "tests/support/data.h"
 
 namespace server::cli {
@@ -120,6 +122,23 @@ TEST(Program, EachKindOfFailureHasItsStatus) {
                 file("sd.json", R"({"handles": [{"source": [0, 0, 0], "radius": 1}], "params": {"corrector": "sd"}})")},
                5, "sd.json:params.corrector");
   expect_error({"demo-scene", "--out", folder.path().string(), "--gaussians", "7"}, 2, "gaussians");
+}
+
+TEST(Program, DamagedNetworksThatJudgeAreNamedBesideTheDiffusionModel) {
+  if (models::Models().no_sd().find("libtorch-dev") != std::string::npos) GTEST_SKIP() << "this build has no libtorch";
+  const support::TempDir folder;
+  const auto refused = [&](const std::string& part) {
+    expect_error({"bench-edit", "--out", (folder.path() / "out").string(), "--case", "slide", "--corrector", "sd",
+                  "--model-dir", folder.path().string()},
+                 5, part);
+  };
+  refused("Stable Diffusion");  // LPIPS may be missing
+  std::filesystem::create_directories(folder.path() / "lpips");
+  for (const char* name : {"vgg16.safetensors", "vgg_v0.1.safetensors"})
+    support::write_file(folder.path() / "lpips" / name, "damaged");
+  refused("lpips");
+  std::filesystem::remove(folder.path() / "lpips" / "vgg16.safetensors");
+  refused("VGG16 of torchvision");  // half of it is there: that is a mistake, too
 }
 
 TEST(Program, RefusesWrongOptionsOfCaptures) {
