@@ -208,7 +208,7 @@ void place_clicks(const ClickPlan& plan, CapturedCase& out) {
 CapturedCase carry_out(const std::string& name, std::uint32_t take, const Plan& plan) {
   CapturedCase out;
   out.name = name, out.take = take, out.what = plan.what, out.said = plan.said;
-  out.is_test = plan.is_test, out.textured = plan.textured;
+  out.is_test = plan.is_test || take != first_take, out.textured = plan.textured;
   out.cameras = photo_cameras(plan.orbit, seed_for(take, for_cameras));
   HeldOut held_out = held_out_cameras(plan.orbit, seed_for(take, for_cameras));
   out.held_out = std::move(held_out.within);

@@ -110,14 +110,14 @@ std::string size_text(const scene::Image& picture) {
   return size_text(picture.width, picture.height, picture.channels);
 }
 
-/// The share of these rows that lie in the picture; 1 where there are none.
+/// About the share of these rows that lie in the picture, by their means. Never 0, so that views that show no more than
+/// rims still compare; 1 where there are no rows.
 double share_in_picture(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows,
                         const scene::Camera& view) {
-  if (rows.empty()) return 1;
   const auto within = std::ranges::count_if(rows, [&](std::uint32_t row) {
     return pixel_in_picture(view, view.cam_from_world(cloud.mean.get(row))).has_value();
   });
-  return double(within) / double(rows.size());
+  return double(within + 1) / double(rows.size() + 1);
 }
 
 /// What the repainter has made of a picture, within the mask; towards its rim it fades into what was there.

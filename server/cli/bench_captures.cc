@@ -133,7 +133,7 @@ CLI::Option* add_capture_options(CLI::App& command, CaptureOptions& options) {
       .add_option(
           "--take", options.take,
           "Which photos and which errors of the hand: those of the first take are what constants are chosen on; "
-          "other takes have others, of the same scenes and the same wishes")
+          "other takes have others, of the same scenes and the same wishes. Give each its own --out")
       ->needs(on)
       ->check(CLI::Range(1, 1'000'000))
       ->type_name("N");

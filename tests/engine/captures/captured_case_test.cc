@@ -63,6 +63,8 @@ TEST(CapturedCases, AnotherTakeIsTheSameWishBySomebodyElse) {
   const CapturedCase &first = made("mug"), second = make_captured_case("mug", 2).value();
   EXPECT_EQ(make_captured_case("mug", first_take)->handles[0].target, first.handles[0].target);
   EXPECT_EQ(second.name, first.name);
+  EXPECT_FALSE(first.is_test);
+  EXPECT_TRUE(second.is_test) << "no constant is chosen on it";
   EXPECT_NE(second.handles[0].target, first.handles[0].target);
   EXPECT_LT(glm::distance(*second.handles[0].target, *first.handles[0].target), 0.1)
       << "it is meant to go to one place";

@@ -531,14 +531,18 @@ TEST(Repair, GoesOutwardFromTheViewThatShowsMostOfTheHoleAndTellsHowFarItIs) {
 }
 
 TEST(Repair, BeginsWithAViewWhoseBorderDoesNotCutTheHoleOff) {
-  // The fourth view is nearer than the others and shows more of the hole, but half of that is beyond its border.
-  BlockScene block;
-  scene::Camera& near = block.cameras[3];
-  near.fx *= 1.6, near.fy *= 1.6;
-  near.cx -= near.pixel_from_cam(near.cam_from_world(block.request.handles[0].source)).x;
-  Moved moved(std::move(block));
-  ASSERT_TRUE(moved.correct());
-  EXPECT_NE(moved.corrector.of_views()[0].examples[0], 3u);
+  // The fourth view is nearer than the others and shows more of the hole: also where half of that is beyond its border.
+  const auto first_view = [](bool cut_off) {
+    BlockScene block;
+    scene::Camera& near = block.cameras[3];
+    near.fx *= 1.6, near.fy *= 1.6;
+    if (cut_off) near.cx -= near.pixel_from_cam(near.cam_from_world(block.middle)).x;
+    Moved moved(std::move(block));
+    EXPECT_TRUE(moved.correct());
+    return moved.corrector.of_views()[0].examples[0];
+  };
+  EXPECT_EQ(first_view(false), 3u);
+  EXPECT_NE(first_view(true), 3u);
 }
 
 TEST(Repair, EndsWithTheErrorOfTheCorrectorOrOfWhoeverIsTold) {
