@@ -27,6 +27,7 @@
 #include <string>
 #include <vector>
 
+#include "bench/or_exit.h"
 #include "engine/core/rng.h"
 #include "engine/diffusion/autoencoder.h"
 #include "engine/diffusion/lpips.h"
@@ -43,13 +44,7 @@ namespace {
 namespace diffusion = engine::diffusion;
 namespace weights = engine::weights;
 using at::Tensor;
-
-template <class T>
-T or_exit(engine::Result<T> result) {
-  if (result) return std::move(*result);
-  std::fprintf(stderr, "error: %s (%s)\n", result.error().message.c_str(), result.error().where.c_str());
-  std::exit(1);
-}
+using bench::or_exit;
 
 /// A file whose tensors are all zeros, and take no room on the disk. It is removed at once, and stays mapped.
 weights::TensorFile hole_of(const std::vector<weights::TensorSpec>& specs) {

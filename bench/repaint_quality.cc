@@ -28,6 +28,7 @@
 #include <utility>
 #include <vector>
 
+#include "bench/or_exit.h"
 #include "engine/core/rng.h"
 #include "engine/correct/repainter.h"
 #include "engine/diffusion/pictures.h"
@@ -47,6 +48,7 @@ namespace diffusion = engine::diffusion;
 namespace evaluate = engine::evaluate;
 namespace procedural = engine::procedural;
 namespace scene = engine::scene;
+using bench::or_exit;
 using engine::DVec3;
 using engine::Rng;
 
@@ -60,24 +62,17 @@ struct Options {
   std::vector<double> strengths{0.1, 0.2, 0.3, 0.5}, guidances{1};
 };
 
-template <class T>
-T or_exit(engine::Result<T> result) {
-  if (result) return std::move(*result);
-  std::fprintf(stderr, "error: %s (%s)\n", result.error().message.c_str(), result.error().where.c_str());
-  std::exit(1);
-}
-void or_exit(const engine::Result<void>& result) {
-  if (result) return;
-  std::fprintf(stderr, "error: %s (%s)\n", result.error().message.c_str(), result.error().where.c_str());
-  std::exit(1);
-}
-
 /// A tear: what was there before, what is torn, and what it should be.
 struct Tear {
   std::string name;
   scene::GaussianCloud before, torn, truth;
   std::vector<scene::Camera> cameras;
 };
+
+/// The demo scene, of which nothing is torn yet.
+Tear whole(const char* name, const procedural::DemoScene& demo) {
+  return {name, demo.cloud, demo.cloud, demo.cloud, demo.cameras};
+}
 
 bool is_of(const procedural::DemoScene& demo, std::size_t row, std::initializer_list<const char*> names) {
   return std::ranges::count(names, demo.object_names[demo.object[row]]) > 0;
@@ -92,8 +87,8 @@ bool is_small_thing(const procedural::DemoScene& demo, std::size_t row) {
 }
 
 Tear frayed(const Options& options) {
-  procedural::DemoScene demo = procedural::make_demo_scene(demo_options(options));
-  Tear tear{"frayed", demo.cloud, demo.cloud, demo.cloud, demo.cameras};
+  const procedural::DemoScene demo = procedural::make_demo_scene(demo_options(options));
+  Tear tear = whole("frayed", demo);
   scene::GaussianCloud& torn = tear.torn;
   for (std::size_t row = 0; row < torn.size(); ++row) {
     if (!is_small_thing(demo, row)) continue;
@@ -106,8 +101,8 @@ Tear frayed(const Options& options) {
 }
 
 Tear riddled(const Options& options) {
-  procedural::DemoScene demo = procedural::make_demo_scene(demo_options(options));
-  Tear tear{"riddled", demo.cloud, demo.cloud, demo.cloud, demo.cameras};
+  const procedural::DemoScene demo = procedural::make_demo_scene(demo_options(options));
+  Tear tear = whole("riddled", demo);
   scene::GaussianCloud& torn = tear.torn;
   for (std::size_t row = 0; row < torn.size(); ++row) {
     if (!is_small_thing(demo, row) && !is_of(demo, row, {"table"})) continue;
@@ -118,8 +113,8 @@ Tear riddled(const Options& options) {
 }
 
 Tear strewn(const Options& options) {
-  procedural::DemoScene demo = procedural::make_demo_scene(demo_options(options));
-  Tear tear{"strewn", demo.cloud, demo.cloud, demo.cloud, demo.cameras};
+  const procedural::DemoScene demo = procedural::make_demo_scene(demo_options(options));
+  Tear tear = whole("strewn", demo);
   scene::GaussianCloud& torn = tear.torn;
   for (std::size_t row = 0; row < torn.size(); ++row) {
     Rng rng(3, row);
@@ -133,7 +128,8 @@ Tear carried(const Options& options) {
   procedural::DemoOptions moved = demo_options(options);
   const procedural::DemoScene demo = procedural::make_demo_scene(moved);
   moved.ball_shift = DVec3(0.8, 0, -0.08);
-  Tear tear{"carried", demo.cloud, demo.cloud, procedural::make_demo_scene(moved).cloud, demo.cameras};
+  Tear tear = whole("carried", demo);
+  tear.truth = procedural::make_demo_scene(moved).cloud;
   for (std::size_t row = 0; row < tear.torn.size(); ++row) {
     if (!is_of(demo, row, {"ball"})) continue;
     tear.torn.mean.x[row] += float(moved.ball_shift.x);

@@ -17,13 +17,13 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <functional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "bench/or_exit.h"
 #include "engine/core/rng.h"
 #include "engine/diffusion/pictures.h"
 #include "engine/diffusion/pretraining.h"
@@ -44,6 +44,7 @@ namespace evaluate = engine::evaluate;
 namespace procedural = engine::procedural;
 namespace scene = engine::scene;
 namespace weights = engine::weights;
+using bench::or_exit;
 using engine::Rng;
 using engine::Vec3;
 using Clock = std::chrono::steady_clock;
@@ -58,18 +59,6 @@ struct Options {
   double save_minutes = 3;
   std::uint64_t seed = 1;
 };
-
-template <class T>
-T or_exit(engine::Result<T> result) {
-  if (result) return std::move(*result);
-  std::fprintf(stderr, "error: %s (%s)\n", result.error().message.c_str(), result.error().where.c_str());
-  std::exit(1);
-}
-void or_exit(const engine::Result<void>& result) {
-  if (result) return;
-  std::fprintf(stderr, "error: %s (%s)\n", result.error().message.c_str(), result.error().where.c_str());
-  std::exit(1);
-}
 
 Vec3 any_colour(Rng& rng) {
   const auto level = [&] { return 30 + int(rng.below(211)); };

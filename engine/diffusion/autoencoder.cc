@@ -4,7 +4,6 @@
 #include <ATen/core/Tensor.h>
 #include <ATen/ops/cat.h>
 #include <ATen/ops/constant_pad_nd.h>
-#include <ATen/ops/empty.h>
 #include <ATen/ops/silu.h>
 
 #include <array>
@@ -65,9 +64,8 @@ Tensor sample_latents(const weights::AutoencoderConfig& config, const Tensor& mo
 
 Tensor sample_latents(const weights::AutoencoderConfig& config, const Tensor& moments, Rng& rng) {
   // A tensor of its own: means cut out of the moments of one picture are contiguous, and would be written over.
-  Tensor noise = at::empty({moments.size(0), config.latent_channels, moments.size(2), moments.size(3)}, at::kFloat);
-  for (float& value : numbers_of(noise)) value = rng.normal();
-  return sample_latents(config, moments, noise);
+  const std::array<std::int64_t, 4> shape{moments.size(0), config.latent_channels, moments.size(2), moments.size(3)};
+  return sample_latents(config, moments, normal_numbers(shape, rng));
 }
 
 Tensor decode_latents(const Model& model, const weights::AutoencoderConfig& config, const Tensor& latents) {
@@ -83,6 +81,11 @@ Tensor decode_latents(const Model& model, const weights::AutoencoderConfig& conf
     hidden = block.shown(std::move(hidden));
   }
   return finish(decoder, hidden, config.norm_groups);
+}
+
+Tensor there_and_back(const Model& model, const weights::AutoencoderConfig& config, const Tensor& pictures) {
+  const Tensor means = encode_moments(model, config, pictures).narrow(1, 0, config.latent_channels);
+  return decode_latents(model, config, means * config.scaling_factor);
 }
 
 }  // namespace engine::diffusion

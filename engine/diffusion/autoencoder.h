@@ -24,6 +24,10 @@ namespace engine::diffusion {
 /// The same with noise that is drawn.
 [[nodiscard]] Tensor sample_latents(const weights::AutoencoderConfig& config, const Tensor& moments, Rng& rng);
 
+/// Pictures, [B, 3, H, W] of -1 to 1, as the autoencoder gives them back, of means: without noise.
+[[nodiscard]] Tensor there_and_back(const Model& model, const weights::AutoencoderConfig& config,
+                                    const Tensor& pictures);
+
 /// The picture of scaled latents, [B, 3, H, W], about -1 to 1, not clamped.
 [[nodiscard]] Tensor decode_latents(const Model& model, const weights::AutoencoderConfig& config,
                                     const Tensor& latents);

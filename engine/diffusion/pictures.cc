@@ -43,8 +43,14 @@ scene::Image resized(const scene::Image& picture, int width, int height) {
 
 std::span<float> numbers_of(Tensor& tensor) { return {tensor.data_ptr<float>(), std::size_t(tensor.numel())}; }
 
-void fill_normal(std::span<float> values, Rng rng) {
+void fill_normal(std::span<float> values, Rng& rng) {
   for (float& value : values) value = rng.normal();
+}
+
+Tensor normal_numbers(std::span<const std::int64_t> shape, Rng& rng) {
+  Tensor numbers = at::empty({shape.data(), shape.size()}, at::kFloat);
+  fill_normal(numbers_of(numbers), rng);
+  return numbers;
 }
 
 }  // namespace engine::diffusion

@@ -1,6 +1,7 @@
 // Pictures as tensors, and back.
 #pragma once
 
+#include <cstdint>
 #include <span>
 
 #include "engine/core/result.h"
@@ -22,6 +23,8 @@ namespace engine::diffusion {
 /// The numbers of a contiguous tensor of floats.
 [[nodiscard]] std::span<float> numbers_of(Tensor& tensor);
 /// Fills with normal numbers.
-void fill_normal(std::span<float> values, Rng rng);
+void fill_normal(std::span<float> values, Rng& rng);
+/// A tensor of normal numbers, of that shape.
+[[nodiscard]] Tensor normal_numbers(std::span<const std::int64_t> shape, Rng& rng);
 
 }  // namespace engine::diffusion

@@ -150,12 +150,6 @@ Tensor batch_of(std::span<const scene::Image> pictures) {
   return at::cat(tensors);
 }
 
-Tensor normal_like(const Tensor& other, Rng rng) {
-  Tensor noise = at::empty(other.sizes(), at::kFloat);
-  fill_normal(numbers_of(noise), rng);
-  return noise;
-}
-
 }  // namespace
 
 struct Pretraining::State {
@@ -198,8 +192,7 @@ struct Pretraining::State {
     const at::NoGradGuard no_gradients;
     const Tensor moments = encode_moments(autoencoder, configs.autoencoder, batch_of(pictures));
     const Tensor latents = sample_latents(configs.autoencoder, moments, rng);
-    Tensor noise = at::empty(latents.sizes(), at::kFloat);
-    for (float& value : numbers_of(noise)) value = rng.normal();
+    const Tensor noise = normal_numbers(latents.sizes(), rng);
     const auto count = std::int64_t(pictures.size());
     Tensor timesteps = at::empty({count}, at::kLong);
     std::vector<Tensor> contexts;
@@ -260,8 +253,8 @@ Result<AutoencoderLoss> Pretraining::autoencoder_step(std::span<const scene::Ima
     const Tensor shown = batch_of(pictures), moments = encode_moments(state_->autoencoder, config, shown);
     const Tensor mean = moments.narrow(1, 0, config.latent_channels),
                  log_variance = moments.narrow(1, config.latent_channels, config.latent_channels);
-    const Tensor noise = normal_like(mean, state_->random(Purpose::autoencoder, state_->autoencoder_steps));
-    const Tensor off = decode_latents(state_->autoencoder, config, sample_latents(config, moments, noise)) - shown;
+    Rng rng = state_->random(Purpose::autoencoder, state_->autoencoder_steps);
+    const Tensor off = decode_latents(state_->autoencoder, config, sample_latents(config, moments, rng)) - shown;
     const Tensor absolute = off.abs().mean(), squares = off.pow(2).mean();
     const Tensor divergence = (mean.pow(2) + log_variance.exp() - log_variance - 1).mean() * 0.5;
     // Squares, whose gradients vanish where a picture is nearly right, are what PSNR asks for; absolutes sharpen edges.
@@ -281,10 +274,7 @@ Result<AutoencoderLoss> Pretraining::autoencoder_step(std::span<const scene::Ima
 Result<scene::Image> Pretraining::through_autoencoder(const scene::Image& picture) const {
   return guarded("pretraining", [&]() -> Result<scene::Image> {
     const at::NoGradGuard no_gradients;
-    const weights::AutoencoderConfig& config = state_->configs.autoencoder;
-    const Tensor moments = encode_moments(state_->autoencoder, config, as_tensor(picture));
-    const Tensor latents = moments.narrow(1, 0, config.latent_channels) * config.scaling_factor;
-    return as_picture(decode_latents(state_->autoencoder, config, latents));
+    return as_picture(there_and_back(state_->autoencoder, state_->configs.autoencoder, as_tensor(picture)));
   });
 }
 

@@ -3,11 +3,9 @@
 #include <ATen/Parallel.h>
 #include <ATen/core/Tensor.h>
 #include <ATen/core/grad_mode.h>
-#include <ATen/ops/empty.h>
 #include <ATen/ops/full.h>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstring>
@@ -207,12 +205,8 @@ Result<void> StableDiffusionRepainter::fine_tune(std::span<const correct::Histor
         const Tensor& moments = moments_of(drawn, whole);
         const Tensor timestep =
             at::full({1}, std::int64_t(rng.below(std::uint32_t(configs.noise.training_steps))), at::kLong);
-        const std::array<std::int64_t, 4> shape{1, configs.autoencoder.latent_channels, moments.size(2),
-                                                moments.size(3)};
-        Tensor of_latents = at::empty(shape, at::kFloat), noise = at::empty(shape, at::kFloat);
-        for (Tensor* normal : {&of_latents, &noise})
-          for (float& value : numbers_of(*normal)) value = rng.normal();
-        const Tensor latents = sample_latents(configs.autoencoder, moments, of_latents);
+        const Tensor latents = sample_latents(configs.autoencoder, moments, rng);
+        const Tensor noise = normal_numbers(latents.sizes(), rng);
         const auto added = add_gradient(unet, configs, {&latents, &noise, &timestep, &*context}, 1.0 / options_.batch);
         if (!added) return propagate(added);
         loss += *added / options_.batch;

@@ -29,7 +29,8 @@ namespace {
 enum class Stream : std::uint64_t { latents, first_noise, later_noise };
 
 void fill_normal(std::span<float> values, std::uint64_t seed, Stream stream, std::uint64_t call = 0) {
-  diffusion::fill_normal(values, Rng(seed, std::uint64_t(stream) + call));
+  Rng rng(seed, std::uint64_t(stream) + call);
+  diffusion::fill_normal(values, rng);
 }
 
 }  // namespace
@@ -114,11 +115,8 @@ Result<scene::Image> StableDiffusion::through_autoencoder(const scene::Image& pi
   if (const auto checked = check(picture); !checked) return propagate(checked);
   return guarded("repaint", [&]() -> Result<scene::Image> {
     const at::NoGradGuard no_gradients;
-    const weights::AutoencoderConfig& config = networks_->configs.autoencoder;
     const Model autoencoder{.parameters = networks_->autoencoder};
-    const Tensor moments = encode_moments(autoencoder, config, as_tensor(picture));
-    const Tensor means = moments.narrow(1, 0, config.latent_channels) * config.scaling_factor;
-    return as_picture(decode_latents(autoencoder, config, means));
+    return as_picture(there_and_back(autoencoder, networks_->configs.autoencoder, as_tensor(picture)));
   });
 }
 
