@@ -26,6 +26,9 @@ struct BorderChoice {
   bool beyond = false;
   /// The walk leaked: its potentials say what is outside without a click there.
   bool leaks = false;
+  /// 0 or more: costs count times what a level encloses, as a share of all, to this power. Whoever clicks here and
+  /// there on a thing would, on a larger one, have clicked elsewhere as well.
+  double smallness = 0;
 };
 
 /// A border, and what is within.
@@ -45,14 +48,16 @@ struct NaturalBorder {
 /// their size: an edge by its width, the geometric mean of its ends' spacings, for a border, and by the square of it
 /// for what is enclosed, as on a surface: a wall's few large Gaussians are much, and their long border is no short one.
 /// Where there are clicks on both sides, or the walk leaked, levels near one half are preferred a little: it decides
-/// where nothing else does. Where nothing is given for the outside and the walk did not leak, all that can be reached
-/// is inside. Farther out and in there are other borders: levels that are joined more weakly than any that enclose
-/// somewhat more or less.
+/// where nothing else does; smaller ones, as much as is asked for. Where nothing is given for the outside and the walk
+/// did not leak, all that can be reached is inside. Farther out and in there are other borders: levels that are joined
+/// more weakly than any that enclose somewhat more or less.
 ///   weight     [edges] 0 or more, the same both ways
 ///   potential  [nodes] of random_walk()
 ///   given      [nodes]; clicked nodes are given for their side
 /// Source: sweeps over level sets, Andersen, Chung and Lang 2006, "Local graph partitioning using PageRank vectors";
-/// the ratio, and that outside pieces count alike, are ours.
+/// that examples speak for the smallest set that holds them, the more of them the more, Tenenbaum and Griffiths 2001,
+/// "Generalization, similarity, and Bayesian inference" (the size principle; theirs is the power of their number); the
+/// ratio, and that outside pieces count alike, are ours.
 [[nodiscard]] NaturalBorder natural_border(const neighbours::NeighbourGraph& graph, std::span<const float> weight,
                                            std::span<const double> potential, std::span<const Given> given,
                                            const ClickedNodes& clicked, const BorderChoice& choice = {});

@@ -101,6 +101,7 @@ class Neighbourhood {
     std::vector<Given> given;  ///< [nodes]
     ClickedNodes clicked;      ///< The node that each point is on, where no point of the other side has it.
     std::vector<float> leak;   ///< [nodes] Of the walk, by the points alone, not by far ends; empty: none.
+    double smallness = 0;      ///< BorderChoice::smallness, by the points alone.
   };
   struct FarEnds {
     std::vector<double> squared;  ///< [n] Distance of each node from the nearest of so many clicks.

@@ -1,5 +1,6 @@
 // Growing on trained captures from the few clicks that a person makes. Nobody knows the rows of their things: the
-// counts are of selections that were looked at in several views. leak_at_extent was chosen on the doll.
+// counts are of selections that were looked at in several views. leak_at_extent was chosen on the doll, and so was how
+// much smaller things are preferred.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -49,6 +50,19 @@ TEST(GrowOnTheDoll, LeavesTheBedThatItSitsOn) {
   const std::size_t doll = grown(file, {{face, left_sleeve, right_sleeve}, {}, {}});
   EXPECT_GT(doll, 20000u) << "of about 26,000";
   EXPECT_LT(doll, 28000u) << "not the quilt and half of the wall (54,000)";
+}
+
+TEST(GrowOnTheDoll, TakesNoMoreThanThatTheMoreIsClickedOn) {
+  const auto file = support::data_dir() / "plush" / "point_cloud.ply";
+  REQUIRE_SHARED(file);
+  const DVec3 hair(-1.13, 0.44, 2.21), left_sleeve(-1.24, 1.40, 3.08), right_tail(0.01, 1.43, 2.58),
+      left_shoe(-1.60, 2.24, 2.72), right_shoe(-0.38, 2.30, 2.45), right_tip(0.59, 1.92, 2.39),
+      left_tail(-2.17, 1.65, 3.42), hat(0.00, -0.43, 2.54);
+  Grow whole{{hair, left_sleeve, right_tail, left_shoe, right_shoe, right_tip, left_tail, hat}, {}, {}};
+  whole.whole = true;
+  const std::size_t doll = grown(file, whole);
+  EXPECT_GT(doll, 20000u) << "of about 26,000";
+  EXPECT_LT(doll, 28000u) << "not most of the quilt and the wall (60,000)";
 }
 
 }  // namespace

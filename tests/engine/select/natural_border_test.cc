@@ -60,6 +60,20 @@ TEST(NaturalBorder, IsTheWeakerOneThoughItEndsASmallerPiece) {
   EXPECT_EQ(inside(three_strips(0.05f, 0.4f), {{10}, {1190}}), numbers(0, 200));
 }
 
+TEST(NaturalBorder, IsTheOneThatEndsASmallerPieceWhereThatIsAskedForAndCostsAreAlike) {
+  const WeightedGraph alike = three_strips(0.05f, 0.3f), far_weaker = three_strips(0.5f, 0.05f);
+  EXPECT_EQ(inside(alike, {{10}, {1190}}), numbers(0, 400));
+  EXPECT_EQ(inside(alike, {{10}, {1190}}, {.smallness = 0.2}), numbers(0, 200));
+  EXPECT_EQ(inside(far_weaker, {{10}, {1190}}, {.smallness = 0.4}), numbers(0, 400));
+  EXPECT_EQ(inside(alike, {{10, 310}, {1190}}, {.smallness = 0.4}), numbers(0, 400)) << "all clicks are inside";
+}
+
+TEST(NaturalBorder, OfTheWholeIsNotSoFarOutWhereSmallerPiecesAreAskedFor) {
+  const WeightedGraph two = three_strips(0.05f, 0.5f);
+  EXPECT_EQ(inside(two, {{10}, {1190}}, {.whole = true}), numbers(0, 400));
+  EXPECT_EQ(inside(two, {{10}, {1190}}, {.whole = true, .smallness = 0.4}), numbers(0, 200));
+}
+
 TEST(NaturalBorder, IsTheOneBeyondAllThatIsClickedOn) {
   EXPECT_EQ(inside(three_strips(0.05f, 0.1f), {{10, 310}, {1190}}), numbers(0, 400))
       << "who clicks on two pieces means one thing";
