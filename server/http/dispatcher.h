@@ -64,6 +64,7 @@ struct CheckedRequest {
   std::optional<Refusal> refusal;
   RouteMatch match;
   std::map<std::string, std::string, std::less<>> query;
+  TokenPtr token;  ///< Of whoever makes it; null where none is needed or none was found.
 };
 
 /// Safe to call from any thread. The guard and the logger outlive it.
@@ -92,6 +93,9 @@ class Dispatcher {
  private:
   [[nodiscard]] tl::expected<void, Refusal> check_into(CheckedRequest& request, const RequestHead& head,
                                                        const std::string& client) const;
+  /// Whose request it is, and whether they may make requests at all.
+  [[nodiscard]] tl::expected<void, Refusal> check_token(CheckedRequest& request, const RequestHead& head,
+                                                        const std::string& client) const;
   [[nodiscard]] tl::expected<void, Refusal> check_body(const RequestHead& head, const Route& route) const;
   [[nodiscard]] Result<Reply> handle(const CheckedRequest& request, const RequestHead& head,
                                      const std::string& request_id, Connection& connection, FormReader& form) const;
