@@ -138,7 +138,10 @@ tl::expected<void, Refusal> Dispatcher::check_into(CheckedRequest& request, cons
   if (segments) request.match = routes_.find(head.method, *segments);
   const Route* const route = request.match.route;
   // Whoever has no token learns nothing about routes but those that are open to all.
-  if (auto known = check_token(request, head, client); !known) return known;
+  if (auto known = check_token(request, head, client); !known) {
+    request.is_audited = true;
+    return known;
+  }
   if (!segments) return tl::make_unexpected(refusal_of(segments.error()));
   if (route == nullptr && !request.match.allow.empty())
     return refuse(405, "method_not_allowed", "this address takes " + request.match.allow);
@@ -151,9 +154,13 @@ tl::expected<void, Refusal> Dispatcher::check_into(CheckedRequest& request, cons
     if (!request.query.emplace(name, value).second)
       return refuse(400, "invalid_argument", "this query parameter is given twice", name);
   }
-  if (const auto scope = scope_of(request))
-    if (auto refusal = AccessGuard::check_scope(request.token.get(), *scope))
+  const auto scope = scope_of(request);
+  request.is_audited = route->method != "GET" && scope != Scope::read;
+  if (scope)
+    if (auto refusal = AccessGuard::check_scope(request.token.get(), *scope)) {
+      request.is_audited = true;
       return tl::make_unexpected(std::move(*refusal));
+    }
   return check_body(head, *route);
 }
 
@@ -248,6 +255,7 @@ tl::expected<void, Refusal> Dispatcher::fill_with_file(Answer& answer, const Rep
 tl::expected<void, Refusal> Dispatcher::fill(Answer& answer, Reply reply, const RequestHead& head) {
   for (auto& [name, value] : reply.headers) answer.headers.emplace_back(name, header_value(std::move(value)));
   answer.status = reply.status;
+  answer.about = std::move(reply.about);
   answer.hold = std::move(reply.hold);
   const bool plain = !reply.file && !reply.events;
   if (reply.etag.empty() && head.only_reads() && reply.status == 200 && plain && reply.media_type == "application/json")

@@ -97,6 +97,9 @@ struct Reply {
   /// against the limit of streams (busy).
   std::function<void(EventSink&)> events;
 
+  /// What the audit log says of it beside what its path and Location name: "scene" and "s000001".
+  std::vector<std::pair<std::string, std::string>> about = {};
+
   [[nodiscard]] static Reply json(std::string text, int status = 200);
   [[nodiscard]] static Reply not_modified(std::string etag);
   [[nodiscard]] static Reply no_content();

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <fstream>
 #include <map>
+#include <memory>
 #include <thread>
 #include <utility>
 
@@ -112,6 +113,14 @@ void reload_tokens(const std::filesystem::path& file, http::AccessGuard& guard, 
   const auto count = std::int64_t(tokens->size());
   guard.replace_tokens(std::move(*tokens));
   http::log(logger, spdlog::level::info, "tokens have been read again", {{"tokens", count}});
+}
+
+void reopen(http::AuditLog& audit, spdlog::logger& logger) {
+  if (const auto reopened = audit.reopen(); !reopened)
+    http::log(logger, spdlog::level::err, "the audit log goes on in the old file: " + reopened.error().message,
+              {{"where", reopened.error().where}});
+  else
+    http::log(logger, spdlog::level::info, "the audit log has been opened again");
 }
 
 void observe_edit(http::Metrics& metrics, const std::vector<proto::StageSeconds>& timings) {
@@ -223,6 +232,15 @@ Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& lo
                             ? routes::worker_routes(metrics, trouble)
                             : routes::all_routes({**scenes, **edits, selections, options.edit_limits, renders, views,
                                                   guard, metrics, service_info(options, models), trouble});
+  std::unique_ptr<http::AuditLog> audit;
+  if (!options.audit_log.empty()) {
+    auto opened = http::AuditLog::open(options.audit_log, logger);
+    if (!opened) return propagate(opened);
+    audit = std::move(*opened);
+    metrics.add_gauge("splatdrag_audit_lines_lost", "Lines of the audit log that could not be written.",
+                      [&audit] { return double(audit->lost()); });
+    options.http.audit = audit.get();
+  }
   auto server = http::HttpServer::start(options.http, std::move(router), guard, metrics, logger);
   if (!server) return propagate(server);
   out << "splatdrag " << SPLATDRAG_VERSION << " is listening on " << (*server)->url() << '\n' << std::flush;
@@ -234,7 +252,10 @@ Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& lo
              {"role", std::string(engine::name_of(options.edits.role))},
              {"data_dir", options.data_dir.string()}});
   std::string signal = signals.wait();
-  for (; signal == "SIGHUP"; signal = signals.wait()) reload_tokens(options.token_file, guard, logger);
+  for (; signal == "SIGHUP"; signal = signals.wait()) {
+    if (!options.token_file.empty()) reload_tokens(options.token_file, guard, logger);
+    if (audit != nullptr) reopen(*audit, logger);
+  }
   http::log(logger, spdlog::level::info, "stopping", {{"signal", signal}});
   readiness.end();
   // Whoever sends requests here has time to hear of it; what is on its way, such as downloads, has it, too.

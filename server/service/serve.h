@@ -22,6 +22,7 @@ namespace server::service {
 struct ServeOptions {
   std::filesystem::path data_dir;    ///< Exists. Scenes and edits get a folder of their own in it.
   std::filesystem::path token_file;  ///< As read_tokens() takes it. Empty: no token is needed.
+  std::filesystem::path audit_log;   ///< Where it is written (http::AuditLog). Empty: nowhere.
   bool insecure = false;             ///< Lets other machines in without a token.
   int drain_seconds = 30;            ///< Time that a running edit gets to finish its interval.
   int unready_seconds = 0;           ///< Time between a signal to end and the end of taking requests.

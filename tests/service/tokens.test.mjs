@@ -1,6 +1,6 @@
 // A service with several tokens: what each of them may do, and what becomes of them when the file is another.
 import assert from 'node:assert/strict';
-import { writeFile } from 'node:fs/promises';
+import { readFile, rename, writeFile } from 'node:fs/promises';
 import path from 'node:path';
 import { after, before, describe, test } from 'node:test';
 import { setTimeout as sleep } from 'node:timers/promises';
@@ -14,18 +14,22 @@ const scopes = { viewer: 'read', studio: 'edit', scraper: 'admin', boss: 'edit,a
 const has = (name, scope) => scopes[name].split(',').some((one) => one === scope || (one === 'edit' && scope === 'read'));
 const lines = (names) => `# name scopes secret\n${names.map((name) => `${name}\t${scopes[name]}  ${secrets[name]}\n`).join('')}`;
 
-let service, file;
+let service, file, audit;
 const as = {};
 before(async () => {
   file = path.join(temporaryFolder(), 'tokens');
   await writeFile(file, lines(Object.keys(secrets)), { mode: 0o600 });
-  service = await Service.start({ args: ['--token-file', file], token: secrets.boss });
+  audit = path.join(temporaryFolder(), 'audit.jsonl');
+  service = await Service.start({ args: ['--token-file', file, '--audit-log', audit], token: secrets.boss });
   for (const name of Object.keys(secrets)) as[name] = new Client(service.url, { token: secrets[name] });
 });
 after(async () => {
   for (const client of Object.values(as)) client.close();
   await service?.stop();
 });
+
+/// What the audit log says, as objects.
+const audited = async (of = audit) => (await readFile(of, 'utf8')).split('\n').filter(Boolean).map((line) => JSON.parse(line));
 
 /// The one scope that the contract asks of a token for an operation; none: any token will do, or none.
 const needed = ({ operation }) => (operation.security ?? [{ bearer: ['read'] }]).flatMap((one) => one.bearer ?? [])[0];
@@ -106,7 +110,36 @@ describe('with a scene', () => {
     page.close();
   });
 
-  test('no secret is in the log', () => {
-    for (const secret of Object.values(secrets)) assert.ok(!service.log.includes(secret));
+  test('the audit log says who changed what, and who was not let in', async () => {
+    const found = await audited();
+    const one = (wanted) => found.filter((line) => Object.entries(wanted).every(([name, value]) => line[name] === value));
+    const [upload] = one({ token: 'studio', route: '/v1/scenes', status: 201 });
+    assert.equal(upload.scene, scene);
+    assert.equal(upload.address, '127.0.0.1');
+    assert.ok(upload.request_id);
+    const [submitted] = one({ token: 'studio', route: '/v1/edits', status: 202 });
+    assert.equal(submitted.scene, scene);
+    assert.match(submitted.edit, /^e\d{6}$/);
+    assert.equal(one({ token: 'studio', method: 'PATCH', route: '/v1/scenes/{id}', scene, status: 200 }).length, 1);
+    assert.equal(one({ token: 'viewer', method: 'DELETE', scene, status: 403, refused: 'forbidden' }).length, 1);
+    assert.equal(one({ token: 'viewer', route: '/v1/session', status: 204 }).length, 1);
+    assert.ok(one({ token: null, status: 401, refused: 'unauthorized' }).length >= 4);
+    assert.deepEqual(one({ route: '/v1/previews', status: 200 }), [], 'a preview changes nothing');
+    assert.deepEqual(found.filter(({ method, status }) => method === 'GET' && status < 400), []);
+  });
+
+  test('the audit log goes on in a new file after SIGHUP', async () => {
+    await rename(audit, `${audit}.1`);
+    const before = service.log.length;
+    service.process.kill('SIGHUP');
+    for (let i = 0; i < 200 && !service.log.slice(before).includes('has been opened again'); ++i) await sleep(20);
+    await as.boss.delete(`/v1/scenes/${scene}`);
+    const [line, ...more] = await audited();
+    assert.deepEqual([line.token, line.method, line.scene, line.status, more.length], ['boss', 'DELETE', scene, 204, 0]);
+  });
+
+  test('no secret is in either log', async () => {
+    const all = service.log + (await readFile(audit, 'utf8')) + (await readFile(`${audit}.1`, 'utf8'));
+    for (const secret of Object.values(secrets)) assert.ok(!all.includes(secret));
   });
 });

@@ -125,6 +125,7 @@ Result<Reply> post_edit(const Call& call, EditService& service, const EditLimits
   Reply reply = Reply::json(proto::to_json(submission->status), 202);
   reply.headers.emplace_back("Location", "/v1/edits/" + submission->status.id);
   reply.headers.emplace_back("Retry-After", "1");
+  reply.about = {{"scene", submission->status.scene}};
   if (!submission->created) reply.headers.emplace_back("Idempotent-Replayed", "true");
   return reply;
 }
