@@ -29,7 +29,8 @@ struct ServeCommandOptions : ServeOptions {
 };
 
 Result<void> run(const ServeCommandOptions& given, Terminal& terminal) {
-  service::EndSignals signals(/*hangup=*/!given.token_file.empty());  // before any thread is started
+  service::EndSignals signals(/*hangup=*/!given.token_file.empty() ||
+                              !given.audit_log.empty());  // before any thread is started
   ServeOptions options = given;
   options.edits.role = engine::value_named<edits::Role>(given.role).value_or(edits::Role::all);
   if (const auto checked = service::check_role(options); !checked) return checked;
@@ -37,7 +38,7 @@ Result<void> run(const ServeCommandOptions& given, Terminal& terminal) {
   const auto logger = http::make_logger(terminal.err, given.log_level, format);
   if (!logger) return propagate(logger);
   const http::LibraryMessages messages(**logger);
-  if (const auto checked = service::check_token(options, **logger); !checked) return checked;
+  if (const auto checked = service::check_tokens(options, **logger); !checked) return checked;
   options.threads = given.compute.threads;
   const auto computing = compute(given.compute, [&](const Machine& machine) -> Result<void> {
     options.threads_here = machine.threads;
@@ -190,8 +191,15 @@ void add_serve_command(CLI::App& program, Action& action) {
   command
       ->add_option(
           "--token-file", options->token_file,
-          "File with a token that every request must carry (\"Authorization: Bearer ...\"); SIGHUP has it read "
-          "again")
+          "File with the token that every request must carry (\"Authorization: Bearer ...\"): one word; or with "
+          "several, a line for each: a name, its scopes (read, edit, admin, with commas between several), the secret. "
+          "SIGHUP has it read again")
+      ->type_name("FILE");
+  command
+      ->add_option(
+          "--audit-log", options->audit_log,
+          "File to which a line of JSON is appended for each request that changes something, and for each that "
+          "is refused for its token; SIGHUP has it opened again")
       ->type_name("FILE");
   command->add_flag("--insecure", options->insecure, "Listen to other machines without a token");
   add_count(*command, "--drain-seconds", options->drain_seconds,

@@ -43,6 +43,10 @@ std::string random_id() {
   return text;
 }
 
+AccessGuard::AccessGuard(AccessOptions options) : options_(std::move(options)), brake_(options_.guesses) {
+  replace_tokens(options_.tokens);
+}
+
 void AccessGuard::bound_to(const std::string& host, int port) {
   const std::string bracketed = host.find(':') == std::string::npos ? host : "[" + host + "]";
   for (const std::string& name :
@@ -93,34 +97,66 @@ std::optional<Refusal> AccessGuard::check_origin(const RequestHead& head) const 
   return std::nullopt;
 }
 
-bool AccessGuard::is_token(std::string_view given) const {
+TokenPtr AccessGuard::token_of_secret(std::string_view secret) const {
   const std::lock_guard lock(mutex_);
-  return needs_token() && same_secret(given, token_);
+  TokenPtr found;
+  for (const TokenPtr& token : tokens_)  // all of them: which one it is does not show in the time either
+    if (same_secret(secret, token->secret)) found = token;
+  return found;
 }
 
-std::optional<Refusal> AccessGuard::check_token(std::string_view authorization, const std::string& client) const {
-  const Refusal wanted{401, "unauthorized", "this service wants its token: \"Authorization: Bearer ...\"", ""};
+tl::expected<TokenPtr, Refusal> AccessGuard::check_token(std::string_view authorization,
+                                                         const std::string& client) const {
+  if (!needs_token()) return nullptr;
+  const Refusal wanted{401, "unauthorized", "this service wants a token: \"Authorization: Bearer ...\"", ""};
   constexpr std::string_view scheme = "bearer ";
   if (authorization.size() < scheme.size() || !same_ignoring_case(authorization.substr(0, scheme.size()), scheme))
-    return wanted;
+    return tl::make_unexpected(wanted);
   if (const auto seconds = brake_.must_wait(client))
-    return Refusal{429, "busy",
-                   "too many wrong tokens came from your address: try again in " + std::to_string(*seconds) + " s", "",
-                   *seconds};
+    return tl::make_unexpected(Refusal{
+        429, "busy", "too many wrong tokens came from your address: try again in " + std::to_string(*seconds) + " s",
+        "", *seconds});
   const std::string given(trim(authorization.substr(scheme.size())));
-  if (is_token(given)) {
+  if (TokenPtr token = token_of_secret(given)) {
     brake_.forget(client);
-    return std::nullopt;
+    return token;
   }
   brake_.count_wrong(client, given);
-  return wanted;
+  return tl::make_unexpected(wanted);
 }
 
-void AccessGuard::replace_token(std::string token) {
+std::optional<Refusal> AccessGuard::check_scope(const Token* token, Scope scope) {
+  if (token == nullptr || token->may(scope)) return std::nullopt;
+  const std::string name(engine::name_of(scope));
+  Refusal refusal{403, "forbidden",
+                  "token \"" + token->name + "\" may not " +
+                      (scope == Scope::admin ? "do what is for operators" : name) + ": it lacks the scope " + name,
+                  ""};
+  refusal.scope = name;
+  return refusal;
+}
+
+bool AccessGuard::still_knows(const Token* token) const {
+  if (token == nullptr) return true;
   const std::lock_guard lock(mutex_);
-  if (token == token_) return;
-  token_ = std::move(token);
-  sessions_.clear();
+  return std::ranges::any_of(tokens_, [&](const TokenPtr& known) { return known->may_the_same_as(*token); });
+}
+
+void AccessGuard::replace_tokens(std::vector<Token> tokens) {
+  const std::lock_guard lock(mutex_);
+  tokens_.clear();
+  for (Token& token : tokens) tokens_.push_back(std::make_shared<const Token>(std::move(token)));
+  for (auto session = sessions_.begin(); session != sessions_.end();) {
+    const auto same = std::ranges::find_if(tokens_, [&](const TokenPtr& token) {  //
+      return token->may_the_same_as(*session->second.token);
+    });
+    if (same == tokens_.end()) {
+      session = sessions_.erase(session);
+    } else {
+      session->second.token = *same;
+      ++session;
+    }
+  }
 }
 
 std::string AccessGuard::address_of(const std::string& peer, std::string_view forwarded_for) const {
@@ -135,29 +171,29 @@ bool AccessGuard::is_secure(std::string_view forwarded_proto) const {
   return options_.trust_proxy && !names.empty() && same_ignoring_case(names.back(), "https");
 }
 
-bool AccessGuard::has_session(std::string_view cookies) const {
+TokenPtr AccessGuard::token_of_session(std::string_view cookies) const {
   const std::string secret = cookie_in(cookies);
-  if (secret.empty()) return false;
+  if (secret.empty()) return nullptr;
   const std::lock_guard lock(mutex_);
-  bool found = false;
-  for (const auto& [known, opened] : sessions_)
-    if (same_secret(secret, known) && Clock::now() - opened < options_.session_lifetime) found = true;
+  TokenPtr found;
+  for (const auto& [known, session] : sessions_)
+    if (same_secret(secret, known) && Clock::now() - session.opened < options_.session_lifetime) found = session.token;
   return found;
 }
 
-std::optional<Refusal> AccessGuard::check_access(const RequestHead& head, const std::string& client) const {
-  if (!needs_token() || has_session(head.header("cookie"))) return std::nullopt;
+tl::expected<TokenPtr, Refusal> AccessGuard::check_access(const RequestHead& head, const std::string& client) const {
+  if (!needs_token()) return nullptr;
+  if (TokenPtr token = token_of_session(head.header("cookie"))) return token;
   return check_token(head.header("authorization"), client);
 }
 
-std::string AccessGuard::open_session() {
+std::string AccessGuard::open_session(TokenPtr token) {
   const std::string secret = random_id();
   const std::lock_guard lock(mutex_);
-  std::erase_if(sessions_, [&](const auto& s) { return Clock::now() - s.second >= options_.session_lifetime; });
+  std::erase_if(sessions_, [&](const auto& s) { return Clock::now() - s.second.opened >= options_.session_lifetime; });
   while (!sessions_.empty() && sessions_.size() >= options_.max_sessions)
-    sessions_.erase(std::min_element(sessions_.begin(), sessions_.end(),
-                                     [](const auto& a, const auto& b) { return a.second < b.second; }));
-  sessions_[secret] = Clock::now();
+    sessions_.erase(std::ranges::min_element(sessions_, {}, [](const auto& s) { return s.second.opened; }));
+  sessions_[secret] = {Clock::now(), std::move(token)};
   return secret;
 }
 

@@ -1,4 +1,4 @@
-// Who may speak to the service: which Host, from which Origin, with which token or session.
+// Who may speak to the service: which Host, from which Origin, with which token or session, and what they may do.
 #pragma once
 
 #include <chrono>
@@ -8,16 +8,18 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <tl/expected.hpp>
 #include <vector>
 
 #include "server/http/guess_brake.h"
 #include "server/http/request_head.h"
+#include "server/http/token.h"
 
 namespace server::http {
 
 /// Who is let in.
 struct AccessOptions {
-  std::string token;  ///< Secret that clients must send; empty: none is needed.
+  std::vector<Token> tokens;  ///< Of which clients must send one, all different; empty: none is needed.
   std::vector<std::string>
       allowed_hosts;  ///< Names beside the bound host and the loopback ones: "name" or "name:port".
   std::vector<std::string> allowed_origins;              ///< Origins beside the service's own: "https://example.org".
@@ -32,8 +34,7 @@ struct AccessOptions {
 /// Safe to call from any thread.
 class AccessGuard {
  public:
-  explicit AccessGuard(AccessOptions options)
-      : options_(std::move(options)), token_(options_.token), brake_(options_.guesses) {}
+  explicit AccessGuard(AccessOptions options);
 
   /// Tells the guard which names the service goes by; called once, before the first request.
   void bound_to(const std::string& host, int port);
@@ -43,17 +44,26 @@ class AccessGuard {
   ///   returns  a refusal: 421 misdirected_request, 403 forbidden
   [[nodiscard]] std::optional<Refusal> check_origin(const RequestHead& head) const;
 
-  [[nodiscard]] bool needs_token() const { return !options_.token.empty(); }
-  /// Whether a request carries the token. Takes the same time wherever the two differ. Wrong ones are counted by the
-  /// client's address; after a few, none is looked at for a while.
+  [[nodiscard]] bool needs_token() const { return !options_.tokens.empty(); }
+  /// The token that a request carries; null where none is needed. What it carries is held against all tokens, and takes
+  /// the same time wherever they differ. Wrong ones are counted by the client's address; after a few, none is looked at
+  /// for a while.
   ///   authorization  header
   ///   client         address_of() the request
-  ///   returns        a refusal: 401 unauthorized, 429 busy
-  [[nodiscard]] std::optional<Refusal> check_token(std::string_view authorization, const std::string& client) const;
-  /// Whether a request carries the token or a session's cookie, or needs neither. As check_token().
-  [[nodiscard]] std::optional<Refusal> check_access(const RequestHead& head, const std::string& client) const;
-  /// Replaces the token by another one, neither empty; sessions that were opened with the old one end.
-  void replace_token(std::string token);
+  ///   returns        or a refusal: 401 unauthorized, 429 busy
+  [[nodiscard]] tl::expected<TokenPtr, Refusal> check_token(std::string_view authorization,
+                                                            const std::string& client) const;
+  /// The token that a request carries, or that of the session whose cookie it carries. As check_token().
+  [[nodiscard]] tl::expected<TokenPtr, Refusal> check_access(const RequestHead& head, const std::string& client) const;
+  /// Whether whoever has this token, of which none is needed if it is null, may do that.
+  ///   returns  a refusal: 403 forbidden, which names the token and what it lacks
+  [[nodiscard]] static std::optional<Refusal> check_scope(const Token* token, Scope scope);
+  /// Whether this token, of which none is needed if it is null, still is one: as it was, but for what a session may
+  /// outlive.
+  [[nodiscard]] bool still_knows(const Token* token) const;
+  /// Replaces all tokens by others, neither none. Sessions end that were opened with a token that is gone, or has
+  /// another name, secret or scope.
+  void replace_tokens(std::vector<Token> tokens);
 
   [[nodiscard]] bool trusts_proxy() const { return options_.trust_proxy; }
   /// The address of the client: that of its connection, or what a trusted proxy says it is.
@@ -64,9 +74,11 @@ class AccessGuard {
   ///   forwarded_proto  header X-Forwarded-Proto
   [[nodiscard]] bool is_secure(std::string_view forwarded_proto) const;
 
-  /// A new session.
+  /// A new session, which may do what its token may.
   ///   returns  its secret, for the cookie
-  [[nodiscard]] std::string open_session();
+  [[nodiscard]] std::string open_session(TokenPtr token);
+  /// The token of the session that a Cookie header names; null: it names none.
+  [[nodiscard]] TokenPtr token_of_session(std::string_view cookies) const;
   /// Ends the session that a Cookie header names, if it does.
   void close_session(std::string_view cookies);
 
@@ -76,14 +88,17 @@ class AccessGuard {
   using Clock = std::chrono::steady_clock;
 
   [[nodiscard]] bool is_own_host(std::string_view host) const;
-  [[nodiscard]] bool has_session(std::string_view cookies) const;
-  [[nodiscard]] bool is_token(std::string_view given) const;
+  [[nodiscard]] TokenPtr token_of_secret(std::string_view secret) const;
 
   const AccessOptions options_;
   std::vector<std::string> own_hosts_;
-  mutable std::mutex mutex_;  ///< Guards token_ and sessions_.
-  std::string token_;
-  std::map<std::string, Clock::time_point> sessions_;  ///< Time of opening by secret.
+  struct Session {
+    Clock::time_point opened;
+    TokenPtr token;
+  };
+  mutable std::mutex mutex_;  ///< Guards tokens_ and sessions_.
+  std::vector<TokenPtr> tokens_;
+  std::map<std::string, Session> sessions_;  ///< By secret.
   mutable GuessBrake brake_;
 };
 

@@ -137,6 +137,26 @@ std::string counted_method(const std::string& method) {
   return "other";
 }
 
+/// What the audit log says of a request that has its answer.
+proto::AuditEntry audit_entry(const Visit& visit) {
+  const Answer& answer = visit.answer;
+  const CheckedRequest& checked = *visit.checked;
+  proto::AuditEntry entry{.time = std::chrono::floor<std::chrono::milliseconds>(std::chrono::system_clock::now()),
+                          .request_id = visit.request_id,
+                          .token = checked.token == nullptr ? "" : checked.token->name,
+                          .address = visit.client,
+                          .method = counted_method(visit.head.method),
+                          .route = answer.route,
+                          .about = things_named(checked.match),
+                          .status = answer.status,
+                          .refusal = answer.refusal};
+  for (const auto& [name, value] : answer.headers)
+    if (name == "Location")
+      if (auto made = thing_at_end(value)) entry.about.push_back(std::move(*made));
+  entry.about.insert(entry.about.end(), answer.about.begin(), answer.about.end());
+  return entry;
+}
+
 void report(const Visit& visit, const std::string& id, const std::string& method, const std::string& route, int status,
             Metrics& metrics, spdlog::logger& logger) {
   const double seconds = std::chrono::duration<double>(Clock::now() - visit.arrived).count();
@@ -261,6 +281,7 @@ class Answerer final : private httplib::Server {
     visit.answer = parts_.dispatcher.answer(*visit.checked, visit.head, visit.request_id, connection, form_);
     form_.set(nullptr);
     Answer& answer = visit.answer;
+    if (visit.checked->is_audited && parts_.audit != nullptr) parts_.audit->write(audit_entry(visit));
     // The next request begins where this body ends. If that is far, the connection ends instead; and nobody waits for a
     // body to tell that it is not wanted.
     const bool refused = answer.status >= 400, last = visit.requests >= parts_.max_requests;

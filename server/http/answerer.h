@@ -5,6 +5,7 @@
 
 #include <chrono>
 
+#include "server/http/audit_log.h"
 #include "server/http/dispatcher.h"
 #include "server/http/metrics.h"
 #include "server/http/visit.h"
@@ -20,6 +21,7 @@ struct AnswererParts {
   Workers& workers;
   Metrics& metrics;
   spdlog::logger& logger;
+  AuditLog* audit = nullptr;  ///< Null: there is none.
 };
 
 /// What one worker serves visits with. Whatever happens to a visit, its `next` says how it goes on.

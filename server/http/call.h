@@ -34,11 +34,12 @@ class HttpCall final : public Call {
     Connection& connection;
     FormReader& form;
     std::uint64_t max_upload_bytes;
+    TokenPtr token;
   };
   explicit HttpCall(Fields fields) : fields_(std::move(fields)) {}
 
   [[nodiscard]] const std::string& request_id() const override { return fields_.request_id; }
-  [[nodiscard]] std::string peer() const override { return fields_.connection.client(); }
+  [[nodiscard]] TokenPtr token() const override { return fields_.token; }
   [[nodiscard]] const std::string& path(std::string_view name) const override;
   [[nodiscard]] std::optional<std::string> query(std::string_view name) const override;
   [[nodiscard]] std::string header(std::string_view name) const override;

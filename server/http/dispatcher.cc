@@ -58,6 +58,43 @@ bool names_other_charset(const std::string& content_type) {
   });
 }
 
+/// A stream that ends with the token of whoever listens.
+class GuardedSink final : public EventSink {
+ public:
+  GuardedSink(EventSink& sink, const AccessGuard& guard, TokenPtr token)
+      : sink_(sink), guard_(guard), token_(std::move(token)) {}
+
+  bool send(std::string_view event, std::string_view id, std::string_view data) override {
+    return guard_.still_knows(token_.get()) && sink_.send(event, id, data);
+  }
+  bool keep_alive() override { return guard_.still_knows(token_.get()) && sink_.keep_alive(); }
+  [[nodiscard]] bool open() const override { return guard_.still_knows(token_.get()) && sink_.open(); }
+
+ private:
+  EventSink& sink_;
+  const AccessGuard& guard_;
+  const TokenPtr token_;
+};
+
+/// What the token of a request needs; nothing: any will do.
+std::optional<Scope> scope_of(const CheckedRequest& request) {
+  const Route& route = *request.match.route;
+  switch (route.access) {
+    case Access::open:
+    case Access::token:
+      return std::nullopt;
+    case Access::read:
+      return Scope::read;
+    case Access::edit: {
+      const auto flag = request.query.find(route.reads_with);
+      return flag != request.query.end() && flag->second == "true" ? Scope::read : Scope::edit;
+    }
+    case Access::admin:
+      return Scope::admin;
+  }
+  return Scope::admin;
+}
+
 }  // namespace
 
 std::string request_id_of(const RequestHead& head) {
@@ -98,15 +135,14 @@ tl::expected<void, Refusal> Dispatcher::check_into(CheckedRequest& request, cons
                                                    const std::string& client) const {
   if (auto refusal = guard_.check_origin(head)) return tl::make_unexpected(std::move(*refusal));
   const auto segments = split_path(head.path);
-  RouteMatch match;
-  if (segments) match = routes_.find(head.method, *segments);
-  // Whoever has no token learns nothing about routes but those that are open to all.
-  const bool open = match.route != nullptr && match.route->access == Access::open;
-  if (!open)
-    if (auto refusal = guard_.check_access(head, client)) return tl::make_unexpected(std::move(*refusal));
-  if (!segments) return tl::make_unexpected(refusal_of(segments.error()));
-  request.match = std::move(match);
+  if (segments) request.match = routes_.find(head.method, *segments);
   const Route* const route = request.match.route;
+  // Whoever has no token learns nothing about routes but those that are open to all.
+  if (auto known = check_token(request, head, client); !known) {
+    request.is_audited = true;
+    return known;
+  }
+  if (!segments) return tl::make_unexpected(refusal_of(segments.error()));
   if (route == nullptr && !request.match.allow.empty())
     return refuse(405, "method_not_allowed", "this address takes " + request.match.allow);
   if (route == nullptr) return refuse(404, "not_found", routes_.of_others());
@@ -118,7 +154,29 @@ tl::expected<void, Refusal> Dispatcher::check_into(CheckedRequest& request, cons
     if (!request.query.emplace(name, value).second)
       return refuse(400, "invalid_argument", "this query parameter is given twice", name);
   }
+  const auto scope = scope_of(request);
+  request.is_audited = route->method != "GET" && scope != Scope::read;
+  if (scope)
+    if (auto refusal = AccessGuard::check_scope(request.token.get(), *scope)) {
+      request.is_audited = true;
+      return tl::make_unexpected(std::move(*refusal));
+    }
   return check_body(head, *route);
+}
+
+tl::expected<void, Refusal> Dispatcher::check_token(CheckedRequest& request, const RequestHead& head,
+                                                    const std::string& client) const {
+  const Route* const route = request.match.route;
+  const Access access = route == nullptr ? Access::read : route->access;
+  if (access == Access::open) {
+    request.token = guard_.token_of_session(head.header("cookie"));
+    return {};
+  }
+  auto token = access == Access::token ? guard_.check_token(head.header("authorization"), client)
+                                       : guard_.check_access(head, client);
+  if (!token) return tl::make_unexpected(std::move(token.error()));
+  request.token = std::move(*token);
+  return {};
 }
 
 tl::expected<void, Refusal> Dispatcher::check_body(const RequestHead& head, const Route& route) const {
@@ -154,8 +212,14 @@ Result<Reply> Dispatcher::handle(const CheckedRequest& request, const RequestHea
     if (route.body != Body::none) body = std::move(*text);
   }
   const HttpCall call({head, request_id, request.match.values, request.query, std::move(body), is_json, connection,
-                       form, options_.max_upload_bytes});
-  return route.handler(call);
+                       form, options_.max_upload_bytes, request.token});
+  auto reply = route.handler(call);
+  if (reply && reply->events)
+    reply->events = [this, token = request.token, events = std::move(reply->events)](EventSink& sink) {
+      GuardedSink guarded(sink, guard_, token);
+      events(guarded);
+    };
+  return reply;
 }
 
 tl::expected<void, Refusal> Dispatcher::fill_with_file(Answer& answer, const Reply& reply,
@@ -191,6 +255,7 @@ tl::expected<void, Refusal> Dispatcher::fill_with_file(Answer& answer, const Rep
 tl::expected<void, Refusal> Dispatcher::fill(Answer& answer, Reply reply, const RequestHead& head) {
   for (auto& [name, value] : reply.headers) answer.headers.emplace_back(name, header_value(std::move(value)));
   answer.status = reply.status;
+  answer.about = std::move(reply.about);
   answer.hold = std::move(reply.hold);
   const bool plain = !reply.file && !reply.events;
   if (reply.etag.empty() && head.only_reads() && reply.status == 200 && plain && reply.media_type == "application/json")

@@ -57,6 +57,7 @@ struct Answer {
   std::shared_ptr<const void> hold;  ///< Lives until the answer is sent.
   std::string refusal;               ///< Code of the error that this answer tells of; "" where it tells of none.
   std::string route = "-";           ///< Path of the route as declared; "-" if no route was found.
+  std::vector<std::pair<std::string, std::string>> about = {};  ///< As of Reply.
 };
 
 /// A request that was held against the guards: its route and what its query says, or why it is refused.
@@ -64,6 +65,9 @@ struct CheckedRequest {
   std::optional<Refusal> refusal;
   RouteMatch match;
   std::map<std::string, std::string, std::less<>> query;
+  TokenPtr token;  ///< Of whoever makes it; null where none is needed or none was found.
+  /// It stands in the audit log: it is to change something, or is refused for its token.
+  bool is_audited = false;
 };
 
 /// Safe to call from any thread. The guard and the logger outlive it.
@@ -92,6 +96,9 @@ class Dispatcher {
  private:
   [[nodiscard]] tl::expected<void, Refusal> check_into(CheckedRequest& request, const RequestHead& head,
                                                        const std::string& client) const;
+  /// Whose request it is, and whether they may make requests at all.
+  [[nodiscard]] tl::expected<void, Refusal> check_token(CheckedRequest& request, const RequestHead& head,
+                                                        const std::string& client) const;
   [[nodiscard]] tl::expected<void, Refusal> check_body(const RequestHead& head, const Route& route) const;
   [[nodiscard]] Result<Reply> handle(const CheckedRequest& request, const RequestHead& head,
                                      const std::string& request_id, Connection& connection, FormReader& form) const;

@@ -30,7 +30,7 @@ struct HttpServer::Impl {
             options.workers,
             [this] {
               return make_answerer({options.requests_per_connection, options.lobby.connection.idle_timeout, dispatcher,
-                                    workers, metrics, logger});
+                                    workers, metrics, logger, options.audit});
             },
             [this](std::unique_ptr<Visit> visit) { hand_on(std::move(visit)); },
             [this](int change) { metrics.add_waiting(change); }) {}

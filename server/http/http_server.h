@@ -10,6 +10,7 @@
 
 #include "engine/core/result.h"
 #include "server/http/access_guard.h"
+#include "server/http/audit_log.h"
 #include "server/http/dispatcher.h"
 #include "server/http/lobby.h"
 #include "server/http/metrics.h"
@@ -27,6 +28,7 @@ struct ServerOptions {
   LobbyOptions lobby = {};
   WorkerLimits workers = {};
   DispatcherOptions dispatcher = {};
+  AuditLog* audit = nullptr;  ///< Outlives the server. Null: there is none.
 };
 
 class HttpServer {

@@ -20,6 +20,15 @@ bool is_open(const std::string& segment) {
   return segment.size() > 2 && segment.front() == '{' && segment.back() == '}';
 }
 
+/// "id" of "{id}".
+std::string name_in(const std::string& open_segment) { return open_segment.substr(1, open_segment.size() - 2); }
+
+/// "scene" of "scenes".
+std::string singular(std::string plural) {
+  if (plural.ends_with('s')) plural.pop_back();
+  return plural;
+}
+
 /// Which segments are spelt out, as a text whose order is that of preference; nothing if the path does not match.
 std::optional<std::string> fit(const std::vector<std::string>& pattern, const std::vector<std::string>& path) {
   if (pattern.size() != path.size()) return std::nullopt;
@@ -33,6 +42,24 @@ std::optional<std::string> fit(const std::vector<std::string>& pattern, const st
 }
 
 }  // namespace
+
+std::vector<NamedThing> things_named(const RouteMatch& match) {
+  std::vector<NamedThing> things;
+  if (match.route == nullptr) return things;
+  const auto segments = split(match.route->path);
+  for (std::size_t i = 1; i < segments.size(); ++i) {
+    if (!is_open(segments[i])) continue;
+    const auto value = match.values.find(name_in(segments[i]));
+    if (value != match.values.end()) things.emplace_back(singular(segments[i - 1]), value->second);
+  }
+  return things;
+}
+
+std::optional<NamedThing> thing_at_end(std::string_view path) {
+  const auto segments = split(path);
+  if (segments.size() < 2) return std::nullopt;
+  return NamedThing{singular(segments[segments.size() - 2]), segments.back()};
+}
 
 RouteTable::RouteTable(Router router) : router_(std::move(router)) {
   for (const Route& route : router_.routes())
@@ -55,7 +82,7 @@ RouteMatch RouteTable::find(std::string_view method, const std::vector<std::stri
     best = *fitting;
     match.values.clear();
     for (std::size_t k = 0; k < segments.size(); ++k)
-      if (is_open(segments_[i][k])) match.values[segments_[i][k].substr(1, segments_[i][k].size() - 2)] = segments[k];
+      if (is_open(segments_[i][k])) match.values[name_in(segments_[i][k])] = segments[k];
   }
   std::sort(methods.begin(), methods.end());
   methods.erase(std::unique(methods.begin(), methods.end()), methods.end());

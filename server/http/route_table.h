@@ -2,8 +2,10 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "server/http/router.h"
@@ -18,6 +20,14 @@ struct RouteMatch {
   PathValues values;             ///< What stands for the {names} of the route's path.
   std::string allow;             ///< Methods that the path has, if it has any: for 405.
 };
+
+/// A thing that a path names, and what it is called there: "scene" and "s000001".
+using NamedThing = std::pair<std::string, std::string>;
+/// What a path names, called by what stands before it: {"scene", "s000001"} and {"version", "3"} of
+/// "/v1/scenes/s000001/versions/3". Nothing where there is no route.
+[[nodiscard]] std::vector<NamedThing> things_named(const RouteMatch& match);
+/// What a path ends with: {"edit", "e000001"} of "/v1/edits/e000001".
+[[nodiscard]] std::optional<NamedThing> thing_at_end(std::string_view path);
 
 /// Immutable once it is made: safe to call from any thread.
 class RouteTable {

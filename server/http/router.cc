@@ -35,6 +35,9 @@ Reply Reply::refusal(const Refusal& refusal, const std::string& request_id) {
   reply.media_type = "application/problem+json";
   reply.body = proto::to_json(proto::Problem{refusal.status, refusal.code, refusal.detail, refusal.where, request_id});
   if (refusal.status == 401) reply.headers.emplace_back("WWW-Authenticate", "Bearer");
+  if (!refusal.scope.empty())  // RFC 6750, section 3.1
+    reply.headers.emplace_back("WWW-Authenticate",
+                               "Bearer error=\"insufficient_scope\", scope=\"" + refusal.scope + '"');
   if (refusal.status == 429 || refusal.status == 503)
     reply.headers.emplace_back("Retry-After", std::to_string(refusal.retry_after));
   return reply;

@@ -16,6 +16,7 @@
 
 #include "engine/core/result.h"
 #include "server/http/request_head.h"
+#include "server/http/token.h"
 
 namespace server::http {
 
@@ -33,8 +34,8 @@ class Call {
   virtual ~Call() = default;
 
   [[nodiscard]] virtual const std::string& request_id() const = 0;
-  /// Address of the connection's other end: of the client, or of a proxy.
-  [[nodiscard]] virtual std::string peer() const { return {}; }
+  /// The token that the request came with, or its session was opened with; null where the service has none.
+  [[nodiscard]] virtual TokenPtr token() const { return nullptr; }
   /// The part of the path that stands for {name} in the route.
   [[nodiscard]] virtual const std::string& path(std::string_view name) const = 0;
   /// Query parameters by name; one given twice, or not declared by the route, has been refused already.
@@ -96,6 +97,9 @@ struct Reply {
   /// against the limit of streams (busy).
   std::function<void(EventSink&)> events;
 
+  /// What the audit log says of it beside what its path and Location name: "scene" and "s000001".
+  std::vector<std::pair<std::string, std::string>> about = {};
+
   [[nodiscard]] static Reply json(std::string text, int status = 200);
   [[nodiscard]] static Reply not_modified(std::string etag);
   [[nodiscard]] static Reply no_content();
@@ -106,9 +110,13 @@ struct Reply {
 using Handler = std::function<Result<Reply>(const Call&)>;
 
 enum class Body { none, json, upload };
+/// What a route wants, where the service has tokens.
 enum class Access {
-  open,       ///< Health, signing in, and the page's own files: no token.
-  protected_  ///< Needs the token or a session cookie, where the service has a token.
+  open,   ///< Nothing: health, signing out, and the page's own files.
+  token,  ///< A token in the request itself, no cookie: signing in.
+  read,   ///< A token, or a session's cookie, of Scope::read. The same for those that follow.
+  edit,
+  admin
 };
 
 /// One entry of the table.
@@ -117,10 +125,13 @@ struct Route {
   std::string path;    ///< "/v1/scenes/{id}", as in openapi.yaml
   Handler handler;
   Body body = Body::none;
-  std::vector<std::string> queries;  ///< Names of the query parameters that the route knows.
-  Access access = Access::protected_;
+  std::vector<std::string> queries = {};  ///< Names of the query parameters that the route knows.
+  Access access = Access::admin;          ///< A route that nothing is said of is for operators.
   /// Answered although all threads are busy, on one that does nothing else: a GET whose handler waits for nobody.
   bool vital = false;
+  /// Of a route that changes something: the query parameter with which it changes nothing, if that is "true". Then
+  /// Scope::read is enough.
+  std::string reads_with = {};
 };
 
 /// The routes of the service, in the order they were added.

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <fstream>
 #include <map>
+#include <memory>
 #include <thread>
 #include <utility>
 
@@ -55,7 +56,7 @@ proto::ServiceInfo service_info(const ServeOptions& options, const models::Model
                  .streams = options.http.dispatcher.max_streams,
                  .scenes = options.scenes.max_scenes,
                  .dataset_bytes = options.scenes.max_dataset_bytes};
-  info.token_required = !options.access.token.empty();
+  info.token_required = !options.access.tokens.empty();
   info.scene_root = !options.scenes.scene_root.empty();
   return info;
 }
@@ -99,18 +100,27 @@ void add_gauges(http::Metrics& metrics, scenes::SceneStore& scenes, edits::EditS
   });
 }
 
-/// Reads the token again. Where that fails the old one stays: a service that is set up wrong locks nobody in or out.
-void reload_token(const std::filesystem::path& file, http::AccessGuard& guard, spdlog::logger& logger) {
+/// Reads the tokens again. Where that fails the old ones stay: a service that is set up wrong locks nobody in or out.
+void reload_tokens(const std::filesystem::path& file, http::AccessGuard& guard, spdlog::logger& logger) {
   std::string warning;
-  auto token = read_token(file, warning);
+  auto tokens = read_tokens(file, warning);
   if (!warning.empty()) http::log(logger, spdlog::level::warn, warning);
-  if (!token) {
-    http::log(logger, spdlog::level::err, "the old token stays: " + token.error().message,
-              {{"where", token.error().where}});
+  if (!tokens) {
+    http::log(logger, spdlog::level::err, "the old tokens stay: " + tokens.error().message,
+              {{"where", tokens.error().where}});
     return;
   }
-  guard.replace_token(std::move(*token));
-  http::log(logger, spdlog::level::info, "the token has been read again");
+  const auto count = std::int64_t(tokens->size());
+  guard.replace_tokens(std::move(*tokens));
+  http::log(logger, spdlog::level::info, "tokens have been read again", {{"tokens", count}});
+}
+
+void reopen(http::AuditLog& audit, spdlog::logger& logger) {
+  if (const auto reopened = audit.reopen(); !reopened)
+    http::log(logger, spdlog::level::err, "the audit log goes on in the old file: " + reopened.error().message,
+              {{"where", reopened.error().where}});
+  else
+    http::log(logger, spdlog::level::info, "the audit log has been opened again");
 }
 
 void observe_edit(http::Metrics& metrics, const std::vector<proto::StageSeconds>& timings) {
@@ -158,15 +168,15 @@ void share_out(ServeOptions& options, spdlog::logger& logger) {
 
 }  // namespace
 
-Result<void> check_token(ServeOptions& options, spdlog::logger& logger) {
+Result<void> check_tokens(ServeOptions& options, spdlog::logger& logger) {
   if (!options.token_file.empty()) {
     std::string warning;
-    auto token = read_token(options.token_file, warning);
-    if (!token) return propagate(token);
+    auto tokens = read_tokens(options.token_file, warning);
+    if (!tokens) return propagate(tokens);
     if (!warning.empty()) http::log(logger, spdlog::level::warn, warning);
-    options.access.token = std::move(*token);
+    options.access.tokens = std::move(*tokens);
   }
-  if (options.access.token.empty() && !is_loopback(options.http.host)) {
+  if (options.access.tokens.empty() && !is_loopback(options.http.host)) {
     if (!options.insecure)
       return engine::fail(ErrorCode::invalid_argument,
                           "a service that other machines can reach needs a token: give --token-file, or --insecure to "
@@ -222,6 +232,15 @@ Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& lo
                             ? routes::worker_routes(metrics, trouble)
                             : routes::all_routes({**scenes, **edits, selections, options.edit_limits, renders, views,
                                                   guard, metrics, service_info(options, models), trouble});
+  std::unique_ptr<http::AuditLog> audit;
+  if (!options.audit_log.empty()) {
+    auto opened = http::AuditLog::open(options.audit_log, logger);
+    if (!opened) return propagate(opened);
+    audit = std::move(*opened);
+    metrics.add_gauge("splatdrag_audit_lines_lost", "Lines of the audit log that could not be written.",
+                      [&audit] { return double(audit->lost()); });
+    options.http.audit = audit.get();
+  }
   auto server = http::HttpServer::start(options.http, std::move(router), guard, metrics, logger);
   if (!server) return propagate(server);
   out << "splatdrag " << SPLATDRAG_VERSION << " is listening on " << (*server)->url() << '\n' << std::flush;
@@ -233,7 +252,10 @@ Result<void> serve(ServeOptions options, EndSignals& signals, spdlog::logger& lo
              {"role", std::string(engine::name_of(options.edits.role))},
              {"data_dir", options.data_dir.string()}});
   std::string signal = signals.wait();
-  for (; signal == "SIGHUP"; signal = signals.wait()) reload_token(options.token_file, guard, logger);
+  for (; signal == "SIGHUP"; signal = signals.wait()) {
+    if (!options.token_file.empty()) reload_tokens(options.token_file, guard, logger);
+    if (audit != nullptr) reopen(*audit, logger);
+  }
   http::log(logger, spdlog::level::info, "stopping", {{"signal", signal}});
   readiness.end();
   // Whoever sends requests here has time to hear of it; what is on its way, such as downloads, has it, too.

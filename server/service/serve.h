@@ -21,7 +21,8 @@ namespace server::service {
 /// What the service is started with. Folders, versions and loggers of the parts are set by serve().
 struct ServeOptions {
   std::filesystem::path data_dir;    ///< Exists. Scenes and edits get a folder of their own in it.
-  std::filesystem::path token_file;  ///< Empty: no token.
+  std::filesystem::path token_file;  ///< As read_tokens() takes it. Empty: no token is needed.
+  std::filesystem::path audit_log;   ///< Where it is written (http::AuditLog). Empty: nowhere.
   bool insecure = false;             ///< Lets other machines in without a token.
   int drain_seconds = 30;            ///< Time that a running edit gets to finish its interval.
   int unready_seconds = 0;           ///< Time between a signal to end and the end of taking requests.
@@ -41,9 +42,9 @@ struct ServeOptions {
   std::string simd;      ///< Instruction set in use, as /v1/info says it.
 };
 
-/// Reads the token into options.access. Writes warnings to the log.
-///   errors  those of read_token(); invalid_argument: a host that others can reach, no token, and not `insecure`
-[[nodiscard]] engine::Result<void> check_token(ServeOptions& options, spdlog::logger& logger);
+/// Reads the tokens into options.access. Writes warnings to the log.
+///   errors  those of read_tokens(); invalid_argument: a host that others can reach, no token, and not `insecure`
+[[nodiscard]] engine::Result<void> check_tokens(ServeOptions& options, spdlog::logger& logger);
 
 /// Whether the process can be what it is to be.
 ///   errors  invalid_argument: a front or a worker without a database

@@ -125,6 +125,7 @@ Result<Reply> post_edit(const Call& call, EditService& service, const EditLimits
   Reply reply = Reply::json(proto::to_json(submission->status), 202);
   reply.headers.emplace_back("Location", "/v1/edits/" + submission->status.id);
   reply.headers.emplace_back("Retry-After", "1");
+  reply.about = {{"scene", submission->status.scene}};
   if (!submission->created) reply.headers.emplace_back("Idempotent-Replayed", "true");
   return reply;
 }
@@ -204,30 +205,36 @@ Result<Reply> delete_edit(const Call& call, EditService& service) {
 }  // namespace
 
 void add_edit_routes(http::Router& router, EditService& service, const EditRouteOptions& options) {
+  using http::Access;
   using http::Body;
-  const auto add = [&](const char* method, const char* path, auto answer, Body body = Body::none,
-                       const std::vector<std::string>& queries = {}) {
+  const auto add = [&](const char* method, const char* path, Access access, auto answer, Body body = Body::none,
+                       const std::vector<std::string>& queries = {}, const std::string& reads_with = {}) {
     router.add({.method = method,
                 .path = path,
                 .handler = [&service, answer](const Call& call) -> Result<Reply> { return answer(call, service); },
                 .body = body,
-                .queries = queries});
+                .queries = queries,
+                .access = access,
+                .reads_with = reads_with});
   };
   const EditLimits limits = options.limits;
   add(
-      "POST", "/v1/previews", [limits](const Call& call, EditService& s) { return post_preview(call, s, limits); },
-      Body::json);
-  add("POST", "/v1/edits", [limits](const Call& call, EditService& s) { return post_edit(call, s, limits); },
-      Body::json, {"validate_only"});
-  add("GET", "/v1/edits", list_edits, Body::none, {"scene", "active", "limit"});
-  add("GET", "/v1/edits/{id}", [](const Call& call, EditService& s) { return reply_with(s.find(call.path("id"))); });
-  add("DELETE", "/v1/edits/{id}", delete_edit);
-  add("GET", "/v1/edits/{id}/events",
+      "POST", "/v1/previews", Access::read,
+      [limits](const Call& call, EditService& s) { return post_preview(call, s, limits); }, Body::json);
+  add(
+      "POST", "/v1/edits", Access::edit,
+      [limits](const Call& call, EditService& s) { return post_edit(call, s, limits); }, Body::json, {"validate_only"},
+      "validate_only");
+  add("GET", "/v1/edits", Access::read, list_edits, Body::none, {"scene", "active", "limit"});
+  add("GET", "/v1/edits/{id}", Access::read,
+      [](const Call& call, EditService& s) { return reply_with(s.find(call.path("id"))); });
+  add("DELETE", "/v1/edits/{id}", Access::edit, delete_edit);
+  add("GET", "/v1/edits/{id}/events", Access::read,
       [options](const Call& call, EditService& s) { return get_events(call, s, options); });
-  add("GET", "/v1/edits/{id}/intervals/{u}/renders/{k}", get_interval_render, Body::none, {"stage"});
-  add("POST", "/v1/edits/{id}/stop",
+  add("GET", "/v1/edits/{id}/intervals/{u}/renders/{k}", Access::read, get_interval_render, Body::none, {"stage"});
+  add("POST", "/v1/edits/{id}/stop", Access::edit,
       [](const Call& call, EditService& s) { return reply_with(s.stop(call.path("id"))); });
-  add("POST", "/v1/edits/{id}/cancel",
+  add("POST", "/v1/edits/{id}/cancel", Access::edit,
       [](const Call& call, EditService& s) { return reply_with(s.cancel(call.path("id"))); });
 }
 

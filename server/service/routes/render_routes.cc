@@ -242,22 +242,26 @@ void add_render_routes(http::Router& router, const RenderRouteDependencies& depe
   router.add({.method = "GET",
               .path = version + "/render",
               .handler = [dependencies](const Call& call) { return get_render(call, dependencies); },
-              .queries = proto::render_queries()});
+              .queries = proto::render_queries(),
+              .access = http::Access::read});
   router.add({.method = "POST",
               .path = version + "/render",
               .handler = [dependencies](const Call& call) { return post_render(call, dependencies); },
               .body = http::Body::json,
-              .queries = {}});
+              .queries = {},
+              .access = http::Access::read});
   router.add({.method = "POST",
               .path = version + "/pick",
               .handler = [dependencies](const Call& call) { return post_pick(call, dependencies); },
               .body = http::Body::json,
-              .queries = {}});
+              .queries = {},
+              .access = http::Access::read});
   router.add({.method = "POST",
               .path = version + "/select",
               .handler = [dependencies](const Call& call) { return post_select(call, dependencies); },
               .body = http::Body::json,
-              .queries = {}});
+              .queries = {},
+              .access = http::Access::read});
 }
 
 }  // namespace server::service::routes

@@ -131,7 +131,8 @@ void add_scene_event_routes(http::Router& router, SceneStore& store, EditService
                 };
                 return reply;
               },
-              .queries = {}});
+              .queries = {},
+              .access = http::Access::read});
 }
 
 }  // namespace server::service::routes

@@ -306,19 +306,23 @@ void add_dataset_routes(http::Router& router, const SceneRouteDependencies& depe
               .path = "/v1/scenes/{id}/dataset",
               .handler = [dependencies](const Call& call) { return put_dataset(call, dependencies); },
               .body = http::Body::upload,
-              .queries = {}});
+              .queries = {},
+              .access = http::Access::edit});
   router.add({.method = "DELETE",
               .path = "/v1/scenes/{id}/dataset",
               .handler = [dependencies](const Call& call) { return delete_dataset(call, dependencies); },
-              .queries = {}});
+              .queries = {},
+              .access = http::Access::edit});
   router.add({.method = "GET",
               .path = "/v1/scenes/{id}/photo",
               .handler = [dependencies](const Call& call) { return get_photo(call, dependencies); },
-              .queries = {"view", "max_side"}});
+              .queries = {"view", "max_side"},
+              .access = http::Access::read});
   router.add({.method = "GET",
               .path = "/v1/scenes/{id}/views",
               .handler = [&views](const Call& call) { return get_views(call, views); },
-              .queries = {}});
+              .queries = {},
+              .access = http::Access::read});
 }
 
 void add_version_routes(http::Router& router, const SceneRouteDependencies& dependencies) {
@@ -326,12 +330,14 @@ void add_version_routes(http::Router& router, const SceneRouteDependencies& depe
   router.add({.method = "GET",
               .path = "/v1/scenes/{id}/versions/{v}",
               .handler = [&store](const Call& call) { return get_version(call, store); },
-              .queries = {}});
+              .queries = {},
+              .access = http::Access::read});
   router.add({.method = "PATCH",
               .path = "/v1/scenes/{id}/versions/{v}",
               .handler = [&store](const Call& call) { return patch_version(call, store); },
               .body = http::Body::json,
-              .queries = {}});
+              .queries = {},
+              .access = http::Access::edit});
   router.add({.method = "DELETE",
               .path = "/v1/scenes/{id}/versions/{v}",
               .handler = [dependencies](const Call& call) -> Result<Reply> {
@@ -339,11 +345,13 @@ void add_version_routes(http::Router& router, const SceneRouteDependencies& depe
                 if (!removed) return propagate(removed);
                 return Reply::no_content();
               },
-              .queries = {}});
+              .queries = {},
+              .access = http::Access::edit});
   router.add({.method = "GET",
               .path = "/v1/scenes/{id}/versions/{v}/file",
               .handler = [&store](const Call& call) { return get_file(call, store); },
-              .queries = {"format"}});
+              .queries = {"format"},
+              .access = http::Access::read});
 }
 
 }  // namespace
@@ -370,21 +378,25 @@ void add_scene_routes(http::Router& router, const SceneRouteDependencies& depend
   router.add({.method = "GET",
               .path = "/v1/scenes",
               .handler = [&store](const Call&) { return list_scenes(store); },
-              .queries = {}});
+              .queries = {},
+              .access = http::Access::read});
   router.add({.method = "POST",
               .path = "/v1/scenes",
               .handler = [&store](const Call& call) { return post_scene(call, store); },
               .body = http::Body::upload,
-              .queries = {"name"}});
+              .queries = {"name"},
+              .access = http::Access::edit});
   router.add({.method = "GET",
               .path = "/v1/scenes/{id}",
               .handler = [&store](const Call& call) { return reply_with(store.find(call.path("id"))); },
-              .queries = {}});
+              .queries = {},
+              .access = http::Access::read});
   router.add({.method = "PATCH",
               .path = "/v1/scenes/{id}",
               .handler = [dependencies](const Call& call) { return patch_scene(call, dependencies); },
               .body = http::Body::json,
-              .queries = {}});
+              .queries = {},
+              .access = http::Access::edit});
   router.add({.method = "DELETE",
               .path = "/v1/scenes/{id}",
               .handler = [dependencies](const Call& call) -> Result<Reply> {
@@ -393,7 +405,8 @@ void add_scene_routes(http::Router& router, const SceneRouteDependencies& depend
                 if (!removed) return propagate(removed);
                 return Reply::no_content();
               },
-              .queries = {}});
+              .queries = {},
+              .access = http::Access::edit});
   add_dataset_routes(router, dependencies);
   add_version_routes(router, dependencies);
 }

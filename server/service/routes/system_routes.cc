@@ -67,12 +67,10 @@ std::string cookie(const std::string& value, const std::string& more) {
 void add_session(http::Router& router, http::AccessGuard& guard) {
   const auto open = [&guard](const Call& call) -> Result<Reply> {
     Reply reply = Reply::no_content();
-    if (!guard.needs_token()) return reply;
-    const std::string client = guard.address_of(call.peer(), call.header("x-forwarded-for"));
-    if (const auto refusal = guard.check_token(call.header("authorization"), client))
-      return Reply::refusal(*refusal, call.request_id());
+    const http::TokenPtr token = call.token();
+    if (token == nullptr) return reply;
     const bool secure = guard.is_secure(call.header("x-forwarded-proto"));
-    reply.headers.emplace_back("Set-Cookie", cookie(guard.open_session(), secure ? "; Secure" : ""));
+    reply.headers.emplace_back("Set-Cookie", cookie(guard.open_session(token), secure ? "; Secure" : ""));
     return reply;
   };
   const auto close = [&guard](const Call& call) -> Result<Reply> {
@@ -81,7 +79,7 @@ void add_session(http::Router& router, http::AccessGuard& guard) {
     reply.headers.emplace_back("Set-Cookie", cookie("", "; Max-Age=0"));
     return reply;
   };
-  router.add({"POST", "/v1/session", open, Body::none, {}, Access::open});
+  router.add({"POST", "/v1/session", open, Body::none, {}, Access::token});
   router.add({"DELETE", "/v1/session", close, Body::none, {}, Access::open});
 }
 
@@ -102,19 +100,19 @@ void add_health_routes(http::Router& router, const http::Metrics& metrics, const
     reply.body = metrics.text();
     return reply;
   };
-  get(router, "/metrics", numbers, Access::protected_);
+  get(router, "/metrics", numbers, Access::admin);
 }
 
 void add_system_routes(http::Router& router, const SystemRouteDependencies& dependencies) {
   add_health_routes(router, dependencies.metrics, dependencies.trouble);
   const auto contract = [bytes = dependencies.contract, etag = http::etag_of(dependencies.contract)](
                             const Call&) -> Result<Reply> { return file_reply("openapi.yaml", bytes, etag); };
-  get(router, "/openapi.yaml", contract, Access::protected_);
+  get(router, "/openapi.yaml", contract, Access::read);
   // Who gets as far as the handler is authorised.
   const auto info = [text = proto::to_json(dependencies.info, true)](const Call&) -> Result<Reply> {
     return Reply::json(text);
   };
-  get(router, "/v1/info", info, Access::protected_);
+  get(router, "/v1/info", info, Access::read);
   add_session(router, dependencies.guard);
   add_page(router, dependencies.page);
 }

@@ -179,7 +179,7 @@ TEST_F(Serve, ReadsItsTokenAgainOnHangup) {
   EXPECT_EQ(status_with("first"), 401);
   EXPECT_EQ(status_with("second"), 200);
   support::write_file(file, "");
-  hang_up_until("the old token stays");
+  hang_up_until("the old tokens stay");
   EXPECT_EQ(status_with("second"), 200) << program.err();
   const auto open = [&](const std::string& proto) {
     return ask(port, "POST", "/v1/session", "Authorization: Bearer second\r\nX-Forwarded-Proto: " + proto + "\r\n")

@@ -13,29 +13,39 @@ RequestHead with_cookie(const std::string& secret) {
   return head;
 }
 
+const TokenPtr owner = std::make_shared<const Token>(only_token("t"));
+
+bool lets_in(const AccessGuard& guard, const RequestHead& head) { return guard.check_access(head, "a").has_value(); }
+int status_of(const AccessGuard& guard, const std::string& authorization, const std::string& client = "a") {
+  const auto token = guard.check_token(authorization, client);
+  return token ? 200 : token.error().status;
+}
+
 TEST(AccessGuard, KeepsABoundedNumberOfSessions) {
-  AccessGuard guard({.token = "t", .allowed_hosts = {}, .allowed_origins = {}, .max_sessions = 3});
+  AccessGuard guard({.tokens = {only_token("t")}, .allowed_hosts = {}, .allowed_origins = {}, .max_sessions = 3});
   std::vector<std::string> secrets;
-  for (int i = 0; i < 5; ++i) secrets.push_back(guard.open_session());
-  for (int i = 0; i < 5; ++i) EXPECT_EQ(!guard.check_access(with_cookie(secrets[std::size_t(i)]), "a"), i >= 2) << i;
+  for (int i = 0; i < 5; ++i) secrets.push_back(guard.open_session(owner));
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(lets_in(guard, with_cookie(secrets[std::size_t(i)])), i >= 2) << i;
 }
 
 TEST(AccessGuard, ForgetsOldSessions) {
-  AccessGuard guard(
-      {.token = "t", .allowed_hosts = {}, .allowed_origins = {}, .session_lifetime = std::chrono::seconds(0)});
-  EXPECT_TRUE(guard.check_access(with_cookie(guard.open_session()), "a"));
+  AccessGuard guard({.tokens = {only_token("t")},
+                     .allowed_hosts = {},
+                     .allowed_origins = {},
+                     .session_lifetime = std::chrono::seconds(0)});
+  EXPECT_FALSE(lets_in(guard, with_cookie(guard.open_session(owner))));
 }
 
 TEST(AccessGuard, LooksAtNoTokenForAWhileAfterManyWrongOnes) {
-  AccessGuard guard({.token = "t", .allowed_hosts = {}, .allowed_origins = {}});
-  const std::string secret = guard.open_session();
-  for (int i = 0; i < 6; ++i) EXPECT_EQ(guard.check_token("Bearer x" + std::to_string(i), "1.2.3.4")->status, 401);
+  AccessGuard guard({.tokens = {only_token("t")}, .allowed_hosts = {}, .allowed_origins = {}});
+  const std::string secret = guard.open_session(owner);
+  for (int i = 0; i < 6; ++i) EXPECT_EQ(status_of(guard, "Bearer x" + std::to_string(i), "1.2.3.4"), 401);
   const auto braked = guard.check_token("Bearer t", "1.2.3.4");
-  ASSERT_TRUE(braked);
-  EXPECT_EQ(braked->status, 429);
-  EXPECT_EQ(braked->retry_after, 1);
-  EXPECT_FALSE(guard.check_token("Bearer t", "1.2.3.5"));
-  EXPECT_FALSE(guard.check_access(with_cookie(secret), "1.2.3.4")) << "a session goes on";
+  ASSERT_FALSE(braked);
+  EXPECT_EQ(braked.error().status, 429);
+  EXPECT_EQ(braked.error().retry_after, 1);
+  EXPECT_EQ(status_of(guard, "Bearer t", "1.2.3.5"), 200);
+  EXPECT_TRUE(guard.check_access(with_cookie(secret), "1.2.3.4")) << "a session goes on";
 }
 
 TEST(AccessGuard, BelievesAProxyOnlyIfTold) {
@@ -53,21 +63,63 @@ TEST(AccessGuard, BelievesAProxyOnlyIfTold) {
 }
 
 TEST(AccessGuard, EndsSessionsWithTheTokenTheyWereOpenedWith) {
-  AccessGuard guard({.token = "t", .allowed_hosts = {}, .allowed_origins = {}});
-  const std::string secret = guard.open_session();
-  guard.replace_token("t");
-  EXPECT_FALSE(guard.check_access(with_cookie(secret), "a"));
-  guard.replace_token("u");
-  EXPECT_TRUE(guard.check_access(with_cookie(secret), "a"));
-  EXPECT_TRUE(guard.check_token("Bearer t", "a"));
-  EXPECT_FALSE(guard.check_token("Bearer u", "a"));
+  const Token first{.name = "first", .read = true, .secret = "1"},
+      second{.name = "second", .edit = true, .secret = "2"};
+  AccessGuard guard({.tokens = {first, second}, .allowed_hosts = {}, .allowed_origins = {}});
+  const auto open = [&](const std::string& secret) {
+    return guard.open_session(*guard.check_token("Bearer " + secret, "a"));
+  };
+  const std::string of_first = open("1"), of_second = open("2");
+  guard.replace_tokens({second, first});
+  EXPECT_TRUE(lets_in(guard, with_cookie(of_first))) << "they only stand in another order";
+  guard.replace_tokens({second});
+  EXPECT_FALSE(lets_in(guard, with_cookie(of_first)));
+  EXPECT_EQ(status_of(guard, "Bearer 1"), 401);
+  EXPECT_TRUE(lets_in(guard, with_cookie(of_second)));
+  for (const auto& change : {+[](Token& token) { token.secret = "3"; }, +[](Token& token) { token.name = "third"; },
+                             +[](Token& token) { token.admin = true; }, +[](Token& token) { token.edit = false; }}) {
+    guard.replace_tokens({second});
+    const std::string session = open("2");
+    Token changed = second;
+    changed.read = true;
+    change(changed);
+    guard.replace_tokens({changed});
+    EXPECT_FALSE(lets_in(guard, with_cookie(session)));
+    EXPECT_FALSE(guard.still_knows(&second));
+    EXPECT_TRUE(guard.still_knows(&changed));
+  }
+}
+
+TEST(AccessGuard, KnowsWhoseRequestItIs) {
+  const AccessGuard guard({.tokens = {{.name = "first", .read = true, .secret = "1"},
+                                      {.name = "second", .edit = true, .secret = "22"},
+                                      {.name = "third", .admin = true, .secret = "12"}},
+                           .allowed_hosts = {},
+                           .allowed_origins = {}});
+  EXPECT_EQ((*guard.check_token("Bearer 1", "a"))->name, "first");
+  EXPECT_EQ((*guard.check_token("Bearer 22", "a"))->name, "second");
+  EXPECT_EQ((*guard.check_token("Bearer 12", "a"))->name, "third");
+  for (const char* wrong : {"2", "11", "2222", "1212", "222", ""})
+    EXPECT_EQ(status_of(guard, std::string("Bearer ") + wrong), 401) << wrong;
+}
+
+TEST(AccessGuard, SaysWhatATokenLacks) {
+  const Token viewer{.name = "viewer", .read = true, .secret = "1"};
+  EXPECT_FALSE(AccessGuard::check_scope(&viewer, Scope::read));
+  EXPECT_FALSE(AccessGuard::check_scope(nullptr, Scope::admin)) << "a service without tokens";
+  const auto refusal = AccessGuard::check_scope(&viewer, Scope::edit);
+  ASSERT_TRUE(refusal);
+  EXPECT_EQ(refusal->status, 403);
+  EXPECT_EQ(refusal->code, "forbidden");
+  EXPECT_EQ(refusal->detail, "token \"viewer\" may not edit: it lacks the scope edit");
+  EXPECT_EQ(refusal->scope, "edit");
 }
 
 TEST(AccessGuard, WithoutATokenAdmitsAll) {
   const AccessGuard guard(AccessOptions{});
   EXPECT_FALSE(guard.needs_token());
-  EXPECT_FALSE(guard.check_access(RequestHead{}, "a"));
-  EXPECT_TRUE(guard.check_token("Bearer ", "a"));
+  EXPECT_TRUE(lets_in(guard, RequestHead{}));
+  EXPECT_EQ(status_of(guard, "Bearer "), 200);
 }
 
 TEST(AccessGuard, KnowsItsNameWithoutAPortOnlyOnPort80) {

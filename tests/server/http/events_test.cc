@@ -54,6 +54,21 @@ TEST(Events, ReachHttp10AndAnswerHead) {
   EXPECT_EQ(ask(server.port(), "HEAD", "/events").status, 200);
 }
 
+TEST(Events, EndWithTheTokenOfWhoeverListens) {
+  support::TempDir folder;
+  const Token keeps{.name = "keeps", .read = true, .secret = "1"}, loses{.name = "loses", .read = true, .secret = "2"};
+  TestServer server(sample_routes(folder.path()), {},
+                    {.tokens = {keeps, loses}, .allowed_hosts = {}, .allowed_origins = {}});
+  RawClient kept(server.port()), lost(server.port());
+  kept.send(request(server.port(), "GET", "/events", "Authorization: Bearer 1\r\n"));
+  lost.send(request(server.port(), "GET", "/events", "Authorization: Bearer 2\r\n"));
+  EXPECT_NE(lost.read_until("\"n\":3}").find("\"n\":3}"), std::string::npos);
+  server.guard.replace_tokens({keeps});
+  EXPECT_TRUE(lost.read_until("0\r\n\r\n").ends_with("0\r\n\r\n")) << "the answer is whole, and over";
+  kept.read_until("\"n\":3}");
+  EXPECT_NE(kept.read_until("\"n\":").find("\"n\":"), std::string::npos);
+}
+
 TEST(Events, AreCappedInNumber) {
   support::TempDir folder;
   ServerOptions options;

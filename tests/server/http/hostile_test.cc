@@ -160,7 +160,8 @@ TEST_F(Hostile, ARefusalDoesNotWaitForTheBody) {
   EXPECT_EQ(refused(server.port(), "/json", ""), 415);
   EXPECT_EQ(refused(server.port(), "/json", "Host: evil.example\r\n"), 421);
   EXPECT_EQ(refused(server.port(), "/json", "Origin: https://evil.example\r\n"), 403);
-  TestServer closed(sample_routes(folder.path()), {}, {.token = "hush", .allowed_hosts = {}, .allowed_origins = {}});
+  TestServer closed(sample_routes(folder.path()), {},
+                    {.tokens = {only_token("hush")}, .allowed_hosts = {}, .allowed_origins = {}});
   EXPECT_EQ(refused(closed.port(), "/json", ""), 401);
 }
 

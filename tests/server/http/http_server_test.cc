@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -16,18 +17,19 @@ namespace {
 using nlohmann::json;
 using namespace std::chrono_literals;
 
+json problem(const RawAnswer& answer) {
+  EXPECT_EQ(answer.header("content-type"), "application/problem+json");
+  const json body = json::parse(answer.body, nullptr, false);
+  EXPECT_TRUE(body.is_object()) << answer.body;
+  EXPECT_EQ(body.value("status", 0), answer.status);
+  EXPECT_EQ(body.value("request_id", ""), answer.header("x-request-id"));
+  return body;
+}
+
 class HttpServerTest : public testing::Test {
  protected:
   RawAnswer get(const std::string& target, const std::string& more = {}) {
     return ask(server.port(), "GET", target, more);
-  }
-  static json problem(const RawAnswer& answer) {
-    EXPECT_EQ(answer.header("content-type"), "application/problem+json");
-    const json body = json::parse(answer.body, nullptr, false);
-    EXPECT_TRUE(body.is_object()) << answer.body;
-    EXPECT_EQ(body.value("status", 0), answer.status);
-    EXPECT_EQ(body.value("request_id", ""), answer.header("x-request-id"));
-    return body;
   }
 
   support::TempDir folder;
@@ -73,7 +75,7 @@ TEST_F(HttpServerTest, RefusesAForeignHost) {
 TEST(HttpServer, KnowsTheHostsAndOriginsItIsTold) {
   support::TempDir folder;
   TestServer server(sample_routes(folder.path()), {},
-                    {.token = "",
+                    {.tokens = {},
                      .allowed_hosts = {"splat.example", "other.example:99"},
                      .allowed_origins = {"https://front.example"}});
   const auto status = [&](const std::string& more) { return ask(server.port(), "GET", "/json", more).status; };
@@ -102,7 +104,7 @@ TEST_F(HttpServerTest, RefusesPagesOfOtherSites) {
 TEST(HttpServer, WantsItsTokenEverywhereButOnOpenRoutes) {
   support::TempDir folder;
   TestServer server(sample_routes(folder.path()), {},
-                    {.token = "correct horse", .allowed_hosts = {}, .allowed_origins = {}});
+                    {.tokens = {only_token("correct horse")}, .allowed_hosts = {}, .allowed_origins = {}});
   const auto ask_with = [&](const std::string& target, const std::string& more) {
     return ask(server.port(), "GET", target, more);
   };
@@ -117,10 +119,63 @@ TEST(HttpServer, WantsItsTokenEverywhereButOnOpenRoutes) {
     EXPECT_EQ(ask_with("/nowhere", wrong).status, 401) << "tells which routes there are";
   }
   EXPECT_EQ(ask_with("/json", "Authorization: bearer correct horse\r\n").status, 200);
-  const std::string secret = server.guard.open_session();
+  const std::string secret = server.guard.open_session(std::make_shared<const Token>(only_token("correct horse")));
   EXPECT_EQ(ask_with("/json", "Cookie: a=b; splatdrag_session=" + secret + "\r\n").status, 200);
   server.guard.close_session("splatdrag_session=" + secret);
   EXPECT_EQ(ask_with("/json", "Cookie: splatdrag_session=" + secret + "\r\n").status, 401);
+}
+
+TEST(HttpServer, AsksEachRouteForItsScope) {
+  Router routes;
+  const auto well = [](const Call& call) -> Result<Reply> {
+    return Reply::json("{\"by\":\"" + (call.token() == nullptr ? "" : call.token()->name) + "\"}");
+  };
+  routes.add({.method = "GET", .path = "/see", .handler = well, .access = Access::read});
+  routes.add({.method = "POST",
+              .path = "/change",
+              .handler = well,
+              .body = Body::json,
+              .queries = {"try"},
+              .access = Access::edit,
+              .reads_with = "try"});
+  routes.add({.method = "GET", .path = "/forgotten", .handler = well});
+  routes.add({.method = "POST", .path = "/sign-in", .handler = well, .access = Access::token});
+  TestServer server(std::move(routes), {},
+                    {.tokens = {{.name = "viewer", .read = true, .secret = "r"},
+                                {.name = "editor", .edit = true, .secret = "e"},
+                                {.name = "scraper", .admin = true, .secret = "a"}},
+                     .allowed_hosts = {},
+                     .allowed_origins = {}});
+  const auto ask_as = [&](const std::string& secret, const std::string& method, const std::string& target) {
+    return ask(server.port(), method, target, "Authorization: Bearer " + secret + "\r\n");
+  };
+  const auto statuses = [&](const std::string& secret) {
+    return std::array{ask_as(secret, "GET", "/see").status, ask_as(secret, "POST", "/change").status,
+                      ask_as(secret, "POST", "/change?try=true").status, ask_as(secret, "GET", "/forgotten").status};
+  };
+  EXPECT_EQ(statuses("r"), (std::array{200, 403, 200, 403}));
+  EXPECT_EQ(statuses("e"), (std::array{200, 200, 200, 403})) << "who changes sees";
+  EXPECT_EQ(statuses("a"), (std::array{403, 403, 403, 200})) << "an operator's token is no key to scenes";
+  EXPECT_EQ(ask_as("r", "POST", "/change?try=false").status, 403);
+  EXPECT_EQ(ask_as("r", "POST", "/change?try=true&try=false").status, 400);
+  EXPECT_EQ(ask_as("r", "HEAD", "/see").status, 200);
+  EXPECT_EQ(ask_as("a", "GET", "/nowhere").status, 404) << "whoever has a token may know what there is";
+  EXPECT_EQ(ask_as("a", "POST", "/see").status, 405);
+
+  const auto refused = ask_as("r", "POST", "/change");
+  EXPECT_EQ(problem(refused)["code"], "forbidden");
+  EXPECT_EQ(problem(refused)["detail"], "token \"viewer\" may not edit: it lacks the scope edit");
+  EXPECT_EQ(refused.header("www-authenticate"), "Bearer error=\"insufficient_scope\", scope=\"edit\"");
+  EXPECT_EQ(problem(ask_as("r", "GET", "/forgotten"))["detail"],
+            "token \"viewer\" may not do what is for operators: it lacks the scope admin");
+  EXPECT_EQ(ask_as("e", "GET", "/see").body, R"({"by":"editor"})");
+  EXPECT_EQ(ask_as("a", "POST", "/sign-in").status, 200) << "of whatever scope";
+  EXPECT_EQ(ask(server.port(), "POST", "/sign-in").status, 401);
+
+  const auto session = server.guard.open_session(*server.guard.check_token("Bearer r", "a"));
+  const std::string cookie = "Cookie: splatdrag_session=" + session + "\r\n";
+  EXPECT_EQ(ask(server.port(), "GET", "/see", cookie).body, R"({"by":"viewer"})");
+  EXPECT_EQ(ask(server.port(), "POST", "/change", cookie).status, 403) << "a session may do what its token may";
 }
 
 TEST_F(HttpServerTest, SaysWhatIsNotThere) {
@@ -439,7 +494,8 @@ TEST(HttpServer, FinishesWhatIsUnderWayWhenItStops) {
 
 TEST(HttpServer, LogsEachRequestWithoutSecretsOrQueries) {
   support::TempDir folder;
-  TestServer server(sample_routes(folder.path()), {}, {.token = "hush", .allowed_hosts = {}, .allowed_origins = {}});
+  TestServer server(sample_routes(folder.path()), {},
+                    {.tokens = {only_token("hush")}, .allowed_hosts = {}, .allowed_origins = {}});
   ask(server.port(), "GET", "/echo/private-name?q=private-query",
       "Authorization: Bearer hush\r\nCookie: splatdrag_session=hush2\r\nX-Request-Id: r1\r\n");
   server.server->stop();

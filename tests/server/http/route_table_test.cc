@@ -35,5 +35,15 @@ TEST(RouteTable, ListsTheMethodsOfAPath) {
   EXPECT_EQ(table.find("GET", {"v1", "edits", ""}).route, nullptr) << "nothing is no id";
 }
 
+TEST(RouteTable, CallsWhatAPathNamesByWhatStandsBeforeIt) {
+  const RouteTable table(routes());
+  const std::vector<NamedThing> edit{{"edit", "e1"}};
+  EXPECT_EQ(things_named(table.find("DELETE", {"v1", "edits", "e1"})), edit);
+  EXPECT_TRUE(things_named(table.find("GET", {"v1", "edits", "latest"})).empty());
+  EXPECT_TRUE(things_named(table.find("GET", {"nowhere"})).empty());
+  EXPECT_EQ(thing_at_end("/v1/edits/e000001"), (NamedThing{"edit", "e000001"}));
+  EXPECT_EQ(thing_at_end("/"), std::nullopt);
+}
+
 }  // namespace
 }  // namespace server::http

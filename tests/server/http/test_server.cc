@@ -35,15 +35,15 @@ Router sample_routes(const std::filesystem::path& folder) {
     reply.body = "name=" + call.path("name") + " q=" + call.query("q").value_or("(none)") + " body=" + call.body();
     return reply;
   };
-  routes.add({"GET", "/echo/{name}", echo, Body::none, {"q"}, Access::protected_});
-  routes.add({"POST", "/echo/{name}", echo, Body::none, {"q"}, Access::protected_});
-  routes.add({"POST", "/json", echo, Body::json, {}, Access::protected_});
+  routes.add({"GET", "/echo/{name}", echo, Body::none, {"q"}, Access::read});
+  routes.add({"POST", "/echo/{name}", echo, Body::none, {"q"}, Access::read});
+  routes.add({"POST", "/json", echo, Body::json, {}, Access::read});
   routes.add({"GET",
               "/json",
               [](const Call&) -> Result<Reply> { return Reply::json("{\"answer\":42}"); },
               Body::none,
               {},
-              Access::protected_});
+              Access::read});
   routes.add({"POST",
               "/upload",
               [folder](const Call& call) -> Result<Reply> {
@@ -59,7 +59,7 @@ Router sample_routes(const std::filesystem::path& folder) {
               },
               Body::upload,
               {},
-              Access::protected_});
+              Access::read});
   routes.add({"GET",
               "/file",
               [folder](const Call&) -> Result<Reply> {
@@ -72,7 +72,7 @@ Router sample_routes(const std::filesystem::path& folder) {
               },
               Body::none,
               {},
-              Access::protected_});
+              Access::read});
   routes.add({"GET",
               "/events",
               [](const Call&) -> Result<Reply> {
@@ -89,7 +89,7 @@ Router sample_routes(const std::filesystem::path& folder) {
               },
               Body::none,
               {},
-              Access::protected_});
+              Access::read});
   routes.add({"GET",
               "/two-events",
               [](const Call&) -> Result<Reply> {
@@ -104,13 +104,13 @@ Router sample_routes(const std::filesystem::path& folder) {
               },
               Body::none,
               {},
-              Access::protected_});
+              Access::read});
   routes.add({"GET",
               "/bug",
               [](const Call&) -> Result<Reply> { throw std::logic_error("secret inner state"); },
               Body::none,
               {},
-              Access::protected_});
+              Access::read});
   routes.add({"GET",
               "/slow",
               [](const Call&) -> Result<Reply> {
@@ -119,7 +119,7 @@ Router sample_routes(const std::filesystem::path& folder) {
               },
               Body::none,
               {},
-              Access::protected_});
+              Access::read});
   routes.add({"GET",
               "/fail/{code}",
               [](const Call& call) -> Result<Reply> {
@@ -127,7 +127,7 @@ Router sample_routes(const std::filesystem::path& folder) {
               },
               Body::none,
               {},
-              Access::protected_});
+              Access::read});
   const auto picture = [](const Call& call) -> Result<Reply> {
     if (!call.accepts("image/png")) return engine::fail(ErrorCode::unsupported, "only image/png here", "Accept");
     if (call.has("pic1")) return Reply::not_modified("pic1");
@@ -138,14 +138,13 @@ Router sample_routes(const std::filesystem::path& folder) {
     reply.headers.emplace_back("Server-Timing", "render;dur=1\r\nSet-Cookie: evil=1");
     return reply;
   };
-  for (const char* method : {"GET", "POST"})
-    routes.add({method, "/picture", picture, Body::none, {}, Access::protected_});
+  for (const char* method : {"GET", "POST"}) routes.add({method, "/picture", picture, Body::none, {}, Access::read});
   routes.add({"DELETE",
               "/thing",
               [](const Call&) -> Result<Reply> { return Reply::no_content(); },
               Body::none,
               {},
-              Access::protected_});
+              Access::read});
   routes.add(
       {"GET", "/open", [](const Call&) -> Result<Reply> { return Reply::json("{}"); }, Body::none, {}, Access::open});
   routes.add({"GET",

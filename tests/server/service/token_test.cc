@@ -15,28 +15,86 @@ using engine::ErrorCode;
 
 class TokenFile : public testing::Test {
  protected:
-  engine::Result<std::string> read(const std::string& text, fs::perms permissions = fs::perms::owner_read) {
-    std::ofstream(folder.path() / "token", std::ios::binary) << text;
-    fs::permissions(folder.path() / "token", permissions | fs::perms::owner_write);
+  engine::Result<std::vector<http::Token>> read(const std::string& text,
+                                                fs::perms permissions = fs::perms::owner_read) {
+    std::ofstream(file, std::ios::binary) << text;
+    fs::permissions(file, permissions | fs::perms::owner_write);
     warning.clear();
-    return read_token(folder.path() / "token", warning);
+    return read_tokens(file, warning);
+  }
+  /// "LINE: message", of a file that is refused.
+  std::string refused(const std::string& text) {
+    const auto tokens = read(text);
+    if (tokens) return "taken";
+    EXPECT_EQ(tokens.error().code, ErrorCode::invalid_argument);
+    const std::string& where = tokens.error().where;
+    EXPECT_TRUE(where.starts_with(file.string())) << where;
+    EXPECT_EQ((where + tokens.error().message).find("s3cr"), std::string::npos) << where << tokens.error().message;
+    return where.substr(std::min(file.string().size() + 1, where.size())) + ": " + tokens.error().message;
   }
 
   support::TempDir folder;
+  const fs::path file = folder.path() / "tokens";
   std::string warning;
 };
 
-TEST_F(TokenFile, HoldsOneWord) {
-  EXPECT_EQ(read("  s3cret\r\n").value(), "s3cret");
-  for (const std::string& text :
-       {std::string(), std::string(" \n"), std::string("two words"), std::string("line\nline"),
-        std::string("caf\xc3\xa9"), std::string("a\0b", 3), std::string(5000, 'a')}) {
-    const auto token = read(text);
-    ASSERT_FALSE(token) << text;
-    EXPECT_EQ(token.error().code, ErrorCode::invalid_argument);
-    EXPECT_EQ(token.error().where, (folder.path() / "token").string());
+TEST_F(TokenFile, OfOneWordHoldsTheTokenThatMayDoAll) {
+  for (const std::string& text : {std::string("  s3cret\r\n"), std::string("#s3cret"), std::string(4096, 'a')}) {
+    const auto tokens = read(text).value();
+    ASSERT_EQ(tokens.size(), 1u);
+    EXPECT_EQ(tokens[0].name, "default");
+    EXPECT_TRUE(tokens[0].read && tokens[0].edit && tokens[0].admin);
   }
-  EXPECT_EQ(read_token(folder.path() / "none", warning).error().code, ErrorCode::not_found);
+  EXPECT_EQ(read("  s3cret\r\n").value()[0].secret, "s3cret");
+  for (const std::string& text : {std::string(), std::string(" \n"), std::string("caf\xc3\xa9"), std::string("a\0b", 3),
+                                  std::string(5000, 'a'), std::string(100'000, 'a'), std::string("# two\n# lines")}) {
+    const auto tokens = read(text);
+    ASSERT_FALSE(tokens) << text;
+    EXPECT_EQ(tokens.error().code, ErrorCode::invalid_argument);
+    EXPECT_EQ(tokens.error().where, file.string());
+  }
+  EXPECT_EQ(read_tokens(folder.path() / "none", warning).error().code, ErrorCode::not_found);
+}
+
+TEST_F(TokenFile, HoldsALineForEachToken) {
+  const auto tokens = read(
+                          "# who       what        secret\r\n"
+                          "viewer      read        s3cr-1   # f\xc3\xbcr die T\xc3\xbcr\r\n"
+                          "\n"
+                          "  studio.1\tread,edit  s3cr-2\n"
+                          "#gone       read        s3cr-3\n"
+                          "ops         edit,admin  s3cr-4")
+                          .value();
+  ASSERT_EQ(tokens.size(), 3u);
+  EXPECT_EQ(tokens[0].name, "viewer");
+  EXPECT_EQ(tokens[0].secret, "s3cr-1");
+  EXPECT_TRUE(tokens[0].may(http::Scope::read));
+  EXPECT_FALSE(tokens[0].may(http::Scope::edit) || tokens[0].may(http::Scope::admin));
+  EXPECT_EQ(tokens[1].name, "studio.1");
+  EXPECT_TRUE(tokens[1].may(http::Scope::edit) && tokens[1].may(http::Scope::read));
+  EXPECT_FALSE(tokens[1].may(http::Scope::admin));
+  EXPECT_TRUE(tokens[2].may(http::Scope::edit) && tokens[2].may(http::Scope::admin));
+  EXPECT_TRUE(tokens[2].may(http::Scope::read)) << "who edits also sees";
+}
+
+TEST_F(TokenFile, NamesTheLineThatIsWrongAndNoSecret) {
+  const std::string good = "# a comment\nviewer read s3cr-1\n";
+  EXPECT_EQ(refused(good + "s3cr-2\n"), "3: expected three words: a name, its scopes, and the secret");
+  EXPECT_EQ(refused(good + "other read s3cr-2 edit\n"), "3: expected three words: a name, its scopes, and the secret");
+  EXPECT_EQ(refused("other read #s3cr\n"), "1: expected three words: a name, its scopes, and the secret");
+  EXPECT_EQ(refused(good + "\nother s3cr-2 read"),
+            "4: scopes are read, edit and admin, with commas between several (the second word)");
+  for (const char* scopes : {"", ",read", "read,", "read,,edit", "READ", "write"})
+    EXPECT_NE(refused(std::string("other ") + scopes + " s3cr-2\n"), "taken") << scopes;
+  EXPECT_TRUE(refused(good + "s3cr/2 read other\n").starts_with("3: a name has up to 64 letters"));
+  EXPECT_TRUE(refused(std::string(65, 'n') + " read s3cr").starts_with("1: a name has"));
+  EXPECT_TRUE(refused("other read s3cr\xc3\xa9").starts_with("1: a secret is"));
+  EXPECT_TRUE(refused("other read s3cr" + std::string(4096, 'a')).starts_with("1: a secret is"));
+  EXPECT_EQ(refused(good + "viewer edit s3cr-2\n"), "3: it has the name of line 2");
+  EXPECT_EQ(refused(good + "other edit s3cr-1\n"), "3: it has the secret of line 2");
+  std::string many;
+  for (int i = 0; i < 257; ++i) many += "n" + std::to_string(i) + " read s3cr" + std::to_string(i) + "\n";
+  EXPECT_EQ(refused(many), "257: there may be 256 tokens");
 }
 
 TEST_F(TokenFile, IsNobodyElsesBusiness) {

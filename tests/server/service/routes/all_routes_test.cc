@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
 #include <set>
 #include <sstream>
 #include <string>
@@ -13,10 +14,11 @@
 namespace server::service::routes {
 namespace {
 
-/// "GET /v1/scenes" for every operation of the contract. Paths stand two spaces from the margin, methods four.
-std::set<std::string> operations_of(std::string_view contract) {
-  std::set<std::string> found;
-  std::string path;
+/// "GET /v1/scenes" for every operation of the contract, with what its security asks of a token. Paths stand two spaces
+/// from the margin, methods four.
+std::map<std::string, std::string> operations_of(std::string_view contract) {
+  std::map<std::string, std::string> found;
+  std::string path, operation;
   bool within_paths = false;
   std::istringstream lines{std::string(contract)};
   for (std::string line; std::getline(lines, line);) {
@@ -26,10 +28,32 @@ std::set<std::string> operations_of(std::string_view contract) {
     for (const char* method : {"GET", "POST", "PUT", "PATCH", "DELETE"}) {
       std::string lower(method);
       for (char& letter : lower) letter = char(std::tolower(letter));
-      if (line.starts_with("    " + lower + ":")) found.insert(method + (" " + path));
+      if (!line.starts_with("    " + lower + ":")) continue;
+      operation = method + (" " + path);
+      found[operation] = "[{bearer: [read]}, {cookie: [read]}, {}]";  // of all that say nothing else
     }
+    if (line.starts_with("      security: ")) found[operation] = line.substr(line.find('['));
   }
   return found;
+}
+
+std::string security_of(const http::Route& route) {
+  const auto with = [](const std::string& scope) {
+    return "[{bearer: [" + scope + "]}, {cookie: [" + scope + "]}, {}]";
+  };
+  switch (route.access) {
+    case http::Access::open:
+      return route.method == "DELETE" ? "[{cookie: []}, {}]" : "[]";
+    case http::Access::token:
+      return "[{bearer: []}, {}]";
+    case http::Access::read:
+      return with("read");
+    case http::Access::edit:
+      return with("edit");
+    case http::Access::admin:
+      return with("admin");
+  }
+  return "";
 }
 
 TEST(AllRoutes, AreThoseOfTheContract) {
@@ -51,9 +75,10 @@ TEST(AllRoutes, AreThoseOfTheContract) {
 
   std::set<std::string> page;
   for (const EmbeddedFile& file : page_files()) page.insert("GET /" + std::string(file.name));
-  std::set<std::string> routes;
+  std::map<std::string, std::string> routes;
   for (const http::Route& route : router.routes())
-    if (const std::string name = route.method + " " + route.path; !page.contains(name)) routes.insert(name);
+    if (const std::string name = route.method + " " + route.path; !page.contains(name))
+      routes[name] = security_of(route);
 
   const auto operations = operations_of(contract_files().front().bytes);
   EXPECT_GT(operations.size(), 20u) << "the contract is not read rightly";

@@ -16,8 +16,8 @@ class SystemRoutes : public testing::Test {
  protected:
   /// The routes are made over the parts of the server that is to serve them, so those come first.
   struct Service {
-    explicit Service(std::string token, std::optional<engine::Error> trouble = std::nullopt)
-        : guard({.token = std::move(token), .allowed_hosts = {}, .allowed_origins = {}}) {
+    explicit Service(std::vector<http::Token> tokens, std::optional<engine::Error> trouble = std::nullopt)
+        : guard({.tokens = std::move(tokens), .allowed_hosts = {}, .allowed_origins = {}}) {
       http::Router router;
       proto::ServiceInfo info;
       info.version = "1.2.3";
@@ -44,13 +44,13 @@ class SystemRoutes : public testing::Test {
     std::unique_ptr<http::HttpServer> server;
   };
 
-  Service open{""};
+  Service open{{}};
 };
 
 TEST_F(SystemRoutes, SayThatTheServiceLives) {
   EXPECT_EQ(open.get("/healthz").body, R"({"status":"ok"})");
   EXPECT_EQ(open.get("/readyz").body, R"({"ready":true})");
-  const Service broken("", engine::Error{engine::ErrorCode::no_space, "the disk is full", "jobs.sqlite"});
+  const Service broken({}, engine::Error{engine::ErrorCode::no_space, "the disk is full", "jobs.sqlite"});
   EXPECT_EQ(broken.get("/healthz").status, 200);
   const RawAnswer answer = broken.get("/readyz");
   EXPECT_EQ(answer.status, 503);
@@ -102,7 +102,7 @@ TEST_F(SystemRoutes, ServeThePageUnderAStrictPolicy) {
 }
 
 TEST_F(SystemRoutes, SwapATokenForACookie) {
-  const Service service("hush");
+  const Service service({http::only_token("hush"), {.name = "viewer", .read = true, .secret = "r"}});
   EXPECT_EQ(service.get("/v1/info").status, 401);
   for (const char* path : {"/healthz", "/readyz", "/", "/main.js"}) EXPECT_EQ(service.get(path).status, 200) << path;
   for (const char* path : {"/metrics", "/openapi.yaml"}) EXPECT_EQ(service.get(path).status, 401) << path;
@@ -118,6 +118,9 @@ TEST_F(SystemRoutes, SwapATokenForACookie) {
   const std::string pair = "Cookie: " + cookie.substr(0, cookie.find(';')) + "\r\n";
   EXPECT_EQ(service.get("/v1/info", pair).status, 200);
   EXPECT_EQ(service.ask("POST", "/v1/session", pair).status, 401) << "a cookie begets no cookie";
+  EXPECT_EQ(service.get("/metrics", pair).status, 200);
+  EXPECT_EQ(service.get("/metrics", "Authorization: Bearer r\r\n").status, 403) << "they are for operators";
+  EXPECT_EQ(service.get("/v1/info", "Authorization: Bearer r\r\n").status, 200);
   const RawAnswer closed = service.ask("DELETE", "/v1/session", pair);
   EXPECT_EQ(closed.status, 204);
   EXPECT_NE(closed.header("set-cookie").find("Max-Age=0"), std::string::npos);

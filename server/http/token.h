@@ -1,0 +1,56 @@
+// The tokens that let somebody in, and what each of them may do.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "engine/core/names.h"
+
+namespace server::http {
+
+/// What a token may do. None takes another in, but that whoever edits also sees.
+enum class Scope {
+  read,  ///< Sees: scenes, pictures, files, edits; what is asked and changes nothing, such as previews.
+  edit,  ///< Changes: uploads, edits, names, removals.
+  admin  ///< What only an operator should: metrics.
+};
+constexpr auto names_of(Scope) {
+  using engine::Name;
+  return std::array{Name{Scope::read, "read"}, Name{Scope::edit, "edit"}, Name{Scope::admin, "admin"}};
+}
+
+/// A secret with the name of whoever has it.
+struct Token {
+  std::string name;  ///< For people, logs and records: letters, digits, '.', '-', '_'.
+  bool read = false, edit = false, admin = false;
+  std::string secret;  ///< Printable ASCII without spaces. Stands in no message and in no log.
+
+  [[nodiscard]] bool may(Scope scope) const {
+    switch (scope) {
+      case Scope::read:
+        return read || edit;
+      case Scope::edit:
+        return edit;
+      case Scope::admin:
+        return admin;
+    }
+    return false;
+  }
+  /// Whether a session that was opened with the other one may go on with this one.
+  [[nodiscard]] bool may_the_same_as(const Token& other) const {
+    return name == other.name && secret == other.secret && read == other.read && edit == other.edit &&
+           admin == other.admin;
+  }
+};
+
+/// Who makes a request; null where the service has no tokens.
+using TokenPtr = std::shared_ptr<const Token>;
+
+/// The token of a service that has only one: it may do everything.
+[[nodiscard]] inline Token only_token(std::string secret) {
+  return {.name = "default", .read = true, .edit = true, .admin = true, .secret = std::move(secret)};
+}
+
+}  // namespace server::http
