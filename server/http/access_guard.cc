@@ -10,13 +10,21 @@
 namespace server::http {
 namespace {
 
-/// Compares all of both, so that the time taken tells nothing about where they differ.
+constexpr std::string_view bearer = "bearer ";
+
+/// Compares all of what is given, so that the time taken tells nothing about where they differ.
+///   expected  not empty
 bool same_secret(std::string_view given, std::string_view expected) {
   unsigned difference = given.size() == expected.size() ? 0 : 1;
   for (std::size_t i = 0; i < given.size(); ++i)
     difference |= unsigned(static_cast<unsigned char>(given[i]) ^
-                           static_cast<unsigned char>(expected.empty() ? '\0' : expected[i % expected.size()]));
+                           static_cast<unsigned char>(expected[std::min(i, expected.size() - 1)]));
   return difference == 0;
+}
+
+/// Is what stands in an Authorization header a token, not what a proxy in front asked a person for?
+bool is_bearer(std::string_view authorization) {
+  return authorization.size() >= bearer.size() && same_ignoring_case(authorization.substr(0, bearer.size()), bearer);
 }
 
 std::string cookie_in(std::string_view cookies) {
@@ -98,27 +106,31 @@ std::optional<Refusal> AccessGuard::check_origin(const RequestHead& head) const 
 }
 
 TokenPtr AccessGuard::token_of_secret(std::string_view secret) const {
-  const std::lock_guard lock(mutex_);
+  if (secret.size() > max_secret_bytes) return nullptr;  // nobody is to make work by what is none
   TokenPtr found;
-  for (const TokenPtr& token : tokens_)  // all of them: which one it is does not show in the time either
+  for (const TokenPtr& token : *tokens())  // all of them: which one it is does not show in the time either
     if (same_secret(secret, token->secret)) found = token;
   return found;
+}
+
+std::shared_ptr<const std::vector<TokenPtr>> AccessGuard::tokens() const {
+  const std::lock_guard lock(mutex_);
+  return tokens_;
 }
 
 tl::expected<TokenPtr, Refusal> AccessGuard::check_token(std::string_view authorization,
                                                          const std::string& client) const {
   if (!needs_token()) return nullptr;
   const Refusal wanted{401, "unauthorized", "this service wants a token: \"Authorization: Bearer ...\"", ""};
-  constexpr std::string_view scheme = "bearer ";
-  if (authorization.size() < scheme.size() || !same_ignoring_case(authorization.substr(0, scheme.size()), scheme))
-    return tl::make_unexpected(wanted);
+  if (!is_bearer(authorization)) return tl::make_unexpected(wanted);
   if (const auto seconds = brake_.must_wait(client))
     return tl::make_unexpected(Refusal{
         429, "busy", "too many wrong tokens came from your address: try again in " + std::to_string(*seconds) + " s",
         "", *seconds});
-  const std::string given(trim(authorization.substr(scheme.size())));
+  const std::string given(trim(authorization.substr(bearer.size())));
   if (TokenPtr token = token_of_secret(given)) {
-    brake_.forget(client);
+    // Whoever has one of several may be after the others.
+    if (has_only_token()) brake_.forget(client);
     return token;
   }
   brake_.count_wrong(client, given);
@@ -138,19 +150,23 @@ std::optional<Refusal> AccessGuard::check_scope(const Token* token, Scope scope)
 
 bool AccessGuard::still_knows(const Token* token) const {
   if (token == nullptr) return true;
-  const std::lock_guard lock(mutex_);
-  return std::ranges::any_of(tokens_, [&](const TokenPtr& known) { return known->may_the_same_as(*token); });
+  return std::ranges::any_of(*tokens(), [&](const TokenPtr& known) { return known->may_the_same_as(*token); });
+}
+
+bool AccessGuard::has_only_token() const {
+  const auto known = tokens();
+  return known->size() == 1 && known->front()->name == only_token_name;
 }
 
 void AccessGuard::replace_tokens(std::vector<Token> tokens) {
+  auto known = std::make_shared<std::vector<TokenPtr>>();
+  for (Token& token : tokens) known->push_back(std::make_shared<const Token>(std::move(token)));
   const std::lock_guard lock(mutex_);
-  tokens_.clear();
-  for (Token& token : tokens) tokens_.push_back(std::make_shared<const Token>(std::move(token)));
+  tokens_ = known;
   for (auto session = sessions_.begin(); session != sessions_.end();) {
-    const auto same = std::ranges::find_if(tokens_, [&](const TokenPtr& token) {  //
-      return token->may_the_same_as(*session->second.token);
-    });
-    if (same == tokens_.end()) {
+    const auto same = std::ranges::find_if(
+        *known, [&](const TokenPtr& token) { return token->may_the_same_as(*session->second.token); });
+    if (same == known->end()) {
       session = sessions_.erase(session);
     } else {
       session->second.token = *same;
@@ -183,17 +199,21 @@ TokenPtr AccessGuard::token_of_session(std::string_view cookies) const {
 
 tl::expected<TokenPtr, Refusal> AccessGuard::check_access(const RequestHead& head, const std::string& client) const {
   if (!needs_token()) return nullptr;
+  const std::string authorization = head.header("authorization");
+  if (is_bearer(authorization)) return check_token(authorization, client);
   if (TokenPtr token = token_of_session(head.header("cookie"))) return token;
-  return check_token(head.header("authorization"), client);
+  return check_token(authorization, client);
 }
 
-std::string AccessGuard::open_session(TokenPtr token) {
+std::optional<std::string> AccessGuard::open_session(const Token& token) {
   const std::string secret = random_id();
   const std::lock_guard lock(mutex_);
+  const auto known = std::ranges::find_if(*tokens_, [&](const TokenPtr& one) { return one->may_the_same_as(token); });
+  if (known == tokens_->end()) return std::nullopt;
   std::erase_if(sessions_, [&](const auto& s) { return Clock::now() - s.second.opened >= options_.session_lifetime; });
   while (!sessions_.empty() && sessions_.size() >= options_.max_sessions)
     sessions_.erase(std::ranges::min_element(sessions_, {}, [](const auto& s) { return s.second.opened; }));
-  sessions_[secret] = {Clock::now(), std::move(token)};
+  sessions_[secret] = {Clock::now(), *known};
   return secret;
 }
 

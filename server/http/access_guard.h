@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstddef>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -53,7 +54,8 @@ class AccessGuard {
   ///   returns        or a refusal: 401 unauthorized, 429 busy
   [[nodiscard]] tl::expected<TokenPtr, Refusal> check_token(std::string_view authorization,
                                                             const std::string& client) const;
-  /// The token that a request carries, or that of the session whose cookie it carries. As check_token().
+  /// The token that a request carries, or, where it carries none, that of the session whose cookie it carries. As
+  /// check_token().
   [[nodiscard]] tl::expected<TokenPtr, Refusal> check_access(const RequestHead& head, const std::string& client) const;
   /// Whether whoever has this token, of which none is needed if it is null, may do that.
   ///   returns  a refusal: 403 forbidden, which names the token and what it lacks
@@ -61,6 +63,8 @@ class AccessGuard {
   /// Whether this token, of which none is needed if it is null, still is one: as it was, but for what a session may
   /// outlive.
   [[nodiscard]] bool still_knows(const Token* token) const;
+  /// Whether there is one word for all (only_token()).
+  [[nodiscard]] bool has_only_token() const;
   /// Replaces all tokens by others, neither none. Sessions end that were opened with a token that is gone, or has
   /// another name, secret or scope.
   void replace_tokens(std::vector<Token> tokens);
@@ -75,8 +79,8 @@ class AccessGuard {
   [[nodiscard]] bool is_secure(std::string_view forwarded_proto) const;
 
   /// A new session, which may do what its token may.
-  ///   returns  its secret, for the cookie
-  [[nodiscard]] std::string open_session(TokenPtr token);
+  ///   returns  its secret, for the cookie; nothing: the token is none any more, since the request was let in with it
+  [[nodiscard]] std::optional<std::string> open_session(const Token& token);
   /// The token of the session that a Cookie header names; null: it names none.
   [[nodiscard]] TokenPtr token_of_session(std::string_view cookies) const;
   /// Ends the session that a Cookie header names, if it does.
@@ -96,8 +100,10 @@ class AccessGuard {
     Clock::time_point opened;
     TokenPtr token;
   };
-  mutable std::mutex mutex_;  ///< Guards tokens_ and sessions_.
-  std::vector<TokenPtr> tokens_;
+  [[nodiscard]] std::shared_ptr<const std::vector<TokenPtr>> tokens() const;
+
+  mutable std::mutex mutex_;  ///< Guards tokens_, which are compared without it, and sessions_.
+  std::shared_ptr<const std::vector<TokenPtr>> tokens_;
   std::map<std::string, Session> sessions_;  ///< By secret.
   mutable GuessBrake brake_;
 };

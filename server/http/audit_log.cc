@@ -16,7 +16,9 @@ namespace {
 /// Also to be read: whoever had it before may have left it with half a line.
 engine::Result<engine::FileDescriptor> open_to_append(const std::filesystem::path& file) {
   constexpr mode_t for_its_group = 0640;  // those who audit need not be who serves
-  engine::FileDescriptor opened(::open(file.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC, for_its_group));
+  // Of a pipe that nobody empties a line is lost, as on a full disk: it keeps nobody waiting.
+  constexpr int how = O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC | O_NONBLOCK | O_NOCTTY;
+  engine::FileDescriptor opened(::open(file.c_str(), how, for_its_group));
   if (opened.get() < 0) return tl::make_unexpected(engine::file_error(errno, "open", file));
   return opened;
 }

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "engine/core/names.h"
@@ -21,11 +23,13 @@ constexpr auto names_of(Scope) {
   return std::array{Name{Scope::read, "read"}, Name{Scope::edit, "edit"}, Name{Scope::admin, "admin"}};
 }
 
+constexpr std::size_t max_secret_bytes = 4096;  // a choice
+
 /// A secret with the name of whoever has it.
 struct Token {
   std::string name;  ///< For people, logs and records: letters, digits, '.', '-', '_'.
   bool read = false, edit = false, admin = false;
-  std::string secret;  ///< Printable ASCII without spaces. Stands in no message and in no log.
+  std::string secret;  ///< Printable ASCII without spaces, 1 to max_secret_bytes. Stands in no message, in no log.
 
   [[nodiscard]] bool may(Scope scope) const {
     switch (scope) {
@@ -48,9 +52,10 @@ struct Token {
 /// Who makes a request; null where the service has no tokens.
 using TokenPtr = std::shared_ptr<const Token>;
 
-/// The token of a service that has only one: it may do everything.
+/// The token of a service that has one word for all: it may do everything. No token of a line has its name.
+constexpr std::string_view only_token_name = "default";
 [[nodiscard]] inline Token only_token(std::string secret) {
-  return {.name = "default", .read = true, .edit = true, .admin = true, .secret = std::move(secret)};
+  return {.name = std::string(only_token_name), .read = true, .edit = true, .admin = true, .secret = std::move(secret)};
 }
 
 }  // namespace server::http

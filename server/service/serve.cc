@@ -110,6 +110,14 @@ void reload_tokens(const std::filesystem::path& file, http::AccessGuard& guard, 
               {{"where", tokens.error().where}});
     return;
   }
+  // A file that is only half written, or was cut off, has one word as well: a name, which is no secret.
+  if (tokens->size() == 1 && tokens->front().name == http::only_token_name && !guard.has_only_token()) {
+    http::log(logger, spdlog::level::err,
+              "the old tokens stay: the file has one word now, and had named tokens; restart the service to have one "
+              "token that may do everything",
+              {{"where", file.string()}});
+    return;
+  }
   const auto count = std::int64_t(tokens->size());
   guard.replace_tokens(std::move(*tokens));
   http::log(logger, spdlog::level::info, "tokens have been read again", {{"tokens", count}});

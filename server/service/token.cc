@@ -21,14 +21,13 @@ namespace {
 
 // Choices, all of them:
 constexpr std::size_t max_file_bytes = 64 * 1024;
-constexpr std::size_t max_secret_bytes = 4096;
 constexpr std::size_t max_name_bytes = 64;
 constexpr std::size_t max_tokens = 256;  // each request is held against all of them
 
 bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
 
 bool is_secret(std::string_view word) {
-  return !word.empty() && word.size() <= max_secret_bytes &&
+  return !word.empty() && word.size() <= http::max_secret_bytes &&
          std::ranges::all_of(word, [](char c) { return c > 0x20 && c < 0x7f; });
 }
 
@@ -92,6 +91,8 @@ class TokenLines {
     token.secret = words[2];
     if (!is_secret(token.secret))
       return wrong("a secret is up to 4096 bytes of printable ASCII; make one with: openssl rand -hex 32");
+    if (token.name == http::only_token_name)
+      return wrong("the name is that of the token of a file of one word: choose another");
     if (const auto [known, added] = names_.emplace(token.name, number_); !added)
       return wrong("it has the name of line " + std::to_string(known->second));
     if (const auto [known, added] = secrets_.emplace(token.secret, number_); !added)
@@ -137,7 +138,7 @@ Result<std::vector<Token>> read_tokens(const std::filesystem::path& file, std::s
   const auto words = words_of(*text);
   if (words.empty()) return fail(ErrorCode::invalid_argument, "the token file is empty", file.string());
   TokenLines lines(file);
-  if (words.size() == 1) {
+  if (words.size() == 1 && words.front() != "#") {
     if (!is_secret(words.front()))
       return fail(ErrorCode::invalid_argument,
                   "a token is one word of printable ASCII, up to 4096 bytes; make one with: openssl rand -hex 32",

@@ -98,6 +98,8 @@ describe('with a scene', () => {
     await reread(`${lines(['viewer', 'boss'])}broken line\n`, 'the old tokens stay');
     await page.get('/v1/scenes', { headers: studio });
     assert.match(service.log, new RegExp(`${file}:4`));
+    await reread('viewer\n', 'the old tokens stay');
+    await page.get('/v1/scenes', { headers: { authorization: 'Bearer viewer' }, expect: 401 });
     await reread(lines(['viewer', 'boss', 'scraper']), 'have been read again');
     await page.get('/v1/scenes', { headers: viewer });
     await page.get('/v1/scenes', { headers: studio, expect: 401 });

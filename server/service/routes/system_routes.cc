@@ -70,7 +70,9 @@ void add_session(http::Router& router, http::AccessGuard& guard) {
     const http::TokenPtr token = call.token();
     if (token == nullptr) return reply;
     const bool secure = guard.is_secure(call.header("x-forwarded-proto"));
-    reply.headers.emplace_back("Set-Cookie", cookie(guard.open_session(token), secure ? "; Secure" : ""));
+    const auto session = guard.open_session(*token);
+    if (!session) return engine::fail(engine::ErrorCode::unavailable, "the token was taken away just now");
+    reply.headers.emplace_back("Set-Cookie", cookie(*session, secure ? "; Secure" : ""));
     return reply;
   };
   const auto close = [&guard](const Call& call) -> Result<Reply> {

@@ -13,7 +13,7 @@ RequestHead with_cookie(const std::string& secret) {
   return head;
 }
 
-const TokenPtr owner = std::make_shared<const Token>(only_token("t"));
+const Token owner = only_token("t");
 
 bool lets_in(const AccessGuard& guard, const RequestHead& head) { return guard.check_access(head, "a").has_value(); }
 int status_of(const AccessGuard& guard, const std::string& authorization, const std::string& client = "a") {
@@ -24,7 +24,7 @@ int status_of(const AccessGuard& guard, const std::string& authorization, const 
 TEST(AccessGuard, KeepsABoundedNumberOfSessions) {
   AccessGuard guard({.tokens = {only_token("t")}, .allowed_hosts = {}, .allowed_origins = {}, .max_sessions = 3});
   std::vector<std::string> secrets;
-  for (int i = 0; i < 5; ++i) secrets.push_back(guard.open_session(owner));
+  for (int i = 0; i < 5; ++i) secrets.push_back(guard.open_session(owner).value());
   for (int i = 0; i < 5; ++i) EXPECT_EQ(lets_in(guard, with_cookie(secrets[std::size_t(i)])), i >= 2) << i;
 }
 
@@ -33,12 +33,12 @@ TEST(AccessGuard, ForgetsOldSessions) {
                      .allowed_hosts = {},
                      .allowed_origins = {},
                      .session_lifetime = std::chrono::seconds(0)});
-  EXPECT_FALSE(lets_in(guard, with_cookie(guard.open_session(owner))));
+  EXPECT_FALSE(lets_in(guard, with_cookie(guard.open_session(owner).value())));
 }
 
 TEST(AccessGuard, LooksAtNoTokenForAWhileAfterManyWrongOnes) {
   AccessGuard guard({.tokens = {only_token("t")}, .allowed_hosts = {}, .allowed_origins = {}});
-  const std::string secret = guard.open_session(owner);
+  const std::string secret = guard.open_session(owner).value();
   for (int i = 0; i < 6; ++i) EXPECT_EQ(status_of(guard, "Bearer x" + std::to_string(i), "1.2.3.4"), 401);
   const auto braked = guard.check_token("Bearer t", "1.2.3.4");
   ASSERT_FALSE(braked);
@@ -67,7 +67,7 @@ TEST(AccessGuard, EndsSessionsWithTheTokenTheyWereOpenedWith) {
       second{.name = "second", .edit = true, .secret = "2"};
   AccessGuard guard({.tokens = {first, second}, .allowed_hosts = {}, .allowed_origins = {}});
   const auto open = [&](const std::string& secret) {
-    return guard.open_session(*guard.check_token("Bearer " + secret, "a"));
+    return guard.open_session(**guard.check_token("Bearer " + secret, "a")).value();
   };
   const std::string of_first = open("1"), of_second = open("2");
   guard.replace_tokens({second, first});
@@ -88,6 +88,53 @@ TEST(AccessGuard, EndsSessionsWithTheTokenTheyWereOpenedWith) {
     EXPECT_FALSE(guard.still_knows(&second));
     EXPECT_TRUE(guard.still_knows(&changed));
   }
+}
+
+TEST(AccessGuard, OpensNoSessionForATokenThatWasTakenAwaySinceItWasLetIn) {
+  const Token first{.name = "first", .read = true, .secret = "1"},
+      second{.name = "second", .edit = true, .secret = "2"};
+  AccessGuard guard({.tokens = {first, second}, .allowed_hosts = {}, .allowed_origins = {}});
+  const TokenPtr let_in = *guard.check_token("Bearer 1", "a");
+  guard.replace_tokens({second});
+  EXPECT_FALSE(guard.open_session(*let_in));
+}
+
+TEST(AccessGuard, BrakesGuessesAtOtherTokensOfWhoeverHasOne) {
+  const auto last_guess = [](std::vector<Token> tokens) {
+    const AccessGuard guard({.tokens = std::move(tokens), .allowed_hosts = {}, .allowed_origins = {}});
+    int status = 0;
+    for (int i = 0; i < 20; ++i) {
+      status = status_of(guard, "Bearer x" + std::to_string(i));
+      (void)status_of(guard, "Bearer t");
+    }
+    return status;
+  };
+  EXPECT_EQ(
+      last_guess({{.name = "viewer", .read = true, .secret = "t"}, {.name = "boss", .admin = true, .secret = "b"}}),
+      429);
+  EXPECT_EQ(last_guess({only_token("t")}), 401) << "whoever has the only one has nothing to guess";
+}
+
+TEST(AccessGuard, LooksAtTheTokenOfARequestBeforeItsCookie) {
+  const Token viewer{.name = "viewer", .read = true, .secret = "1"}, boss{.name = "boss", .admin = true, .secret = "2"};
+  AccessGuard guard({.tokens = {viewer, boss}, .allowed_hosts = {}, .allowed_origins = {}});
+  RequestHead head = with_cookie(guard.open_session(viewer).value());
+  const auto with = [&](const std::string& authorization) {
+    RequestHead both = head;
+    both.headers.emplace_back("authorization", authorization);
+    const auto token = guard.check_access(both, "a");
+    return token ? (*token)->name : std::to_string(token.error().status);
+  };
+  EXPECT_EQ(with("Bearer 2"), "boss");
+  EXPECT_EQ(with("Bearer 3"), "401");
+  EXPECT_EQ(with("Basic cHJveHk6cHJveHk="), "viewer") << "what a proxy asked for says nothing here";
+}
+
+TEST(AccessGuard, HoldsNoTokenAgainstWhatIsTooLongToBeOne) {
+  const std::string longest(max_secret_bytes, 'x');
+  const AccessGuard guard({.tokens = {only_token(longest)}, .allowed_hosts = {}, .allowed_origins = {}});
+  EXPECT_EQ(status_of(guard, "Bearer " + longest), 200);
+  EXPECT_EQ(status_of(guard, "Bearer " + longest + "x"), 401);
 }
 
 TEST(AccessGuard, KnowsWhoseRequestItIs) {

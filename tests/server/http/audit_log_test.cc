@@ -1,6 +1,7 @@
 #include "server/http/audit_log.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <filesystem>
 #include <fstream>
@@ -84,6 +85,16 @@ TEST_F(AuditLogTest, NamesAFileThatCannotBeOpened) {
   ASSERT_FALSE(log);
   EXPECT_EQ(log.error().code, engine::ErrorCode::not_found);
   EXPECT_EQ(log.error().where, (folder.path() / "no" / "audit").string());
+}
+
+TEST_F(AuditLogTest, KeepsNobodyWaitingForAPipeThatNobodyEmpties) {
+  ASSERT_EQ(::mkfifo(file.c_str(), 0600), 0);
+  const auto log = AuditLog::open(file, service_log.logger());
+  ASSERT_TRUE(log) << log.error().message;
+  proto::AuditEntry entry;
+  entry.route = std::string(4000, 'r');
+  for (int i = 0; i < 1000 && (*log)->lost() == 0; ++i) (*log)->write(entry);  // a pipe holds 64 KiB
+  EXPECT_GT((*log)->lost(), 0u);
 }
 
 TEST_F(AuditLogTest, OnAFullDiskTellsTheServicesLogAndLaterHowMuchItLacks) {

@@ -119,7 +119,7 @@ TEST(HttpServer, WantsItsTokenEverywhereButOnOpenRoutes) {
     EXPECT_EQ(ask_with("/nowhere", wrong).status, 401) << "tells which routes there are";
   }
   EXPECT_EQ(ask_with("/json", "Authorization: bearer correct horse\r\n").status, 200);
-  const std::string secret = server.guard.open_session(std::make_shared<const Token>(only_token("correct horse")));
+  const std::string secret = server.guard.open_session(only_token("correct horse")).value();
   EXPECT_EQ(ask_with("/json", "Cookie: a=b; splatdrag_session=" + secret + "\r\n").status, 200);
   server.guard.close_session("splatdrag_session=" + secret);
   EXPECT_EQ(ask_with("/json", "Cookie: splatdrag_session=" + secret + "\r\n").status, 401);
@@ -172,7 +172,7 @@ TEST(HttpServer, AsksEachRouteForItsScope) {
   EXPECT_EQ(ask_as("a", "POST", "/sign-in").status, 200) << "of whatever scope";
   EXPECT_EQ(ask(server.port(), "POST", "/sign-in").status, 401);
 
-  const auto session = server.guard.open_session(*server.guard.check_token("Bearer r", "a"));
+  const auto session = server.guard.open_session(**server.guard.check_token("Bearer r", "a")).value();
   const std::string cookie = "Cookie: splatdrag_session=" + session + "\r\n";
   EXPECT_EQ(ask(server.port(), "GET", "/see", cookie).body, R"({"by":"viewer"})");
   EXPECT_EQ(ask(server.port(), "POST", "/change", cookie).status, 403) << "a session may do what its token may";

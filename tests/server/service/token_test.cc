@@ -46,8 +46,9 @@ TEST_F(TokenFile, OfOneWordHoldsTheTokenThatMayDoAll) {
     EXPECT_TRUE(tokens[0].read && tokens[0].edit && tokens[0].admin);
   }
   EXPECT_EQ(read("  s3cret\r\n").value()[0].secret, "s3cret");
-  for (const std::string& text : {std::string(), std::string(" \n"), std::string("caf\xc3\xa9"), std::string("a\0b", 3),
-                                  std::string(5000, 'a'), std::string(100'000, 'a'), std::string("# two\n# lines")}) {
+  for (const std::string& text :
+       {std::string(), std::string(" \n"), std::string("caf\xc3\xa9"), std::string("a\0b", 3), std::string(5000, 'a'),
+        std::string(100'000, 'a'), std::string("# two\n# lines"), std::string("#")}) {
     const auto tokens = read(text);
     ASSERT_FALSE(tokens) << text;
     EXPECT_EQ(tokens.error().code, ErrorCode::invalid_argument);
@@ -92,6 +93,7 @@ TEST_F(TokenFile, NamesTheLineThatIsWrongAndNoSecret) {
   EXPECT_TRUE(refused("other read s3cr" + std::string(4096, 'a')).starts_with("1: a secret is"));
   EXPECT_EQ(refused(good + "viewer edit s3cr-2\n"), "3: it has the name of line 2");
   EXPECT_EQ(refused(good + "other edit s3cr-1\n"), "3: it has the secret of line 2");
+  EXPECT_EQ(refused("default read s3cr"), "1: the name is that of the token of a file of one word: choose another");
   std::string many;
   for (int i = 0; i < 257; ++i) many += "n" + std::to_string(i) + " read s3cr" + std::to_string(i) + "\n";
   EXPECT_EQ(refused(many), "257: there may be 256 tokens");
