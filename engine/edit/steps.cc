@@ -107,10 +107,28 @@ bool repairs_a_departure(const Edit& edit) {
 
 bool has_outskirts(const Edit& edit) { return edit.request.crumbs != Crumbs::keep && repairs_a_departure(edit); }
 
-/// Its shadow is that of one part, which arrives at once: else a shadow would be where nothing is yet.
+/// How the only part moves, where it goes as one piece.
+deform::RigidMotion motion_of_part(const State& state, const Edit& edit) {
+  const deform::Attachment& part = edit.parts.attachments.front();
+  const auto drags = interval_drags(state.scene.frame(), edit.request, edit.parts.corrected, state.positions, 1, 1);
+  return deform::nearest_motion(drags, part.group, part.scales);
+}
+
+/// Is a part turned by so much that its shadow would be another one? The light does not turn with it.
+bool turns_in_the_light(const State& state, const Edit& edit) {
+  // Of half an angle of 30 degrees: a chair that is led around by 25 keeps its shadow; a door that is opened by 60 had
+  // something dark beside it carried along.
+  constexpr double least_cosine = 0.966;
+  return std::abs(motion_of_part(state, edit).turn.w) < least_cosine;
+}
+
+/// Its shadow is that of one part, which arrives at once: else a shadow would be where nothing is yet. Whoever asks for
+/// the shadow to be removed knows of one; else it goes along, as it is.
 bool has_shadow(const State& state, const Edit& edit) {
-  return edit.request.shadow != ShadowOfPart::keep && repairs_a_departure(edit) &&
-         state.report.resolved.intervals == 1 && edit.parts.attachments.size() <= 1;
+  const bool is_one = edit.request.shadow != ShadowOfPart::keep && repairs_a_departure(edit) &&
+                      state.report.resolved.intervals == 1 && edit.parts.attachments.size() <= 1;
+  const bool goes_along = edit.request.shadow == ShadowOfPart::move && edit.request.mode == Mode::move;
+  return is_one && !(goes_along && turns_in_the_light(state, edit));
 }
 
 /// May the edit change this row, though it is not selected? Not outside of the region; what is healed goes anyway, and
@@ -145,10 +163,8 @@ Result<void> look_at_outskirts(State& state, Edit& edit, const ViewChoice& choic
 /// not go along.
 std::function<DVec3(DVec3)> back_to_source(const State& state, const Edit& edit) {
   if (edit.request.mode == Mode::remove || edit.request.shadow == ShadowOfPart::remove) return {};
-  const deform::Attachment& part = edit.parts.attachments.front();
   const working::Frame& frame = state.scene.frame();
-  const auto drags = interval_drags(frame, edit.request, edit.parts.corrected, state.positions, 1, 1);
-  const deform::RigidMotion motion = deform::nearest_motion(drags, part.group, part.scales);
+  const deform::RigidMotion motion = motion_of_part(state, edit);
   return [motion, &frame](DVec3 point) {
     const DVec3 arrived = frame.edit_from_world(point) - motion.centre - motion.shift;
     return frame.world_from_edit(motion.centre + glm::conjugate(motion.turn) * arrived / motion.scale);

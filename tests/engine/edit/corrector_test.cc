@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <numbers>
 #include <numeric>
 #include <optional>
 #include <string>
@@ -20,6 +21,7 @@
 #include "engine/render/forward.h"
 #include "tests/engine/edit/block.h"
 #include "tests/engine/edit/likeness.h"
+#include "tests/engine/repair/shadowed_block.h"
 
 namespace engine::edit {
 namespace {
@@ -118,6 +120,26 @@ BlockScene removing_the_block() {
   block.request.mode = Mode::remove;
   block.request.handles[0].target.reset();
   return block;
+}
+
+TEST(EditWithACorrector, AShadowGoesAlongUnlessThePartTurnsInTheLight) {
+  const auto relit = [](double degrees, ShadowOfPart shadow) {
+    repair::ShadowedBlock scene(repair::beside_block);
+    Request& request = scene.block.request;
+    request.region.reset();
+    request.selected = scene.part;
+    request.shadow = shadow;
+    request.params.interpolation = Interpolation::arap;
+    request.params.iterations = 1;
+    const double half = degrees * std::numbers::pi / 360;
+    request.handles[0].rotation = DQuat(std::cos(half), 0, std::sin(half), 0);
+    return run_with_scene_corrector(scene.block).report.relit;
+  };
+  EXPECT_GT(relit(-25, ShadowOfPart::move), 10u);
+  EXPECT_EQ(relit(35, ShadowOfPart::move), 0u);
+  EXPECT_EQ(relit(-180, ShadowOfPart::move), 0u);
+  EXPECT_GT(relit(350, ShadowOfPart::move), 10u) << "by 10, the other way";
+  EXPECT_GT(relit(60, ShadowOfPart::remove), 10u) << "who asks for it has seen one";
 }
 
 TEST(EditWithACorrector, RemovesABlockAndClosesWhatItLeft) {
