@@ -91,6 +91,22 @@ Result<Job> Queue::cancel(const std::string& id) {
   return with_latest_progress(std::move(*job));
 }
 
+Result<Job> Queue::requeue(const std::string& id) {
+  const std::lock_guard lock(ends_mutex_);
+  auto job = store_.find(id);
+  if (!job) return job;
+  const int checkpoint = last_checkpoint(folder_of(id));
+  // The note first: one that still says "failed" would count as what the record has lost when the queue is opened.
+  const auto again = transition(*job, {.event = Event::requeue, .interval = checkpoint}, {});
+  if (again)
+    if (auto noted = write_note(options_.folder, *again); !noted) return propagate(noted);
+  auto requeued = store_.requeue(id, checkpoint);
+  if (!requeued && again) note_end(*job);
+  if (!requeued) return requeued;
+  bump_revision();
+  return with_latest_progress(std::move(*requeued));
+}
+
 Result<void> Queue::remove(const std::string& id) {
   const std::lock_guard lock(ends_mutex_);
   const auto job = store_.find(id);

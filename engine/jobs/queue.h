@@ -42,7 +42,7 @@ class Queue {
 
   /// Accepts a job: when this returns, it is on disk and will be done. With an idempotency key that is known already it
   /// answers with the job that was accepted then.
-  ///   errors  busy: the queue is full; unprocessable: the key belongs to another payload or lane
+  ///   errors  busy: the queue is full; unprocessable: the key belongs to another payload or lane; quota_exceeded
   [[nodiscard]] Result<Submission> submit(const NewJob& job);
   /// Whether there is room for another job, for whoever has work to do before submit(). Others may come first.
   ///   errors  busy: the queue is full
@@ -58,6 +58,12 @@ class Queue {
   /// Asks a job to end at once and keep nothing; one that waits is cancelled when this returns. Idempotent.
   ///   errors  conflict: the job has succeeded or failed
   [[nodiscard]] Result<Job> cancel(const std::string& id);
+  /// Whether the requester's quota has room for the job. Others may come first.
+  ///   errors  quota_exceeded
+  [[nodiscard]] Result<void> check_quota(const NewJob& job) { return store_.check_quota(job); }
+  /// Has a job that has failed taken up again, from its last checkpoint if that is still there.
+  ///   errors  conflict: it has not failed, or a younger job of its lane has yet to end
+  [[nodiscard]] Result<Job> requeue(const std::string& id);
   /// Removes the record and the files of an ended job.
   ///   errors  conflict: it has not ended
   [[nodiscard]] Result<void> remove(const std::string& id);

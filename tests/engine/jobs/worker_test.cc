@@ -48,6 +48,12 @@ class Between final : public Store {
     return store_.submit(job, max_queued, witness);
   }
   Result<void> check_room(std::size_t max_queued) override { return store_.check_room(max_queued); }
+  Result<void> check_quota(const NewJob& job) override { return store_.check_quota(job); }
+  Result<Usage> usage(const std::string& requester) override { return store_.usage(requester); }
+  Result<Job> requeue(const std::string& id, int finished_intervals) override {
+    return store_.requeue(id, finished_intervals);
+  }
+  Result<Time> now() override { return store_.now(); }
   Result<void> restore(const Job& job) override { return store_.restore(job); }
   Result<Job> find(const std::string& id) override { return store_.find(id); }
   Result<std::optional<Job>> find_key(const std::string& key) override { return store_.find_key(key); }
@@ -222,6 +228,43 @@ TEST_P(WorkerTest, RecordsTheErrorOfAJobAndGoesOn) {
   EXPECT_EQ(bad.error->code, ErrorCode::unprocessable);
   EXPECT_EQ(bad.error->where, "handles[0]");
   EXPECT_EQ(wait_for_end(*queue, "e000002").state, JobState::succeeded);
+}
+
+TEST_P(WorkerTest, AJobThatFailedGoesOnFromItsCheckpointOnceItIsTakenUpAgain) {
+  const std::string id = submit();
+  std::atomic<bool> broken = true;
+  start([&](JobContext& context) -> Result<JobResult> {
+    std::string done = context.finished_intervals() > 0 ? value(context.load_checkpoint()) : "";
+    for (int u = context.finished_intervals() + 1; u <= 3; ++u) {
+      if (u == 3 && broken) return fail(ErrorCode::no_space, "the disk is full");
+      done += std::to_string(u);
+      if (auto saved = context.save_checkpoint(u, done); !saved) return propagate(saved);
+    }
+    return JobResult{.text = done + (broken ? "" : " at last")};
+  });
+  EXPECT_EQ(wait_for_end(*queue, id).state, JobState::failed);
+  EXPECT_TRUE(fs::exists(folder(id) / "checkpoint-2")) << "it may be wanted";
+  broken = false;
+  value(queue->requeue(id));
+  EXPECT_EQ(wait_for_end(*queue, id).result, "123 at last");
+  worker->drain(patience);
+  EXPECT_TRUE(fs::is_empty(folder(id)));
+}
+
+TEST_P(WorkerTest, CountsTheTimeOfWork) {
+  const std::string id = value(queue->submit({.lane = "a", .payload = "", .requester = "studio"})).job.id;
+  start([&](JobContext& context) -> Result<JobResult> {
+    std::this_thread::sleep_for(30ms);
+    context.publish_progress("some");
+    std::this_thread::sleep_for(30ms);
+    if (auto saved = context.save_checkpoint(1, "x"); !saved) return propagate(saved);
+    std::this_thread::sleep_for(30ms);
+    return JobResult{};
+  });
+  const Job done = wait_for_end(*queue, id);
+  EXPECT_GE(done.worked, 88ms) << "each part may be cut to whole milliseconds";
+  EXPECT_LE(done.worked, *done.ended - *done.claimed_at + 50ms);
+  EXPECT_EQ(value(store->usage("studio")).worked_today, done.worked) << "unless it was midnight";
 }
 
 TEST_P(WorkerTest, TurnsAnExceptionIntoAnInternalError) {
