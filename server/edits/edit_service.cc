@@ -392,6 +392,15 @@ Result<void> EditService::remove(const std::string& id) {
   return removed;
 }
 
+Result<proto::EditStatus> EditService::requeue(const std::string& id) {
+  const auto job = about_edit(impl_->queue->find(id), id);
+  if (!job) return propagate(job);
+  const auto hold = impl_->hold(job->lane, engine::LockKind::shared);
+  if (!hold) return propagate(hold);
+  if (const auto scene = impl_->scenes.find(job->lane); !scene) return propagate(scene);
+  return impl_->shown(about_edit(impl_->queue->requeue(id), id));
+}
+
 Result<std::string> EditService::interval_picture(const std::string& id, int interval, int view,
                                                   const std::string& stage) {
   const auto status = find(id);

@@ -111,6 +111,10 @@ class EditService {
   [[nodiscard]] Result<proto::EditStatus> stop(const std::string& id);
   [[nodiscard]] Result<proto::EditStatus> cancel(const std::string& id);
   [[nodiscard]] Result<void> remove(const std::string& id);
+  /// Has an edit that failed taken up again, from its last checkpoint if that is still there.
+  ///   errors  conflict: it has not failed, or a later edit of its scene has yet to end; not_found: the edit, or its
+  ///           scene
+  [[nodiscard]] Result<proto::EditStatus> requeue(const std::string& id);
   /// A picture of a finished interval: JPEG bytes.
   ///   stage   "before", "deformed", "corrected", "optimised"
   ///   errors  not_found: no such interval, view or stage (the message lists those there are)

@@ -236,6 +236,8 @@ void add_edit_routes(http::Router& router, EditService& service, const EditRoute
       [](const Call& call, EditService& s) { return reply_with(s.stop(call.path("id"))); });
   add("POST", "/v1/edits/{id}/cancel", Access::edit,
       [](const Call& call, EditService& s) { return reply_with(s.cancel(call.path("id"))); });
+  add("POST", "/v1/edits/{id}/requeue", Access::admin,
+      [](const Call& call, EditService& s) { return reply_with(s.requeue(call.path("id"))); });
 }
 
 }  // namespace server::service::routes

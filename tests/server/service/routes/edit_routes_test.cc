@@ -106,13 +106,14 @@ TEST_F(EditRoutesTest, AreThoseOfTheContract) {
   for (const http::Route& known : router.routes()) {
     found.push_back(known.method + " " + known.path);
     const bool reads = known.method == "GET" || known.path == "/v1/previews";
-    EXPECT_EQ(known.access, reads ? http::Access::read : http::Access::edit) << known.path;
+    const auto changes = known.path.ends_with("/requeue") ? http::Access::admin : http::Access::edit;
+    EXPECT_EQ(known.access, reads ? http::Access::read : changes) << known.path;
   }
   std::sort(found.begin(), found.end());
   EXPECT_EQ(found, (std::vector<std::string>{
                        "DELETE /v1/edits/{id}", "GET /v1/edits", "GET /v1/edits/{id}", "GET /v1/edits/{id}/events",
                        "GET /v1/edits/{id}/intervals/{u}/renders/{k}", "POST /v1/edits", "POST /v1/edits/{id}/cancel",
-                       "POST /v1/edits/{id}/stop", "POST /v1/previews"}));
+                       "POST /v1/edits/{id}/requeue", "POST /v1/edits/{id}/stop", "POST /v1/previews"}));
   EXPECT_EQ(route("POST", "/v1/edits").body, http::Body::json);
   EXPECT_EQ(route("POST", "/v1/edits/{id}/stop").body, http::Body::none);
   EXPECT_EQ(route("POST", "/v1/edits").reads_with, "validate_only");
