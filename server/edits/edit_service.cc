@@ -60,6 +60,14 @@ Result<jobs::Job> about_edit(Result<jobs::Job> job, const std::string& id) {
   return job;
 }
 
+/// The answer to a job, in the words of those who ask for edits.
+template <class T>
+Result<T> in_terms_of_edits(Result<T> result) {
+  if (!result && result.error().code == ErrorCode::quota_exceeded)
+    result.error().where = result.error().where == "active" ? "edits" : "seconds";
+  return result;
+}
+
 /// The request with the scene and version it is about always there: what a job's payload says.
 Result<proto::EditRequest> canonical(proto::EditRequest request) {
   if (!request.scene)
@@ -289,22 +297,27 @@ Result<std::unique_ptr<EditService>> EditService::open(scenes::SceneStore& scene
 }
 
 Result<EditService::Submission> EditService::submit(const proto::EditRequest& request,
-                                                    const std::string& idempotency_key) {
+                                                    const std::string& idempotency_key, const Requester& requester) {
   const auto asked = canonical(request);
   if (!asked) return propagate(asked);
-  jobs::NewJob job{.lane = *asked->scene, .payload = proto::to_json(*asked), .idempotency_key = idempotency_key};
+  jobs::NewJob job{.lane = *asked->scene,
+                   .payload = proto::to_json(*asked),
+                   .idempotency_key = idempotency_key,
+                   .requester = requester.name,
+                   .quota = requester.quota};
   const auto earlier = impl_->earlier(idempotency_key, job);
   if (!earlier) return propagate(earlier);
   if (*earlier) return Submission{status_of(impl_->settled(**earlier)), false};
   // Before any work is done for a request that there is no place for.
   if (auto room = impl_->queue->check_room(); !room) return propagate(room);
+  if (auto room = in_terms_of_edits(impl_->queue->check_quota(job)); !room) return propagate(room);
   const auto hold = impl_->hold(*asked->scene, engine::LockKind::shared);
   if (!hold) return propagate(hold);
   const auto admitted = impl_->admitted(*asked);
   if (!admitted) return propagate(admitted);
   if (auto fits = admit_slow(admitted->work, asked->allow_slow); !fits) return propagate(fits);
   job.expected = in_milliseconds(admitted->seconds);
-  const auto submission = impl_->queue->submit(job);
+  const auto submission = in_terms_of_edits(impl_->queue->submit(job));
   if (!submission) return propagate(submission);
   return Submission{status_of(impl_->settled(submission->job)), submission->created};
 }

@@ -138,6 +138,43 @@ describe('with a scene', () => {
     assert.deepEqual([line.token, line.method, line.scene, line.status, more.length], ['boss', 'DELETE', scene, 204, 0]);
   });
 
+  test('a token with quotas may so much, and is told which it has used up', async () => {
+    const guest = 'secret-of-the-guest';
+    const mine = await as.boss.upload(demo.ply);
+    const size = (await as.boss.get(`/v1/scenes/${mine.id}`)).json().disk_bytes;
+    const reread = async (quotas) => {
+      await writeFile(file, `${lines(Object.keys(secrets))}guest edit ${guest} ${quotas}\n`, { mode: 0o600 });
+      const before = service.log.length;
+      service.process.kill('SIGHUP');
+      for (let i = 0; i < 200 && !service.log.slice(before).includes('have been read again'); ++i) await sleep(20);
+    };
+    await reread(`edits=1 bytes=${size + 100}`);
+    const client = new Client(service.url, { token: guest });
+    const refused = async (what, quota) => {
+      const response = await what;
+      assert.deepEqual([response.status, response.json().code, response.json().where], [429, 'quota_exceeded', quota], response.json().detail);
+      return response;
+    };
+    const own = await client.upload(demo.ply);
+    const { headers } = await refused(client.request('POST', '/v1/scenes', { body: demo.ply, headers: { 'content-type': 'application/octet-stream' } }), 'bytes');
+    assert.equal(headers['retry-after'], undefined, 'time gives no room');
+    const long = { ...demo.leaf, scene: own.id, version: 0, params: { intervals: 20, views: 20, max_image_side: 256 } };
+    const first = await client.submit(long, { 'idempotency-key': 'one' });
+    const again = await refused(client.request('POST', '/v1/edits', { json: long }), 'edits');
+    assert.ok(Number(again.headers['retry-after']) >= 1);
+    assert.equal((await client.submit(long, { 'idempotency-key': 'one' })).id, first.id, 'the same is no other');
+    await as.boss.submit({ ...edit, scene: mine.id });
+    await client.post(`/v1/edits/${first.id}/cancel`);
+    await client.ended(first.id);
+    await reread('seconds=1');
+    const { headers: tomorrow } = await refused(client.request('POST', '/v1/edits', { json: { ...long, params: { ...long.params, views: 200 } } }), 'seconds');
+    assert.ok(Number(tomorrow['retry-after']) <= 24 * 3600);
+    await service.stop();
+    await service.start();
+    await refused(new Client(service.url, { token: guest }).request('POST', '/v1/edits', { json: { ...long, params: { ...long.params, views: 200 } } }), 'seconds');
+    client.close();
+  });
+
   test('no secret is in either log', async () => {
     const all = service.log + (await readFile(audit, 'utf8')) + (await readFile(`${audit}.1`, 'utf8'));
     for (const secret of Object.values(secrets)) assert.ok(!all.includes(secret));

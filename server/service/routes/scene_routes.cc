@@ -48,9 +48,15 @@ Result<Reply> reply_with(const Result<SceneInfo>& scene) {
   return Reply::json(proto::to_json(told(*scene)));
 }
 
-/// Hands an uploaded file, and its name, to `take`.
+scenes::Uploader uploader_of(const Call& call) {
+  const http::TokenPtr token = call.token();
+  return token == nullptr ? scenes::Uploader() : scenes::Uploader{token->name, token->quotas.bytes};
+}
+
+/// Hands an uploaded file, and its name, to `take`. Whoever may store nothing more has to send nothing.
 template <class Take>
 Result<SceneInfo> with_upload(const Call& call, SceneStore& store, Take take) {
+  if (const auto fits = store.check_quota(uploader_of(call), /*bytes=*/1); !fits) return propagate(fits);
   const auto scratch = store.scratch();
   if (!scratch) return propagate(scratch);
   const auto file = scratch->folder() / upload_name;
@@ -64,13 +70,13 @@ Result<SceneInfo> add_scene(const Call& call, SceneStore& store) {
   if (name && name->empty()) return fail(ErrorCode::invalid_argument, "expected a name, or none at all", "name");
   if (!call.is_json())
     return with_upload(call, store, [&](const std::filesystem::path& file, const std::string& filename) {
-      return store.add_upload(file, filename, name.value_or(""));
+      return store.add_upload(file, filename, name.value_or(""), uploader_of(call));
     });
   const auto source = proto::parse_scene_source(call.body());
   if (!source) return propagate(source);
   if (name && !source->name.empty())
     return fail(ErrorCode::invalid_argument, "the name is given twice: in the query and in the body", "name");
-  return store.add_path(source->path, name.value_or(source->name));
+  return store.add_path(source->path, name.value_or(source->name), uploader_of(call));
 }
 
 Result<Reply> post_scene(const Call& call, SceneStore& store) {
@@ -150,7 +156,7 @@ Result<Reply> put_dataset(const Call& call, const SceneRouteDependencies& depend
   const auto put = [&]() -> Result<SceneInfo> {
     if (!call.is_json())
       return with_upload(call, dependencies.store, [&](const std::filesystem::path& file, const std::string& filename) {
-        return change([&] { return dependencies.store.put_dataset_zip(id, file, filename); });
+        return change([&] { return dependencies.store.put_dataset_zip(id, file, filename, uploader_of(call)); });
       });
     const auto source = proto::parse_dataset_source(call.body());
     if (!source) return propagate(source);

@@ -24,6 +24,7 @@ using namespace std::chrono_literals;
 struct Request : http::Call {
   std::map<std::string, std::string, std::less<>> in_path, in_query, headers;
   std::string text, known_etag, nothing;
+  http::TokenPtr by;
 
   const std::string& request_id() const override { return nothing; }
   const std::string& path(std::string_view name) const override { return in_path.find(name)->second; }
@@ -37,6 +38,7 @@ struct Request : http::Call {
   }
   bool has_header(std::string_view name) const override { return headers.contains(name); }
   const std::string& body() const override { return text; }
+  http::TokenPtr token() const override { return by; }
   bool is_json() const override { return true; }
   Result<http::UploadInfo> receive(const std::filesystem::path&) const override {
     return engine::fail(ErrorCode::internal, "no route of edits takes a file");
@@ -151,6 +153,35 @@ TEST_F(EditRoutesTest, AFullQueueSaysWhenThereIsRoom) {
   EXPECT_GT(seconds, 1);
   EXPECT_LE(seconds, std::ceil(2 * *known.eta_seconds)) << "it is what is left of the edit that runs";
   for (const auto& edit : value(service->list({}))) (void)value(service->cancel(edit.id));
+}
+
+TEST_F(EditRoutesTest, AQuotaIsThatOfTheTokenAndSaysWhichAndForHowLong) {
+  Request body = edit_body();
+  const auto with = [&](const http::Quotas& quotas) {
+    body.by = std::make_shared<const http::Token>(
+        http::Token{.name = "studio", .edit = true, .secret = "s", .quotas = quotas});
+    return value(call("POST", "/v1/edits", body));
+  };
+  proto::EditRequest slow = edits::move_ball_for_long(scene);
+  slow.allow_slow = true;
+  body.text = proto::to_json(slow);
+  EXPECT_EQ(with({.edits = 1}).status, 202);
+  body.text = edit_body().text;
+  const auto many = with({.edits = 1});
+  EXPECT_EQ(many.status, 429);
+  EXPECT_EQ(json::parse(many.body).at("code"), "quota_exceeded");
+  EXPECT_EQ(json::parse(many.body).at("where"), "edits");
+  EXPECT_GE(std::stoi(header_of(many, "Retry-After")), 1);
+  body.text = proto::to_json(slow);
+  const auto tired = with({.seconds = 1});
+  EXPECT_EQ(tired.status, 429);
+  EXPECT_EQ(json::parse(tired.body).at("where"), "seconds");
+  const int seconds = std::stoi(header_of(tired, "Retry-After"));
+  EXPECT_GE(seconds, 1);
+  EXPECT_LE(seconds, 24 * 3600) << "until the day is over";
+  body.text = edit_body().text;
+  EXPECT_EQ(with({.edits = 3}).status, 202);
+  for (const auto& edit : value(service->list({}))) (void)service->cancel(edit.id);
 }
 
 TEST_F(EditRoutesTest, AskForNoMoreThanTheServiceAllows) {
