@@ -21,6 +21,8 @@ for (const kind of ['a file', 'PostgreSQL'])
     });
     after(() => service?.stop());
 
+    /// Longer than anybody looks at it.
+    const endless = () => ({ scene, ...demo.leaf, params: { intervals: 20, max_image_side: 400 } });
     const long = () => ({ scene, ...demo.leaf, params: { intervals: 12, views: 4, max_image_side: 160 } });
     const admin = async (command, ...args) => (await run('admin', command, '--data-dir', dataDir, ...store, ...args)).stdout;
     const refusal = (...args) => admin(...args).then(() => assert.fail('it was done'), ({ code, stderr }) => ({ code, stderr }));
@@ -28,8 +30,8 @@ for (const kind of ['a file', 'PostgreSQL'])
 
     test('what waits and who works is told, and the service goes on', async () => {
       assert.equal(await admin('queue'), 'no edit waits or runs\n');
-      const first = await service.client.submit(long());
-      const second = await service.client.submit(long());
+      const first = await service.client.submit(endless());
+      const second = await service.client.submit(endless());
       await service.client.until(first.id, ({ finished_intervals: done }) => done.length >= 1);
       const [runs, waits] = await queue();
       assert.deepEqual([runs.id, runs.state, runs.scene, waits.id, waits.state, waits.place], [first.id, 'running', scene, second.id, 'queued', 1]);
