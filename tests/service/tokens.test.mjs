@@ -20,7 +20,7 @@ before(async () => {
   file = path.join(temporaryFolder(), 'tokens');
   await writeFile(file, lines(Object.keys(secrets)), { mode: 0o600 });
   audit = path.join(temporaryFolder(), 'audit.jsonl');
-  service = await Service.start({ args: ['--token-file', file, '--audit-log', audit], token: secrets.boss });
+  service = await Service.start({ args: ['--token-file', file, '--audit-log', audit, '--drain-seconds', '1'], token: secrets.boss });
   for (const name of Object.keys(secrets)) as[name] = new Client(service.url, { token: secrets[name] });
 });
 after(async () => {
@@ -169,7 +169,7 @@ describe('with a scene', () => {
     await reread('seconds=1');
     const { headers: tomorrow } = await refused(client.request('POST', '/v1/edits', { json: { ...long, params: { ...long.params, views: 200 } } }), 'seconds');
     assert.ok(Number(tomorrow['retry-after']) <= 24 * 3600);
-    await service.stop();
+    await service.kill();
     await service.start();
     await refused(new Client(service.url, { token: guest }).request('POST', '/v1/edits', { json: { ...long, params: { ...long.params, views: 200 } } }), 'seconds');
     client.close();
