@@ -100,9 +100,9 @@ std::optional<std::uint64_t> bytes_in(std::string_view text) {
 bool give_quota(std::string_view word, http::Quotas& quotas) {
   const std::size_t equals = std::min(word.find('='), word.size());
   const std::string_view name = word.substr(0, equals), text = word.substr(std::min(equals + 1, word.size()));
-  const auto give = [](auto& quota, auto number) {
+  const auto give = [](auto& quota, const auto& number) {
     if (quota || !number || *number == 0) return false;
-    quota = *number;
+    quota = number;
     return true;
   };
   if (name == "edits") return give(quotas.edits, engine::number_in<std::size_t>(text));
