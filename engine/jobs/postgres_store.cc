@@ -421,7 +421,7 @@ Result<Usage> PostgresStore::usage(const std::string& requester) {
   return impl_->look([&] { return impl_->usage(requester); });
 }
 
-Result<Job> PostgresStore::requeue(const std::string& id, int finished_intervals) {
+Result<Job> PostgresStore::requeue(const std::string& id, int finished_intervals, const Witness& witness) {
   return impl_->transact([&] {
     impl_->work.run(
         "SELECT 1::bigint FROM splatdrag.store FOR UPDATE");  // as in submit(): none joins the lane meanwhile
@@ -436,6 +436,7 @@ Result<Job> PostgresStore::requeue(const std::string& id, int finished_intervals
     impl_->write(*changed);
     impl_->has_news = true;
     impl_->find_places({&*changed, 1});
+    if (const auto witnessed = witness(*changed); !witnessed) throw StoreFailure(witnessed.error());
     return std::move(*changed);
   });
 }

@@ -85,6 +85,8 @@ class Queue {
   [[nodiscard]] std::filesystem::path folder_of(const std::string& id) const { return options_.folder / id; }
   /// Writes down how a job has ended. Where that fails, the next open() does.
   void note_end(const Job& job) const;
+  /// Writes the note of a job that other processes may just change, or removes its traces where they have removed it.
+  void note_what_is_recorded(const std::string& id) const;
   void bump_revision();
   [[nodiscard]] std::shared_ptr<RunningJob> find_running(const std::string& id) const;
   void attach(const std::string& id, std::shared_ptr<RunningJob> running);

@@ -578,7 +578,7 @@ Result<Usage> SqliteStore::usage(const std::string& requester) {
   });
 }
 
-Result<Job> SqliteStore::requeue(const std::string& id, int finished_intervals) {
+Result<Job> SqliteStore::requeue(const std::string& id, int finished_intervals, const Witness& witness) {
   return impl_->transact([&] {
     const Job job = find_in(impl_->database, id);
     const auto younger = ids(
@@ -586,7 +586,10 @@ Result<Job> SqliteStore::requeue(const std::string& id, int finished_intervals) 
                   job.lane, known_number(id)));
     if (job.state == JobState::failed)
       check_is_last_of_lane(job, younger.empty() ? std::nullopt : std::optional(younger.front()));
-    return apply_in(impl_->database, id, {.event = Event::requeue, .interval = finished_intervals}, impl_->now());
+    Job requeued =
+        apply_in(impl_->database, id, {.event = Event::requeue, .interval = finished_intervals}, impl_->now());
+    if (const auto witnessed = witness(requeued); !witnessed) throw StoreFailure(witnessed.error());
+    return requeued;
   });
 }
 

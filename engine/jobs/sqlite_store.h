@@ -37,12 +37,13 @@ class SqliteStore final : public Store {
   [[nodiscard]] static Result<std::unique_ptr<SqliteStore>> open(const SqliteOptions& options);
   ~SqliteStore() override;
 
+  using Store::requeue;
   using Store::submit;
   [[nodiscard]] Result<Submission> submit(const NewJob& job, std::size_t max_queued, const Witness& witness) override;
   [[nodiscard]] Result<void> check_room(std::size_t max_queued) override;
   [[nodiscard]] Result<void> check_quota(const NewJob& job) override;
   [[nodiscard]] Result<Usage> usage(const std::string& requester) override;
-  [[nodiscard]] Result<Job> requeue(const std::string& id, int finished_intervals) override;
+  [[nodiscard]] Result<Job> requeue(const std::string& id, int finished_intervals, const Witness& witness) override;
   [[nodiscard]] Result<Time> now() override;
   [[nodiscard]] Result<void> restore(const Job& job) override;
   [[nodiscard]] Result<Job> find(const std::string& id) override;

@@ -90,9 +90,14 @@ class Store {
   [[nodiscard]] virtual Result<Usage> usage(const std::string& requester) = 0;
   /// Has a job that has failed taken up again (Event::requeue).
   ///   finished_intervals  that of the checkpoint that is still there; 0: there is none
+  ///   witness             called with the record as it will be, before anybody else can see or change it. When
+  ///                       requeue() returns an error afterwards, nothing has changed
   ///   returns             the record afterwards
-  ///   errors              conflict: it has not failed, or a younger job of its lane has yet to end
-  [[nodiscard]] virtual Result<Job> requeue(const std::string& id, int finished_intervals) = 0;
+  ///   errors              conflict: it has not failed, or a younger job of its lane has yet to end; those of `witness`
+  [[nodiscard]] virtual Result<Job> requeue(const std::string& id, int finished_intervals, const Witness& witness) = 0;
+  [[nodiscard]] Result<Job> requeue(const std::string& id, int finished_intervals) {
+    return requeue(id, finished_intervals, [](const Job&) -> Result<void> { return {}; });
+  }
   /// The time by which records are dated: that of the storage, wherever that is.
   [[nodiscard]] virtual Result<Time> now() = 0;
   /// Puts back a record that was lost, or that is known to have become this one. Nobody holds the job afterwards.

@@ -327,12 +327,14 @@ Result<Job> Worker::try_to_record_end(const std::string& id, const Change& chang
   if (job->state == JobState::cancelled) {
     std::error_code ignored;
     fs::remove_all(queue_.folder_of(id), ignored);
-  } else if (job->state == JobState::succeeded) {
-    remove_files(queue_.folder_of(id), checkpoint_prefix);  // of one that failed it stays: it may be taken up again
+  } else if (job->state == JobState::succeeded || (job->error && job->error->code == ErrorCode::no_space)) {
+    // Of one that failed it stays, which may be taken up again; but not where it helps to keep the disk full.
+    remove_files(queue_.folder_of(id), checkpoint_prefix);
   }
-  // Another process may have removed the record before this one had put the note and the files away.
-  if (const auto record = queue_.store_.find(id); !record && record.error().code == ErrorCode::not_found)
-    remove_traces(queue_.options_.folder, id);
+  // Another process may have removed the record, or had the job taken up again, before this one had put the note and
+  // the files away.
+  const auto record = queue_.store_.find(id);
+  if (record ? !is_final(record->state) : record.error().code == ErrorCode::not_found) queue_.note_what_is_recorded(id);
   return job;
 }
 

@@ -414,6 +414,18 @@ TEST_P(StoreTest, TakesUpAgainWhatHasFailedAndNothingElse) {
   EXPECT_EQ(claim(), second);
 }
 
+TEST_P(StoreTest, AJobWhoseWitnessRefusesIsNotTakenUpAgain) {
+  const std::string id = submit();
+  EXPECT_EQ(claim(), id);
+  value(apply(id, {.event = Event::fail, .error = {ErrorCode::internal, "oh", ""}}));
+  const auto refused = store->requeue(id, 0, [](const Job& again) -> Result<void> {
+    EXPECT_EQ(again.state, JobState::queued);
+    return fail(ErrorCode::no_space, "no note can be written");
+  });
+  EXPECT_EQ(code_of(refused), ErrorCode::no_space);
+  EXPECT_EQ(value(store->find(id)).state, JobState::failed);
+}
+
 TEST_P(StoreTest, CountsWhatIsUsedOfAQuotaAndRefusesMore) {
   use_own_clock();
   const NewJob asked{.lane = "a",
