@@ -287,6 +287,10 @@ struct PostgresStore::Impl {
     return usage;
   }
 
+  void check_quota(const NewJob& job) {
+    if (has_limit(job.quota)) jobs::check_quota(usage(job.requester), job);
+  }
+
   /// The one that claim() gives out, for a change, and whether a claim has run out.
   PostgresRows find_next() {
     return work.run(
@@ -392,7 +396,7 @@ Result<Submission> PostgresStore::submit(const NewJob& job, std::size_t max_queu
       if (auto earlier = impl_->find_where("WHERE idempotency_key = $1", job.idempotency_key))
         return same_submission(std::move(*earlier), job);
     impl_->check_room_for_one(max_queued);
-    jobs::check_quota(impl_->usage(job.requester), job);
+    impl_->check_quota(job);
     Job accepted;
     accepted.id = id_of(last.integer(0, 0) + 1);
     accepted.lane = job.lane;
@@ -414,7 +418,7 @@ Result<void> PostgresStore::check_room(std::size_t max_queued) {
 }
 
 Result<void> PostgresStore::check_quota(const NewJob& job) {
-  return impl_->look([&] { jobs::check_quota(impl_->usage(job.requester), job); });
+  return impl_->look([&] { impl_->check_quota(job); });
 }
 
 Result<Usage> PostgresStore::usage(const std::string& requester) {

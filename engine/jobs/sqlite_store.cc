@@ -396,6 +396,10 @@ Usage usage_in(Database& database, const std::string& requester, Time now) {
   return usage;
 }
 
+void check_quota_in(Database& database, const NewJob& job, Time now) {
+  if (has_limit(job.quota)) jobs::check_quota(usage_in(database, job.requester, now), job);
+}
+
 /// First column of the first row.
 std::string text_of(Database& database, std::string_view sql) {
   Statement row(database, sql);
@@ -543,7 +547,7 @@ Result<Submission> SqliteStore::submit(const NewJob& job, std::size_t max_queued
     }
     check_room_in(database, max_queued);
     const Time now = impl_->now();
-    jobs::check_quota(usage_in(database, job.requester, now), job);
+    check_quota_in(database, job, now);
     Statement(database,
               "INSERT INTO jobs (lane, payload, idempotency_key, state, claimed, stopped_early, finished_intervals, "
               "progress, result, created, expected, requester) VALUES (?1, ?2, ?3, 'queued', 0, 0, 0, '', '', ?4, ?5, "
@@ -567,7 +571,7 @@ Result<void> SqliteStore::check_room(std::size_t max_queued) {
 Result<void> SqliteStore::check_quota(const NewJob& job) {
   return guarded([&] {
     const std::lock_guard lock(impl_->mutex);
-    jobs::check_quota(usage_in(impl_->database, job.requester, impl_->now()), job);
+    check_quota_in(impl_->database, job, impl_->now());
   });
 }
 

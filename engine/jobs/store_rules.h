@@ -50,7 +50,9 @@ auto guarded(Body body) -> Result<decltype(body())> {
 [[nodiscard]] std::int64_t known_number(const std::string& id);
 /// Throws where `waiting` jobs are as many as may wait.
 void check_room(std::size_t waiting, std::size_t max_queued);
-/// Throws where the requester's quota has no room for the job.
+/// Whether the quota limits anything: else there is nothing to count.
+[[nodiscard]] inline bool has_limit(const Quota& quota) { return quota.active || quota.worked_per_day; }
+/// Throws where the requester's quota has no room for the job, or never has.
 void check_quota(const Usage& usage, const NewJob& job);
 /// Throws where the lane of a job that is taken up again has one that has yet to end and is younger: it may run, and
 /// two of a lane never do.
