@@ -42,7 +42,8 @@ class Queue {
 
   /// Accepts a job: when this returns, it is on disk and will be done. With an idempotency key that is known already it
   /// answers with the job that was accepted then.
-  ///   errors  busy: the queue is full; unprocessable: the key belongs to another payload or lane; quota_exceeded
+  ///   errors  busy: the queue is full; unprocessable: the key belongs to another payload or lane; quota_exceeded,
+  ///           too_large
   [[nodiscard]] Result<Submission> submit(const NewJob& job);
   /// Whether there is room for another job, for whoever has work to do before submit(). Others may come first.
   ///   errors  busy: the queue is full
@@ -59,7 +60,7 @@ class Queue {
   ///   errors  conflict: the job has succeeded or failed
   [[nodiscard]] Result<Job> cancel(const std::string& id);
   /// Whether the requester's quota has room for the job. Others may come first.
-  ///   errors  quota_exceeded
+  ///   errors  quota_exceeded, too_large
   [[nodiscard]] Result<void> check_quota(const NewJob& job) { return store_.check_quota(job); }
   /// Has a job that has failed taken up again, from its last checkpoint if that is still there.
   ///   errors  conflict: it has not failed, or a younger job of its lane has yet to end

@@ -74,7 +74,8 @@ class Store {
   ///   witness     called for a new job before anybody else can see it. When submit() returns an error afterwards, the
   ///               job does not exist
   ///   errors      busy: as many wait already; unprocessable: the idempotency key belongs to another payload or lane;
-  ///               quota_exceeded: the requester's (`where` is "active" or "worked_per_day"); those of `witness`
+  ///               quota_exceeded: the requester's (`where` is "active" or "worked_per_day"); too_large: it takes more
+  ///               than a whole "worked_per_day"; those of `witness`
   [[nodiscard]] virtual Result<Submission> submit(const NewJob& job, std::size_t max_queued,
                                                   const Witness& witness) = 0;
   [[nodiscard]] Result<Submission> submit(const NewJob& job, std::size_t max_queued) {
@@ -84,7 +85,7 @@ class Store {
   ///   errors  busy: as many wait already
   [[nodiscard]] virtual Result<void> check_room(std::size_t max_queued) = 0;
   /// Whether the requester's quota has room for the job, as submit() would say.
-  ///   errors  quota_exceeded
+  ///   errors  quota_exceeded; too_large
   [[nodiscard]] virtual Result<void> check_quota(const NewJob& job) = 0;
   /// What a requester has used of any quota.
   [[nodiscard]] virtual Result<Usage> usage(const std::string& requester) = 0;

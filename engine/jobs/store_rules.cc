@@ -72,6 +72,11 @@ void check_quota(const Usage& usage, const NewJob& job) {
                             std::to_string(*job.quota.active) +
                             " that may wait or run at a time: wait for one to end, or cancel one",
                         "active"});
+  if (job.quota.worked_per_day && job.expected > *job.quota.worked_per_day)
+    throw StoreFailure({ErrorCode::too_large,
+                        "this should take " + seconds(job.expected) + " of work, and " + job.requester + " may have " +
+                            seconds(*job.quota.worked_per_day) + " a day: it fits on no day, ask for less",
+                        "worked_per_day"});
   const auto promised = usage.worked_today + usage.expected;
   if (job.quota.worked_per_day && promised + job.expected > *job.quota.worked_per_day)
     throw StoreFailure({ErrorCode::quota_exceeded,

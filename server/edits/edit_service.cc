@@ -63,8 +63,8 @@ Result<jobs::Job> about_edit(Result<jobs::Job> job, const std::string& id) {
 /// The answer to a job, in the words of those who ask for edits.
 template <class T>
 Result<T> in_terms_of_edits(Result<T> result) {
-  if (!result && result.error().code == ErrorCode::quota_exceeded)
-    result.error().where = result.error().where == "active" ? "edits" : "seconds";
+  if (!result && result.error().where == "active") result.error().where = "edits";
+  if (!result && result.error().where == "worked_per_day") result.error().where = "seconds";
   return result;
 }
 

@@ -460,6 +460,11 @@ TEST_P(StoreTest, CountsWhatIsUsedOfAQuotaAndRefusesMore) {
   NewJob small = asked;
   small.expected = 5s;
   value(store->check_quota(small));
+  NewJob never = asked;
+  never.expected = 101s;
+  refused = store->submit(never, many);
+  ASSERT_EQ(code_of(refused), ErrorCode::too_large) << "on no day";
+  EXPECT_EQ(refused.error().where, "worked_per_day");
 
   reopen({.own_clock = true});
   EXPECT_EQ(value(store->usage("studio")).worked_today, 55s);

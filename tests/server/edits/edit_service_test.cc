@@ -488,7 +488,7 @@ TEST_F(ServiceTest, KeepsEverybodyWithinTheirQuota) {
   (void)value(service->submit(move_ball(scene), "", studio));
   const auto too_long =
       service->submit(move_ball_for_long(scene), "", {.name = "third", .quota = {.worked_per_day = 1ms}});
-  ASSERT_EQ(code_of(too_long), ErrorCode::quota_exceeded);
+  ASSERT_EQ(code_of(too_long), ErrorCode::too_large) << "it fits on no day";
   EXPECT_EQ(too_long.error().where, "seconds");
 }
 
