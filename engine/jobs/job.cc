@@ -188,6 +188,7 @@ Result<Job> transition(Job job, const Change& change, Time now) {
       break;
     case Event::requeue:
       job.finished_intervals = change.interval;
+      if (change.interval == 0) job.progress.clear();  // of work that is done anew, its time included
       job.error.reset();
       job.ended.reset();
       job.deaths = 0;

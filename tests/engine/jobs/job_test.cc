@@ -106,6 +106,7 @@ TEST(JobStates, EndWithATimeAndWithoutAWorker) {
 TEST(JobStates, OneThatFailedIsTakenUpAgainAsIfNothingHadHappened) {
   Job job = job_in(JobState::failed, false, 3);
   job.error = Error{ErrorCode::no_space, "the disk is full", ""};
+  job.progress = "so far";
   job.ended = noon, job.started = Time(std::chrono::hours(3));
   job.deaths = 3, job.died_at = "interval 4", job.place = "interval 4", job.claim_number = 5;
   job.worked = std::chrono::minutes(7);
@@ -119,6 +120,9 @@ TEST(JobStates, OneThatFailedIsTakenUpAgainAsIfNothingHadHappened) {
   EXPECT_EQ(again->claim_number, 5) << "whoever held it before still does not hold it";
   EXPECT_EQ(again->started, job.started);
   EXPECT_EQ(again->worked, job.worked);
+  EXPECT_EQ(again->progress, job.progress);
+  EXPECT_EQ(transition(job, {.event = Event::requeue, .interval = 0}, noon)->progress, "")
+      << "what begins anew has taken no time yet";
 }
 
 TEST(JobClaims, SayWhoAndSinceWhen) {

@@ -628,6 +628,10 @@ TEST_F(ServiceTest, AnEditThatOutlivesItsTimeEndsWithWhatItHas) {
   EXPECT_EQ(none.error->code, ErrorCode::too_large);
   EXPECT_NE(none.error->message.find("--edit-time"), std::string::npos) << none.error->message;
   EXPECT_EQ(versions(), 2u);
+
+  sleeper.seconds = 0;
+  (void)value(hurried->requeue(none.id));
+  EXPECT_EQ(wait_for_end(*hurried, none.id).state, "succeeded") << "it has its whole time again";
 }
 
 TEST_F(ServiceTest, ACancelledEditLeavesNothingAtWhateverMomentItComes) {
