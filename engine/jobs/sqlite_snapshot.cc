@@ -3,6 +3,7 @@
 #include <fcntl.h>
 
 #include <array>
+#include <cerrno>
 #include <chrono>
 #include <fstream>
 #include <optional>
@@ -61,12 +62,15 @@ Result<void> copy_sqlite_store(const fs::path& from, const fs::path& to) {
   return fail(ErrorCode::busy, "the job store changes faster than it can be copied: try again", from / store_name);
 }
 
-bool is_sqlite_store_in_use(const fs::path& folder) {
-  const FileDescriptor file(::open((folder / store_name).c_str(), O_RDWR | O_CLOEXEC));
+std::optional<bool> is_sqlite_store_in_use(const fs::path& folder) {
+  // To ask for the lock of one who writes, nobody has to be allowed to write.
+  const FileDescriptor file(::open((folder / store_name).c_str(), O_RDONLY | O_CLOEXEC));
   struct flock lock {};
   lock.l_type = F_WRLCK;
   lock.l_whence = SEEK_SET;  // all of the file: SQLite locks bytes far behind its end
-  return file.get() >= 0 && ::fcntl(file.get(), F_GETLK, &lock) == 0 && lock.l_type != F_UNLCK;
+  if (file.get() < 0 && errno == ENOENT) return false;
+  if (file.get() < 0 || ::fcntl(file.get(), F_GETLK, &lock) != 0) return std::nullopt;
+  return lock.l_type != F_UNLCK;
 }
 
 }  // namespace engine::jobs

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 
 #include "engine/core/result.h"
 
@@ -15,7 +16,7 @@ namespace engine::jobs {
 /// In the process that has the store open it would end its lock (closing a file ends all locks of the process on it).
 [[nodiscard]] Result<void> copy_sqlite_store(const std::filesystem::path& from, const std::filesystem::path& to);
 
-/// Whether another process has the store of this folder open.
-[[nodiscard]] bool is_sqlite_store_in_use(const std::filesystem::path& folder);
+/// Whether another process has the store of this folder open; nothing where that cannot be told.
+[[nodiscard]] std::optional<bool> is_sqlite_store_in_use(const std::filesystem::path& folder);
 
 }  // namespace engine::jobs

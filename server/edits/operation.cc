@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <system_error>
 #include <utility>
 
@@ -106,7 +107,7 @@ Result<QueueLook> look_at_queue(const fs::path& folder, const std::string& store
   }
   const auto copy = TemporaryFolder::make("splatdrag-look");
   if (!copy) return propagate(copy);
-  const bool in_use = jobs::is_sqlite_store_in_use(folder);
+  const std::optional<bool> in_use = jobs::is_sqlite_store_in_use(folder);
   if (auto copied = jobs::copy_sqlite_store(folder, copy->path()); !copied) return propagate(copied);
   const auto visited = visit_file(copy->path());
   if (!visited && visited.error().code == ErrorCode::corrupt_data)
@@ -119,9 +120,9 @@ Result<QueueLook> look_at_queue(const fs::path& folder, const std::string& store
 
 Result<EditAtHand> requeue_edit(const fs::path& folder, const std::string& store, const std::string& id) {
   if (auto there = check_place(folder, store); !there) return propagate(there);
-  if (store.empty() && jobs::is_sqlite_store_in_use(folder))
+  if (store.empty() && jobs::is_sqlite_store_in_use(folder).value_or(true))
     return fail(ErrorCode::unavailable,
-                "a service has the records open: ask it, by POST /v1/edits/" + id +
+                "a service has the records open, or may have: ask it, by POST /v1/edits/" + id +
                     "/requeue with a token of scope admin, or stop it first",
                 folder.string());
   const auto visited = store.empty() ? visit_file(folder) : visit_database(folder, store);

@@ -40,7 +40,8 @@ struct EditAtHand {
 struct QueueLook {
   /// Those in work, those that wait, in their turn, then, if asked for, those that have failed, the youngest first.
   std::vector<EditAtHand> edits = {};
-  /// Records in a file alone: whether a service has it open. Else claims are those of one that has ended.
+  /// Records in a file alone: whether a service has it open, as far as that can be told. Else claims are those of one
+  /// that has ended.
   std::optional<bool> in_use = {};
 };
 

@@ -45,7 +45,7 @@ TEST_F(SqliteSnapshotTest, IsWholeAtAnyMomentWhileAnotherProcessWrites) {
     const auto jobs = value(store->list({.limit = 1'000'000}));
     EXPECT_GE(jobs.size(), seen) << "time goes on";
     seen = jobs.size();
-    EXPECT_TRUE(is_sqlite_store_in_use(from));
+    EXPECT_EQ(is_sqlite_store_in_use(from), true);
     std::this_thread::sleep_for(20ms);
   }
   EXPECT_GT(seen, 5u);
@@ -59,7 +59,7 @@ TEST_F(SqliteSnapshotTest, ShowsClaimsAndLeavesTheStoreAsItIs) {
     value(store->submit({.lane = "a", .payload = "x"}, 10));
     (void)value(store->claim());
   }
-  EXPECT_FALSE(is_sqlite_store_in_use(from));
+  EXPECT_EQ(is_sqlite_store_in_use(from), false);
   const auto before = support::read_file(from / "jobs.db");
   EXPECT_EQ(value(copy()->find("e000001")).holder, "host:1");
   EXPECT_TRUE(value(copy()->find("e000001")).claimed);
@@ -69,7 +69,9 @@ TEST_F(SqliteSnapshotTest, ShowsClaimsAndLeavesTheStoreAsItIs) {
 TEST_F(SqliteSnapshotTest, MissesAStoreThatIsNotThere) {
   fs::create_directory(from);
   EXPECT_EQ(code_of(copy_sqlite_store(from, dir.path())), ErrorCode::not_found);
-  EXPECT_FALSE(is_sqlite_store_in_use(from));
+  EXPECT_EQ(is_sqlite_store_in_use(from), false);
+  fs::create_symlink("jobs.db", from / "jobs.db");  // which cannot be opened
+  EXPECT_EQ(is_sqlite_store_in_use(from), std::nullopt);
 }
 
 }  // namespace
