@@ -189,7 +189,7 @@ struct EditService::Impl {
     jobs::WorkerOptions working;
     working.ended = [this](const jobs::Job& job) {
       (void)settled(job);  // where that cannot be now, it is when somebody asks for the edit
-      if (job.state != jobs::JobState::succeeded) drop_results(scenes, job.id);
+      if (job.state != jobs::JobState::succeeded) drop_results(scenes, job.id, job.claim_number);
     };
     worker.emplace(
         *queue, [workshop](jobs::JobContext& context) { return carry_out(context, workshop); }, working);
