@@ -110,8 +110,11 @@ const std::vector<engine::Error>& SceneStore::recovered() const { return impl_->
 
 Result<Scratch> SceneStore::scratch() { return impl_->scratch.make(); }
 
-Result<void> SceneStore::check_quota(const Uploader& uploader, std::uint64_t bytes) const {
-  const auto fits = impl_->catalogue.hold_quota(uploader, bytes);
+Result<void> SceneStore::check_quota(const Uploader& uploader, std::uint64_t bytes, const std::string& replaced) const {
+  std::uint64_t freed = 0;
+  if (const auto at = impl_->catalogue.snapshot(replaced); !replaced.empty() && at)
+    freed = freed_by_replacing(*at->manifest, uploader);
+  const auto fits = impl_->catalogue.hold_quota(uploader, bytes, freed);
   if (!fits) return propagate(fits);
   return {};
 }

@@ -58,8 +58,10 @@ class SceneStore {
   [[nodiscard]] Result<Scratch> scratch();
 
   /// Whether somebody may store so many bytes more.
-  ///   errors  quota_exceeded (`where` is "bytes")
-  [[nodiscard]] Result<void> check_quota(const Uploader& uploader, std::uint64_t bytes = 0) const;
+  ///   replaced  if given: the scene whose dataset goes for them
+  ///   errors    quota_exceeded (`where` is "bytes")
+  [[nodiscard]] Result<void> check_quota(const Uploader& uploader, std::uint64_t bytes = 0,
+                                         const std::string& replaced = {}) const;
   /// What somebody has brought in and the store still has: bytes of scenes as they came, and of unpacked datasets.
   [[nodiscard]] std::uint64_t bytes_of(const std::string& uploader) const;
 

@@ -79,6 +79,10 @@ DatasetInfo about(const io::Dataset& found) {
 
 }  // namespace
 
+std::uint64_t freed_by_replacing(const Manifest& manifest, const Uploader& uploader) {
+  return manifest.dataset && manifest.dataset->uploader == uploader.name ? manifest.dataset->disk_bytes : 0;
+}
+
 Result<ManifestPtr> Datasets::put_zip(const Snapshot& at, const fs::path& zip, const std::string& filename,
                                       const Uploader& uploader) {
   const auto staging = scratch_.make();
@@ -96,9 +100,7 @@ Result<ManifestPtr> Datasets::put_zip(const Snapshot& at, const fs::path& zip, c
   if (auto synced = sync_file_system(into); !synced) return public_error_(synced, staging->folder());
   const std::string list = to_text(*digests);
   const std::uint64_t bytes = bytes_below(into);
-  const auto& before = at.manifest->dataset;
-  const auto quota =
-      catalogue_.hold_quota(uploader, bytes, before && before->uploader == uploader.name ? before->disk_bytes : 0);
+  const auto quota = catalogue_.hold_quota(uploader, bytes, freed_by_replacing(*at.manifest, uploader));
   if (!quota) return propagate(quota);
   return replace(at, *found, {root.lexically_relative(into).string(), false, bytes, digest_of(list), uploader.name},
                  into, list);

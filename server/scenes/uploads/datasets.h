@@ -1,6 +1,7 @@
 // The datasets of scenes: cameras and photos, unpacked into the store or used where they are.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -14,6 +15,9 @@
 #include "server/scenes/disk/scratch.h"
 
 namespace server::scenes {
+
+/// How much less somebody has stored once the scene's dataset is another's.
+[[nodiscard]] std::uint64_t freed_by_replacing(const Manifest& manifest, const Uploader& uploader);
 
 /// Keeps what it has read of them in `memory`. Safe to call from any thread.
 class Datasets {

@@ -579,6 +579,11 @@ TEST_F(SceneStoreTest, StoresNoMoreForSomebodyThanTheyMay) {
   EXPECT_EQ(store->bytes_of("studio"), 2 * bytes);
   EXPECT_TRUE(put({.name = "third", .max_bytes = dataset_bytes}));
   EXPECT_FALSE(put({.name = "third", .max_bytes = dataset_bytes - 1}));
+  const Uploader full{.name = "third", .max_bytes = dataset_bytes};
+  EXPECT_FALSE(store->check_quota(full, 1));
+  EXPECT_TRUE(store->check_quota(full, dataset_bytes, first->id)) << "in place of what goes";
+  EXPECT_FALSE(store->check_quota(full, dataset_bytes + 1, first->id));
+  EXPECT_FALSE(store->check_quota({.name = "studio", .max_bytes = 2 * bytes}, 1, first->id)) << "it is another's";
 
   open();
   EXPECT_EQ(store->bytes_of("studio"), 2 * bytes) << "it outlives a restart";
