@@ -7,7 +7,6 @@
 
 #include "engine/core/fair_semaphore.h"
 #include "engine/core/file_lock.h"
-#include "engine/core/numbers.h"
 #include "engine/edit/handles.h"
 #include "engine/edit/preview.h"
 #include "engine/edit/workload.h"
@@ -23,6 +22,7 @@
 #include "server/edits/named_locks.h"
 #include "server/edits/records.h"
 #include "server/edits/results.h"
+#include "server/edits/scene_hold.h"
 #include "server/edits/speed_log.h"
 #include "server/edits/status.h"
 #include "server/scenes/disk/public_errors.h"
@@ -43,9 +43,6 @@ constexpr std::size_t all_jobs = 1'000'000;
 constexpr double outlived = 2;
 /// So long an edit waits for others to be measured: as long as for memory. A choice.
 constexpr auto measured_within = std::chrono::seconds(10);
-/// So long a change of a scene waits for edits that are being accepted, and those for it, in other processes. A choice:
-/// an edit is mostly accepted within one.
-constexpr auto others_are_done_within = std::chrono::seconds(10);
 
 double seconds_since(steady_clock::time_point start) {
   return std::chrono::duration<double>(steady_clock::now() - start).count();
@@ -215,16 +212,10 @@ struct EditService::Impl {
   Result<Hold> hold(const std::string& scene, engine::LockKind kind) {
     const bool alone = kind == engine::LockKind::alone;
     auto here = alone ? scenes_in_use.lock(scene) : scenes_in_use.lock_shared(scene);
-    if (options.role == Role::all) return Hold{std::move(here), std::nullopt};
-    auto lock = engine::FileLock::take(options.folder / "scenes_in_use", engine::number_of_id('s', scene).value_or(0),
-                                       kind, others_are_done_within);
-    if (lock) return Hold{std::move(here), std::move(*lock)};
-    if (lock.error().code != ErrorCode::busy)
-      return tl::make_unexpected(scenes::without_folder(lock.error(), options.folder));
-    return fail(ErrorCode::conflict,
-                alone ? "an edit of this scene is just being accepted: wait for its end"
-                      : "this scene is just being changed: try again",
-                scene);
+    if (options.store.empty()) return Hold{std::move(here), std::nullopt};  // no other process changes the records
+    auto lock = hold_scene(options.folder, scene, kind);
+    if (!lock) return tl::make_unexpected(scenes::without_folder(lock.error(), options.folder));
+    return Hold{std::move(here), std::move(*lock)};
   }
 
   /// A request that can be carried out here, and what will be: errors as submit().

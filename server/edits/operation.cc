@@ -13,6 +13,7 @@
 #include "engine/jobs/sqlite_store.h"
 #include "server/edits/records.h"
 #include "server/edits/records_database.h"
+#include "server/edits/scene_hold.h"
 #include "server/edits/temporary_folder.h"
 
 namespace server::edits {
@@ -129,6 +130,14 @@ Result<EditAtHand> requeue_edit(const fs::path& folder, const std::string& store
   if (!visited) return propagate(visited);
   const auto queue = jobs::Queue::open(**visited, {.folder = jobs_folder(folder), .others_are_at_work = true});
   if (!queue) return propagate(queue);
+  const auto failed = (*queue)->find(id);
+  if (!failed) return propagate(failed);
+  std::optional<engine::FileLock> hold;  // as EditService::requeue() has it
+  if (!store.empty()) {
+    auto held = hold_scene(folder, failed->lane, engine::LockKind::shared);
+    if (!held) return propagate(held);
+    hold = std::move(*held);
+  }
   const auto job = (*queue)->requeue(id);
   if (!job) return propagate(job);
   const auto now = (*visited)->now();

@@ -56,7 +56,8 @@ struct QueueLook {
 /// Has an edit that failed taken up again, from its last checkpoint, if there is one; the deaths of its workers are
 /// forgotten.
 ///   returns  the edit, as it waits now
-///   errors   conflict: it has not failed, or a later edit of its scene has yet to end; unavailable: a service has the
+///   errors   conflict: it has not failed, or a later edit of its scene has yet to end, or the scene is just
+///            being changed; unavailable: a service has the
 ///            records open, which has to be asked itself (POST /v1/edits/{id}/requeue); those of look_at_queue()
 [[nodiscard]] Result<EditAtHand> requeue_edit(const std::filesystem::path& folder, const std::string& store,
                                               const std::string& id);
