@@ -402,6 +402,9 @@ Result<proto::EditStatus> EditService::requeue(const std::string& id) {
   const auto hold = impl_->hold(job->lane, engine::LockKind::shared);
   if (!hold) return propagate(hold);
   if (const auto scene = impl_->scenes.find(job->lane); !scene) return propagate(scene);
+  if (const auto request = proto::parse_edit_request(job->payload); request && request->version)
+    if (const auto version = impl_->scenes.find_version(job->lane, std::to_string(*request->version)); !version)
+      return propagate(version);
   return impl_->shown(about_edit(impl_->queue->requeue(id), id));
 }
 

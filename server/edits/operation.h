@@ -53,8 +53,8 @@ struct QueueLook {
 [[nodiscard]] Result<QueueLook> look_at_queue(const std::filesystem::path& folder, const std::string& store,
                                               bool with_failed);
 
-/// Has an edit that failed taken up again, from its last checkpoint, if there is one; the deaths of its workers are
-/// forgotten.
+/// Has an edit that failed taken up again, from its last checkpoint, if there is one and it can still be used; the
+/// deaths of its workers are forgotten. Whether scene and version are still there shows when it is carried out.
 ///   returns  the edit, as it waits now
 ///   errors   conflict: it has not failed, or a later edit of its scene has yet to end, or the scene is just
 ///            being changed; unavailable: a service has the

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <atomic>
 #include <fstream>
 
 #include "engine/jobs/notes.h"
@@ -94,11 +96,92 @@ TEST_F(OperationTest, SaysWhereTheRecordsAre) {
 
 class RequeueTest : public ServiceTest {};
 
-TEST_F(RequeueTest, OfAServiceWantsAFailedEditOfASceneThatIsThere) {
+/// Fails at its second call, as long as it is broken.
+class Brittle final : public engine::optim::PerceptualLoss {
+ public:
+  engine::Result<double> evaluate(const engine::scene::Image& rendered, const engine::scene::Image&,
+                                  engine::scene::Image& v_rendered) override {
+    if (++calls == 2 && broken) return engine::fail(ErrorCode::unavailable, "there is no model");
+    v_rendered = engine::scene::Image(rendered.width, rendered.height, rendered.channels, 0.0f);
+    return 0.0;
+  }
+  std::atomic<bool> broken = true;
+  std::atomic<int> calls = 0;
+};
+
+class RequeueTest : public ServiceTest {
+ protected:
+  void SetUp() override {
+    service.reset();
+    service = value(EditService::open(
+        *store, {.folder = dir.path() / "edits", .pictured_views = 1, .threads = 1, .perceptual = &brittle}));
+  }
+  void TearDown() override { service.reset(); }
+  static proto::EditRequest request_of(const std::string& scene, int version = 0) {
+    proto::EditRequest request = move_ball(scene, 3);
+    request.version = version;
+    request.params.iterations = 1;
+    return request;
+  }
+  /// Once its first interval is finished.
+  std::string failed(int version = 0) {
+    brittle.broken = true;
+    brittle.calls = 0;
+    std::string id = submit(request_of(scene, version));
+    const auto status = wait_for_end(*service, id);
+    EXPECT_EQ(status.state, "failed");
+    EXPECT_EQ(status.finished_intervals.size(), 1u);
+    brittle.broken = false;
+    return id;
+  }
+  proto::EditStatus done(const std::string& id) {
+    auto status = wait_for_end(*service, id);
+    EXPECT_EQ(status.state, "succeeded");
+    EXPECT_EQ(status.finished_intervals.size(), 3u);
+    return status;
+  }
+  static bool began_anew(const proto::EditStatus& status) {
+    return std::ranges::any_of(status.warnings,
+                               [](const auto& warning) { return warning.find("began anew") != std::string::npos; });
+  }
+  Brittle brittle;
+};
+
+TEST_F(RequeueTest, OfAServiceWantsAFailedEditOfAVersionThatIsThere) {
   EXPECT_EQ(code_of(service->requeue("e000001")), ErrorCode::not_found);
-  const std::string id = submit(move_ball(scene));
-  wait_for_end(*service, id);
-  EXPECT_EQ(code_of(service->requeue(id)), ErrorCode::conflict) << "it has succeeded";
+  brittle.broken = false;
+  const std::string good = submit(request_of(scene));
+  ASSERT_EQ(done(good).result_version, 1);
+  EXPECT_EQ(code_of(service->requeue(good)), ErrorCode::conflict) << "it has succeeded";
+
+  const std::string id = failed(1);
+  value(service->remove_version(scene, "1"));
+  auto refused = service->requeue(id);
+  ASSERT_EQ(code_of(refused), ErrorCode::not_found);
+  EXPECT_EQ(refused.error().where, "version");
+  value(service->remove_scene(scene));
+  refused = service->requeue(id);
+  ASSERT_EQ(code_of(refused), ErrorCode::not_found);
+  EXPECT_EQ(refused.error().where, "scene");
+  EXPECT_EQ(value(service->find(id)).state, "failed");
+}
+
+TEST_F(RequeueTest, GoesOnFromTheCheckpointUnlessTheSceneIsAnother) {
+  const std::string same = failed();
+  const int before = brittle.calls;
+  (void)value(service->requeue(same));
+  EXPECT_FALSE(began_anew(done(same)));
+  const int went_on = brittle.calls - before;
+
+  const std::string other = failed();
+  (void)value(store->patch(scene, {.up = engine::DVec3(1, 0, 0)}));
+  brittle.calls = 0;
+  (void)value(service->requeue(other));
+  const auto anew = done(other);
+  EXPECT_TRUE(began_anew(anew));
+  EXPECT_EQ(brittle.calls, went_on + 1) << "all three intervals";
+  const auto fresh = done(submit(request_of(scene)));
+  EXPECT_EQ(version_bytes(*store, scene, *anew.result_version), version_bytes(*store, scene, *fresh.result_version));
 }
 
 }  // namespace
