@@ -94,8 +94,6 @@ TEST_F(OperationTest, SaysWhereTheRecordsAre) {
   EXPECT_EQ(code_of(requeue_edit(edits, "", "e000001")), ErrorCode::conflict);
 }
 
-class RequeueTest : public ServiceTest {};
-
 /// Fails at its second call, as long as it is broken.
 class Brittle final : public engine::optim::PerceptualLoss {
  public:
@@ -120,6 +118,7 @@ class RequeueTest : public ServiceTest {
   static proto::EditRequest request_of(const std::string& scene, int version = 0) {
     proto::EditRequest request = move_ball(scene, 3);
     request.version = version;
+    if (version > 0) request.handles[0].source = {0.5, 0, 0}, request.handles[0].target = proto::Point{0.9, 0, 0};
     request.params.iterations = 1;
     return request;
   }
@@ -174,7 +173,7 @@ TEST_F(RequeueTest, GoesOnFromTheCheckpointUnlessTheSceneIsAnother) {
   const int went_on = brittle.calls - before;
 
   const std::string other = failed();
-  (void)value(store->patch(scene, {.up = engine::DVec3(1, 0, 0)}));
+  (void)value(store->patch(scene, {.name = {}, .up = engine::DVec3(1, 0, 0)}));
   brittle.calls = 0;
   (void)value(service->requeue(other));
   const auto anew = done(other);
