@@ -76,7 +76,9 @@ for (const kind of ['a file', 'PostgreSQL'])
       const alone = await service.client.submit({ ...long(), version: 0 });
       const bytes = async (version) => service.client.file(scene, version);
       assert.deepEqual(await bytes(edit.result_version), await bytes((await service.client.succeeded(alone.id)).result_version), 'the same bytes');
-      assert.match((await refusal('requeue', 'e000099')).stderr, /e000099|a service has the records open/);
+      const { code, stderr } = await refusal('requeue', 'e000099');
+      if (kind === 'a file') assert.deepEqual([code, /a service has the records open.*\/v1\/edits\/e000099\/requeue/.test(stderr)], [12, true], stderr);
+      else assert.deepEqual([code, /there is no job "e000099"/.test(stderr)], [3, true], stderr);
     });
   });
 
