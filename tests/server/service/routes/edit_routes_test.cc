@@ -183,7 +183,9 @@ TEST_F(EditRoutesTest, AQuotaIsThatOfTheTokenAndSaysWhichAndForHowLong) {
   const auto now = std::chrono::system_clock::now();
   const std::chrono::duration<double> left = std::chrono::ceil<std::chrono::days>(now) - now;
   EXPECT_NEAR(seconds, left.count(), 60) << "until the day is over, unless it just was";
-  const auto never = with({.seconds = 0});
+  body.by = std::make_shared<const http::Token>(
+      http::Token{.name = "idle", .edit = true, .secret = "i", .quotas = {.seconds = 0}});
+  const auto never = call("POST", "/v1/edits", body);
   ASSERT_FALSE(never);
   EXPECT_EQ(never.error().code, ErrorCode::too_large) << "no day is long enough, and so there is none to wait for";
   EXPECT_EQ(never.error().where, "seconds");
