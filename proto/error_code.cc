@@ -27,6 +27,8 @@ std::string_view name_of(engine::ErrorCode code) {
       return "cancelled";
     case ErrorCode::unavailable:
       return "unavailable";
+    case ErrorCode::quota_exceeded:
+      return "quota_exceeded";
     case ErrorCode::internal:
       break;
   }

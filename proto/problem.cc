@@ -61,6 +61,7 @@ int http_status(ErrorCode code) {
     case ErrorCode::no_space:
       return 507;
     case ErrorCode::busy:
+    case ErrorCode::quota_exceeded:
       return 429;
     case ErrorCode::cancelled:
     case ErrorCode::unavailable:

@@ -19,7 +19,7 @@ struct Problem {
 
 /// The one HTTP status of each code:
 ///   invalid_argument 400, unprocessable, corrupt_data and unsupported 422, not_found 404, conflict 409, too_large 413,
-///   no_space 507, busy 429, cancelled and unavailable 503, internal 500
+///   no_space 507, busy and quota_exceeded 429, cancelled and unavailable 503, internal 500
 [[nodiscard]] int http_status(engine::ErrorCode code);
 
 /// The standard phrase of a status: "Not Found".

@@ -20,7 +20,8 @@ enum class ErrorCode {
   busy,
   cancelled,
   unavailable,
-  internal
+  internal,
+  quota_exceeded  ///< Whoever asks has used up what they may. Last: the numbers of the others are in files.
 };
 
 /// People read `message`, programs read `code` and `where`.

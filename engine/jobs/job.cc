@@ -22,14 +22,14 @@ constexpr std::array<Row, state_count> make_transitions() {
   constexpr std::optional wait(JobState::queued), run(JobState::running), stop(JobState::stop_requested),
       cancel(JobState::cancel_requested), good(JobState::succeeded), bad(JobState::failed), gone(JobState::cancelled);
   return {{
-      //  claim report finish_interval stop cancel succeed fail release make_way abandon
-      Row{run, no, no, stop, gone, no, no, no, no, no},                   // queued
-      Row{run, run, run, stop, cancel, good, bad, run, wait, run},        // running
-      Row{stop, stop, stop, stop, cancel, good, bad, stop, stop, stop},   // stop_requested
-      Row{no, cancel, cancel, no, cancel, gone, gone, gone, gone, gone},  // cancel_requested
-      Row{},                                                              // succeeded
-      Row{},                                                              // failed
-      Row{no, no, no, no, gone, no, no, no, no, no},                      // cancelled
+      //  claim report finish_interval stop cancel succeed fail release make_way abandon requeue
+      Row{run, no, no, stop, gone, no, no, no, no, no, no},                   // queued
+      Row{run, run, run, stop, cancel, good, bad, run, wait, run, no},        // running
+      Row{stop, stop, stop, stop, cancel, good, bad, stop, stop, stop, no},   // stop_requested
+      Row{no, cancel, cancel, no, cancel, gone, gone, gone, gone, gone, no},  // cancel_requested
+      Row{},                                                                  // succeeded
+      Row{no, no, no, no, no, no, no, no, no, no, wait},                      // failed
+      Row{no, no, no, no, gone, no, no, no, no, no, no},                      // cancelled
   }};
 }
 constexpr auto transitions = make_transitions();
@@ -41,6 +41,7 @@ std::string refusal(const Job& job, Event event) {
     return job.id + " has no finished interval to keep yet: wait for the first one, or cancel";
   }
   if (event == Event::stop || event == Event::cancel) return is + ": it has already ended and stays as it is";
+  if (event == Event::requeue) return is + ": only what has failed is taken up again";
   return is + (job.claimed ? ", held by a worker" : ", held by no worker") + ": the change does not apply";
 }
 
@@ -56,6 +57,8 @@ std::optional<JobState> next_state(const Job& job, Event event) {
     case Event::cancel:
       // A job that no worker holds is cancelled at once: there is nobody to wait for.
       return job.claimed ? next : JobState::cancelled;
+    case Event::requeue:
+      return next;
     default:
       return job.claimed ? next : std::nullopt;
   }
@@ -75,6 +78,7 @@ bool is_of_worker(Event event) {
     case Event::stop:
     case Event::cancel:
     case Event::abandon:
+    case Event::requeue:
       return false;
   }
   return false;
@@ -144,10 +148,13 @@ Result<Job> transition(Job job, const Change& change, Time now) {
   const bool was_final = is_final(job.state);
   job.state = *next;
   if (change.progress) job.progress = *change.progress;
+  if (is_of_worker(change.event)) job.worked += change.worked;
   switch (change.event) {
     case Event::claim:
       job.claimed = true;
       ++job.claim_number;
+      job.holder = change.holder;
+      job.claimed_at = now;
       job.place.clear();
       if (!job.started) job.started = now;
       break;
@@ -178,6 +185,15 @@ Result<Job> transition(Job job, const Change& change, Time now) {
       break;
     case Event::report:
       if (change.place) job.place = *change.place;
+      break;
+    case Event::requeue:
+      job.finished_intervals = change.interval;
+      if (change.interval == 0) job.progress.clear();  // of work that is done anew, its time included
+      job.error.reset();
+      job.ended.reset();
+      job.deaths = 0;
+      job.died_at.clear();
+      job.place.clear();
       break;
     case Event::stop:
     case Event::cancel:

@@ -20,8 +20,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view magic = "SDJOBNTE";
-constexpr std::uint32_t format_number = 2;  // another once a value of ErrorCode becomes another number
-constexpr std::uint32_t first_with_expected = 2;
+constexpr std::uint32_t format_number = 3;  // another once a value of ErrorCode becomes another number
+constexpr std::uint32_t first_with_expected = 2, first_with_requester = 3;
 constexpr const char* note_suffix = ".job";
 constexpr const char* removed_suffix = ".removed";
 constexpr const char* counter_name = "last_number";
@@ -82,6 +82,7 @@ std::string encode_note(const Job& job) {
   out.write_string(error.message), out.write_string(error.where);
   for (const std::optional<Time>& time : {std::optional(job.created), job.started, job.ended}) write_time(out, time);
   out.write(std::int64_t(job.expected.count()));
+  out.write_string(job.requester);
   out.write(fnv1a(out.bytes()));
   return std::move(out).take();
 }
@@ -109,7 +110,8 @@ Result<Job> decode_note(std::string_view text) {
   const auto created = read_time(in);
   job.started = read_time(in), job.ended = read_time(in);
   if (format >= first_with_expected) job.expected = std::chrono::milliseconds(in.read<std::int64_t>());
-  if (!in.ok() || in.remaining() != 0 || !state || code < 0 || code > int(ErrorCode::internal)) return damaged();
+  if (format >= first_with_requester) job.requester = in.read_string();
+  if (!in.ok() || in.remaining() != 0 || !state || code < 0 || code > int(ErrorCode::quota_exceeded)) return damaged();
   error.code = ErrorCode(code);
   job.state = *state;
   job.created = created.value_or(Time{});

@@ -47,6 +47,19 @@ constexpr std::array steps = {R"(
   CREATE INDEX next ON splatdrag.jobs ((state = 'running') DESC, turn, number) WHERE ended IS NULL AND NOT claimed;
   CREATE INDEX held ON splatdrag.jobs (lease_until) WHERE ended IS NULL AND claimed;
   CREATE INDEX ended ON splatdrag.jobs (ended DESC, number DESC) WHERE ended IS NOT NULL;
+)",
+                              R"(
+  ALTER TABLE splatdrag.jobs
+    ADD COLUMN requester BYTEA NOT NULL DEFAULT '',
+    ADD COLUMN worked BIGINT NOT NULL DEFAULT 0,
+    ADD COLUMN holder BYTEA NOT NULL DEFAULT '',
+    ADD COLUMN claimed_at BIGINT;
+  CREATE TABLE splatdrag.worked (
+    requester BYTEA NOT NULL,
+    day BIGINT NOT NULL,  -- since 1970, UTC
+    milliseconds BIGINT NOT NULL,
+    PRIMARY KEY (requester, day)
+  );
 )"};
 constexpr auto schema_number = std::int64_t(steps.size());
 
@@ -96,6 +109,7 @@ void PostgresTransaction::commit() {
 
 void join(PostgresConnection& connection, const PostgresOptions& options) {
   connection.open();
+  if (options.visits) return;
   const std::string usual = connection.run("SHOW lock_timeout").text(0, 0);
   connection.execute("SET lock_timeout = " + std::to_string(options.busy_timeout.count()));
   try {
@@ -127,6 +141,13 @@ void bring_up_to_date(PostgresConnection& connection, const PostgresOptions& opt
 }
 
 void check_is_ours(PostgresConnection& connection, const PostgresOptions& options) {
+  if (options.visits) {
+    if (!has_tables(connection))
+      throw StoreFailure({ErrorCode::not_found, "the database has no jobs: no service has used it yet", {}});
+    if (connection.run("SELECT schema_number FROM splatdrag.store").integer(0, 0) < schema_number)
+      throw StoreFailure(
+          {ErrorCode::unsupported, "the job store was written by an older version: start a service of this one", {}});
+  }
   check_version(connection);
   check_owner(connection, options);
 }

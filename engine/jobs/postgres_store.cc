@@ -50,10 +50,10 @@ std::string select(const PostgresOptions& options, bool whole, const std::string
   return "SELECT number, lane, " + payload +
          ", idempotency_key, state, claimed, stopped_early, finished_intervals, progress, " + result +
          ", error_code, error_message, error_where, created, started, ended, place, died_at, deaths, expected, "
-         "claim_number, " +
+         "claim_number, requester, worked, holder, claimed_at, CASE WHEN claimed THEN lease_until END, " +
          options.now + more + " FROM splatdrag.jobs ";
 }
-constexpr int columns_of_job = 22;
+constexpr int columns_of_job = 27;
 
 std::optional<Time> time_at(const PostgresRows& rows, int row, int column) {
   if (rows.is_null(row, column)) return std::nullopt;
@@ -96,7 +96,12 @@ Found read(const PostgresRows& rows, int row) {
   job.deaths = int(rows.integer(row, 18));
   job.expected = std::chrono::milliseconds(rows.integer(row, 19));
   job.claim_number = rows.integer(row, 20);
-  return {std::move(job), time_at(rows, row, 21).value_or(Time{})};
+  job.requester = rows.text(row, 21);
+  job.worked = std::chrono::milliseconds(rows.integer(row, 22));
+  job.holder = rows.text(row, 23);
+  job.claimed_at = time_at(rows, row, 24);
+  job.lease_until = time_at(rows, row, 25);
+  return {std::move(job), time_at(rows, row, 26).value_or(Time{})};
 }
 
 std::vector<std::string> ids(const PostgresRows& rows) {
@@ -255,13 +260,35 @@ struct PostgresStore::Impl {
         "UPDATE splatdrag.jobs SET turn = $2, state = $3, claimed = $4, stopped_early = $5, finished_intervals = $6, "
         "progress = $7, result = $8, error_code = $9, error_message = $10, error_where = $11, started = $12, "
         "ended = $13, place = $14, died_at = $15, deaths = $16, claim_number = greatest(claim_number, $17), "
-        "lease_until = CASE WHEN $18 THEN " +
+        "worked = $20, holder = $21, claimed_at = $22, lease_until = CASE WHEN $18 THEN " +
             options.now + " + $19 ELSE lease_until END WHERE number = $1 RETURNING pg_current_xact_id()::text",
         known_number(job.id), turn_of(job), to_string(job.state), job.claimed, job.stopped_early,
         std::int64_t(job.finished_intervals), job.progress, job.result, code, message, where, job.started, job.ended,
-        job.place, job.died_at, std::int64_t(job.deaths), job.claim_number, claims,
-        std::int64_t(options.lease.count()));
+        job.place, job.died_at, std::int64_t(job.deaths), job.claim_number, claims, std::int64_t(options.lease.count()),
+        std::int64_t(job.worked.count()), job.holder, job.claimed_at);
     change = written.text(0, 0);
+  }
+  /// Notes for whom so much was worked. After the record is held: all come in this order.
+  void count_worked(const std::string& requester, std::chrono::milliseconds worked, Time now) {
+    if (worked.count() <= 0 || requester.empty()) return;
+    work.run(
+        "INSERT INTO splatdrag.worked AS old (requester, day, milliseconds) VALUES ($1, $2, $3) ON CONFLICT "
+        "(requester, day) DO UPDATE SET milliseconds = old.milliseconds + excluded.milliseconds",
+        requester, day_of(now), std::int64_t(worked.count()));
+  }
+  Usage usage(const std::string& requester) {
+    const auto rows = work.run("SELECT count(*), coalesce(sum(greatest(expected - worked, 0)), 0)::bigint, " +
+                                   options.now + " FROM splatdrag.jobs WHERE ended IS NULL AND requester = $1",
+                               requester);
+    Usage usage{.active = std::size_t(rows.integer(0, 0)), .expected = std::chrono::milliseconds(rows.integer(0, 1))};
+    const auto worked = work.run("SELECT milliseconds FROM splatdrag.worked WHERE requester = $1 AND day = $2",
+                                 requester, day_of(Time(std::chrono::milliseconds(rows.integer(0, 2)))));
+    if (worked.size() > 0) usage.worked_today = std::chrono::milliseconds(worked.integer(0, 0));
+    return usage;
+  }
+
+  void check_quota(const NewJob& job) {
+    if (has_limit(job.quota)) jobs::check_quota(usage(job.requester), job);
   }
 
   /// The one that claim() gives out, for a change, and whether a claim has run out.
@@ -272,11 +299,12 @@ struct PostgresStore::Impl {
   }
   void insert(const Job& job) {
     const auto inserted = work.run(
-        "INSERT INTO splatdrag.jobs AS old (number, lane, payload, idempotency_key, expected, turn, state, created) "
-        "VALUES ($1, $2, $3, $4, $5, $6, $7, $8) ON CONFLICT (number) DO UPDATE SET lane = $2, payload = $3, "
-        "idempotency_key = $4, expected = $5, created = $8 RETURNING pg_current_xact_id()::text",
+        "INSERT INTO splatdrag.jobs AS old (number, lane, payload, idempotency_key, expected, turn, state, created, "
+        "requester) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9) ON CONFLICT (number) DO UPDATE SET lane = $2, "
+        "payload = $3, idempotency_key = $4, expected = $5, created = $8, requester = $9 "
+        "RETURNING pg_current_xact_id()::text",
         known_number(job.id), job.lane, job.payload, key_of(job.idempotency_key), std::int64_t(job.expected.count()),
-        turn_of(job), to_string(job.state), job.created);
+        turn_of(job), to_string(job.state), job.created, job.requester);
     change = inserted.text(0, 0);
     work.run("UPDATE splatdrag.store SET last_number = greatest(last_number, $1)", known_number(job.id));
   }
@@ -331,6 +359,7 @@ Result<std::unique_ptr<PostgresStore>> PostgresStore::open(const PostgresOptions
   auto impl = std::make_unique<Impl>(options, *address);
   auto opened = guarded([&] {
     join(impl->work, options);
+    if (options.visits) return check_is_ours(impl->work, options);
     PostgresTransaction transaction(impl->work);
     bring_up_to_date(impl->work, options);
     if (options.alone) impl->abandon_where("ended IS NULL AND claimed");
@@ -367,12 +396,14 @@ Result<Submission> PostgresStore::submit(const NewJob& job, std::size_t max_queu
       if (auto earlier = impl_->find_where("WHERE idempotency_key = $1", job.idempotency_key))
         return same_submission(std::move(*earlier), job);
     impl_->check_room_for_one(max_queued);
+    impl_->check_quota(job);
     Job accepted;
     accepted.id = id_of(last.integer(0, 0) + 1);
     accepted.lane = job.lane;
     accepted.payload = job.payload;
     accepted.idempotency_key = job.idempotency_key;
     accepted.expected = job.expected;
+    accepted.requester = job.requester;
     accepted.created = time_at(last, 0, 1).value_or(Time{});
     impl_->insert(accepted);
     impl_->has_news = true;
@@ -384,6 +415,39 @@ Result<Submission> PostgresStore::submit(const NewJob& job, std::size_t max_queu
 
 Result<void> PostgresStore::check_room(std::size_t max_queued) {
   return impl_->look([&] { impl_->check_room_for_one(max_queued); });
+}
+
+Result<void> PostgresStore::check_quota(const NewJob& job) {
+  return impl_->look([&] { impl_->check_quota(job); });
+}
+
+Result<Usage> PostgresStore::usage(const std::string& requester) {
+  return impl_->look([&] { return impl_->usage(requester); });
+}
+
+Result<Job> PostgresStore::requeue(const std::string& id, int finished_intervals, const Witness& witness) {
+  return impl_->transact([&] {
+    impl_->work.run(
+        "SELECT 1::bigint FROM splatdrag.store FOR UPDATE");  // as in submit(): none joins the lane meanwhile
+    const auto [job, now] = impl_->find_to_change(id);
+    const auto younger = ids(
+        impl_->work.run("SELECT number FROM splatdrag.jobs WHERE ended IS NULL AND lane = $1 AND number > $2 LIMIT 1",
+                        job.lane, known_number(id)));
+    if (job.state == JobState::failed)
+      check_is_last_of_lane(job, younger.empty() ? std::nullopt : std::optional(younger.front()));
+    auto changed = transition(job, {.event = Event::requeue, .interval = finished_intervals}, now);
+    if (!changed) throw StoreFailure(changed.error());
+    impl_->write(*changed);
+    impl_->has_news = true;
+    impl_->find_places({&*changed, 1});
+    if (const auto witnessed = witness(*changed); !witnessed) throw StoreFailure(witnessed.error());
+    return std::move(*changed);
+  });
+}
+
+Result<Time> PostgresStore::now() {
+  return impl_->look(
+      [&] { return Time(std::chrono::milliseconds(impl_->work.run("SELECT " + impl_->options.now).integer(0, 0))); });
 }
 
 Result<void> PostgresStore::restore(const Job& job) {
@@ -430,7 +494,7 @@ Result<std::optional<Job>> PostgresStore::claim() {
     }
     if (rows.size() == 0) return std::nullopt;
     const auto [next, now] = read(rows, 0);
-    auto claimed = transition(next, {.event = Event::claim}, now);
+    auto claimed = transition(next, {.event = Event::claim, .holder = impl_->options.holder}, now);
     if (!claimed) throw StoreFailure(claimed.error());
     impl_->write(*claimed, /*claims=*/true);
     return std::move(*claimed);
@@ -482,6 +546,7 @@ Result<Job> PostgresStore::apply(const std::string& id, const Change& change) {
     auto changed = transition(job, change, now);
     if (!changed) throw StoreFailure(changed.error());
     impl_->write(*changed, change.event == Event::claim);
+    impl_->count_worked(changed->requester, changed->worked - job.worked, now);
     impl_->has_news = true;
     impl_->find_places({&*changed, 1});
     return std::move(*changed);
@@ -505,6 +570,7 @@ Result<std::vector<std::string>> PostgresStore::expire(const Retention& retentio
         "ORDER BY ended DESC, number DESC OFFSET $1 LIMIT 1)",
         std::int64_t(retention.max_count));
     expired.insert(expired.end(), too_many.begin(), too_many.end());
+    impl_->work.run("DELETE FROM splatdrag.worked WHERE day < " + impl_->options.now + " / 86400000 - $1", days_kept);
     std::ranges::sort(expired);
     return expired;
   });

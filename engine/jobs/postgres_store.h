@@ -22,6 +22,10 @@ struct PostgresOptions {
   /// Nobody else has the store open meanwhile: then whoever is left as the holder of a job is no more, as with
   /// SqliteStore, and open() ends every claim (Event::abandon).
   bool alone = false;
+  std::string holder = {};  ///< How this process is called in the claims that it makes.
+  /// Somebody comes to look, or to change a record, and claims nothing: nobody is kept out, nor are they by whoever is
+  /// alone; tables are not made, and not brought up to date.
+  bool visits = false;
   std::chrono::milliseconds lease{30'000};       ///< How long a claim lasts that is not renewed. A choice.
   std::chrono::milliseconds busy_timeout{2000};  ///< Longest wait for a process that is just ending.
   std::int64_t used_numbers = 0;                 ///< As of SqliteOptions.
@@ -41,7 +45,7 @@ class PostgresStore final : public Store {
   ///   errors  invalid_argument: the address is none; unavailable: the server cannot be reached or lets nobody in of
   ///           this name, or somebody has the store open and one of the two is to be `alone`; conflict: the jobs are
   ///           another owner's; corrupt_data: the tables are not ours, or lost; unsupported: a newer version wrote
-  ///           them. `where` is the address without its password
+  ///           them; not_found: somebody visits, and there are no tables. `where` is the address without its password
   [[nodiscard]] static Result<std::unique_ptr<PostgresStore>> open(const PostgresOptions& options);
   /// Puts the tables aside, under a name that nothing has, so that open() makes new ones.
   ///   returns  that name; empty: there was nothing
@@ -49,9 +53,14 @@ class PostgresStore final : public Store {
   [[nodiscard]] static Result<std::string> move_away(const PostgresOptions& options);
   ~PostgresStore() override;
 
+  using Store::requeue;
   using Store::submit;
   [[nodiscard]] Result<Submission> submit(const NewJob& job, std::size_t max_queued, const Witness& witness) override;
   [[nodiscard]] Result<void> check_room(std::size_t max_queued) override;
+  [[nodiscard]] Result<void> check_quota(const NewJob& job) override;
+  [[nodiscard]] Result<Usage> usage(const std::string& requester) override;
+  [[nodiscard]] Result<Job> requeue(const std::string& id, int finished_intervals, const Witness& witness) override;
+  [[nodiscard]] Result<Time> now() override;
   [[nodiscard]] Result<void> restore(const Job& job) override;
   [[nodiscard]] Result<Job> find(const std::string& id) override;
   [[nodiscard]] Result<std::optional<Job>> find_key(const std::string& idempotency_key) override;

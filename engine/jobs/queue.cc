@@ -91,6 +91,21 @@ Result<Job> Queue::cancel(const std::string& id) {
   return with_latest_progress(std::move(*job));
 }
 
+Result<Job> Queue::requeue(const std::string& id) {
+  const std::lock_guard lock(ends_mutex_);
+  bool noted = false;
+  // The note before the commit: one that still says "failed" would count as what the record has lost when the queue is
+  // opened. And while the record is held: others change it, too.
+  auto requeued = store_.requeue(id, last_checkpoint(folder_of(id)), [&](const Job& again) {
+    noted = true;
+    return write_note(options_.folder, again);
+  });
+  if (noted) note_what_is_recorded(id);
+  if (!requeued) return requeued;
+  bump_revision();
+  return with_latest_progress(std::move(*requeued));
+}
+
 Result<void> Queue::remove(const std::string& id) {
   const std::lock_guard lock(ends_mutex_);
   const auto job = store_.find(id);
@@ -117,6 +132,17 @@ Result<void> Queue::expire() {
 }
 
 void Queue::note_end(const Job& job) const { (void)write_note(options_.folder, job); }
+
+void Queue::note_what_is_recorded(const std::string& id) const {
+  constexpr int tries = 10;  // a choice: each time the job would have ended, or been requeued, just then
+  auto record = store_.find(id);
+  for (int i = 0; record && i < tries; ++i) {
+    note_end(*record);
+    const auto before = std::exchange(record, store_.find(id));
+    if (record && record->state == before->state && record->claim_number == before->claim_number) return;
+  }
+  if (!record && record.error().code == ErrorCode::not_found) remove_traces(options_.folder, id);
+}
 
 std::uint64_t Queue::revision() const {
   const std::lock_guard lock(mutex_);

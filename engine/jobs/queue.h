@@ -42,7 +42,8 @@ class Queue {
 
   /// Accepts a job: when this returns, it is on disk and will be done. With an idempotency key that is known already it
   /// answers with the job that was accepted then.
-  ///   errors  busy: the queue is full; unprocessable: the key belongs to another payload or lane
+  ///   errors  busy: the queue is full; unprocessable: the key belongs to another payload or lane; quota_exceeded,
+  ///           too_large
   [[nodiscard]] Result<Submission> submit(const NewJob& job);
   /// Whether there is room for another job, for whoever has work to do before submit(). Others may come first.
   ///   errors  busy: the queue is full
@@ -58,6 +59,12 @@ class Queue {
   /// Asks a job to end at once and keep nothing; one that waits is cancelled when this returns. Idempotent.
   ///   errors  conflict: the job has succeeded or failed
   [[nodiscard]] Result<Job> cancel(const std::string& id);
+  /// Whether the requester's quota has room for the job. Others may come first.
+  ///   errors  quota_exceeded, too_large
+  [[nodiscard]] Result<void> check_quota(const NewJob& job) { return store_.check_quota(job); }
+  /// Has a job that has failed taken up again, from its last checkpoint if that is still there.
+  ///   errors  conflict: it has not failed, or a younger job of its lane has yet to end
+  [[nodiscard]] Result<Job> requeue(const std::string& id);
   /// Removes the record and the files of an ended job.
   ///   errors  conflict: it has not ended
   [[nodiscard]] Result<void> remove(const std::string& id);
@@ -79,6 +86,8 @@ class Queue {
   [[nodiscard]] std::filesystem::path folder_of(const std::string& id) const { return options_.folder / id; }
   /// Writes down how a job has ended. Where that fails, the next open() does.
   void note_end(const Job& job) const;
+  /// Writes the note of a job that other processes may just change, or removes its traces where they have removed it.
+  void note_what_is_recorded(const std::string& id) const;
   void bump_revision();
   [[nodiscard]] std::shared_ptr<RunningJob> find_running(const std::string& id) const;
   void attach(const std::string& id, std::shared_ptr<RunningJob> running);

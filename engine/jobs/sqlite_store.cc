@@ -19,7 +19,7 @@
 namespace engine::jobs {
 namespace {
 
-constexpr int schema_number = 5;  // of the tables below; user_version in the file
+constexpr int schema_number = 6;  // of the tables below; user_version in the file
 constexpr const char* schema = R"(
   CREATE TABLE jobs (
     number INTEGER PRIMARY KEY AUTOINCREMENT,  -- AUTOINCREMENT: a removed job's number is never given away again
@@ -58,6 +58,20 @@ constexpr const char* adds_expected = "ALTER TABLE jobs ADD COLUMN expected INTE
 /// From schema 4 to 5.
 constexpr const char* adds_claim_numbers = "ALTER TABLE jobs ADD COLUMN claim_number INTEGER NOT NULL DEFAULT 0;";
 
+/// From schema 5 to 6: who asked for a job, who holds it, and what was worked for whom.
+constexpr const char* adds_people = R"(
+  ALTER TABLE jobs ADD COLUMN requester TEXT NOT NULL DEFAULT '';
+  ALTER TABLE jobs ADD COLUMN worked INTEGER NOT NULL DEFAULT 0;  -- milliseconds
+  ALTER TABLE jobs ADD COLUMN holder TEXT NOT NULL DEFAULT '';
+  ALTER TABLE jobs ADD COLUMN claimed_at INTEGER;
+  CREATE TABLE worked (
+    requester TEXT NOT NULL,
+    day INTEGER NOT NULL,  -- since 1970, UTC
+    milliseconds INTEGER NOT NULL,
+    PRIMARY KEY (requester, day)
+  ) STRICT, WITHOUT ROWID;
+)";
+
 /// A row in the order of its checksum, which is the last of its columns. SQLite's own checks see damage to its pages
 /// and indices, but not to what they hold.
 std::string summed_columns(int schema_of_row = schema_number) {
@@ -66,6 +80,7 @@ std::string summed_columns(int schema_of_row = schema_number) {
       "error_code, error_message, error_where, created, started, ended, place, died_at, deaths";
   if (schema_of_row > 3) columns += ", expected";
   if (schema_of_row > 4) columns += ", claim_number";
+  if (schema_of_row > 5) columns += ", requester, worked, holder, claimed_at";
   return columns;
 }
 
@@ -254,7 +269,7 @@ std::string select(bool whole) {
   return "SELECT number, lane, " + payload +
          ", idempotency_key, state, claimed, stopped_early, finished_intervals, progress, " + result +
          ", error_code, error_message, error_where, created, started, ended, place, died_at, deaths, expected, "
-         "claim_number, " +
+         "claim_number, requester, worked, holder, claimed_at, " +
          is_sound + " FROM jobs ";
 }
 
@@ -266,7 +281,7 @@ std::optional<Time> time_at(const Statement& row, int column) {
 Job read(const Database& database, const Statement& row) {
   Job job;
   job.id = id_of(row.integer(0));
-  if (row.integer(21) == 0) database.corrupt("the record of job " + job.id);
+  if (row.integer(25) == 0) database.corrupt("the record of job " + job.id);
   job.lane = row.text(1);
   job.payload = row.text(2);
   job.idempotency_key = row.text(3);
@@ -291,6 +306,10 @@ Job read(const Database& database, const Statement& row) {
   job.deaths = int(row.integer(18));
   job.expected = std::chrono::milliseconds(row.integer(19));
   job.claim_number = row.integer(20);
+  job.requester = row.text(21);
+  job.worked = std::chrono::milliseconds(row.integer(22));
+  job.holder = row.text(23);
+  job.claimed_at = time_at(row, 24);
   return job;
 }
 
@@ -340,19 +359,45 @@ void write_in(Database& database, const Job& job) {
   Statement(database,
             "UPDATE jobs SET state = ?2, claimed = ?3, stopped_early = ?4, finished_intervals = ?5, progress = ?6, "
             "result = ?7, error_code = ?8, error_message = ?9, error_where = ?10, started = ?11, ended = ?12, "
-            "place = ?13, died_at = ?14, deaths = ?15, claim_number = max(claim_number, ?16) WHERE number = ?1",
+            "place = ?13, died_at = ?14, deaths = ?15, claim_number = max(claim_number, ?16), worked = ?17, "
+            "holder = ?18, claimed_at = ?19 WHERE number = ?1",
             known_number(job.id), to_string(job.state), std::int64_t(job.claimed), std::int64_t(job.stopped_early),
             std::int64_t(job.finished_intervals), job.progress, job.result, code, message, where, job.started,
-            job.ended, job.place, job.died_at, std::int64_t(job.deaths), job.claim_number)
+            job.ended, job.place, job.died_at, std::int64_t(job.deaths), job.claim_number,
+            std::int64_t(job.worked.count()), job.holder, job.claimed_at)
       .run();
   seal(database, known_number(job.id));
 }
 
 Job apply_in(Database& database, const std::string& id, const Change& change, Time now) {
-  const auto changed = transition(find_in(database, id), change, now);
+  const Job before = find_in(database, id);
+  const auto changed = transition(before, change, now);
   if (!changed) throw StoreFailure(changed.error());
   write_in(database, *changed);
+  if (const auto worked = changed->worked - before.worked; worked.count() > 0 && !changed->requester.empty())
+    Statement(database,
+              "INSERT INTO worked (requester, day, milliseconds) VALUES (?1, ?2, ?3) ON CONFLICT DO UPDATE SET "
+              "milliseconds = milliseconds + excluded.milliseconds",
+              changed->requester, day_of(now), std::int64_t(worked.count()))
+        .run();
   return find_in(database, id);
+}
+
+Usage usage_in(Database& database, const std::string& requester, Time now) {
+  Statement active(database,
+                   "SELECT count(*), coalesce(sum(max(expected - worked, 0)), 0) FROM jobs WHERE ended IS NULL AND "
+                   "requester = ?1",
+                   requester);
+  active.step();
+  Usage usage{.active = std::size_t(active.integer(0)), .expected = std::chrono::milliseconds(active.integer(1))};
+  Statement worked(database, "SELECT milliseconds FROM worked WHERE requester = ?1 AND day = ?2", requester,
+                   day_of(now));
+  if (worked.step()) usage.worked_today = std::chrono::milliseconds(worked.integer(0));
+  return usage;
+}
+
+void check_quota_in(Database& database, const NewJob& job, Time now) {
+  if (has_limit(job.quota)) jobs::check_quota(usage_in(database, job.requester, now), job);
 }
 
 /// First column of the first row.
@@ -398,14 +443,15 @@ void bring_up_to_date(Database& database, int found_schema) {
     return text_of(database, "SELECT count(*) FROM pragma_table_info('jobs') WHERE name = '" + column + "'") != "0";
   };
   if ((found_schema < 3 && has("checksum")) || (found_schema < 4 && has("expected")) ||
-      (found_schema < 5 && has("claim_number")))
+      (found_schema < 5 && has("claim_number")) || (found_schema < 6 && has("requester")))
     database.corrupt("the number of its schema");
   if (found_schema == schema_number) return;
   if (found_schema < 2) database.execute(counts_deaths);
   if (found_schema < 3) database.execute(adds_checksums);
   if (found_schema >= 3) check_rows(database, found_schema);  // before they are sealed anew
   if (found_schema < 4) database.execute(adds_expected);
-  database.execute(adds_claim_numbers);
+  if (found_schema < 5) database.execute(adds_claim_numbers);
+  database.execute(adds_people);
   database.execute(("PRAGMA user_version = " + std::to_string(schema_number)).c_str());
   Statement(database, "UPDATE jobs SET checksum = " + checksum_of_row()).run();
 }
@@ -432,8 +478,9 @@ void prepare(Database& database, Time now, const SqliteOptions& options) {
                         database.file()});
   bring_up_to_date(database, found_schema);
   check_all(database);
-  for (const std::string& id : ids(Statement(database, "SELECT number FROM jobs WHERE claimed ORDER BY number")))
-    apply_in(database, id, {.event = Event::abandon, .max_deaths = options.max_deaths}, now);
+  if (!options.visits)
+    for (const std::string& id : ids(Statement(database, "SELECT number FROM jobs WHERE claimed ORDER BY number")))
+      apply_in(database, id, {.event = Event::abandon, .max_deaths = options.max_deaths}, now);
   if (options.used_numbers > 0) skip_numbers(database, options.used_numbers);
   transaction.commit();
 }
@@ -448,7 +495,8 @@ std::uintmax_t size_of(const std::filesystem::path& file) {
 }  // namespace
 
 struct SqliteStore::Impl {
-  Impl(std::filesystem::path file, std::function<Time()> clock) : database(std::move(file)), now(std::move(clock)) {}
+  Impl(std::filesystem::path file, std::string holds, std::function<Time()> clock)
+      : database(std::move(file)), holder(std::move(holds)), now(std::move(clock)) {}
 
   /// One transaction, one thread at a time.
   template <class Body>
@@ -469,6 +517,7 @@ struct SqliteStore::Impl {
 
   std::mutex mutex;  ///< Guards `database`: SQLite's connection is one thread's at a time.
   Database database;
+  const std::string holder;
   std::function<Time()> now;
 };
 
@@ -478,7 +527,7 @@ SqliteStore::~SqliteStore() = default;
 Result<std::unique_ptr<SqliteStore>> SqliteStore::open(const SqliteOptions& options) {
   if (auto made = create_folder(options.folder); !made) return propagate(made);
   return guarded([&] {
-    auto impl = std::make_unique<Impl>(options.folder / "jobs.db", options.now);
+    auto impl = std::make_unique<Impl>(options.folder / "jobs.db", options.holder, options.now);
     if (options.must_exist && size_of(impl->database.file()) == 0)
       throw StoreFailure(
           {ErrorCode::corrupt_data, "the job store is gone, but there have been jobs", impl->database.file()});
@@ -497,10 +546,13 @@ Result<Submission> SqliteStore::submit(const NewJob& job, std::size_t max_queued
       if (auto earlier = find_key_in(database, job.idempotency_key)) return same_submission(std::move(*earlier), job);
     }
     check_room_in(database, max_queued);
+    const Time now = impl_->now();
+    check_quota_in(database, job, now);
     Statement(database,
               "INSERT INTO jobs (lane, payload, idempotency_key, state, claimed, stopped_early, finished_intervals, "
-              "progress, result, created, expected) VALUES (?1, ?2, ?3, 'queued', 0, 0, 0, '', '', ?4, ?5)",
-              job.lane, job.payload, key, impl_->now(), std::int64_t(job.expected.count()))
+              "progress, result, created, expected, requester) VALUES (?1, ?2, ?3, 'queued', 0, 0, 0, '', '', ?4, ?5, "
+              "?6)",
+              job.lane, job.payload, key, now, std::int64_t(job.expected.count()), job.requester)
         .run();
     seal(database, sqlite3_last_insert_rowid(database.handle()));
     Job accepted = find_in(database, id_of(sqlite3_last_insert_rowid(database.handle())));
@@ -515,6 +567,37 @@ Result<void> SqliteStore::check_room(std::size_t max_queued) {
     check_room_in(impl_->database, max_queued);
   });
 }
+
+Result<void> SqliteStore::check_quota(const NewJob& job) {
+  return guarded([&] {
+    const std::lock_guard lock(impl_->mutex);
+    check_quota_in(impl_->database, job, impl_->now());
+  });
+}
+
+Result<Usage> SqliteStore::usage(const std::string& requester) {
+  return guarded([&] {
+    const std::lock_guard lock(impl_->mutex);
+    return usage_in(impl_->database, requester, impl_->now());
+  });
+}
+
+Result<Job> SqliteStore::requeue(const std::string& id, int finished_intervals, const Witness& witness) {
+  return impl_->transact([&] {
+    const Job job = find_in(impl_->database, id);
+    const auto younger = ids(
+        Statement(impl_->database, "SELECT number FROM jobs WHERE ended IS NULL AND lane = ?1 AND number > ?2 LIMIT 1",
+                  job.lane, known_number(id)));
+    if (job.state == JobState::failed)
+      check_is_last_of_lane(job, younger.empty() ? std::nullopt : std::optional(younger.front()));
+    Job requeued =
+        apply_in(impl_->database, id, {.event = Event::requeue, .interval = finished_intervals}, impl_->now());
+    if (const auto witnessed = witness(requeued); !witnessed) throw StoreFailure(witnessed.error());
+    return requeued;
+  });
+}
+
+Result<Time> SqliteStore::now() { return impl_->now(); }
 
 Result<void> SqliteStore::restore(const Job& job) {
   return impl_->transact([&] {
@@ -531,9 +614,9 @@ Result<void> SqliteStore::restore(const Job& job) {
               number, job.lane, job.payload, job.created)
         .run();
     Statement(database,
-              "UPDATE jobs SET lane = ?2, payload = ?3, idempotency_key = ?4, created = ?5, expected = ?6 "
-              "WHERE number = ?1",
-              number, job.lane, job.payload, key, job.created, std::int64_t(job.expected.count()))
+              "UPDATE jobs SET lane = ?2, payload = ?3, idempotency_key = ?4, created = ?5, expected = ?6, "
+              "requester = ?7 WHERE number = ?1",
+              number, job.lane, job.payload, key, job.created, std::int64_t(job.expected.count()), job.requester)
         .run();
     write_in(database, job);
   });
@@ -573,7 +656,7 @@ Result<std::optional<Job>> SqliteStore::claim() {
   return impl_->transact([&]() -> std::optional<Job> {
     const auto found = ids(Statement(impl_->database, next_in_sql("number")));
     if (found.empty()) return std::nullopt;
-    return apply_in(impl_->database, found.front(), {.event = Event::claim}, impl_->now());
+    return apply_in(impl_->database, found.front(), {.event = Event::claim, .holder = impl_->holder}, impl_->now());
   });
 }
 
@@ -613,7 +696,8 @@ Result<void> SqliteStore::remove(const std::string& id) {
 
 Result<std::vector<std::string>> SqliteStore::expire(const Retention& retention) {
   return impl_->transact([&] {
-    const Time oldest = impl_->now() - retention.max_age;
+    const Time now = impl_->now(), oldest = now - retention.max_age;
+    Statement(impl_->database, "DELETE FROM worked WHERE day < ?1", day_of(now) - days_kept).run();
     return ids(
         Statement(impl_->database,
                   "DELETE FROM jobs WHERE ended IS NOT NULL AND (ended < ?1 OR number NOT IN (SELECT number FROM "

@@ -20,6 +20,9 @@ struct SqliteOptions {
   bool must_exist = false;                       ///< There have been jobs: a file that is absent or empty was lost.
   int max_deaths =
       3;  ///< A job whose process has died so often in a row at the same place has failed; 0: never. A choice.
+  std::string holder = {};  ///< How this process is called in the claims that it makes.
+  /// Somebody comes to look, or to change a record, and claims nothing: claims that are there stay, whoever has them.
+  bool visits = false;
   std::function<Time()> now = [] {
     return std::chrono::floor<std::chrono::milliseconds>(std::chrono::system_clock::now());
   };
@@ -34,9 +37,14 @@ class SqliteStore final : public Store {
   [[nodiscard]] static Result<std::unique_ptr<SqliteStore>> open(const SqliteOptions& options);
   ~SqliteStore() override;
 
+  using Store::requeue;
   using Store::submit;
   [[nodiscard]] Result<Submission> submit(const NewJob& job, std::size_t max_queued, const Witness& witness) override;
   [[nodiscard]] Result<void> check_room(std::size_t max_queued) override;
+  [[nodiscard]] Result<void> check_quota(const NewJob& job) override;
+  [[nodiscard]] Result<Usage> usage(const std::string& requester) override;
+  [[nodiscard]] Result<Job> requeue(const std::string& id, int finished_intervals, const Witness& witness) override;
+  [[nodiscard]] Result<Time> now() override;
   [[nodiscard]] Result<void> restore(const Job& job) override;
   [[nodiscard]] Result<Job> find(const std::string& id) override;
   [[nodiscard]] Result<std::optional<Job>> find_key(const std::string& idempotency_key) override;

@@ -14,12 +14,26 @@
 
 namespace engine::jobs {
 
+/// How much somebody may ask for. What is not said has no limit.
+struct Quota {
+  std::optional<std::size_t> active = {};                        ///< Jobs that have not ended.
+  std::optional<std::chrono::milliseconds> worked_per_day = {};  ///< Of work, from midnight to midnight UTC.
+};
+/// How much of that is used.
+struct Usage {
+  std::size_t active = 0;
+  std::chrono::milliseconds expected{0};      ///< What is left of these jobs, as they were handed in.
+  std::chrono::milliseconds worked_today{0};  ///< On all jobs of theirs, removed ones included.
+};
+
 /// A job as it is handed in.
 struct NewJob {
   std::string lane;
   std::string payload;
   std::string idempotency_key = {};       ///< "": none.
   std::chrono::milliseconds expected{0};  ///< As of Job.
+  std::string requester = {};             ///< As of Job.
+  Quota quota = {};                       ///< Of the requester.
 };
 
 /// The answer to a job that was handed in.
@@ -60,7 +74,8 @@ class Store {
   ///   witness     called for a new job before anybody else can see it. When submit() returns an error afterwards, the
   ///               job does not exist
   ///   errors      busy: as many wait already; unprocessable: the idempotency key belongs to another payload or lane;
-  ///               those of `witness`
+  ///               quota_exceeded: the requester's (`where` is "active" or "worked_per_day"); too_large: it takes more
+  ///               than a whole "worked_per_day"; those of `witness`
   [[nodiscard]] virtual Result<Submission> submit(const NewJob& job, std::size_t max_queued,
                                                   const Witness& witness) = 0;
   [[nodiscard]] Result<Submission> submit(const NewJob& job, std::size_t max_queued) {
@@ -69,6 +84,23 @@ class Store {
   /// Whether one more may wait, as submit() would say.
   ///   errors  busy: as many wait already
   [[nodiscard]] virtual Result<void> check_room(std::size_t max_queued) = 0;
+  /// Whether the requester's quota has room for the job, as submit() would say.
+  ///   errors  quota_exceeded; too_large
+  [[nodiscard]] virtual Result<void> check_quota(const NewJob& job) = 0;
+  /// What a requester has used of any quota.
+  [[nodiscard]] virtual Result<Usage> usage(const std::string& requester) = 0;
+  /// Has a job that has failed taken up again (Event::requeue).
+  ///   finished_intervals  that of the checkpoint that is still there; 0: there is none
+  ///   witness             called with the record as it will be, before anybody else can see or change it. When
+  ///                       requeue() returns an error afterwards, nothing has changed
+  ///   returns             the record afterwards
+  ///   errors              conflict: it has not failed, or a younger job of its lane has yet to end; those of `witness`
+  [[nodiscard]] virtual Result<Job> requeue(const std::string& id, int finished_intervals, const Witness& witness) = 0;
+  [[nodiscard]] Result<Job> requeue(const std::string& id, int finished_intervals) {
+    return requeue(id, finished_intervals, [](const Job&) -> Result<void> { return {}; });
+  }
+  /// The time by which records are dated: that of the storage, wherever that is.
+  [[nodiscard]] virtual Result<Time> now() = 0;
   /// Puts back a record that was lost, or that is known to have become this one. Nobody holds the job afterwards.
   ///   errors  conflict: another job has its idempotency key
   [[nodiscard]] virtual Result<void> restore(const Job& job) = 0;
@@ -81,6 +113,7 @@ class Store {
   /// and no older one of its lane has yet to end. One that was running when its worker went away comes first: it has
   /// not made way. Then comes the one whose turn (turn_of()) is earliest. Its `claim_number` is the caller's: with it
   /// go renew() and what apply() is to change.
+  /// Its `holder` is who the store was opened by.
   [[nodiscard]] virtual Result<std::optional<Job>> claim() = 0;
   /// How long a claim lasts that is not renewed; then others may take the job over. Nothing: as long as the process.
   [[nodiscard]] virtual std::optional<std::chrono::milliseconds> lease() const = 0;

@@ -10,10 +10,10 @@ namespace engine::jobs {
 namespace {
 
 /// In the order of ErrorCode.
-constexpr std::array<std::string_view, 12> code_names = {
-    "invalid_argument", "unprocessable", "not_found", "conflict",  "corrupt_data", "unsupported",
-    "too_large",        "no_space",      "busy",      "cancelled", "unavailable",  "internal"};
-static_assert(std::size_t(ErrorCode::internal) + 1 == code_names.size());
+constexpr std::array<std::string_view, 13> code_names = {
+    "invalid_argument", "unprocessable", "not_found", "conflict",    "corrupt_data", "unsupported",   "too_large",
+    "no_space",         "busy",          "cancelled", "unavailable", "internal",     "quota_exceeded"};
+static_assert(std::size_t(ErrorCode::quota_exceeded) + 1 == code_names.size());
 
 /// The jobs that wait, in the order of their turns, by number: 1 for the next one.
 std::map<std::int64_t, int> places_in_queue(const std::vector<ActiveJob>& active) {
@@ -61,6 +61,39 @@ void check_room(std::size_t waiting, std::size_t max_queued) {
                           std::to_string(max_queued) + "; try again later",
                       "max_queued"});
 }
+
+void check_quota(const Usage& usage, const NewJob& job) {
+  const auto seconds = [](std::chrono::milliseconds time) {
+    return std::to_string(std::chrono::ceil<std::chrono::seconds>(time).count()) + " s";
+  };
+  if (job.quota.active && usage.active >= *job.quota.active)
+    throw StoreFailure({ErrorCode::quota_exceeded,
+                        job.requester + " has " + std::to_string(usage.active) + " of " +
+                            std::to_string(*job.quota.active) +
+                            " that may wait or run at a time: wait for one to end, or cancel one",
+                        "active"});
+  if (job.quota.worked_per_day && job.expected > *job.quota.worked_per_day)
+    throw StoreFailure({ErrorCode::too_large,
+                        "this should take " + seconds(job.expected) + " of work, and " + job.requester + " may have " +
+                            seconds(*job.quota.worked_per_day) + " a day: it fits on no day, ask for less",
+                        "worked_per_day"});
+  const auto promised = usage.worked_today + usage.expected;
+  if (job.quota.worked_per_day && promised + job.expected > *job.quota.worked_per_day)
+    throw StoreFailure({ErrorCode::quota_exceeded,
+                        job.requester + " may have " + seconds(*job.quota.worked_per_day) + " of work a day (UTC): " +
+                            seconds(usage.worked_today) + " are used, what waits and runs should take " +
+                            seconds(usage.expected) + ", and this " + seconds(job.expected),
+                        "worked_per_day"});
+}
+
+void check_is_last_of_lane(const Job& job, const std::optional<std::string>& younger) {
+  if (!younger) return;
+  throw StoreFailure({ErrorCode::conflict,
+                      *younger + " came after " + job.id + " in its lane and has yet to end: wait for it, or cancel it",
+                      job.id});
+}
+
+std::int64_t day_of(Time time) { return std::chrono::floor<std::chrono::days>(time).time_since_epoch().count(); }
 
 Submission same_submission(Job earlier, const NewJob& job) {
   if (earlier.payload != job.payload || earlier.lane != job.lane)

@@ -50,6 +50,17 @@ auto guarded(Body body) -> Result<decltype(body())> {
 [[nodiscard]] std::int64_t known_number(const std::string& id);
 /// Throws where `waiting` jobs are as many as may wait.
 void check_room(std::size_t waiting, std::size_t max_queued);
+/// Whether the quota limits anything: else there is nothing to count.
+[[nodiscard]] inline bool has_limit(const Quota& quota) { return quota.active || quota.worked_per_day; }
+/// Throws where the requester's quota has no room for the job, or never has.
+void check_quota(const Usage& usage, const NewJob& job);
+/// Throws where the lane of a job that is taken up again has one that has yet to end and is younger: it may run, and
+/// two of a lane never do.
+void check_is_last_of_lane(const Job& job, const std::optional<std::string>& younger);
+/// The day since 1970, UTC.
+[[nodiscard]] std::int64_t day_of(Time time);
+/// Days of the use of quotas that are kept. A choice: what has been used shows for a while.
+inline constexpr std::int64_t days_kept = 40;
 /// The job that came with this idempotency key before, as the answer to one that comes with it now.
 [[nodiscard]] Submission same_submission(Job earlier, const NewJob& job);
 /// Throws where a job that is restored has the idempotency key of this one.

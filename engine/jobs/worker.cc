@@ -19,6 +19,10 @@ using std::chrono::steady_clock;
 
 constexpr std::string_view checkpoint_prefix = "checkpoint-";
 
+std::int64_t now_ms() {
+  return std::chrono::floor<std::chrono::milliseconds>(steady_clock::now().time_since_epoch()).count();
+}
+
 /// Is the cause of this error one that may pass by itself?
 bool worth_retrying(const Error& error) {
   return error.code == ErrorCode::no_space || error.code == ErrorCode::unavailable || error.code == ErrorCode::busy;
@@ -40,7 +44,13 @@ JobContext::JobContext(Worker& worker, Job job, Queue::RunningJob& running)
       queue_(worker.queue_),
       job_(std::move(job)),
       running_(running),
-      last_write_(steady_clock::now().time_since_epoch().count()) {}
+      last_write_(steady_clock::now().time_since_epoch().count()),
+      counted_from_ms_(now_ms()) {}
+
+std::chrono::milliseconds JobContext::take_worked() {
+  const std::int64_t now = now_ms();
+  return std::chrono::milliseconds(std::max<std::int64_t>(now - counted_from_ms_.exchange(now), 0));
+}
 
 fs::path JobContext::folder() const { return queue_.folder_of(job_.id); }
 
@@ -104,7 +114,9 @@ Result<void> JobContext::confirm_claim() {
 
 Result<void> JobContext::write(Change change) {
   change.claim = running_.claim;
+  change.worked = take_worked();
   const auto written = queue_.store_.apply(job_.id, change);
+  if (!written) counted_from_ms_ -= change.worked.count();  // for the next one that is
   if (written) {
     worker_.store_has_answered();
     running_.heed(written->state);
@@ -272,6 +284,7 @@ void Worker::run(const Job& job) {
   JobContext context(*this, job, *running);
   const auto outcome = call(context);
   Change change{.event = Event::succeed, .claim = running->claim, .progress = running->progress()};
+  change.worked = context.take_worked();
   if (outcome) {
     change.result = outcome->text;
     change.stopped_early = outcome->stopped_early;
@@ -314,12 +327,14 @@ Result<Job> Worker::try_to_record_end(const std::string& id, const Change& chang
   if (job->state == JobState::cancelled) {
     std::error_code ignored;
     fs::remove_all(queue_.folder_of(id), ignored);
-  } else {
+  } else if (job->state == JobState::succeeded || (job->error && job->error->code == ErrorCode::no_space)) {
+    // Of one that failed it stays, which may be taken up again; but not where it helps to keep the disk full.
     remove_files(queue_.folder_of(id), checkpoint_prefix);
   }
-  // Another process may have removed the record before this one had put the note and the files away.
-  if (const auto record = queue_.store_.find(id); !record && record.error().code == ErrorCode::not_found)
-    remove_traces(queue_.options_.folder, id);
+  // Another process may have removed the record, or had the job taken up again, before this one had put the note and
+  // the files away.
+  const auto record = queue_.store_.find(id);
+  if (record ? !is_final(record->state) : record.error().code == ErrorCode::not_found) queue_.note_what_is_recorded(id);
   return job;
 }
 

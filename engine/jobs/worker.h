@@ -108,12 +108,15 @@ class JobContext {
   ///   errors  cancelled: there is no time to wait; `error` itself, if it is not that the store cannot be reached
   Result<void> wait_for_store(const Error& error);
   [[nodiscard]] tl::unexpected<Error> taken_over() const;
+  /// The work since this was called last, for a record that is to say so.
+  [[nodiscard]] std::chrono::milliseconds take_worked();
 
   Worker& worker_;
   Queue& queue_;
   Job job_;
   Queue::RunningJob& running_;
   std::atomic<std::chrono::steady_clock::rep> last_write_;  ///< When progress last went to disk.
+  std::atomic<std::int64_t> counted_from_ms_;  ///< Work since then is in no record yet; by the steady clock.
   bool makes_way_ = false;
 };
 

@@ -26,7 +26,8 @@ constexpr std::array statuses{
     Status{ErrorCode::conflict, 9, "the result would replace its own input"},
     Status{ErrorCode::busy, 10, "busy"},
     Status{ErrorCode::cancelled, 11, "stopped before it was finished"},
-    Status{ErrorCode::unavailable, 12, "a file or folder may not be read or written"}};
+    Status{ErrorCode::unavailable, 12, "a file or folder may not be read or written"},
+    Status{ErrorCode::quota_exceeded, 13, "a quota is used up"}};
 
 }  // namespace
 

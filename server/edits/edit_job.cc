@@ -11,8 +11,10 @@
 #include <memory>
 #include <new>
 #include <optional>
+#include <sstream>
 #include <stop_token>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -39,6 +41,7 @@ using engine::Result;
 using engine::jobs::JobContext;
 using engine::jobs::JobResult;
 
+constexpr std::string_view inputs_begin = "of ";
 constexpr int background_niceness = 10;  // beyond that of the process: its starter may have chosen one
 
 /// On Linux, process 0 of PRIO_PROCESS is the calling thread alone; the first thread has the process's id. Where this
@@ -68,6 +71,17 @@ proto::EditRecord earlier_record(const JobContext& context) {
   std::erase_if(record->finished_intervals,
                 [&](const auto& finished) { return finished.interval > context.finished_intervals(); });
   return std::move(*record);
+}
+
+/// What an edit is about beside its request, in a line: it stands before each checkpoint. An edit that is taken up
+/// again after it had failed may find another.
+std::string inputs_line(const scenes::SceneInfo& scene, const scenes::VersionInfo& version) {
+  std::ostringstream line;
+  line << inputs_begin << "version " << version.version << " of " << version.created.time_since_epoch().count()
+       << ", dataset " << (scene.dataset ? scene.dataset->number : 0);
+  if (scene.up) line << std::hexfloat << ", up " << scene.up->x << ' ' << scene.up->y << ' ' << scene.up->z;
+  line << '\n';
+  return line.str();
 }
 
 /// Where in its work an edit is, as far as it is the same in each attempt.
@@ -104,6 +118,9 @@ class Run {
     const auto about = workshop_.scenes.find(scene_id());
     if (!about) return propagate(about);
     if (about->up) request_.up = *about->up;
+    const auto version_info = workshop_.scenes.find_version(scene_id(), std::to_string(version_number()));
+    if (!version_info) return propagate(version_info);
+    inputs_ = inputs_line(*about, *version_info);
     const auto dataset = workshop_.scenes.dataset(scene_id());
     if (!dataset) return propagate(dataset);
     cameras_ = cameras_of(dataset->get());
@@ -226,8 +243,18 @@ class Run {
   /// The state to go on from; nothing: from the start.
   std::optional<edit::State> last_state() {
     if (context_.finished_intervals() == 0) return std::nullopt;
-    auto state = context_.load_checkpoint().and_then(
-        [&](const std::string& bytes) { return edit::decode(bytes, *input_, request_); });
+    auto state = context_.load_checkpoint().and_then([&](std::string_view bytes) -> Result<edit::State> {
+      if (bytes.starts_with(inputs_begin)) {  // else it is of a release before
+        const std::string_view inputs = bytes.substr(0, bytes.find('\n') + 1);
+        if (inputs != inputs_) return fail(ErrorCode::conflict, "its inputs have changed since");
+        bytes.remove_prefix(inputs.size());
+      }
+      return edit::decode(bytes, *input_, request_);
+    });
+    if (!state && state.error().code == ErrorCode::conflict) {
+      begin_anew();
+      return std::nullopt;
+    }
     if (state && state->interval == context_.finished_intervals()) {
       note(spdlog::level::info, "goes on after interval " + std::to_string(state->interval));
       return std::move(*state);
@@ -247,6 +274,15 @@ class Run {
         "the same");
   }
 
+  /// It has other inputs than what was saved. What it has taken so far was for another result.
+  void begin_anew() {
+    note(spdlog::level::warn, "begins anew: its scene has another dataset or `up` than when it failed");
+    keeper_.warn(
+        "the edit began anew when it was taken up again: its scene has another dataset or another `up` than before");
+    keeper_.forget_time();
+    keeper_.record().finished_intervals.clear();
+  }
+
   Result<void> finish_interval(const edit::IntervalDone& done) {
     last_interval_ = done.interval;
     keeper_.add({.interval = done.interval,
@@ -256,7 +292,7 @@ class Run {
                  .renders = pictures_->renders_of(done.interval)});
     keeper_.publish();
     if (done.interval <= context_.finished_intervals()) return {};  // made up for
-    auto saved = context_.save_checkpoint(done.interval, edit::encode(done.state), left());
+    auto saved = context_.save_checkpoint(done.interval, inputs_ + edit::encode(done.state), left());
     if (!saved && saved.error().code != ErrorCode::cancelled)
       return fail(saved.error().code, "the checkpoint of interval " + std::to_string(done.interval) +
                                           " cannot be kept: " + saved.error().message);
@@ -295,6 +331,7 @@ class Run {
   RecordKeeper keeper_;
   proto::EditRequest asked_;
   edit::Request request_;
+  std::string inputs_;  ///< inputs_line()
   std::vector<scene::Camera> cameras_;
   std::shared_ptr<const scene::GaussianCloud> input_;
   std::optional<IntervalPictures> pictures_;

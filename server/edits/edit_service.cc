@@ -7,7 +7,6 @@
 
 #include "engine/core/fair_semaphore.h"
 #include "engine/core/file_lock.h"
-#include "engine/core/numbers.h"
 #include "engine/edit/handles.h"
 #include "engine/edit/preview.h"
 #include "engine/edit/workload.h"
@@ -23,6 +22,7 @@
 #include "server/edits/named_locks.h"
 #include "server/edits/records.h"
 #include "server/edits/results.h"
+#include "server/edits/scene_hold.h"
 #include "server/edits/speed_log.h"
 #include "server/edits/status.h"
 #include "server/scenes/disk/public_errors.h"
@@ -43,9 +43,6 @@ constexpr std::size_t all_jobs = 1'000'000;
 constexpr double outlived = 2;
 /// So long an edit waits for others to be measured: as long as for memory. A choice.
 constexpr auto measured_within = std::chrono::seconds(10);
-/// So long a change of a scene waits for edits that are being accepted, and those for it, in other processes. A choice:
-/// an edit is mostly accepted within one.
-constexpr auto others_are_done_within = std::chrono::seconds(10);
 
 double seconds_since(steady_clock::time_point start) {
   return std::chrono::duration<double>(steady_clock::now() - start).count();
@@ -58,6 +55,14 @@ Result<jobs::Job> about_edit(Result<jobs::Job> job, const std::string& id) {
     job.error().message = "there is no edit \"" + id + "\"; ended ones are removed after a while";
   if (job.error().where == id) job.error().where = "edit";
   return job;
+}
+
+/// The answer to a job, in the words of those who ask for edits.
+template <class T>
+Result<T> in_terms_of_edits(Result<T> result) {
+  if (!result && result.error().where == "active") result.error().where = "edits";
+  if (!result && result.error().where == "worked_per_day") result.error().where = "seconds";
+  return result;
 }
 
 /// The request with the scene and version it is about always there: what a job's payload says.
@@ -181,7 +186,7 @@ struct EditService::Impl {
     jobs::WorkerOptions working;
     working.ended = [this](const jobs::Job& job) {
       (void)settled(job);  // where that cannot be now, it is when somebody asks for the edit
-      if (job.state != jobs::JobState::succeeded) drop_results(scenes, job.id);
+      if (job.state != jobs::JobState::succeeded) drop_results(scenes, job.id, job.claim_number);
     };
     worker.emplace(
         *queue, [workshop](jobs::JobContext& context) { return carry_out(context, workshop); }, working);
@@ -207,16 +212,10 @@ struct EditService::Impl {
   Result<Hold> hold(const std::string& scene, engine::LockKind kind) {
     const bool alone = kind == engine::LockKind::alone;
     auto here = alone ? scenes_in_use.lock(scene) : scenes_in_use.lock_shared(scene);
-    if (options.role == Role::all) return Hold{std::move(here), std::nullopt};
-    auto lock = engine::FileLock::take(options.folder / "scenes_in_use", engine::number_of_id('s', scene).value_or(0),
-                                       kind, others_are_done_within);
-    if (lock) return Hold{std::move(here), std::move(*lock)};
-    if (lock.error().code != ErrorCode::busy)
-      return tl::make_unexpected(scenes::without_folder(lock.error(), options.folder));
-    return fail(ErrorCode::conflict,
-                alone ? "an edit of this scene is just being accepted: wait for its end"
-                      : "this scene is just being changed: try again",
-                scene);
+    if (options.store.empty()) return Hold{std::move(here), std::nullopt};  // no other process changes the records
+    auto lock = hold_scene(options.folder, scene, kind);
+    if (!lock) return tl::make_unexpected(scenes::without_folder(lock.error(), options.folder));
+    return Hold{std::move(here), std::move(*lock)};
   }
 
   /// A request that can be carried out here, and what will be: errors as submit().
@@ -289,22 +288,27 @@ Result<std::unique_ptr<EditService>> EditService::open(scenes::SceneStore& scene
 }
 
 Result<EditService::Submission> EditService::submit(const proto::EditRequest& request,
-                                                    const std::string& idempotency_key) {
+                                                    const std::string& idempotency_key, const Requester& requester) {
   const auto asked = canonical(request);
   if (!asked) return propagate(asked);
-  jobs::NewJob job{.lane = *asked->scene, .payload = proto::to_json(*asked), .idempotency_key = idempotency_key};
+  jobs::NewJob job{.lane = *asked->scene,
+                   .payload = proto::to_json(*asked),
+                   .idempotency_key = idempotency_key,
+                   .requester = requester.name,
+                   .quota = requester.quota};
   const auto earlier = impl_->earlier(idempotency_key, job);
   if (!earlier) return propagate(earlier);
   if (*earlier) return Submission{status_of(impl_->settled(**earlier)), false};
   // Before any work is done for a request that there is no place for.
   if (auto room = impl_->queue->check_room(); !room) return propagate(room);
+  if (auto room = in_terms_of_edits(impl_->queue->check_quota(job)); !room) return propagate(room);
   const auto hold = impl_->hold(*asked->scene, engine::LockKind::shared);
   if (!hold) return propagate(hold);
   const auto admitted = impl_->admitted(*asked);
   if (!admitted) return propagate(admitted);
   if (auto fits = admit_slow(admitted->work, asked->allow_slow); !fits) return propagate(fits);
   job.expected = in_milliseconds(admitted->seconds);
-  const auto submission = impl_->queue->submit(job);
+  const auto submission = in_terms_of_edits(impl_->queue->submit(job));
   if (!submission) return propagate(submission);
   return Submission{status_of(impl_->settled(submission->job)), submission->created};
 }
@@ -390,6 +394,18 @@ Result<void> EditService::remove(const std::string& id) {
   auto removed = impl_->queue->remove(id);
   if (!removed && removed.error().where == id) removed.error().where = "edit";
   return removed;
+}
+
+Result<proto::EditStatus> EditService::requeue(const std::string& id) {
+  const auto job = about_edit(impl_->queue->find(id), id);
+  if (!job) return propagate(job);
+  const auto hold = impl_->hold(job->lane, engine::LockKind::shared);
+  if (!hold) return propagate(hold);
+  if (const auto scene = impl_->scenes.find(job->lane); !scene) return propagate(scene);
+  if (const auto request = proto::parse_edit_request(job->payload); request && request->version)
+    if (const auto version = impl_->scenes.find_version(job->lane, std::to_string(*request->version)); !version)
+      return propagate(version);
+  return impl_->shown(about_edit(impl_->queue->requeue(id), id));
 }
 
 Result<std::string> EditService::interval_picture(const std::string& id, int interval, int view,

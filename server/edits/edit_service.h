@@ -83,6 +83,11 @@ class EditService {
                                                                  const ServiceOptions& options);
   ~EditService();
 
+  /// Who asks for an edit.
+  struct Requester {
+    std::string name = {};  ///< As whoever lets them in calls them; empty: nobody says.
+    engine::jobs::Quota quota = {};
+  };
   struct Submission {
     proto::EditStatus status;
     bool created = true;  ///< false: the idempotency key had been used for this very request.
@@ -91,11 +96,16 @@ class EditService {
   /// handle is held against the scene; a selection is carried out.
   ///   errors  invalid_argument, not_found (`where` "scene", "version"; a view of a selection), unprocessable (a handle
   ///           without Gaussians, an empty selection; a key used for another request), unsupported (a model that is not
-  ///           there), busy (the queue is full: looked at first), unavailable (others are being measured for too long);
-  ///           those of admit(), admit_time(), admit_slow() and MemoryBudget::take()
-  [[nodiscard]] Result<Submission> submit(const proto::EditRequest& request, const std::string& idempotency_key);
-  /// What submit() would do, and what it would cost. Errors as submit(), but for busy, since it takes no
-  /// place in the queue, and those of admit_slow(), which become a warning.
+  ///           there), busy (the queue is full: looked at first), quota_exceeded (the requester's; `where` is "edits"
+  ///           or "seconds"), unavailable (others are being measured for too long); those of admit(), admit_time(),
+  ///           admit_slow() and MemoryBudget::take()
+  [[nodiscard]] Result<Submission> submit(const proto::EditRequest& request, const std::string& idempotency_key,
+                                          const Requester& requester);
+  [[nodiscard]] Result<Submission> submit(const proto::EditRequest& request, const std::string& idempotency_key) {
+    return submit(request, idempotency_key, Requester());
+  }
+  /// What submit() would do, and what it would cost. Errors as submit(), but for busy and quota_exceeded, since it
+  /// takes no place in the queue, and those of admit_slow(), which become a warning.
   [[nodiscard]] Result<proto::EditEstimate> estimate(const proto::EditRequest& request);
   /// The deformation alone, at once. Errors as submit().
   [[nodiscard]] Result<proto::Preview> preview(const proto::EditRequest& request);
@@ -111,6 +121,10 @@ class EditService {
   [[nodiscard]] Result<proto::EditStatus> stop(const std::string& id);
   [[nodiscard]] Result<proto::EditStatus> cancel(const std::string& id);
   [[nodiscard]] Result<void> remove(const std::string& id);
+  /// Has an edit that failed taken up again, from its last checkpoint if that is still there.
+  ///   errors  conflict: it has not failed, or a later edit of its scene has yet to end; not_found: the edit, or its
+  ///           scene
+  [[nodiscard]] Result<proto::EditStatus> requeue(const std::string& id);
   /// A picture of a finished interval: JPEG bytes.
   ///   stage   "before", "deformed", "corrected", "optimised"
   ///   errors  not_found: no such interval, view or stage (the message lists those there are)

@@ -81,6 +81,11 @@ double RecordKeeper::seconds() {
   return sum;
 }
 
+void RecordKeeper::forget_time() {
+  count_time();
+  record_.timings.clear();
+}
+
 void RecordKeeper::publish() {
   count_time();
   published_ = clock_();

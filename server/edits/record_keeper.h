@@ -34,6 +34,7 @@ class RecordKeeper {
   void warn(const std::string& warning);  ///< Once for each sentence.
   /// Time that has counted for stages so far, those of earlier runs included, seconds.
   [[nodiscard]] double seconds();
+  void forget_time();  ///< From now on it counts anew.
   void publish();
   void finish();  ///< All is done: publishes it.
 

@@ -1,10 +1,7 @@
 #include "server/edits/records.h"
 
-#include <stdlib.h>
-
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <system_error>
 #include <utility>
 
@@ -14,6 +11,7 @@
 #include "engine/jobs/postgres_store.h"
 #include "engine/jobs/sqlite_store.h"
 #include "server/edits/records_database.h"
+#include "server/edits/temporary_folder.h"
 
 namespace server::edits {
 namespace {
@@ -51,7 +49,8 @@ Result<std::unique_ptr<jobs::Store>> open_store(const fs::path& folder, const st
     return jobs::SqliteStore::open({.folder = folder,
                                     .used_numbers = known.used_numbers,
                                     .must_exist = known.must_exist,
-                                    .max_deaths = known.max_deaths});
+                                    .max_deaths = known.max_deaths,
+                                    .holder = this_process()});
   auto database = database_of(folder, store);
   if (!database) return propagate(database);
   database->alone = known.role == Role::all;
@@ -59,6 +58,7 @@ Result<std::unique_ptr<jobs::Store>> open_store(const fs::path& folder, const st
   database->used_numbers = known.used_numbers;
   database->must_exist = known.must_exist;
   database->max_deaths = known.max_deaths;
+  database->holder = this_process();
   return jobs::PostgresStore::open(*database);
 }
 
@@ -76,28 +76,6 @@ fs::path free_name(const fs::path& file) {
     if (fs::path name = file.string() + ".damaged-" + std::to_string(i); !fs::exists(name, ignored)) return name;
 }
 
-/// A folder outside of the data folder, gone when this is.
-class TemporaryFolder {
- public:
-  static Result<TemporaryFolder> make() {
-    std::error_code error;
-    std::string name = (fs::temp_directory_path(error) / "splatdrag-check-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) return tl::make_unexpected(engine::file_error(errno, "make", name));
-    return TemporaryFolder(name);
-  }
-  TemporaryFolder(TemporaryFolder&& other) noexcept : path_(std::exchange(other.path_, {})) {}
-  TemporaryFolder& operator=(TemporaryFolder&&) = delete;
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    if (!path_.empty()) fs::remove_all(path_, ignored);
-  }
-  [[nodiscard]] const fs::path& path() const { return path_; }
-
- private:
-  explicit TemporaryFolder(fs::path path) : path_(std::move(path)) {}
-  fs::path path_;
-};
-
 /// What of check_records() needs no records.
 void check_notes(const fs::path& folder, const jobs::Traces& traces, RecordsCheck& found) {
   for (const std::string& id : traces.notes)
@@ -107,7 +85,7 @@ void check_notes(const fs::path& folder, const jobs::Traces& traces, RecordsChec
 
 /// What check_records() finds by opening a copy of the records and of the notes as a service would.
 Result<void> check_copy(const fs::path& folder, const jobs::Traces& traces, RecordsCheck& found) {
-  const auto copy = TemporaryFolder::make();
+  const auto copy = TemporaryFolder::make("splatdrag-check");
   if (!copy) return propagate(copy);
   const fs::path notes = jobs_folder(copy->path());
   std::error_code error;

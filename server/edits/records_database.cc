@@ -41,6 +41,8 @@ bool is_in_database(const fs::path& folder) {
   return fs::exists(folder / folder_id_name, error);
 }
 
+std::string this_process() { return name_of_this_host() + ":" + std::to_string(::getpid()); }
+
 Result<jobs::PostgresOptions> database_of(const fs::path& folder, const std::string& address) {
   if (!is_in_database(folder))
     if (auto made = make_id(folder); !made) return propagate(made);

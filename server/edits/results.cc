@@ -42,9 +42,9 @@ void settle_results(scenes::SceneStore& scenes, jobs::Queue& queue) {
   }
 }
 
-void drop_results(scenes::SceneStore& scenes, const std::string& edit) {
+void drop_results(scenes::SceneStore& scenes, const std::string& edit, std::int64_t claim) {
   for (const std::string& made : scenes.made_versions())
-    if (edit_of(made) == edit) scenes.discard_made(made);
+    if (edit_of(made) == edit && claim_of(made) <= claim) scenes.discard_made(made);
 }
 
 }  // namespace server::edits

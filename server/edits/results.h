@@ -3,6 +3,9 @@
 // halted for longer than its claim lasts, and wakes at whatever moment, has made nothing that others see.
 #pragma once
 
+#include <cstdint>
+#include <string>
+
 #include "engine/jobs/queue.h"
 #include "server/scenes/scene_store.h"
 
@@ -20,7 +23,8 @@ using engine::Result;
 /// Called at the start, and before a version gets its number: the one before has to have its own by then.
 void settle_results(scenes::SceneStore& scenes, engine::jobs::Queue& queue);
 
-/// Drops what the attempts at an edit have made.
-void drop_results(scenes::SceneStore& scenes, const std::string& edit);
+/// Drops what the attempts at an edit have made, up to that of this claim: it may have been taken up again since, and
+/// what a later one makes is still wanted.
+void drop_results(scenes::SceneStore& scenes, const std::string& edit, std::int64_t claim);
 
 }  // namespace server::edits

@@ -18,7 +18,8 @@ struct Refusal {
   std::string code = "invalid_argument";
   std::string detail;
   std::string where;
-  int retry_after = 1;     ///< Seconds; said with 429 and 503. What is in the way of most requests passes within one.
+  /// Seconds; said with 429 and 503. What is in the way of most requests passes within one. 0: nobody can say when.
+  int retry_after = 1;
   std::string scope = {};  ///< Of 403: what the token lacks; empty: it is not for that.
 };
 

@@ -26,7 +26,10 @@ Reply Reply::no_content() {
 }
 
 Refusal refusal_of(const engine::Error& error) {
-  return {proto::http_status(error.code), std::string(proto::name_of(error.code)), error.message, error.where};
+  Refusal refusal{proto::http_status(error.code), std::string(proto::name_of(error.code)), error.message, error.where};
+  // Time alone gives nothing back of most quotas; a route that knows better says so.
+  if (error.code == engine::ErrorCode::quota_exceeded) refusal.retry_after = 0;
+  return refusal;
 }
 
 Reply Reply::refusal(const Refusal& refusal, const std::string& request_id) {
@@ -38,7 +41,7 @@ Reply Reply::refusal(const Refusal& refusal, const std::string& request_id) {
   if (!refusal.scope.empty())  // RFC 6750, section 3.1
     reply.headers.emplace_back("WWW-Authenticate",
                                "Bearer error=\"insufficient_scope\", scope=\"" + refusal.scope + '"');
-  if (refusal.status == 429 || refusal.status == 503)
+  if ((refusal.status == 429 || refusal.status == 503) && refusal.retry_after > 0)
     reply.headers.emplace_back("Retry-After", std::to_string(refusal.retry_after));
   return reply;
 }

@@ -3,7 +3,9 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -16,7 +18,7 @@ namespace server::http {
 enum class Scope {
   read,  ///< Sees: scenes, pictures, files, edits; what is asked and changes nothing, such as previews.
   edit,  ///< Changes: uploads, edits, names, removals.
-  admin  ///< What only an operator should: metrics.
+  admin  ///< What only an operator should: metrics, taking up what has failed.
 };
 constexpr auto names_of(Scope) {
   using engine::Name;
@@ -25,11 +27,19 @@ constexpr auto names_of(Scope) {
 
 constexpr std::size_t max_secret_bytes = 4096;  // a choice
 
+/// How much may be asked for with a token. What is not said has no limit.
+struct Quotas {
+  std::optional<std::size_t> edits = {};      ///< That wait or run at a time.
+  std::optional<std::uint64_t> bytes = {};    ///< Of uploads that are stored.
+  std::optional<std::uint64_t> seconds = {};  ///< Of work on edits, from midnight to midnight UTC.
+};
+
 /// A secret with the name of whoever has it.
 struct Token {
   std::string name;  ///< For people, logs and records: letters, digits, '.', '-', '_'.
   bool read = false, edit = false, admin = false;
   std::string secret;  ///< Printable ASCII without spaces, 1 to max_secret_bytes. Stands in no message, in no log.
+  Quotas quotas = {};
 
   [[nodiscard]] bool may(Scope scope) const {
     switch (scope) {
@@ -42,7 +52,7 @@ struct Token {
     }
     return false;
   }
-  /// Whether a session that was opened with the other one may go on with this one.
+  /// Whether a session that was opened with the other one may go on with this one, whatever its quotas are now.
   [[nodiscard]] bool may_the_same_as(const Token& other) const {
     return name == other.name && secret == other.secret && read == other.read && edit == other.edit &&
            admin == other.admin;

@@ -110,12 +110,24 @@ const std::vector<engine::Error>& SceneStore::recovered() const { return impl_->
 
 Result<Scratch> SceneStore::scratch() { return impl_->scratch.make(); }
 
-Result<SceneInfo> SceneStore::add_upload(const fs::path& file, const std::string& filename, const std::string& name) {
-  return impl_->info(impl_->uploads.add(file, filename, name));
+Result<void> SceneStore::check_quota(const Uploader& uploader, std::uint64_t bytes, const std::string& replaced) const {
+  std::uint64_t freed = 0;
+  if (const auto at = impl_->catalogue.snapshot(replaced); !replaced.empty() && at)
+    freed = freed_by_replacing(*at->manifest, uploader);
+  const auto fits = impl_->catalogue.hold_quota(uploader, bytes, freed);
+  if (!fits) return propagate(fits);
+  return {};
 }
 
-Result<SceneInfo> SceneStore::add_path(const std::string& path, const std::string& name) {
-  return impl_->info(impl_->uploads.add_path(path, name));
+std::uint64_t SceneStore::bytes_of(const std::string& uploader) const { return impl_->catalogue.bytes_of(uploader); }
+
+Result<SceneInfo> SceneStore::add_upload(const fs::path& file, const std::string& filename, const std::string& name,
+                                         const Uploader& uploader) {
+  return impl_->info(impl_->uploads.add(file, filename, name, uploader));
+}
+
+Result<SceneInfo> SceneStore::add_path(const std::string& path, const std::string& name, const Uploader& uploader) {
+  return impl_->info(impl_->uploads.add_path(path, name, uploader));
 }
 
 std::vector<SceneInfo> SceneStore::list() const {
@@ -150,8 +162,10 @@ Result<void> SceneStore::remove(const std::string& id) {
   return {};
 }
 
-Result<SceneInfo> SceneStore::put_dataset_zip(const std::string& id, const fs::path& zip, const std::string& filename) {
-  return impl_->info(impl_->with(id, [&](const Snapshot& at) { return impl_->datasets.put_zip(at, zip, filename); }));
+Result<SceneInfo> SceneStore::put_dataset_zip(const std::string& id, const fs::path& zip, const std::string& filename,
+                                              const Uploader& uploader) {
+  return impl_->info(
+      impl_->with(id, [&](const Snapshot& at) { return impl_->datasets.put_zip(at, zip, filename, uploader); }));
 }
 
 Result<SceneInfo> SceneStore::put_dataset_path(const std::string& id, const std::string& path) {

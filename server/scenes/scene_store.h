@@ -57,14 +57,24 @@ class SceneStore {
   /// A new, empty folder for an upload to go to, below the data folder; gone when what is returned is.
   [[nodiscard]] Result<Scratch> scratch();
 
+  /// Whether somebody may store so many bytes more.
+  ///   replaced  if given: the scene whose dataset goes for them
+  ///   errors    quota_exceeded (`where` is "bytes")
+  [[nodiscard]] Result<void> check_quota(const Uploader& uploader, std::uint64_t bytes = 0,
+                                         const std::string& replaced = {}) const;
+  /// What somebody has brought in and the store still has: bytes of scenes as they came, and of unpacked datasets.
+  [[nodiscard]] std::uint64_t bytes_of(const std::string& uploader) const;
+
   /// A new scene from an uploaded file, which is moved into the store. The file is read whole, once.
   ///   filename  as its user calls it, for the scene's name and for error addresses
-  ///   errors    those of io::read_scene(); too_large: too many scenes, or one that the memory can never hold; busy
+  ///   errors    those of io::read_scene(); too_large: too many scenes, or one that the memory can never hold; busy;
+  ///             quota_exceeded: beyond what the uploader may store
   [[nodiscard]] Result<SceneInfo> add_upload(const std::filesystem::path& file, const std::string& filename,
-                                             const std::string& name);
+                                             const std::string& name, const Uploader& uploader = {});
   /// A new scene from a file below the scene root, which is copied.
   ///   errors  invalid_argument: no scene root, or the path leads out of it (`where` is "path"); not_found; as above
-  [[nodiscard]] Result<SceneInfo> add_path(const std::string& path, const std::string& name);
+  [[nodiscard]] Result<SceneInfo> add_path(const std::string& path, const std::string& name,
+                                           const Uploader& uploader = {});
 
   [[nodiscard]] std::vector<SceneInfo> list() const;
   [[nodiscard]] Result<SceneInfo> find(const std::string& id) const;
@@ -79,9 +89,10 @@ class SceneStore {
   /// Replaces the dataset: from a zip file, which is unpacked into the store, or a folder below the scene root, which
   /// is used where it is. Whoever holds the one before keeps its photos.
   ///   errors  those of io::read_dataset(); a zip: corrupt_data, unsupported (encrypted), too_large (names the limit),
-  ///           invalid_argument: an entry that leads out of the folder, a link (`where` is "data.zip:entry name")
+  ///           invalid_argument: an entry that leads out of the folder, a link (`where` is "data.zip:entry name");
+  ///           quota_exceeded: unpacked, it is beyond what the uploader may store
   [[nodiscard]] Result<SceneInfo> put_dataset_zip(const std::string& id, const std::filesystem::path& zip,
-                                                  const std::string& filename);
+                                                  const std::string& filename, const Uploader& uploader = {});
   [[nodiscard]] Result<SceneInfo> put_dataset_path(const std::string& id, const std::string& path);
   /// Takes the dataset away. Whoever holds it keeps its photos.
   ///   errors  not_found: there is none (`where` is "dataset")

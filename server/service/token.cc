@@ -3,11 +3,18 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <limits>
 #include <map>
+#include <optional>
+#include <span>
 #include <string_view>
+#include <utility>
+
+#include "engine/core/numbers.h"
 
 namespace server::service {
 
@@ -71,6 +78,39 @@ bool give_scopes(std::string_view list, Token& token) {
   return true;
 }
 
+/// 2'000'000'000 for "2GB". Nothing for what is no such number, or larger than any disk.
+std::optional<std::uint64_t> bytes_in(std::string_view text) {
+  constexpr std::array<std::pair<std::string_view, std::uint64_t>, 9> units{{{"KiB", std::uint64_t{1} << 10},
+                                                                             {"MiB", std::uint64_t{1} << 20},
+                                                                             {"GiB", std::uint64_t{1} << 30},
+                                                                             {"TiB", std::uint64_t{1} << 40},
+                                                                             {"kB", 1'000},
+                                                                             {"MB", 1'000'000},
+                                                                             {"GB", 1'000'000'000},
+                                                                             {"TB", 1'000'000'000'000},
+                                                                             {"", 1}}};
+  const auto unit = std::ranges::find_if(units, [&](const auto& known) { return text.ends_with(known.first); });
+  const auto number = engine::number_in<std::uint64_t>(text.substr(0, text.size() - unit->first.size()));
+  if (!number || *number > std::numeric_limits<std::uint64_t>::max() / unit->second) return std::nullopt;
+  return *number * unit->second;
+}
+
+/// Whether the word is a quota that the token does not have yet; then it has it.
+bool give_quota(std::string_view word, http::Quotas& quotas) {
+  const std::size_t equals = std::min(word.find('='), word.size());
+  const std::string_view name = word.substr(0, equals), text = word.substr(std::min(equals + 1, word.size()));
+  const auto give = [](auto& quota, const auto& number) {
+    if (quota || !number || *number == 0) return false;
+    quota = number;
+    return true;
+  };
+  if (name == "edits") return give(quotas.edits, engine::number_in<std::size_t>(text));
+  if (name == "bytes") return give(quotas.bytes, bytes_in(text));
+  // More than a century is a slip.
+  if (name == "seconds") return give(quotas.seconds, engine::number_in<std::uint32_t>(text));
+  return false;
+}
+
 /// The tokens of the file's lines.
 class TokenLines {
  public:
@@ -81,7 +121,7 @@ class TokenLines {
     auto words = words_of(line);
     words.erase(std::ranges::find_if(words, [](std::string_view word) { return word.starts_with('#'); }), words.end());
     if (words.empty()) return {};
-    if (words.size() != 3) return wrong("expected three words: a name, its scopes, and the secret");
+    if (words.size() < 3) return wrong("expected three words: a name, its scopes, and the secret");
     Token token;
     token.name = words[0];
     if (!is_name(token.name))
@@ -93,6 +133,9 @@ class TokenLines {
       return wrong("a secret is up to 4096 bytes of printable ASCII; make one with: openssl rand -hex 32");
     if (token.name == http::only_token_name)
       return wrong("the name is that of the token of a file of one word: choose another");
+    for (const std::string_view word : std::span(words).subspan(3))
+      if (!give_quota(word, token.quotas))
+        return wrong("quotas are such as edits=4, bytes=2GB and seconds=3600, each once (what follows the secret)");
     if (const auto [known, added] = names_.emplace(token.name, number_); !added)
       return wrong("it has the name of line " + std::to_string(known->second));
     if (const auto [known, added] = secrets_.emplace(token.secret, number_); !added)

@@ -13,13 +13,14 @@ namespace server::service {
 /// The tokens in a file. One that holds a single word holds the one token of the service, which may do everything
 /// (http::only_token()). Any other has a line for each token, of words with white space between them:
 ///
-///     # name      scopes      secret
+///     # name      scopes      secret       quotas
 ///     viewer      read        3f9a0c51...
-///     pipeline    edit        77ab12e0...
+///     pipeline    edit        77ab12e0...  edits=4 bytes=2GB seconds=3600
 ///     prometheus  admin       c0ffee42...
 ///
-/// Scopes are those of http::Scope, with commas between several. Empty lines count for nothing, nor does what follows a
-/// word that begins with '#', so that no secret does.
+/// Scopes are those of http::Scope, with commas between several. Quotas are those of http::Quotas; each is a whole
+/// number above 0, that of bytes with a unit if it has one (kB, MB, GB, TB, or KiB, MiB, GiB, TiB). Empty lines count
+/// for nothing, nor does what follows a word that begins with '#', so that no secret does.
 ///   warning  set if other users of the machine may read the file
 ///   errors   not_found, unavailable; invalid_argument: there is no token, or a line is none, or it has the name or the
 ///            secret of another (`where` is "FILE:LINE"). No message says what stands in the file: words change places

@@ -602,6 +602,21 @@ describe('a real capture', () => {
   });
 });
 
+test('an edit that failed is taken up again', async () => {
+  const mortal = await Service.start({ args: ['--edit-attempts', '1', '--threads', '1'] });
+  const { id: of } = await mortal.client.upload(demo.ply);
+  const { id } = await mortal.client.submit({ scene: of, ...demo.leaf, params: { intervals: 12, views: 4, max_image_side: 160 } });
+  await mortal.client.post(`/v1/edits/${id}/requeue`, undefined, { expect: 409 });
+  await mortal.client.until(id, ({ finished_intervals: done }) => done.length >= 1);
+  await mortal.kill();
+  await mortal.start();
+  assert.equal((await mortal.client.ended(id)).state, 'failed');
+  const again = (await mortal.client.post(`/v1/edits/${id}/requeue`)).json();
+  assert.deepEqual([again.error, again.ended], [null, null]);
+  assert.equal((await mortal.client.succeeded(id)).finished_intervals.length, 12);
+  await mortal.stop();
+});
+
 test('every success that the contract lists has been seen', () => {
   const missing = [];
   for (const { id, operation } of operations)

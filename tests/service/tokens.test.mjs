@@ -20,7 +20,7 @@ before(async () => {
   file = path.join(temporaryFolder(), 'tokens');
   await writeFile(file, lines(Object.keys(secrets)), { mode: 0o600 });
   audit = path.join(temporaryFolder(), 'audit.jsonl');
-  service = await Service.start({ args: ['--token-file', file, '--audit-log', audit], token: secrets.boss });
+  service = await Service.start({ args: ['--token-file', file, '--audit-log', audit, '--drain-seconds', '1'], token: secrets.boss });
   for (const name of Object.keys(secrets)) as[name] = new Client(service.url, { token: secrets[name] });
 });
 after(async () => {
@@ -138,6 +138,78 @@ describe('with a scene', () => {
     await as.boss.delete(`/v1/scenes/${scene}`);
     const [line, ...more] = await audited();
     assert.deepEqual([line.token, line.method, line.scene, line.status, more.length], ['boss', 'DELETE', scene, 204, 0]);
+  });
+
+  test('a token with quotas may so much, and is told which it has used up', async () => {
+    const guest = 'secret-of-the-guest';
+    const mine = await as.boss.upload(demo.ply);
+    const size = (await as.boss.get(`/v1/scenes/${mine.id}`)).json().disk_bytes;
+    const reread = async (quotas) => {
+      await writeFile(file, `${lines(Object.keys(secrets))}guest edit ${guest} ${quotas}\n`, { mode: 0o600 });
+      const before = service.log.length;
+      service.process.kill('SIGHUP');
+      for (let i = 0; i < 200 && !service.log.slice(before).includes('have been read again'); ++i) await sleep(20);
+    };
+    await reread(`edits=1 bytes=${size + 100}`);
+    const client = new Client(service.url, { token: guest });
+    const refused = async (what, quota) => {
+      const response = await what;
+      assert.deepEqual([response.status, response.json().code, response.json().where], [429, 'quota_exceeded', quota], response.json().detail);
+      return response;
+    };
+    const own = await client.upload(demo.ply);
+    const { headers } = await refused(client.request('POST', '/v1/scenes', { body: demo.ply, headers: { 'content-type': 'application/octet-stream' } }), 'bytes');
+    assert.equal(headers['retry-after'], undefined, 'time gives no room');
+    const long = { ...demo.leaf, scene: own.id, version: 0, params: { intervals: 20, views: 20, max_image_side: 256 } };
+    const first = await client.submit(long, { 'idempotency-key': 'one' });
+    const again = await refused(client.request('POST', '/v1/edits', { json: long }), 'edits');
+    assert.ok(Number(again.headers['retry-after']) >= 1);
+    assert.equal((await client.submit(long, { 'idempotency-key': 'one' })).id, first.id, 'the same is no other');
+    await as.boss.submit({ ...edit, scene: mine.id });
+    await client.post(`/v1/edits/${first.id}/cancel`);
+    await client.ended(first.id);
+    await reread('seconds=1');
+    const never = await client.request('POST', '/v1/edits', { json: { ...long, params: { ...long.params, views: 200 } } });
+    assert.deepEqual([never.status, never.json().code, never.json().where, never.headers['retry-after']], [413, 'too_large', 'seconds', undefined], 'it fits on no day');
+    client.close();
+  });
+
+  test('what has been worked on a day outlives a kill', async () => {
+    const own = await as.boss.upload(demo.ply);
+    const short = { ...demo.ball, scene: own.id, version: 0, preset: 'preview' };
+    const long = { ...demo.leaf, scene: own.id, version: 0, params: { intervals: 20, views: 20, max_image_side: 400 } };
+    const write = (quotas) => writeFile(file, `${lines(Object.keys(secrets))}worker edit secret-of-the-worker ${quotas}\nother edit secret-of-the-other ${quotas}\n`, { mode: 0o600 });
+    await write('');
+    await service.kill();
+    await service.start();
+    let worker = new Client(service.url, { token: 'secret-of-the-worker' });
+    const estimate = (await worker.post('/v1/edits', short, { query: { validate_only: 'true' } })).json().estimate.seconds;
+    let worked = 0;
+    while (worked < 6) {
+      const { id } = await worker.submit(long);
+      await worker.until(id, ({ state }) => state !== 'queued');
+      const since = performance.now();
+      await worker.succeeded(id);
+      worked += Math.max((performance.now() - since) / 1000 - 0.5, 0.1);
+    }
+    // Enough for the edit, as often as estimates may differ, but not beside what has been worked.
+    const quota = Math.ceil(estimate) + Math.floor(worked) - 2;
+    await write(`seconds=${quota}`);
+    for (let i = 0; i < 2; ++i) {
+      await service.kill();
+      await service.start();
+      worker.close();
+      worker = new Client(service.url, { token: 'secret-of-the-worker' });
+      const { status, headers, ...refused } = await worker.request('POST', '/v1/edits', { json: short });
+      assert.deepEqual([status, refused.json().code, refused.json().where], [429, 'quota_exceeded', 'seconds'], refused.json().detail);
+      const now = Date.now();
+      const left = 24 * 3600 - (now / 1000) % (24 * 3600);
+      assert.ok(Math.abs(Number(headers['retry-after']) - left) < 30, `${headers['retry-after']} s, and it is ${left} s until midnight`);
+    }
+    const other = new Client(service.url, { token: 'secret-of-the-other' });
+    await other.succeeded((await other.submit(short)).id);
+    other.close();
+    worker.close();
   });
 
   test('no secret is in either log', async () => {

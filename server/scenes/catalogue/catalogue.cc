@@ -29,6 +29,8 @@ constexpr std::uint64_t skipped_numbers = 1000;
 /// Its bytes are what processes lock that share the folder: that of a scene's number, and the first for the counter.
 constexpr const char* writers_name = ".writers";
 constexpr std::uint64_t lock_of_counter = 0;
+/// What they lock who bring in what counts for a quota.
+constexpr const char* quotas_name = ".quotas";
 /// So long a change waits for others of the same scene: many times what one takes. A choice.
 constexpr std::chrono::seconds others_are_done_within{10};
 
@@ -264,7 +266,34 @@ Result<std::uint64_t> Catalogue::next_number() {
   return next_scene_++;
 }
 
-Result<Snapshot> Catalogue::add(Manifest manifest, const fs::path& base_file, const fs::path& staging) {
+std::uint64_t Catalogue::bytes_of(const std::string& uploader) {
+  std::uint64_t bytes = 0;
+  for (const ManifestPtr& manifest : manifests()) {
+    if (manifest->scene.uploader == uploader) bytes += manifest->base_disk_bytes;
+    if (manifest->dataset && manifest->dataset->uploader == uploader) bytes += manifest->dataset->disk_bytes;
+  }
+  return bytes;
+}
+
+Result<Catalogue::QuotaHold> Catalogue::hold_quota(const Uploader& uploader, std::uint64_t bytes, std::uint64_t freed) {
+  if (!uploader.max_bytes) return QuotaHold{};
+  QuotaHold hold{std::unique_lock(quota_), std::nullopt};
+  if (sharing_ == Sharing::shared) {
+    auto lock = engine::FileLock::take(folder_ / quotas_name, 0, engine::LockKind::alone, others_are_done_within);
+    if (!lock) return public_error_(lock);
+    hold.among_processes = std::move(*lock);
+  }
+  const std::uint64_t stored = bytes_of(uploader.name);
+  if (stored - std::min(freed, stored) + bytes <= *uploader.max_bytes) return hold;
+  return fail(ErrorCode::quota_exceeded,
+              uploader.name + " may store " + std::to_string(*uploader.max_bytes) +
+                  " bytes of scenes and datasets, has " + std::to_string(stored) + ", and this takes " +
+                  std::to_string(bytes) + ": delete a scene first",
+              "bytes");
+}
+
+Result<Snapshot> Catalogue::add(Manifest manifest, const fs::path& base_file, const fs::path& staging,
+                                std::optional<std::uint64_t> max_bytes) {
   const auto number = next_number();
   if (!number) return public_error_(number);
   const std::string id = manifest.scene.id = engine::numbered_id(id_kind, *number);
@@ -274,6 +303,8 @@ Result<Snapshot> Catalogue::add(Manifest manifest, const fs::path& base_file, co
   if (auto moved = move_durably(base_file, whole / manifest.base); !moved) return public_error_(moved, staging);
   if (auto synced = sync_file(whole / manifest.base); !synced) return public_error_(synced, staging);
   if (auto written = write_manifest(whole, manifest); !written) return public_error_(written, staging);
+  const auto quota = hold_quota({manifest.scene.uploader, max_bytes}, manifest.base_disk_bytes);
+  if (!quota) return propagate(quota);
   if (auto moved = move_durably(whole, folder); !moved) {
     remove_renamed(folder);
     return public_error_(moved, staging);

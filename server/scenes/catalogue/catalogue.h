@@ -111,12 +111,27 @@ class Catalogue {
   /// Reserves a place in the count of scenes.
   ///   errors  too_large: there are as many scenes as there may be
   [[nodiscard]] Result<Reservation> reserve();
+  /// What somebody has brought in and the store still has: bytes of scenes as they came, and of unpacked datasets.
+  [[nodiscard]] std::uint64_t bytes_of(const std::string& uploader);
+  /// Held from the look at what somebody has stored until what they bring in is there, too.
+  struct QuotaHold {
+    std::unique_lock<std::mutex> here;
+    std::optional<engine::FileLock> among_processes;
+  };
+  /// Whether somebody may store so much more. Nothing is held for whom no limit is set.
+  ///   bytes   what comes
+  ///   freed   what of theirs goes for it
+  ///   errors  quota_exceeded (`where` is "bytes")
+  [[nodiscard]] Result<QuotaHold> hold_quota(const Uploader& uploader, std::uint64_t bytes, std::uint64_t freed = 0);
   /// A new scene, on disk when this returns: it appears whole or not at all.
   ///   manifest   without id
+  ///   max_bytes  that its uploader may store
   ///   base_file  what becomes its version 0; moved
   ///   staging    a folder to put things together in, on the same file system
+  ///   errors     quota_exceeded: beyond that; those of file_error(), in words for strangers
   [[nodiscard]] Result<Snapshot> add(Manifest manifest, const std::filesystem::path& base_file,
-                                     const std::filesystem::path& staging);
+                                     const std::filesystem::path& staging,
+                                     std::optional<std::uint64_t> max_bytes = std::nullopt);
   /// Replaces a scene's manifest by one that `change` has changed.
   ///   dataset_folder  if given: that of the changed manifest, swapped for the one before
   ///   returns         the new manifest
@@ -155,6 +170,8 @@ class Catalogue {
   mutable std::mutex mutex_;  ///< Guards what follows, and the scenes' own manifests.
   std::map<std::string, std::shared_ptr<CatalogueEntry>> scenes_;
   std::size_t reserved_ = 0;  ///< Scenes that are being added.
+
+  std::mutex quota_;  ///< Held as QuotaHold, against the rule that no lock is held over I/O: two must not fit together.
 
   /// Held while the number of the next scene goes to disk: it must not be written twice, nor go back.
   std::mutex counter_writer_;

@@ -19,11 +19,12 @@ using engine::propagate;
 using nlohmann::json;
 using nlohmann::ordered_json;
 
-constexpr int manifest_format = 4;  // format number of scene.json
+constexpr int manifest_format = 5;  // format number of scene.json
 constexpr int most_versions = 1'000'000'000;
 constexpr int first_with_digests = 2;  // a format before has none
 constexpr int first_with_gaps = 3;     // before, no version was ever deleted
 constexpr int first_with_names = 4;    // of versions
+constexpr int first_with_uploaders = 5;
 /// A larger file is refused before it is read: a hundred thousand versions come to less. A choice.
 constexpr std::uint64_t max_manifest_bytes = std::uint64_t{64} << 20;
 
@@ -134,6 +135,7 @@ ordered_json encoded(const DatasetInfo& info, const DatasetLocation& location) {
           {"below_root", location.below_root},
           {"disk_bytes", location.disk_bytes},
           {"xxh3", encoded_digest(location.list_digest)},
+          {"uploader", location.uploader},
           {"views", info.views},
           {"photos", info.photos},
           {"psnr_mean_db", or_null(info.psnr_mean_db)},
@@ -144,7 +146,7 @@ ordered_json encoded(const DatasetInfo& info, const DatasetLocation& location) {
 
 void read_dataset(const json& value, int format, Manifest& manifest) {
   const Object in(value, "dataset",
-                  {"kind", "folder", "below_root", "disk_bytes", "xxh3", "views", "photos", "psnr_mean_db",
+                  {"kind", "folder", "below_root", "disk_bytes", "xxh3", "uploader", "views", "photos", "psnr_mean_db",
                    "psnr_worst_db", "psnr_worst_view", "warnings"});
   DatasetInfo info;
   info.kind = in.text("kind");
@@ -157,7 +159,8 @@ void read_dataset(const json& value, int format, Manifest& manifest) {
     info.warnings.push_back(warning.get<std::string>());
   }
   manifest.dataset = DatasetLocation{in.relative("folder"), in.boolean("below_root"), in.count("disk_bytes"),
-                                     format < first_with_digests ? "" : in.digest("xxh3")};
+                                     format < first_with_digests ? "" : in.digest("xxh3"),
+                                     format < first_with_uploaders ? "" : in.text("uploader")};
   manifest.scene.dataset = std::move(info);
 }
 
@@ -207,6 +210,7 @@ Manifest decode(const json& document, std::string_view text) {
                                  "id",
                                  "nonce",
                                  "name",
+                                 "uploader",
                                  "created",
                                  "format",
                                  "base",
@@ -230,6 +234,7 @@ Manifest decode(const json& document, std::string_view text) {
   scene.id = in.text("id");
   manifest.nonce = in.text("nonce");
   scene.name = in.text("name");
+  if (format >= first_with_uploaders) scene.uploader = in.text("uploader");
   scene.created = in.time("created");
   scene.format = in.text("format");
   manifest.base = in.relative("base");
@@ -263,6 +268,7 @@ ordered_json encoded(const Manifest& manifest) {
                    {"id", scene.id},
                    {"nonce", manifest.nonce},
                    {"name", scene.name},
+                   {"uploader", scene.uploader},
                    {"created", encoded(scene.created)},
                    {"format", scene.format},
                    {"base", manifest.base},

@@ -20,6 +20,7 @@ struct DatasetLocation {
   bool below_root = false;       ///< Whether `folder` is relative to the scene root.
   std::uint64_t disk_bytes = 0;  ///< Bytes that it takes in the scene's folder.
   std::string list_digest;       ///< Of the list of its files, see dataset_list_name(); "": there is none.
+  std::string uploader = {};     ///< Who brought it in; empty: nobody has said.
 };
 
 /// What scene.json says, field by field.

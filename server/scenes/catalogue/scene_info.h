@@ -29,6 +29,12 @@ struct VersionInfo {
   std::uint64_t disk_bytes = 0;  ///< What this version takes beside version 0.
 };
 
+/// Whoever brings files in, and how much of theirs the store may hold.
+struct Uploader {
+  std::string name = {};                        ///< As whoever lets them in calls them; empty: nobody says.
+  std::optional<std::uint64_t> max_bytes = {};  ///< Of scenes and unpacked datasets together; none: no limit.
+};
+
 /// What is known of a scene's dataset.
 struct DatasetInfo {
   std::string kind;  ///< "colmap", "transforms", "inria"
@@ -44,6 +50,7 @@ struct DatasetInfo {
 struct SceneInfo {
   std::string id;  ///< "s000001": counts up, never used twice.
   std::string name;
+  std::string uploader;  ///< Who brought it in; empty: nobody has said.
   Time created{};
   std::string format;  ///< Name of an io::SceneFormat: "ply", "compressed_ply", "splat", "spz", "sog", "glb"
   int sh_degree = 0;

@@ -79,7 +79,12 @@ DatasetInfo about(const io::Dataset& found) {
 
 }  // namespace
 
-Result<ManifestPtr> Datasets::put_zip(const Snapshot& at, const fs::path& zip, const std::string& filename) {
+std::uint64_t freed_by_replacing(const Manifest& manifest, const Uploader& uploader) {
+  return manifest.dataset && manifest.dataset->uploader == uploader.name ? manifest.dataset->disk_bytes : 0;
+}
+
+Result<ManifestPtr> Datasets::put_zip(const Snapshot& at, const fs::path& zip, const std::string& filename,
+                                      const Uploader& uploader) {
   const auto staging = scratch_.make();
   if (!staging) return propagate(staging);
   const fs::path into = staging->folder() / "dataset";
@@ -94,8 +99,11 @@ Result<ManifestPtr> Datasets::put_zip(const Snapshot& at, const fs::path& zip, c
   if (!digests) return public_error_(digests, into);
   if (auto synced = sync_file_system(into); !synced) return public_error_(synced, staging->folder());
   const std::string list = to_text(*digests);
-  return replace(at, *found, {root.lexically_relative(into).string(), false, bytes_below(into), digest_of(list)}, into,
-                 list);
+  const std::uint64_t bytes = bytes_below(into);
+  const auto quota = catalogue_.hold_quota(uploader, bytes, freed_by_replacing(*at.manifest, uploader));
+  if (!quota) return propagate(quota);
+  return replace(at, *found, {root.lexically_relative(into).string(), false, bytes, digest_of(list), uploader.name},
+                 into, list);
 }
 
 Result<ManifestPtr> Datasets::put_path(const Snapshot& at, const std::string& path) {
@@ -114,7 +122,7 @@ Result<ManifestPtr> Datasets::put_path(const Snapshot& at, const std::string& pa
                   "path");
   std::error_code error;
   const fs::path relative = folder->lexically_relative(fs::canonical(scene_root, error));
-  return replace(at, *found, {relative.string(), true, 0, {}}, std::nullopt, {});
+  return replace(at, *found, {relative.string(), true, 0, {}, {}}, std::nullopt, {});
 }
 
 Result<ManifestPtr> Datasets::replace(const Snapshot& at, const io::Dataset& found, DatasetLocation location,

@@ -1,6 +1,7 @@
 // The datasets of scenes: cameras and photos, unpacked into the store or used where they are.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -15,6 +16,9 @@
 
 namespace server::scenes {
 
+/// How much less somebody has stored once the scene's dataset is another's.
+[[nodiscard]] std::uint64_t freed_by_replacing(const Manifest& manifest, const Uploader& uploader);
+
 /// Keeps what it has read of them in `memory`. Safe to call from any thread.
 class Datasets {
  public:
@@ -24,9 +28,10 @@ class Datasets {
       : options_(options), memory_(memory), catalogue_(catalogue), scratch_(scratch), public_error_(public_error) {}
 
   /// Replaces the scene's dataset by what is in a zip file, which is unpacked into the store; the new manifest.
-  ///   errors  those of unzip() and io::read_dataset()
+  ///   uploader  who brings it in
+  ///   errors    those of unzip() and io::read_dataset(); quota_exceeded: beyond what the uploader may store
   [[nodiscard]] Result<ManifestPtr> put_zip(const Snapshot& at, const std::filesystem::path& zip,
-                                            const std::string& filename);
+                                            const std::string& filename, const Uploader& uploader);
   /// Replaces it by a folder below the scene root, which is used where it is; the new manifest.
   ///   errors  those of below_root() and io::read_dataset()
   [[nodiscard]] Result<ManifestPtr> put_path(const Snapshot& at, const std::string& path);

@@ -41,7 +41,8 @@ Result<Uploads::Upload> Uploads::read(const fs::path& file) {
   return Upload{std::make_shared<const io::SceneFile>(std::move(*scene)), std::move(**reservation)};
 }
 
-Result<ManifestPtr> Uploads::add_staged(const fs::path& file, const fs::path& staging, const std::string& name) {
+Result<ManifestPtr> Uploads::add_staged(const fs::path& file, const fs::path& staging, const std::string& name,
+                                        const Uploader& uploader) {
   const auto called = name_for(name, file.filename().string());
   if (!called) return propagate(called);
   auto upload = read(file);
@@ -63,6 +64,7 @@ Result<ManifestPtr> Uploads::add_staged(const fs::path& file, const fs::path& st
   SceneInfo& scene = manifest.scene;
   const SceneStatistics measured = statistics(cloud);
   scene.name = *called;
+  scene.uploader = uploader.name;
   scene.created = options_.clock();
   scene.format = engine::name_of(*format);
   scene.sh_degree = cloud.sh_degree;
@@ -72,7 +74,7 @@ Result<ManifestPtr> Uploads::add_staged(const fs::path& file, const fs::path& st
   uploaded_version.created = scene.created;
   uploaded_version.gaussians = cloud.size();
 
-  const auto at = catalogue_.add(std::move(manifest), file, staging);
+  const auto at = catalogue_.add(std::move(manifest), file, staging, uploader.max_bytes);
   if (!at) return propagate(at);
   const std::string& id = at->scene->id;
   memory_.put(id + "/base", {upload->file, at->manifest->base_memory_bytes}, std::move(upload->reservation));
@@ -80,7 +82,8 @@ Result<ManifestPtr> Uploads::add_staged(const fs::path& file, const fs::path& st
   return at->manifest;
 }
 
-Result<ManifestPtr> Uploads::add(const fs::path& file, const std::string& filename, const std::string& name) {
+Result<ManifestPtr> Uploads::add(const fs::path& file, const std::string& filename, const std::string& name,
+                                 const Uploader& uploader) {
   const auto counted = catalogue_.reserve();
   if (!counted) return propagate(counted);
   const auto staging = scratch_.make();
@@ -91,10 +94,12 @@ Result<ManifestPtr> Uploads::add(const fs::path& file, const std::string& filena
   std::error_code error;
   fs::rename(file, uploaded, error);
   if (error) return public_error_(engine::file_error(error.value(), "take", uploaded), folder);
-  return add_staged(uploaded, staging->folder(), name);
+  // Before it is read, which takes longer; nothing is held yet.
+  if (const auto fits = catalogue_.hold_quota(uploader, bytes_below(uploaded)); !fits) return propagate(fits);
+  return add_staged(uploaded, staging->folder(), name, uploader);
 }
 
-Result<ManifestPtr> Uploads::add_path(const std::string& path, const std::string& name) {
+Result<ManifestPtr> Uploads::add_path(const std::string& path, const std::string& name, const Uploader& uploader) {
   const auto found = open_below_root(options_.scene_root, path);
   if (!found) return propagate(found);
   const auto staging = scratch_.make();
@@ -107,7 +112,7 @@ Result<ManifestPtr> Uploads::add_path(const std::string& path, const std::string
       return engine::fail(copied.error().code, "the file cannot be read to its end", "path");
     return public_error_(copied, staging->folder());
   }
-  return add(copy, fs::path(path).filename().string(), name);
+  return add(copy, fs::path(path).filename().string(), name, uploader);
 }
 
 }  // namespace server::scenes

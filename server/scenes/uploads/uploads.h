@@ -25,12 +25,15 @@ class Uploads {
   /// A new scene of an uploaded file, which is moved into the store.
   ///   filename  as its user calls it
   ///   name      of the scene; empty: that of the file
-  ///   errors    those of io::read_scene(); too_large: too many scenes, or one that the memory can never hold; busy
+  ///   uploader  who brings it in
+  ///   errors    those of io::read_scene(); too_large: too many scenes, or one that the memory can never hold; busy;
+  ///             quota_exceeded: beyond what the uploader may store
   [[nodiscard]] Result<ManifestPtr> add(const std::filesystem::path& file, const std::string& filename,
-                                        const std::string& name);
+                                        const std::string& name, const Uploader& uploader);
   /// A new scene of a file below the scene root, which is copied.
   ///   errors  those of below_root() and add()
-  [[nodiscard]] Result<ManifestPtr> add_path(const std::string& path, const std::string& name);
+  [[nodiscard]] Result<ManifestPtr> add_path(const std::string& path, const std::string& name,
+                                             const Uploader& uploader);
 
  private:
   /// A file in memory, and the memory reserved for it until the cache counts it.
@@ -40,7 +43,7 @@ class Uploads {
   };
   [[nodiscard]] Result<Upload> read(const std::filesystem::path& file);
   [[nodiscard]] Result<ManifestPtr> add_staged(const std::filesystem::path& file, const std::filesystem::path& staging,
-                                               const std::string& name);
+                                               const std::string& name, const Uploader& uploader);
 
   const StoreOptions& options_;
   BoundedCache& memory_;

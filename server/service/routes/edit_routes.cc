@@ -97,13 +97,28 @@ Result<Reply> post_preview(const Call& call, EditService& service, const EditLim
   return Reply::json(proto::to_json(*preview));
 }
 
-/// A full queue takes no edit before the running one is done; whoever asks each second until then only takes time from
-/// it.
-Reply queue_is_full(const Call& call, const engine::Error& error, EditService& service) {
+int seconds_until_tomorrow() {
+  const auto now = std::chrono::system_clock::now();
+  return int(std::chrono::ceil<std::chrono::seconds>(std::chrono::ceil<std::chrono::days>(now) - now).count());
+}
+
+/// An edit that there is no room for. A full queue takes none before the running one is done, and mostly so does a
+/// quota of edits; whoever asks each second until then only takes time from it. A quota of seconds is that of a day.
+Reply no_room(const Call& call, const engine::Error& error, EditService& service) {
   http::Refusal refusal = http::refusal_of(error);
   const double seconds = std::ceil(service.seconds_until_room().value_or(1));
-  refusal.retry_after = int(std::clamp(seconds, 1.0, longest_retry_seconds));
+  refusal.retry_after = error.code == ErrorCode::quota_exceeded && error.where == "seconds"
+                            ? seconds_until_tomorrow()
+                            : int(std::clamp(seconds, 1.0, longest_retry_seconds));
   return Reply::refusal(refusal, call.request_id());
+}
+
+EditService::Requester requester_of(const Call& call) {
+  const http::TokenPtr token = call.token();
+  if (token == nullptr) return {};
+  EditService::Requester requester{.name = token->name, .quota = {.active = token->quotas.edits}};
+  if (token->quotas.seconds) requester.quota.worked_per_day = std::chrono::seconds(*token->quotas.seconds);
+  return requester;
 }
 
 Result<Reply> post_edit(const Call& call, EditService& service, const EditLimits& limits) {
@@ -118,9 +133,10 @@ Result<Reply> post_edit(const Call& call, EditService& service, const EditLimits
     if (!estimate) return propagate(estimate);
     return Reply::json(proto::to_json(*estimate));
   }
-  const auto submission = service.submit(*request, *key);
-  if (!submission && submission.error().code == ErrorCode::busy)
-    return queue_is_full(call, submission.error(), service);
+  const auto submission = service.submit(*request, *key, requester_of(call));
+  if (!submission &&
+      (submission.error().code == ErrorCode::busy || submission.error().code == ErrorCode::quota_exceeded))
+    return no_room(call, submission.error(), service);
   if (!submission) return propagate(submission);
   Reply reply = Reply::json(proto::to_json(submission->status), 202);
   reply.headers.emplace_back("Location", "/v1/edits/" + submission->status.id);
@@ -236,6 +252,8 @@ void add_edit_routes(http::Router& router, EditService& service, const EditRoute
       [](const Call& call, EditService& s) { return reply_with(s.stop(call.path("id"))); });
   add("POST", "/v1/edits/{id}/cancel", Access::edit,
       [](const Call& call, EditService& s) { return reply_with(s.cancel(call.path("id"))); });
+  add("POST", "/v1/edits/{id}/requeue", Access::admin,
+      [](const Call& call, EditService& s) { return reply_with(s.requeue(call.path("id"))); });
 }
 
 }  // namespace server::service::routes

@@ -48,9 +48,26 @@ Result<Reply> reply_with(const Result<SceneInfo>& scene) {
   return Reply::json(proto::to_json(told(*scene)));
 }
 
-/// Hands an uploaded file, and its name, to `take`.
+scenes::Uploader uploader_of(const Call& call) {
+  const http::TokenPtr token = call.token();
+  return token == nullptr ? scenes::Uploader() : scenes::Uploader{token->name, token->quotas.bytes};
+}
+
+/// The least that is stored of an upload, as far as its length is declared. A form is longer than the file in it; what
+/// is in a zip file is about as long as that, or longer: half of it is on the safe side.
+std::uint64_t least_stored(const Call& call, bool is_zip) {
+  constexpr std::uint64_t most_of_a_form = 64 * 1024;  // around the file: a choice
+  const auto declared = engine::number_in<std::uint64_t>(call.header("content-length")).value_or(0);
+  const std::uint64_t file = declared > most_of_a_form ? declared - most_of_a_form : 0;
+  return std::max<std::uint64_t>(is_zip ? file / 2 : file, 1);
+}
+
+/// Hands an uploaded file, and its name, to `take`. Whoever may not store it has to send nothing.
+///   replaced  the scene whose dataset it replaces; empty: it is a scene
 template <class Take>
-Result<SceneInfo> with_upload(const Call& call, SceneStore& store, Take take) {
+Result<SceneInfo> with_upload(const Call& call, SceneStore& store, const std::string& replaced, Take take) {
+  const std::uint64_t least = least_stored(call, /*is_zip=*/!replaced.empty());
+  if (const auto fits = store.check_quota(uploader_of(call), least, replaced); !fits) return propagate(fits);
   const auto scratch = store.scratch();
   if (!scratch) return propagate(scratch);
   const auto file = scratch->folder() / upload_name;
@@ -63,14 +80,14 @@ Result<SceneInfo> add_scene(const Call& call, SceneStore& store) {
   const auto name = call.query("name");
   if (name && name->empty()) return fail(ErrorCode::invalid_argument, "expected a name, or none at all", "name");
   if (!call.is_json())
-    return with_upload(call, store, [&](const std::filesystem::path& file, const std::string& filename) {
-      return store.add_upload(file, filename, name.value_or(""));
+    return with_upload(call, store, {}, [&](const std::filesystem::path& file, const std::string& filename) {
+      return store.add_upload(file, filename, name.value_or(""), uploader_of(call));
     });
   const auto source = proto::parse_scene_source(call.body());
   if (!source) return propagate(source);
   if (name && !source->name.empty())
     return fail(ErrorCode::invalid_argument, "the name is given twice: in the query and in the body", "name");
-  return store.add_path(source->path, name.value_or(source->name));
+  return store.add_path(source->path, name.value_or(source->name), uploader_of(call));
 }
 
 Result<Reply> post_scene(const Call& call, SceneStore& store) {
@@ -149,9 +166,10 @@ Result<Reply> put_dataset(const Call& call, const SceneRouteDependencies& depend
   };
   const auto put = [&]() -> Result<SceneInfo> {
     if (!call.is_json())
-      return with_upload(call, dependencies.store, [&](const std::filesystem::path& file, const std::string& filename) {
-        return change([&] { return dependencies.store.put_dataset_zip(id, file, filename); });
-      });
+      return with_upload(
+          call, dependencies.store, id, [&](const std::filesystem::path& file, const std::string& filename) {
+            return change([&] { return dependencies.store.put_dataset_zip(id, file, filename, uploader_of(call)); });
+          });
     const auto source = proto::parse_dataset_source(call.body());
     if (!source) return propagate(source);
     return change([&] { return dependencies.store.put_dataset_path(id, source->path); });

@@ -38,7 +38,7 @@ struct Line {
   JobState state;
   bool claimed;
   int finished_intervals;
-  /// claim report finish_interval stop cancel succeed fail release make_way abandon
+  /// claim report finish_interval stop cancel succeed fail release make_way abandon requeue
   std::array<std::string, event_count> next;
 };
 
@@ -48,19 +48,22 @@ const std::string no = "-", wait = "queued", run = "running", stopping = "stop_r
 const std::vector<Line>& table() {
   using enum JobState;
   static const std::vector<Line> lines = {
-      {queued, false, 0, {run, no, no, no, gone, no, no, no, no, no}},
-      {queued, false, 2, {run, no, no, stopping, gone, no, no, no, no, no}},
-      {running, true, 0, {no, run, run, no, leaving, good, bad, run, wait, run}},
-      {running, true, 2, {no, run, run, stopping, leaving, good, bad, run, wait, run}},
-      {running, false, 0, {run, no, no, no, gone, no, no, no, no, no}},
-      {running, false, 2, {run, no, no, stopping, gone, no, no, no, no, no}},
-      {stop_requested, true, 2, {no, stopping, stopping, stopping, leaving, good, bad, stopping, stopping, stopping}},
-      {stop_requested, false, 2, {stopping, no, no, stopping, gone, no, no, no, no, no}},
-      {cancel_requested, true, 0, {no, leaving, leaving, no, leaving, gone, gone, gone, gone, gone}},
-      {cancel_requested, true, 2, {no, leaving, leaving, no, leaving, gone, gone, gone, gone, gone}},
-      {succeeded, false, 2, {no, no, no, no, no, no, no, no, no, no}},
-      {failed, false, 2, {no, no, no, no, no, no, no, no, no, no}},
-      {cancelled, false, 0, {no, no, no, no, gone, no, no, no, no, no}},
+      {queued, false, 0, {run, no, no, no, gone, no, no, no, no, no, no}},
+      {queued, false, 2, {run, no, no, stopping, gone, no, no, no, no, no, no}},
+      {running, true, 0, {no, run, run, no, leaving, good, bad, run, wait, run, no}},
+      {running, true, 2, {no, run, run, stopping, leaving, good, bad, run, wait, run, no}},
+      {running, false, 0, {run, no, no, no, gone, no, no, no, no, no, no}},
+      {running, false, 2, {run, no, no, stopping, gone, no, no, no, no, no, no}},
+      {stop_requested,
+       true,
+       2,
+       {no, stopping, stopping, stopping, leaving, good, bad, stopping, stopping, stopping, no}},
+      {stop_requested, false, 2, {stopping, no, no, stopping, gone, no, no, no, no, no, no}},
+      {cancel_requested, true, 0, {no, leaving, leaving, no, leaving, gone, gone, gone, gone, gone, no}},
+      {cancel_requested, true, 2, {no, leaving, leaving, no, leaving, gone, gone, gone, gone, gone, no}},
+      {succeeded, false, 2, {no, no, no, no, no, no, no, no, no, no, no}},
+      {failed, false, 2, {no, no, no, no, no, no, no, no, no, no, wait}},
+      {cancelled, false, 0, {no, no, no, no, gone, no, no, no, no, no, no}},
   };
   return lines;
 }
@@ -98,6 +101,41 @@ TEST(JobStates, EndWithATimeAndWithoutAWorker) {
       EXPECT_EQ(!result->result.empty() || result->stopped_early, result->state == JobState::succeeded);
       EXPECT_EQ(result->error.has_value(), result->state == JobState::failed);
     }
+}
+
+TEST(JobStates, OneThatFailedIsTakenUpAgainAsIfNothingHadHappened) {
+  Job job = job_in(JobState::failed, false, 3);
+  job.error = Error{ErrorCode::no_space, "the disk is full", ""};
+  job.progress = "so far";
+  job.ended = noon, job.started = Time(std::chrono::hours(3));
+  job.deaths = 3, job.died_at = "interval 4", job.place = "interval 4", job.claim_number = 5;
+  job.worked = std::chrono::minutes(7);
+  const auto again = transition(job, {.event = Event::requeue, .interval = 2}, noon);
+  ASSERT_TRUE(again);
+  EXPECT_EQ(again->state, JobState::queued);
+  EXPECT_EQ(again->finished_intervals, 2) << "what there is a checkpoint of";
+  EXPECT_FALSE(again->error || again->ended);
+  EXPECT_EQ(again->deaths, 0);
+  EXPECT_EQ(again->died_at + again->place, "");
+  EXPECT_EQ(again->claim_number, 5) << "whoever held it before still does not hold it";
+  EXPECT_EQ(again->started, job.started);
+  EXPECT_EQ(again->worked, job.worked);
+  EXPECT_EQ(again->progress, job.progress);
+  EXPECT_EQ(transition(job, {.event = Event::requeue, .interval = 0}, noon)->progress, "")
+      << "what begins anew has taken no time yet";
+}
+
+TEST(JobClaims, SayWhoAndSinceWhen) {
+  Job job = *transition(job_in(JobState::queued, false, 0), {.event = Event::claim, .holder = "host:7"}, noon);
+  EXPECT_EQ(job.holder, "host:7");
+  EXPECT_EQ(job.claimed_at, noon);
+  const auto later = noon + std::chrono::hours(1);
+  job = *transition(job, {.event = Event::release, .claim = 1, .worked = std::chrono::minutes(59)}, later);
+  job = *transition(job, {.event = Event::claim, .holder = "other:8"}, later);
+  job = *transition(job, {.event = Event::fail, .claim = 2, .worked = std::chrono::minutes(1)}, later);
+  EXPECT_EQ(job.holder, "other:8") << "it stays when the claim is over";
+  EXPECT_EQ(job.claimed_at, later);
+  EXPECT_EQ(job.worked, std::chrono::hours(1)) << "of all claims";
 }
 
 TEST(JobStates, CancellingAgainChangesNothing) {

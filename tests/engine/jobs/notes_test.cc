@@ -21,6 +21,7 @@ Job full_job() {
   job.created = Time(std::chrono::milliseconds(5));
   job.ended = Time(std::chrono::milliseconds(7));
   job.expected = std::chrono::milliseconds(90);
+  job.requester = "studio";
   return job;
 }
 
@@ -33,6 +34,7 @@ TEST(Note, ComesBackAsItWasWritten) {
   EXPECT_FALSE(read.started);
   EXPECT_EQ(read.ended, full_job().ended);
   EXPECT_EQ(read.expected, full_job().expected);
+  EXPECT_EQ(read.requester, "studio");
 }
 
 TEST(Note, KnowsItselfByEveryBitAndEveryCut) {
@@ -100,6 +102,35 @@ TEST_F(NotesTest, BringBackAStoreThatWasLost) {
   EXPECT_EQ(submit("next"), "e000006") << "no number is given away twice";
   open();
   EXPECT_TRUE(queue->findings().empty()) << queue->findings()[0].message;
+}
+
+TEST_F(NotesTest, SpeakOfAJobThatIsTakenUpAgain) {
+  const std::string id = submit("x");
+  ASSERT_EQ(value(store->claim())->id, id);
+  Job failed = value(store->apply(id, {.event = Event::fail, .claim = 1, .error = {ErrorCode::no_space, "full", ""}}));
+  value(write_note(jobs, failed));
+  fs::create_directories(jobs / id);
+  support::write_file(jobs / id / "checkpoint-2", "two");
+  const auto revision = queue->revision();
+  EXPECT_EQ(value(queue->requeue(id)).finished_intervals, 2);
+  EXPECT_NE(queue->revision(), revision);
+  open();
+  EXPECT_EQ(value(queue->find(id)).state, JobState::queued) << "its note says nothing else";
+  lose_store();
+  EXPECT_EQ(value(queue->find(id)).state, JobState::queued);
+  EXPECT_EQ(value(queue->find(id)).finished_intervals, 2);
+
+  EXPECT_EQ(code_of(queue->requeue(id)), ErrorCode::conflict);
+  EXPECT_EQ(code_of(queue->requeue("e000099")), ErrorCode::not_found);
+}
+
+TEST_F(NotesTest, ARefusedRequeueChangesNoNote) {
+  const std::string id = submit("x");
+  ASSERT_EQ(value(store->claim())->id, id);
+  value(write_note(jobs, value(store->apply(id, {.event = Event::fail, .claim = 1}))));
+  submit("younger");
+  EXPECT_EQ(code_of(queue->requeue(id)), ErrorCode::conflict);
+  EXPECT_EQ(value(read_note(jobs, id)).state, JobState::failed);
 }
 
 TEST_F(NotesTest, NobodyHoldsAClaimAgainThatWasLostWithTheStore) {

@@ -10,6 +10,8 @@ class PostgresPlace final : public StorePlace {
   Result<std::unique_ptr<Store>> open(const StoreSetup& setup) override {
     PostgresOptions options = database_.options();
     options.alone = true;
+    options.holder = "here:1";
+    options.visits = setup.visits;
     options.used_numbers = setup.used_numbers;
     options.max_deaths = setup.max_deaths;
     options.lease = std::chrono::hours(24 * 365);  // what ends with a lease, the tests of this store alone are about

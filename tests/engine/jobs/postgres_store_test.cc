@@ -465,6 +465,80 @@ TEST_F(PostgresStoreTest, OneThatWantsToBeAloneIsAlone) {
   EXPECT_EQ(code_of(PostgresStore::open(alone)), ErrorCode::unavailable);
 }
 
+TEST_F(PostgresStoreTest, WhoVisitsIsNotKeptOutAndKeepsNobodyOut) {
+  PostgresOptions visits = options();
+  visits.visits = true;
+  EXPECT_EQ(code_of(PostgresStore::open(visits)), ErrorCode::not_found) << "no tables are made for a visitor";
+  PostgresOptions alone = options();
+  alone.alone = true;
+  alone.holder = "host:1";
+  const auto service = value(PostgresStore::open(alone));
+  submit(*service);
+  const Job claimed = *value(service->claim());
+  const auto visitor = value(PostgresStore::open(visits));
+  const Job seen = value(visitor->find(claimed.id));
+  EXPECT_TRUE(seen.claimed);
+  EXPECT_EQ(seen.holder, "host:1");
+  ASSERT_TRUE(seen.lease_until);
+  EXPECT_GT(*seen.lease_until, value(visitor->now()));
+  value(service->apply(claimed.id, {.event = Event::fail, .claim = claimed.claim_number}));
+  EXPECT_EQ(value(visitor->requeue(claimed.id, 0)).state, JobState::queued);
+  EXPECT_EQ(value(service->claim())->id, claimed.id);
+  visits.owner = "folder 2";
+  database->run("UPDATE splatdrag.store SET owner = 'folder 1'");
+  EXPECT_EQ(code_of(PostgresStore::open(visits)), ErrorCode::conflict);
+}
+
+TEST_F(PostgresStoreTest, NoLaneIsWorkedOnTwiceWhileJobsAreTakenUpAgain) {
+  // Whoever requeues, submits and claims at the same time: a lane never has two that are held.
+  const auto store = open();
+  for (int i = 0; i < 3; ++i) submit(*store);
+  std::atomic<int> together = 0, requeued = 0, ended = 0;
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 2; ++t)
+    threads.emplace_back([&] {
+      const auto worker = open();
+      while (ended < 60) {
+        const auto job = value(worker->claim());
+        if (!job) continue;
+        const auto active = value(worker->list({.active_only = true}));
+        together += std::ranges::count_if(active, [](const Job& other) { return other.claimed; }) > 1 ? 1 : 0;
+        value(worker->apply(job->id, {.event = Event::fail, .claim = job->claim_number}));
+        ++ended;
+      }
+    });
+  threads.emplace_back([&] {
+    const auto visitor = open();
+    while (ended < 60) {
+      for (const Job& job : value(visitor->list({})))
+        if (visitor->requeue(job.id, 0)) ++requeued;
+      if (value(visitor->list({.active_only = true})).empty()) submit(*visitor);
+    }
+  });
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(together, 0);
+  EXPECT_GT(requeued, 0);
+}
+
+TEST_F(PostgresStoreTest, TablesOfTheVersionBeforeAreBroughtUpToDate) {
+  {
+    const auto store = open();
+    submit(*store);
+    (void)value(store->claim());
+  }
+  database->run(
+      "ALTER TABLE splatdrag.jobs DROP COLUMN requester, DROP COLUMN worked, DROP COLUMN holder, DROP COLUMN "
+      "claimed_at; DROP TABLE splatdrag.worked; UPDATE splatdrag.store SET schema_number = 1");
+  PostgresOptions visits = options();
+  visits.visits = true;
+  EXPECT_EQ(code_of(PostgresStore::open(visits)), ErrorCode::unsupported) << "a visitor changes no tables";
+  const Job job = value(open()->find("e000001"));
+  EXPECT_TRUE(job.claimed);
+  EXPECT_EQ(job.holder, "");
+  EXPECT_FALSE(job.claimed_at);
+  EXPECT_EQ(job.requester, "");
+}
+
 TEST_F(PostgresStoreTest, JobsOfAnotherOwnerAreLeftAlone) {
   PostgresOptions ours = options();
   ours.owner = "folder 1";
@@ -511,7 +585,7 @@ TEST_F(PostgresStoreTest, TablesOfANewerVersionAreLeftAlone) {
   database->run("UPDATE splatdrag.store SET schema_number = 99");
   const auto refused = PostgresStore::open(options());
   ASSERT_EQ(code_of(refused), ErrorCode::unsupported);
-  EXPECT_TRUE(refused.error().message.starts_with("the job store was written by a newer version (99, known is 1)"))
+  EXPECT_TRUE(refused.error().message.starts_with("the job store was written by a newer version (99, known is 2)"))
       << refused.error().message;
   database->run("SELECT pg_terminate_backend(pid, 5000) FROM pg_stat_activity WHERE application_name = 'splatdrag'");
   EXPECT_EQ(code_of(store->list({})), ErrorCode::unsupported) << "of whoever was there before, too";

@@ -11,7 +11,9 @@ class SqlitePlace final : public StorePlace {
     SqliteOptions options{.folder = folder_,
                           .busy_timeout = std::chrono::milliseconds(20),
                           .used_numbers = setup.used_numbers,
-                          .max_deaths = setup.max_deaths};
+                          .max_deaths = setup.max_deaths,
+                          .holder = "here:1",
+                          .visits = setup.visits};
     if (setup.own_clock) options.now = [this] { return now_; };
     auto store = SqliteStore::open(options);
     if (!store) return propagate(store);

@@ -20,6 +20,11 @@ using namespace std::chrono_literals;
 
 constexpr std::size_t many = 1000;
 
+/// Makes tables as they were before they knew who asks and who works.
+const std::string without_people =
+    "DROP TABLE worked; ALTER TABLE jobs DROP COLUMN requester; ALTER TABLE jobs DROP COLUMN worked; ALTER TABLE jobs "
+    "DROP COLUMN holder; ALTER TABLE jobs DROP COLUMN claimed_at; ";
+
 /// What the checksum of a row is: FNV-1a over its values, each with its type, texts with their length, too.
 void checksum(sqlite3_context* context, int count, sqlite3_value** values) {
   ByteWriter all;
@@ -101,11 +106,11 @@ TEST_F(SqliteStoreTest, ReadsAFileOfTheVersionBefore) {
   submit();
   claim();
   value(store->apply("e000001", {.event = Event::finish_interval, .claim = 1, .progress = "half", .interval = 2}));
-  execute(
-      "ALTER TABLE jobs DROP COLUMN claim_number; ALTER TABLE jobs DROP COLUMN place; ALTER TABLE jobs DROP COLUMN "
-      "died_at; ALTER TABLE jobs DROP COLUMN deaths; "
-      "ALTER TABLE jobs DROP COLUMN checksum; ALTER TABLE jobs DROP COLUMN expected; "
-      "PRAGMA user_version = 1");
+  execute(without_people +
+          "ALTER TABLE jobs DROP COLUMN claim_number; ALTER TABLE jobs DROP COLUMN place; ALTER TABLE jobs DROP COLUMN "
+          "died_at; ALTER TABLE jobs DROP COLUMN deaths; "
+          "ALTER TABLE jobs DROP COLUMN checksum; ALTER TABLE jobs DROP COLUMN expected; "
+          "PRAGMA user_version = 1");
   store = open_store(dir.path());
   const Job job = value(store->find("e000001"));
   EXPECT_EQ(job.finished_intervals, 2);
@@ -123,17 +128,17 @@ TEST_F(SqliteStoreTest, ReadsAFileWithoutClaimNumbersAndHoldsItsRowsAgainstTheir
       "started, ended, place, died_at, deaths, expected)";
   submit();
   claim();
-  execute("ALTER TABLE jobs DROP COLUMN claim_number; " + version_4);
+  execute(without_people + "ALTER TABLE jobs DROP COLUMN claim_number; " + version_4);
   reopen();
   EXPECT_EQ(value(store->claim())->claim_number, 1) << "they begin anew: whoever held the job is gone";
-  execute("ALTER TABLE jobs DROP COLUMN claim_number; " + version_4 + "; UPDATE jobs SET lane = 'b'");
+  execute(without_people + "ALTER TABLE jobs DROP COLUMN claim_number; " + version_4 + "; UPDATE jobs SET lane = 'b'");
   const auto damaged = SqliteStore::open({.folder = dir.path()});
   ASSERT_EQ(code_of(damaged), ErrorCode::corrupt_data);
   EXPECT_NE(damaged.error().message.find("e000001"), std::string::npos) << damaged.error().message;
 }
 
 TEST_F(SqliteStoreTest, RefusesAFileOfANewerVersion) {
-  execute("PRAGMA user_version = 6");
+  execute("PRAGMA user_version = 7");
   EXPECT_EQ(code_of(SqliteStore::open({.folder = dir.path()})), ErrorCode::unsupported);
 }
 

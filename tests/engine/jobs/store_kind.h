@@ -17,6 +17,7 @@ struct StoreSetup {
   std::int64_t used_numbers = 0;
   int max_deaths = 3;
   bool own_clock = false;  ///< Its time is what set_time() says.
+  bool visits = false;     ///< Somebody else than the service opens it.
 };
 
 /// Where the store of one test is, whoever has it open.

@@ -61,13 +61,13 @@ INSTANTIATE_TEST_SUITE_P(Each, StoreTest, testing::ValuesIn(store_kinds()));
 
 TEST_P(StoreTest, KeepsEveryFieldAcrossARestart) {
   const std::string bytes("a\0'\"\xff\n", 6);
-  const auto submitted =
-      value(store->submit({.lane = bytes, .payload = bytes, .idempotency_key = "key", .expected = 1234ms}, many));
+  const auto submitted = value(store->submit(
+      {.lane = bytes, .payload = bytes, .idempotency_key = "key", .expected = 1234ms, .requester = bytes}, many));
   EXPECT_TRUE(submitted.created);
   const std::string id = submitted.job.id;
   EXPECT_EQ(id, "e000001");
   EXPECT_EQ(claim(), id);
-  value(apply(id, {.event = Event::finish_interval, .progress = bytes, .interval = 3}));
+  value(apply(id, {.event = Event::finish_interval, .progress = bytes, .interval = 3, .worked = 90ms}));
   const Job before =
       value(apply(id, {.event = Event::fail, .error = {ErrorCode::no_space, "the disk is full", "scene.ply"}}));
   reopen();
@@ -76,6 +76,11 @@ TEST_P(StoreTest, KeepsEveryFieldAcrossARestart) {
   EXPECT_EQ(after.payload, bytes);
   EXPECT_EQ(after.idempotency_key, "key");
   EXPECT_EQ(after.expected, 1234ms);
+  EXPECT_EQ(after.requester, bytes);
+  EXPECT_EQ(after.worked, 90ms);
+  EXPECT_EQ(after.holder, "here:1");
+  EXPECT_EQ(after.claimed_at, before.claimed_at);
+  EXPECT_TRUE(after.claimed_at);
   EXPECT_EQ(after.state, JobState::failed);
   EXPECT_EQ(after.finished_intervals, 3);
   EXPECT_EQ(after.progress, bytes);
@@ -385,6 +390,109 @@ TEST_P(StoreTest, ARecordThatIsPutBackEndsItsClaim) {
   lost.id = "e000007";
   EXPECT_EQ(code_of(store->restore(lost)), ErrorCode::conflict) << "another has its key";
   EXPECT_EQ(code_of(store->find("e000007")), ErrorCode::not_found);
+}
+
+TEST_P(StoreTest, TakesUpAgainWhatHasFailedAndNothingElse) {
+  const std::string first = submit(), second = submit("b");
+  EXPECT_EQ(code_of(store->requeue(first, 0)), ErrorCode::conflict) << "it has not failed";
+  EXPECT_EQ(code_of(store->requeue("e000099", 0)), ErrorCode::not_found);
+  EXPECT_EQ(claim(), first);
+  value(apply(first, {.event = Event::finish_interval, .interval = 2}));
+  value(apply(first, {.event = Event::fail, .error = {ErrorCode::no_space, "the disk is full", ""}}));
+  const std::string younger = submit();
+  const auto refused = store->requeue(first, 2);
+  ASSERT_EQ(code_of(refused), ErrorCode::conflict) << "what came later in its lane may just be run";
+  EXPECT_NE(refused.error().message.find(younger), std::string::npos) << refused.error().message;
+  value(store->apply(younger, {.event = Event::cancel}));
+  const Job again = value(store->requeue(first, 2));
+  EXPECT_EQ(again.state, JobState::queued);
+  EXPECT_EQ(again.queue_position, 1);
+  reopen();
+  EXPECT_EQ(value(store->find(first)).finished_intervals, 2);
+  EXPECT_FALSE(value(store->find(first)).error);
+  EXPECT_EQ(claim(), first) << "it is the oldest";
+  EXPECT_EQ(claim(), second);
+}
+
+TEST_P(StoreTest, AJobWhoseWitnessRefusesIsNotTakenUpAgain) {
+  const std::string id = submit();
+  EXPECT_EQ(claim(), id);
+  value(apply(id, {.event = Event::fail, .error = {ErrorCode::internal, "oh", ""}}));
+  const auto refused = store->requeue(id, 0, [](const Job& again) -> Result<void> {
+    EXPECT_EQ(again.state, JobState::queued);
+    return fail(ErrorCode::no_space, "no note can be written");
+  });
+  EXPECT_EQ(code_of(refused), ErrorCode::no_space);
+  EXPECT_EQ(value(store->find(id)).state, JobState::failed);
+}
+
+TEST_P(StoreTest, CountsWhatIsUsedOfAQuotaAndRefusesMore) {
+  use_own_clock();
+  const NewJob asked{.lane = "a",
+                     .payload = "",
+                     .expected = 40s,
+                     .requester = "studio",
+                     .quota = {.active = 2, .worked_per_day = 100s}};
+  const auto submit_asked = [&] { return store->submit(asked, many); };
+  const std::string first = value(submit_asked()).job.id;
+  value(submit_asked());
+  value(store->submit({.lane = "a", .payload = "", .requester = "others"}, many));
+  EXPECT_EQ(value(store->usage("studio")).active, 2u);
+  EXPECT_EQ(value(store->usage("studio")).expected, 80s);
+  auto refused = submit_asked();
+  ASSERT_EQ(code_of(refused), ErrorCode::quota_exceeded);
+  EXPECT_EQ(refused.error().where, "active");
+  EXPECT_EQ(code_of(store->check_quota(asked)), ErrorCode::quota_exceeded);
+
+  EXPECT_EQ(claim(), first);
+  value(apply(first, {.event = Event::report, .worked = 30s}));
+  EXPECT_EQ(value(store->usage("studio")).expected, 50s) << "what is left of both";
+  value(apply(first, {.event = Event::succeed, .worked = 25s}));
+  value(store->remove(first));
+  const Usage used = value(store->usage("studio"));
+  EXPECT_EQ(used.active, 1u);
+  EXPECT_EQ(used.expected, 40s);
+  EXPECT_EQ(used.worked_today, 55s) << "a record that is removed does not undo the work";
+  refused = submit_asked();
+  ASSERT_EQ(code_of(refused), ErrorCode::quota_exceeded);
+  EXPECT_EQ(refused.error().where, "worked_per_day");
+  EXPECT_NE(refused.error().message.find("55 s are used"), std::string::npos) << refused.error().message;
+  NewJob small = asked;
+  small.expected = 5s;
+  value(store->check_quota(small));
+  NewJob never = asked;
+  never.expected = 101s;
+  refused = store->submit(never, many);
+  ASSERT_EQ(code_of(refused), ErrorCode::too_large) << "on no day";
+  EXPECT_EQ(refused.error().where, "worked_per_day");
+
+  reopen({.own_clock = true});
+  EXPECT_EQ(value(store->usage("studio")).worked_today, 55s);
+  advance(24h);
+  EXPECT_EQ(value(store->usage("studio")).worked_today, 0s) << "a new day";
+  value(submit_asked());
+  EXPECT_EQ(value(store->usage("others")).worked_today, 0s);
+}
+
+TEST_P(StoreTest, CountsNoQuotaWhereNobodyIsNamed) {
+  const std::string id = submit();
+  claim();
+  value(apply(id, {.event = Event::succeed, .worked = 25s}));
+  EXPECT_EQ(value(store->usage("")).worked_today, 0s);
+  EXPECT_EQ(value(store->find(id)).worked, 25s);
+}
+
+TEST_P(StoreTest, WhoVisitsLeavesClaimsAsTheyAre) {
+  const std::string id = submit();
+  claim();
+  reopen({.visits = true});
+  const Job job = value(store->find(id));
+  EXPECT_TRUE(job.claimed);
+  EXPECT_EQ(job.deaths, 0);
+  EXPECT_EQ(job.holder, "here:1");
+  EXPECT_GE(value(store->now()), *job.claimed_at);
+  reopen();
+  EXPECT_FALSE(value(store->find(id)).claimed);
 }
 
 TEST_P(StoreTest, AJobThatItsWitnessRefusesDoesNotExist) {

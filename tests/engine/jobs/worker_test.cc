@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "engine/core/rng.h"
+#include "engine/jobs/notes.h"
 #include "tests/engine/jobs/jobs_support.h"
 #include "tests/engine/jobs/store_kind.h"
 
@@ -41,13 +42,25 @@ class Between final : public Store {
  public:
   explicit Between(Store& store) : store_(store) {}
   std::function<void(const Change&)> after_apply = [](const Change&) {};
+  std::function<void()> before_requeue = [] {};
+  bool loses_answer_to_requeue = false;
   std::function<std::optional<Error>()> instead_of_renew = [] { return std::nullopt; };
 
+  using Store::requeue;
   using Store::submit;
   Result<Submission> submit(const NewJob& job, std::size_t max_queued, const Witness& witness) override {
     return store_.submit(job, max_queued, witness);
   }
   Result<void> check_room(std::size_t max_queued) override { return store_.check_room(max_queued); }
+  Result<void> check_quota(const NewJob& job) override { return store_.check_quota(job); }
+  Result<Usage> usage(const std::string& requester) override { return store_.usage(requester); }
+  Result<Job> requeue(const std::string& id, int finished_intervals, const Witness& witness) override {
+    before_requeue();
+    auto job = store_.requeue(id, finished_intervals, witness);
+    if (loses_answer_to_requeue) return fail(ErrorCode::unavailable, "the server has gone away");
+    return job;
+  }
+  Result<Time> now() override { return store_.now(); }
   Result<void> restore(const Job& job) override { return store_.restore(job); }
   Result<Job> find(const std::string& id) override { return store_.find(id); }
   Result<std::optional<Job>> find_key(const std::string& key) override { return store_.find_key(key); }
@@ -222,6 +235,131 @@ TEST_P(WorkerTest, RecordsTheErrorOfAJobAndGoesOn) {
   EXPECT_EQ(bad.error->code, ErrorCode::unprocessable);
   EXPECT_EQ(bad.error->where, "handles[0]");
   EXPECT_EQ(wait_for_end(*queue, "e000002").state, JobState::succeeded);
+}
+
+TEST_P(WorkerTest, AJobThatFailedGoesOnFromItsCheckpointOnceItIsTakenUpAgain) {
+  const std::string id = submit();
+  std::atomic<bool> broken = true;
+  start([&](JobContext& context) -> Result<JobResult> {
+    std::string done = context.finished_intervals() > 0 ? value(context.load_checkpoint()) : "";
+    for (int u = context.finished_intervals() + 1; u <= 3; ++u) {
+      if (u == 3 && broken) return fail(ErrorCode::unavailable, "there is no model");
+      done += std::to_string(u);
+      if (auto saved = context.save_checkpoint(u, done); !saved) return propagate(saved);
+    }
+    return JobResult{.text = done + (broken ? "" : " at last")};
+  });
+  EXPECT_EQ(wait_for_end(*queue, id).state, JobState::failed);
+  EXPECT_TRUE(fs::exists(folder(id) / "checkpoint-2")) << "it may be wanted";
+  broken = false;
+  value(queue->requeue(id));
+  EXPECT_EQ(wait_for_end(*queue, id).result, "123 at last");
+  worker->drain(patience);
+  EXPECT_TRUE(fs::is_empty(folder(id)));
+}
+
+TEST_P(WorkerTest, AJobThatFailedOfAFullDiskGivesItsCheckpointBack) {
+  const std::string id = submit();
+  std::atomic<bool> full = true;
+  start([&](JobContext& context) -> Result<JobResult> {
+    EXPECT_EQ(context.finished_intervals(), 0);
+    if (auto saved = context.save_checkpoint(1, "one"); !saved) return propagate(saved);
+    if (full) return fail(ErrorCode::no_space, "the disk is full");
+    return JobResult{};
+  });
+  EXPECT_EQ(wait_for_end(*queue, id).state, JobState::failed);
+  value(queue->expire());  // waits for the end of what the worker does about it
+  EXPECT_TRUE(fs::is_empty(folder(id)));
+  full = false;
+  value(queue->requeue(id));
+  EXPECT_EQ(wait_for_end(*queue, id).state, JobState::succeeded);
+}
+
+/// Jobs that other processes take up again or remove at whatever moment.
+class RequeueTest : public WorkerTest {
+ protected:
+  void TearDown() override {
+    worker.reset();
+    queue.reset();
+  }
+  std::string failed() {
+    const std::string id = submit();
+    const auto claimed = value(store->claim());
+    value(write_note(jobs, value(store->apply(id, {.event = Event::fail, .claim = claimed->claim_number}))));
+    queue.reset();
+    queue = open_queue(between, dir.path());
+    return id;
+  }
+  JobState noted(const std::string& id) { return value(read_note(jobs, id)).state; }
+  /// As in another process.
+  void take_up_again(const std::string& id) {
+    value(store->requeue(id, 0, [&](const Job& again) { return write_note(jobs, again); }));
+  }
+  const fs::path jobs = dir.path() / "jobs";
+  Between between{*store};
+};
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(RequeueTest);
+INSTANTIATE_TEST_SUITE_P(Each, RequeueTest, testing::ValuesIn(store_kinds()));
+
+TEST_P(RequeueTest, OneWhoseAnswerIsLostStands) {
+  const std::string id = failed();
+  between.loses_answer_to_requeue = true;
+  EXPECT_EQ(code_of(queue->requeue(id)), ErrorCode::unavailable);
+  EXPECT_EQ(value(store->find(id)).state, JobState::queued);
+  EXPECT_EQ(noted(id), JobState::queued) << "the next start would put the failure back";
+}
+
+TEST_P(RequeueTest, OfTwoAtOnceTheSecondUndoesNothing) {
+  const std::string id = failed();
+  between.before_requeue = [&] { take_up_again(id); };
+  EXPECT_EQ(code_of(queue->requeue(id)), ErrorCode::conflict);
+  EXPECT_EQ(noted(id), JobState::queued);
+}
+
+TEST_P(RequeueTest, BringsNothingBackThatIsRemovedMeanwhile) {
+  const std::string id = failed();
+  between.before_requeue = [&] {
+    value(store->remove(id));
+    remove_traces(jobs, id);
+  };
+  EXPECT_EQ(code_of(queue->requeue(id)), ErrorCode::not_found);
+  EXPECT_FALSE(fs::exists(jobs / (id + ".job")));
+}
+
+TEST_P(RequeueTest, OutlivesTheNoteOfTheWorkerThatRecordsTheFailure) {
+  const std::string id = submit();
+  queue.reset();
+  queue = open_queue(between, dir.path());
+  bool first = true;
+  between.after_apply = [&](const Change& change) {
+    if (change.event == Event::fail && std::exchange(first, false)) take_up_again(id);
+  };
+  start([&](JobContext&) -> Result<JobResult> {
+    if (first) return fail(ErrorCode::unavailable, "there is no model");
+    arrived.open();
+    gate.pass();
+    return JobResult{};
+  });
+  arrived.pass();
+  EXPECT_EQ(noted(id), JobState::queued);
+  gate.open();
+  EXPECT_EQ(wait_for_end(*queue, id).state, JobState::succeeded);
+}
+
+TEST_P(WorkerTest, CountsTheTimeOfWork) {
+  const std::string id = value(queue->submit({.lane = "a", .payload = "", .requester = "studio"})).job.id;
+  start([&](JobContext& context) -> Result<JobResult> {
+    std::this_thread::sleep_for(30ms);
+    context.publish_progress("some");
+    std::this_thread::sleep_for(30ms);
+    if (auto saved = context.save_checkpoint(1, "x"); !saved) return propagate(saved);
+    std::this_thread::sleep_for(30ms);
+    return JobResult{};
+  });
+  const Job done = wait_for_end(*queue, id);
+  EXPECT_GE(done.worked, 88ms) << "each part may be cut to whole milliseconds";
+  EXPECT_LE(done.worked, *done.ended - *done.claimed_at + 50ms);
+  EXPECT_EQ(value(store->usage("studio")).worked_today, done.worked) << "unless it was midnight";
 }
 
 TEST_P(WorkerTest, TurnsAnExceptionIntoAnInternalError) {

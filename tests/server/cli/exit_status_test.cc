@@ -11,7 +11,7 @@ using engine::ErrorCode;
 
 TEST(ExitStatus, DiffersForEveryErrorCodeAndIsInTheHelp) {
   std::set<int> seen;
-  for (int code = 0; code <= int(ErrorCode::internal); ++code) {
+  for (int code = 0; code <= int(ErrorCode::quota_exceeded); ++code) {
     const int status = exit_status(ErrorCode(code));
     EXPECT_GT(status, 0);
     EXPECT_LT(status, 126) << "from 126 on the shell has meanings of its own";

@@ -2,10 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <future>
 #include <optional>
 #include <string>
 #include <thread>
 
+#include "server/edits/operation.h"
 #include "server/edits/records.h"
 #include "tests/engine/jobs/postgres_support.h"
 #include "tests/server/edits/service_support.h"
@@ -110,6 +112,18 @@ TEST_F(DatabaseTest, AFolderThatTheDatabaseKnowsKeepsItsId) {
   ASSERT_FALSE(open(store));
   fs::remove(edits / "jobs");
   EXPECT_TRUE(open(store)) << "with another id it were another's";
+}
+
+TEST_F(DatabaseTest, NothingIsTakenUpAgainFromOutsideWhileASceneIsChanged) {
+  const std::string id = finished_edit(store);
+  const auto service = value(open(store));
+  std::future<Result<EditAtHand>> requeued;
+  value(service->while_idle(scene, [&]() -> Result<void> {
+    requeued = std::async(std::launch::async, [&] { return requeue_edit(edits, store, id); });
+    EXPECT_EQ(requeued.wait_for(500ms), std::future_status::timeout) << "it waits for the end of this";
+    return {};
+  }));
+  EXPECT_EQ(code_of(requeued.get()), ErrorCode::conflict) << "it has succeeded";
 }
 
 /// Several processes over one folder and one database: here, as many stores of scenes and services.

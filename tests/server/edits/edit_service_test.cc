@@ -474,6 +474,24 @@ TEST_F(ServiceTest, AFullQueueIsBusy) {
   EXPECT_EQ(code_of(service->submit(move_ball(scene), "")), ErrorCode::busy);
 }
 
+TEST_F(ServiceTest, KeepsEverybodyWithinTheirQuota) {
+  const EditService::Requester studio{.name = "studio", .quota = {.active = 1}};
+  const std::string first = value(service->submit(move_ball_for_long(scene), "key", studio)).status.id;
+  const auto refused = service->submit(move_ball(scene), "", studio);
+  ASSERT_EQ(code_of(refused), ErrorCode::quota_exceeded);
+  EXPECT_EQ(refused.error().where, "edits");
+  EXPECT_EQ(value(service->submit(move_ball_for_long(scene), "key", studio)).status.id, first) << "asked again";
+  (void)value(service->submit(move_ball(scene), "", {.name = "others", .quota = {.active = 1}}));
+  (void)value(service->estimate(move_ball(scene)));
+  (void)value(service->cancel(first));
+  wait_for_end(*service, first);
+  (void)value(service->submit(move_ball(scene), "", studio));
+  const auto too_long =
+      service->submit(move_ball_for_long(scene), "", {.name = "third", .quota = {.worked_per_day = 1ms}});
+  ASSERT_EQ(code_of(too_long), ErrorCode::too_large) << "it fits on no day";
+  EXPECT_EQ(too_long.error().where, "seconds");
+}
+
 TEST_F(ServiceTest, LooksAtASceneWithinTheMemoryForWorkAndOnlyWhereThereIsRoomInTheQueue) {
   service.reset();
   engine::MemoryBudget budget(1 << 30, "--work-memory", std::chrono::milliseconds(20));
@@ -610,6 +628,10 @@ TEST_F(ServiceTest, AnEditThatOutlivesItsTimeEndsWithWhatItHas) {
   EXPECT_EQ(none.error->code, ErrorCode::too_large);
   EXPECT_NE(none.error->message.find("--edit-time"), std::string::npos) << none.error->message;
   EXPECT_EQ(versions(), 2u);
+
+  sleeper.seconds = 0;
+  (void)value(hurried->requeue(none.id));
+  EXPECT_EQ(wait_for_end(*hurried, none.id).state, "succeeded") << "it has its whole time again";
 }
 
 TEST_F(ServiceTest, ACancelledEditLeavesNothingAtWhateverMomentItComes) {

@@ -85,6 +85,16 @@ TEST_F(ResultsTest, WhatACancelledOrForgottenEditHasMadeIsDropped) {
   EXPECT_TRUE(scenes->made_versions().empty());
 }
 
+TEST_F(ResultsTest, WhatAnEditMakesThatIsTakenUpAgainOutlivesTheEndBefore) {
+  const Edit failed = begin();
+  value(store->apply(failed.id, {.event = Event::fail, .claim = failed.claim}));
+  value(queue->requeue(failed.id));
+  Edit next{failed.id, value(store->claim())->claim_number, {}};
+  next.made = make(next);
+  drop_results(*scenes, failed.id, failed.claim);  // its worker comes to that late
+  EXPECT_EQ(scenes->made_versions(), std::vector<std::string>{next.made.file});
+}
+
 TEST_F(ResultsTest, VersionsOfEditsThatFollowEachOtherAreInTheirOrder) {
   const Edit first = begin();
   succeed(first);  // and is killed at once

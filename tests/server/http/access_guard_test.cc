@@ -137,6 +137,15 @@ TEST(AccessGuard, HoldsNoTokenAgainstWhatIsTooLongToBeOne) {
   EXPECT_EQ(status_of(guard, "Bearer " + longest + "x"), 401);
 }
 
+TEST(AccessGuard, ASessionOutlivesOtherQuotasAndHasThem) {
+  Token token{.name = "studio", .edit = true, .secret = "1", .quotas = {.edits = 1}};
+  AccessGuard guard({.tokens = {token}, .allowed_hosts = {}, .allowed_origins = {}});
+  const RequestHead head = with_cookie(guard.open_session(**guard.check_token("Bearer 1", "a")).value());
+  token.quotas.edits = 7;
+  guard.replace_tokens({token});
+  EXPECT_EQ(guard.check_access(head, "a").value()->quotas.edits, 7u);
+}
+
 TEST(AccessGuard, KnowsWhoseRequestItIs) {
   const AccessGuard guard({.tokens = {{.name = "first", .read = true, .secret = "1"},
                                       {.name = "second", .edit = true, .secret = "22"},

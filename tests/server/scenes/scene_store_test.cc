@@ -538,6 +538,77 @@ TEST_F(SceneStoreTest, RefusesMoreScenesThanTheLimit) {
   EXPECT_NE(refused.error().message.find("--max-scenes"), std::string::npos);
 }
 
+TEST_F(SceneStoreTest, StoresNoMoreForSomebodyThanTheyMay) {
+  const auto upload = [&](const Uploader& uploader) {
+    write(temp.path() / "up.ply", random_cloud(50, 0, 1));
+    return store->add_upload(temp.path() / "up.ply", "chair.ply", "", uploader);
+  };
+  const auto first = upload({.name = "studio"});
+  ASSERT_TRUE(first) << first.error().message;
+  const std::uint64_t bytes = first->disk_bytes;
+  EXPECT_EQ(first->uploader, "studio");
+  EXPECT_EQ(store->bytes_of("studio"), bytes);
+  EXPECT_EQ(store->bytes_of("others"), 0u);
+  EXPECT_EQ(store->bytes_of(""), 0u);
+
+  const Uploader studio{.name = "studio", .max_bytes = 2 * bytes + 10};
+  EXPECT_TRUE(store->check_quota(studio, bytes + 10));
+  ASSERT_TRUE(upload(studio));
+  const auto refused = upload(studio);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::quota_exceeded);
+  EXPECT_EQ(refused.error().where, "bytes");
+  EXPECT_NE(refused.error().message.find("studio may store " + std::to_string(2 * bytes + 10)), std::string::npos)
+      << refused.error().message;
+  EXPECT_FALSE(store->check_quota(studio, 11));
+  EXPECT_TRUE(upload({.name = "others", .max_bytes = bytes})) << "everybody has their own";
+
+  // Unpacked datasets count for who brought them in, whosever the scene is; one that is replaced gives way.
+  write_zip(temp.path() / "data.zip", {{"transforms.json", transforms_json()}});
+  const auto put = [&](const Uploader& uploader) {
+    return store->put_dataset_zip(first->id, temp.path() / "data.zip", "data.zip", uploader);
+  };
+  const auto too_large = put(studio);
+  ASSERT_FALSE(too_large);
+  EXPECT_EQ(too_large.error().code, ErrorCode::quota_exceeded);
+  EXPECT_FALSE(store->find(first->id)->dataset);
+  const auto with_dataset = put({.name = "third"});
+  ASSERT_TRUE(with_dataset) << with_dataset.error().message;
+  const std::uint64_t dataset_bytes = with_dataset->disk_bytes - bytes;
+  EXPECT_EQ(store->bytes_of("third"), dataset_bytes);
+  EXPECT_EQ(store->bytes_of("studio"), 2 * bytes);
+  EXPECT_TRUE(put({.name = "third", .max_bytes = dataset_bytes}));
+  EXPECT_FALSE(put({.name = "third", .max_bytes = dataset_bytes - 1}));
+  const Uploader full{.name = "third", .max_bytes = dataset_bytes};
+  EXPECT_FALSE(store->check_quota(full, 1));
+  EXPECT_TRUE(store->check_quota(full, dataset_bytes, first->id)) << "in place of what goes";
+  EXPECT_FALSE(store->check_quota(full, dataset_bytes + 1, first->id));
+  EXPECT_FALSE(store->check_quota({.name = "studio", .max_bytes = 2 * bytes}, 1, first->id)) << "it is another's";
+
+  open();
+  EXPECT_EQ(store->bytes_of("studio"), 2 * bytes) << "it outlives a restart";
+  EXPECT_EQ(store->bytes_of("third"), dataset_bytes);
+  ASSERT_TRUE(store->remove(first->id));
+  EXPECT_EQ(store->bytes_of("third"), 0u);
+  EXPECT_TRUE(upload(studio));
+}
+
+TEST_F(SceneStoreTest, ManyUploadsAtOnceDoNotPassAQuotaTogether) {
+  for (int i = 0; i < 6; ++i) write(temp.path() / ("up" + std::to_string(i) + ".ply"), random_cloud(50, 0, 1));
+  const std::uint64_t bytes = fs::file_size(temp.path() / "up0.ply");
+  std::atomic<int> taken = 0;
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 6; ++i)
+    threads.emplace_back([&, i] {
+      const auto added = store->add_upload(temp.path() / ("up" + std::to_string(i) + ".ply"), "a.ply", "",
+                                           {.name = "studio", .max_bytes = 2 * bytes});
+      if (added) ++taken;
+    });
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(taken, 2);
+  EXPECT_EQ(store->list().size(), 2u);
+}
+
 TEST_F(SceneStoreTest, SaysWhatThereIsNot) {
   const std::string id = add();
   EXPECT_EQ(store->find("s000099").error().where, "scene");

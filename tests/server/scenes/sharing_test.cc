@@ -53,6 +53,21 @@ TEST_F(SharingTest, WhatOneHasDoneTheOtherSees) {
   EXPECT_EQ(store->usage().memory_bytes, 0u);
 }
 
+TEST_F(SharingTest, WhatSomebodyStoresThroughOneCountsInTheOther) {
+  const auto upload = [&](SceneStore& to) {
+    write(temp.path() / "up.ply", engine::scene::random_cloud(20, 0, 1));
+    return to.add_upload(temp.path() / "up.ply", "chair.ply", "", {.name = "studio", .max_bytes = 3000});
+  };
+  const auto first = upload(*store);
+  ASSERT_TRUE(first) << first.error().message;
+  ASSERT_GT(2 * first->disk_bytes, 3000u);
+  const auto second = upload(*other);
+  ASSERT_FALSE(second);
+  EXPECT_EQ(second.error().code, ErrorCode::quota_exceeded);
+  ASSERT_TRUE(other->remove(first->id));
+  EXPECT_TRUE(upload(*store));
+}
+
 TEST_F(SharingTest, ADatasetIsTheOneThatCameLast) {
   const std::string id = add();
   const auto put = [&](SceneStore& to) {

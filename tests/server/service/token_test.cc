@@ -78,10 +78,29 @@ TEST_F(TokenFile, HoldsALineForEachToken) {
   EXPECT_TRUE(tokens[2].may(http::Scope::read)) << "who edits also sees";
 }
 
+TEST_F(TokenFile, MayGiveATokenQuotas) {
+  const auto tokens = read(
+                          "a edit 1 edits=4 bytes=2GB seconds=3600 # a day\n"
+                          "b edit 2 bytes=512MiB\n"
+                          "c edit 3 bytes=17\n")
+                          .value();
+  EXPECT_EQ(tokens[0].quotas.edits, 4u);
+  EXPECT_EQ(tokens[0].quotas.bytes, 2'000'000'000u);
+  EXPECT_EQ(tokens[0].quotas.seconds, 3600u);
+  EXPECT_EQ(tokens[1].quotas.bytes, 512u << 20);
+  EXPECT_FALSE(tokens[1].quotas.edits || tokens[1].quotas.seconds);
+  EXPECT_EQ(tokens[2].quotas.bytes, 17u);
+}
+
 TEST_F(TokenFile, NamesTheLineThatIsWrongAndNoSecret) {
   const std::string good = "# a comment\nviewer read s3cr-1\n";
   EXPECT_EQ(refused(good + "s3cr-2\n"), "3: expected three words: a name, its scopes, and the secret");
-  EXPECT_EQ(refused(good + "other read s3cr-2 edit\n"), "3: expected three words: a name, its scopes, and the secret");
+  EXPECT_EQ(refused(good + "other read s3cr-2 edit\n"),
+            "3: quotas are such as edits=4, bytes=2GB and seconds=3600, each once (what follows the secret)");
+  for (const char* quota :
+       {"edits=", "edits", "edits=0", "edits=-1", "edits=1.5", "edits=4x", "bytes=2gb", "bytes=GB",
+        "bytes=99999999999TB", "seconds=1h", "seconds=99999999999", "secrets=1", "=", "edits=1 edits=1"})
+    EXPECT_TRUE(refused(std::string("other edit s3cr-2 ") + quota).starts_with("1: quotas are")) << quota;
   EXPECT_EQ(refused("other read #s3cr\n"), "1: expected three words: a name, its scopes, and the secret");
   EXPECT_EQ(refused(good + "\nother s3cr-2 read"),
             "4: scopes are read, edit and admin, with commas between several (the second word)");

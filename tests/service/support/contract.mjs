@@ -49,7 +49,7 @@ export const operationOf = (method, path) =>
 /// Status of each problem code. `general` ones may come from any route; the others only where they are listed.
 const statusOf = {
   invalid_argument: [400, 416], unprocessable: [422], not_found: [404], conflict: [409], corrupt_data: [422], unsupported: [422, 501, 505],
-  too_large: [413, 414, 431], no_space: [507], busy: [429], cancelled: [503], unavailable: [503], internal: [500],
+  too_large: [413, 414, 431], no_space: [507], busy: [429], quota_exceeded: [429], cancelled: [503], unavailable: [503], internal: [500],
   unauthorized: [401], forbidden: [403], misdirected_request: [421], method_not_allowed: [405], unsupported_media_type: [415],
   not_acceptable: [406], request_timeout: [408],
 };

@@ -12,6 +12,7 @@ Manifest full_manifest() {
   SceneInfo& scene = manifest.scene;
   scene.id = "s000007";
   scene.name = "a \"chair\"\xc3\xa9";
+  scene.uploader = "studio";
   scene.created = Time(std::chrono::milliseconds(1'700'000'000'123));
   scene.format = "ply";
   scene.sh_degree = 3;
@@ -27,7 +28,7 @@ Manifest full_manifest() {
   manifest.overlay_memory_bytes = {0, 99};
   manifest.base_digest = "00112233445566ff";
   manifest.overlay_digests = {"", "0123456789abcdef"};
-  manifest.dataset = DatasetLocation{"dataset.3/chair", false, 1234, "fedcba9876543210"};
+  manifest.dataset = DatasetLocation{"dataset.3/chair", false, 1234, "fedcba9876543210", "other"};
   manifest.next_dataset = 4;
   manifest.next_version = 5;
   return manifest;
@@ -42,6 +43,8 @@ TEST(Manifest, ComesBackAsItWasWritten) {
   ASSERT_TRUE(write_manifest(again.path(), *read));
   EXPECT_EQ(support::read_file(temp.path() / manifest_name), support::read_file(again.path() / manifest_name));
   EXPECT_EQ(read->scene.versions[1].edit, "e000001");
+  EXPECT_EQ(read->scene.uploader, "studio");
+  EXPECT_EQ(read->dataset->uploader, "other");
   EXPECT_EQ(read->scene.dataset->psnr_mean_db, 35.5);
   EXPECT_EQ(read->scene.up, engine::DVec3(0, -1, 0));
 }
@@ -124,6 +127,7 @@ TEST(Manifest, KnowsItselfByEveryBit) {
 /// What releases before checksums wrote.
 std::string of_format_1(nlohmann::json document) {
   document["manifest"] = 1;
+  document.erase("uploader"), document["dataset"].erase("uploader");
   document.erase("xxh3"), document.erase("base_xxh3"), document["dataset"].erase("xxh3");
   for (auto& version : document["versions"]) version.erase("xxh3");
   return document.dump();

@@ -1,6 +1,7 @@
 #include "server/service/routes/edit_routes.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <functional>
 #include <map>
@@ -24,6 +25,7 @@ using namespace std::chrono_literals;
 struct Request : http::Call {
   std::map<std::string, std::string, std::less<>> in_path, in_query, headers;
   std::string text, known_etag, nothing;
+  http::TokenPtr by;
 
   const std::string& request_id() const override { return nothing; }
   const std::string& path(std::string_view name) const override { return in_path.find(name)->second; }
@@ -37,6 +39,7 @@ struct Request : http::Call {
   }
   bool has_header(std::string_view name) const override { return headers.contains(name); }
   const std::string& body() const override { return text; }
+  http::TokenPtr token() const override { return by; }
   bool is_json() const override { return true; }
   Result<http::UploadInfo> receive(const std::filesystem::path&) const override {
     return engine::fail(ErrorCode::internal, "no route of edits takes a file");
@@ -106,13 +109,14 @@ TEST_F(EditRoutesTest, AreThoseOfTheContract) {
   for (const http::Route& known : router.routes()) {
     found.push_back(known.method + " " + known.path);
     const bool reads = known.method == "GET" || known.path == "/v1/previews";
-    EXPECT_EQ(known.access, reads ? http::Access::read : http::Access::edit) << known.path;
+    const auto changes = known.path.ends_with("/requeue") ? http::Access::admin : http::Access::edit;
+    EXPECT_EQ(known.access, reads ? http::Access::read : changes) << known.path;
   }
   std::sort(found.begin(), found.end());
   EXPECT_EQ(found, (std::vector<std::string>{
                        "DELETE /v1/edits/{id}", "GET /v1/edits", "GET /v1/edits/{id}", "GET /v1/edits/{id}/events",
                        "GET /v1/edits/{id}/intervals/{u}/renders/{k}", "POST /v1/edits", "POST /v1/edits/{id}/cancel",
-                       "POST /v1/edits/{id}/stop", "POST /v1/previews"}));
+                       "POST /v1/edits/{id}/requeue", "POST /v1/edits/{id}/stop", "POST /v1/previews"}));
   EXPECT_EQ(route("POST", "/v1/edits").body, http::Body::json);
   EXPECT_EQ(route("POST", "/v1/edits/{id}/stop").body, http::Body::none);
   EXPECT_EQ(route("POST", "/v1/edits").reads_with, "validate_only");
@@ -150,6 +154,44 @@ TEST_F(EditRoutesTest, AFullQueueSaysWhenThereIsRoom) {
   EXPECT_GT(seconds, 1);
   EXPECT_LE(seconds, std::ceil(2 * *known.eta_seconds)) << "it is what is left of the edit that runs";
   for (const auto& edit : value(service->list({}))) (void)value(service->cancel(edit.id));
+}
+
+TEST_F(EditRoutesTest, AQuotaIsThatOfTheTokenAndSaysWhichAndForHowLong) {
+  Request body = edit_body();
+  const auto with = [&](const http::Quotas& quotas) {
+    body.by = std::make_shared<const http::Token>(
+        http::Token{.name = "studio", .edit = true, .secret = "s", .quotas = quotas});
+    return call("POST", "/v1/edits", body);
+  };
+  proto::EditRequest slow = edits::move_ball_for_long(scene, 2);
+  slow.allow_slow = true;
+  body.text = proto::to_json(slow);
+  EXPECT_EQ(value(with({.edits = 1})).status, 202);
+  body.text = edit_body().text;
+  const auto many = value(with({.edits = 1}));
+  EXPECT_EQ(many.status, 429);
+  EXPECT_EQ(json::parse(many.body).at("code"), "quota_exceeded");
+  EXPECT_EQ(json::parse(many.body).at("where"), "edits");
+  EXPECT_GE(std::stoi(header_of(many, "Retry-After")), 1);
+  body.text = proto::to_json(slow);
+  EXPECT_EQ(value(with({.edits = 2})).status, 202);
+  const double alone = value(service->estimate(slow)).seconds;
+  const auto tired = value(with({.seconds = std::uint64_t(std::ceil(1.2 * alone))}));
+  EXPECT_EQ(tired.status, 429);
+  EXPECT_EQ(json::parse(tired.body).at("where"), "seconds");
+  const int seconds = std::stoi(header_of(tired, "Retry-After"));
+  const auto now = std::chrono::system_clock::now();
+  const std::chrono::duration<double> left = std::chrono::ceil<std::chrono::days>(now) - now;
+  EXPECT_NEAR(seconds, left.count(), 60) << "until the day is over, unless it just was";
+  body.by = std::make_shared<const http::Token>(
+      http::Token{.name = "idle", .edit = true, .secret = "i", .quotas = {.seconds = 0}});
+  const auto never = call("POST", "/v1/edits", body);
+  ASSERT_FALSE(never);
+  EXPECT_EQ(never.error().code, ErrorCode::too_large) << "no day is long enough, and so there is none to wait for";
+  EXPECT_EQ(never.error().where, "seconds");
+  body.text = edit_body().text;
+  EXPECT_EQ(value(with({.edits = 3})).status, 202);
+  for (const auto& edit : value(service->list({}))) (void)service->cancel(edit.id);
 }
 
 TEST_F(EditRoutesTest, AskForNoMoreThanTheServiceAllows) {

@@ -24,6 +24,8 @@ struct FakeCall : http::Call {
   std::string text, accept, known_etag, id = "request-1";
   bool json_body = true;
   std::string upload, upload_name;
+  std::uint64_t declared = 0;  ///< Length of the body; 0: not said.
+  http::TokenPtr by;
 
   const std::string& request_id() const override { return id; }
   const std::string& path(std::string_view name) const override { return in_path.find(name)->second; }
@@ -31,7 +33,10 @@ struct FakeCall : http::Call {
     const auto found = in_query.find(name);
     return found == in_query.end() ? std::nullopt : std::optional(found->second);
   }
-  std::string header(std::string_view) const override { return {}; }
+  std::string header(std::string_view name) const override {
+    return name == "content-length" && declared > 0 ? std::to_string(declared) : std::string();
+  }
+  http::TokenPtr token() const override { return by; }
   bool has_header(std::string_view) const override { return false; }
   const std::string& body() const override { return text; }
   bool is_json() const override { return json_body; }

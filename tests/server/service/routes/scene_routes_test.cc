@@ -312,6 +312,32 @@ TEST_F(SceneRoutes, KeepADatasetThatCannotBeComparedAndSayWhy) {
   EXPECT_EQ(json::parse(call("GET", "/v1/scenes/{id}", about(id))->body)["dataset"], dataset);
 }
 
+TEST_F(SceneRoutes, WhoeverMayStoreNothingMoreMayReplaceADatasetAndNeedNotSendMore) {
+  const std::string id = add_wall();
+  scenes::write_zip(temp.path() / "bare.zip", {{"transforms.json", scenes::transforms_json()}});
+  FakeCall request = uploading(support::read_file(temp.path() / "bare.zip"), "capture.zip");
+  request.in_path = {{"id", id}};
+  const auto may_store = [&](std::uint64_t bytes) {
+    request.by = std::make_shared<const http::Token>(
+        http::Token{.name = "studio", .edit = true, .secret = "s", .quotas = {.bytes = bytes}});
+  };
+  may_store(1'000'000);
+  const auto put = [&] { return call("PUT", "/v1/scenes/{id}/dataset", request); };
+  ASSERT_TRUE(put());
+  may_store(store->bytes_of("studio"));
+  const auto again = put();
+  EXPECT_TRUE(again) << again.error().message;
+
+  request.declared = 10'000'000;
+  request.upload = "nobody reads this";
+  const auto long_one = put();
+  ASSERT_FALSE(long_one);
+  EXPECT_EQ(long_one.error().code, ErrorCode::quota_exceeded);
+  const auto scene = call("POST", "/v1/scenes", request);
+  ASSERT_FALSE(scene);
+  EXPECT_EQ(scene.error().code, ErrorCode::quota_exceeded);
+}
+
 TEST_F(SceneRoutes, TakeADatasetWithoutPhotosAndNameWhatIsMissing) {
   const std::string id = add_wall();
   scenes::write_zip(temp.path() / "bare.zip", {{"transforms.json", scenes::transforms_json()}});
