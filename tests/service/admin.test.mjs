@@ -13,13 +13,19 @@ before(async () => { demo = await demoScene({ gaussians: 5000, views: 4, size: '
 for (const kind of ['a file', 'PostgreSQL'])
   describe(`over ${kind}`, { skip: kind !== 'a file' && !installed && 'PostgreSQL\'s server is not on this machine (postgresql-15)' }, () => {
     const dataDir = temporaryFolder();
-    let service, scene, store = [];
+    let postgres, service, scene, store = [];
     before(async () => {
-      if (kind !== 'a file') store = ['--store', (await Postgres.start()).address];
+      if (kind !== 'a file') {
+        postgres = await Postgres.start();
+        store = ['--store', postgres.address];
+      }
       service = await Service.start({ dataDir, args: [...store, '--edit-attempts', '1', '--threads', '1'] });
       scene = (await service.client.upload(demo.ply)).id;
     });
-    after(() => service?.stop());
+    after(async () => {
+      await service?.stop();
+      await postgres?.crash();
+    });
 
     /// Longer than anybody looks at it.
     const endless = () => ({ scene, ...demo.leaf, params: { intervals: 20, max_image_side: 400 } });
