@@ -433,8 +433,7 @@ Result<Job> PostgresStore::requeue(const std::string& id, int finished_intervals
     const auto younger = ids(
         impl_->work.run("SELECT number FROM splatdrag.jobs WHERE ended IS NULL AND lane = $1 AND number > $2 LIMIT 1",
                         job.lane, known_number(id)));
-    if (job.state == JobState::failed)
-      check_is_last_of_lane(job, younger.empty() ? std::nullopt : std::optional(younger.front()));
+    check_is_last_of_lane(job, younger);
     auto changed = transition(job, {.event = Event::requeue, .interval = finished_intervals}, now);
     if (!changed) throw StoreFailure(changed.error());
     impl_->write(*changed);

@@ -588,8 +588,7 @@ Result<Job> SqliteStore::requeue(const std::string& id, int finished_intervals, 
     const auto younger = ids(
         Statement(impl_->database, "SELECT number FROM jobs WHERE ended IS NULL AND lane = ?1 AND number > ?2 LIMIT 1",
                   job.lane, known_number(id)));
-    if (job.state == JobState::failed)
-      check_is_last_of_lane(job, younger.empty() ? std::nullopt : std::optional(younger.front()));
+    check_is_last_of_lane(job, younger);
     Job requeued =
         apply_in(impl_->database, id, {.event = Event::requeue, .interval = finished_intervals}, impl_->now());
     if (const auto witnessed = witness(requeued); !witnessed) throw StoreFailure(witnessed.error());

@@ -112,8 +112,7 @@ class Store {
   /// Gives the job that can run and comes first to the caller; nothing if none can. A job can run if nobody holds it
   /// and no older one of its lane has yet to end. One that was running when its worker went away comes first: it has
   /// not made way. Then comes the one whose turn (turn_of()) is earliest. Its `claim_number` is the caller's: with it
-  /// go renew() and what apply() is to change.
-  /// Its `holder` is who the store was opened by.
+  /// go renew() and what apply() is to change; its `holder` is who the store was opened by.
   [[nodiscard]] virtual Result<std::optional<Job>> claim() = 0;
   /// How long a claim lasts that is not renewed; then others may take the job over. Nothing: as long as the process.
   [[nodiscard]] virtual std::optional<std::chrono::milliseconds> lease() const = 0;

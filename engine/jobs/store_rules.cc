@@ -86,11 +86,12 @@ void check_quota(const Usage& usage, const NewJob& job) {
                         "worked_per_day"});
 }
 
-void check_is_last_of_lane(const Job& job, const std::optional<std::string>& younger) {
-  if (!younger) return;
-  throw StoreFailure({ErrorCode::conflict,
-                      *younger + " came after " + job.id + " in its lane and has yet to end: wait for it, or cancel it",
-                      job.id});
+void check_is_last_of_lane(const Job& job, std::span<const std::string> younger) {
+  if (job.state != JobState::failed || younger.empty()) return;
+  throw StoreFailure(
+      {ErrorCode::conflict,
+       younger.front() + " came after " + job.id + " in its lane and has yet to end: wait for it, or cancel it",
+       job.id});
 }
 
 std::int64_t day_of(Time time) { return std::chrono::floor<std::chrono::days>(time).time_since_epoch().count(); }

@@ -54,9 +54,10 @@ void check_room(std::size_t waiting, std::size_t max_queued);
 [[nodiscard]] inline bool has_limit(const Quota& quota) { return quota.active || quota.worked_per_day; }
 /// Throws where the requester's quota has no room for the job, or never has.
 void check_quota(const Usage& usage, const NewJob& job);
-/// Throws where the lane of a job that is taken up again has one that has yet to end and is younger: it may run, and
-/// two of a lane never do.
-void check_is_last_of_lane(const Job& job, const std::optional<std::string>& younger);
+/// Throws where the lane of a failed job, which is to be taken up again, has younger ones that have yet to end: one may
+/// run, and two of a lane never do. Of a job that has not failed there is nothing to say here.
+///   younger  ids of any of these
+void check_is_last_of_lane(const Job& job, std::span<const std::string> younger);
 /// The day since 1970, UTC.
 [[nodiscard]] std::int64_t day_of(Time time);
 /// Days of the use of quotas that are kept. A choice: what has been used shows for a while.

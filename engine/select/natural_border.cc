@@ -52,7 +52,10 @@ struct Terrain {
     return border(node, edge) * root[node] * root[graph.to[edge]];
   }
   /// How much of a surface a node is; 1 where nodes count alike.
-  [[nodiscard]] double area(std::uint32_t node) const { return std::pow(root[node], 4.0); }
+  [[nodiscard]] double area(std::uint32_t node) const {
+    const double spacing = root[node] * root[node];
+    return spacing * spacing;
+  }
 };
 
 Terrain terrain_of(const neighbours::NeighbourGraph& graph, std::span<const float> weight, bool by_size) {
@@ -169,11 +172,14 @@ std::vector<std::uint32_t> by_potential(std::span<const double> potential, std::
   return order;
 }
 
-/// [n + 1] After so many nodes of the order, their share of all area.
-std::vector<double> shares_of_area(const Terrain& terrain, std::span<const std::uint32_t> order) {
-  std::vector<double> out(order.size() + 1, 0.0);
+/// [n + 1] By what the cost of a border counts, after so many nodes of the order: BorderChoice::smallness.
+std::vector<double> preferences_for_small(const Terrain& terrain, std::span<const std::uint32_t> order,
+                                          double smallness) {
+  std::vector<double> out(order.size() + 1, smallness > 0 ? 0.0 : 1.0);
+  if (!(smallness > 0)) return out;
   for (std::size_t i = 0; i < order.size(); ++i) out[i + 1] = out[i] + terrain.area(order[i]);
-  for (double& share : out) share /= out.back();
+  const double all = out.back();
+  for (double& area : out) area = std::pow(area / all, smallness);
   return out;
 }
 
@@ -218,15 +224,14 @@ NaturalBorder natural_border(const neighbours::NeighbourGraph& graph, std::span<
   const Terrain terrain = terrain_of(graph, weight, choice.whole || choice.beyond);
   const std::vector<double> inside = border_costs(terrain, order, clicked.inside);
   const std::vector<double> outside = border_costs(terrain, backwards, clicked.outside);
-  const std::vector<double> share = shares_of_area(terrain, order);
+  const std::vector<double> small = preferences_for_small(terrain, order, choice.smallness);
   const double preference = choice.leaks || !clicked.outside.empty() ? halfway : 0.0;
   std::vector<Level> levels;
   for (std::size_t taken = 1; taken <= n && given[order[taken - 1]] != Given::outside; ++taken) {
     const double last = potential[order[taken - 1]], next = taken < n ? potential[order[taken]] : 0.0;
     if (last == next || (taken == n && !choice.leaks)) continue;  // both or neither; or nobody knows of an outside
-    const double cost = (inside[taken] + outside[n - taken]) *
-                        (1 + preference * squared_log_odds(0.5 * (last + next))) *
-                        std::pow(share[taken], choice.smallness);
+    const double cost =
+        (inside[taken] + outside[n - taken]) * (1 + preference * squared_log_odds(0.5 * (last + next))) * small[taken];
     if (cost < infinity) levels.push_back({taken, cost});
   }
   NaturalBorder out{std::vector<std::uint8_t>(n, 0)};

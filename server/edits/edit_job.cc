@@ -243,18 +243,17 @@ class Run {
   /// The state to go on from; nothing: from the start.
   std::optional<edit::State> last_state() {
     if (context_.finished_intervals() == 0) return std::nullopt;
-    auto state = context_.load_checkpoint().and_then([&](std::string_view bytes) -> Result<edit::State> {
-      if (bytes.starts_with(inputs_begin)) {  // else it is of a release before
-        const std::string_view inputs = bytes.substr(0, bytes.find('\n') + 1);
-        if (inputs != inputs_) return fail(ErrorCode::conflict, "its inputs have changed since");
-        bytes.remove_prefix(inputs.size());
+    const auto saved = context_.load_checkpoint();
+    std::string_view bytes = saved ? std::string_view(*saved) : std::string_view();
+    if (bytes.starts_with(inputs_begin)) {  // else it is of a release before
+      const std::string_view inputs = bytes.substr(0, bytes.find('\n') + 1);
+      if (inputs != inputs_) {
+        begin_anew();
+        return std::nullopt;
       }
-      return edit::decode(bytes, *input_, request_);
-    });
-    if (!state && state.error().code == ErrorCode::conflict) {
-      begin_anew();
-      return std::nullopt;
+      bytes.remove_prefix(inputs.size());
     }
+    auto state = saved ? edit::decode(bytes, *input_, request_) : propagate(saved);
     if (state && state->interval == context_.finished_intervals()) {
       note(spdlog::level::info, "goes on after interval " + std::to_string(state->interval));
       return std::move(*state);

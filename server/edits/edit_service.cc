@@ -37,7 +37,6 @@ using engine::fail;
 using engine::propagate;
 using std::chrono::steady_clock;
 
-constexpr std::size_t all_jobs = 1'000'000;
 /// An edit that takes so many times what one may be estimated to take has outlived its time. A choice: estimates are
 /// mostly within a factor of one and a half.
 constexpr double outlived = 2;

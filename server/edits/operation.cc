@@ -25,8 +25,6 @@ using engine::ErrorCode;
 using engine::fail;
 using engine::propagate;
 
-constexpr std::size_t all_jobs = 1'000'000;
-
 double seconds_of(std::chrono::milliseconds time) { return std::chrono::duration<double>(time).count(); }
 
 EditAtHand at_hand(const jobs::Job& job, jobs::Time now) {

@@ -56,9 +56,9 @@ struct QueueLook {
 /// Has an edit that failed taken up again, from its last checkpoint, if there is one and it can still be used; the
 /// deaths of its workers are forgotten. Whether scene and version are still there shows when it is carried out.
 ///   returns  the edit, as it waits now
-///   errors   conflict: it has not failed, or a later edit of its scene has yet to end, or the scene is just
-///            being changed; unavailable: a service has the
-///            records open, which has to be asked itself (POST /v1/edits/{id}/requeue); those of look_at_queue()
+///   errors   conflict: it has not failed, or a later edit of its scene has yet to end, or the scene is just being
+///            changed; unavailable: a service has the records open, which has to be asked itself (POST
+///            /v1/edits/{id}/requeue); those of look_at_queue()
 [[nodiscard]] Result<EditAtHand> requeue_edit(const std::filesystem::path& folder, const std::string& store,
                                               const std::string& id);
 

@@ -23,6 +23,9 @@ namespace server::edits {
 
 [[nodiscard]] inline std::filesystem::path jobs_folder(const std::filesystem::path& edits) { return edits / "jobs"; }
 
+/// Jobs in a list that is to have them all: more than are ever kept.
+constexpr std::size_t all_jobs = 1'000'000;
+
 struct OpenRecords {
   std::unique_ptr<engine::jobs::Store> records;
   std::unique_ptr<engine::jobs::Queue> queue;  ///< Of `records`.

@@ -111,9 +111,10 @@ const std::vector<engine::Error>& SceneStore::recovered() const { return impl_->
 Result<Scratch> SceneStore::scratch() { return impl_->scratch.make(); }
 
 Result<void> SceneStore::check_quota(const Uploader& uploader, std::uint64_t bytes, const std::string& replaced) const {
+  if (!uploader.max_bytes) return {};
   std::uint64_t freed = 0;
-  if (const auto at = impl_->catalogue.snapshot(replaced); !replaced.empty() && at)
-    freed = freed_by_replacing(*at->manifest, uploader);
+  if (!replaced.empty())
+    if (const auto at = impl_->catalogue.snapshot(replaced)) freed = freed_by_replacing(*at->manifest, uploader);
   const auto fits = impl_->catalogue.hold_quota(uploader, bytes, freed);
   if (!fits) return propagate(fits);
   return {};
