@@ -48,6 +48,7 @@ inline void append(std::vector<procedural::Patch>& to, std::vector<procedural::P
 
 // Plans of things of several parts, in plans_of_homes.cc.
 [[nodiscard]] Plan can_on_floor();
+[[nodiscard]] Plan vase_on_tiles();
 [[nodiscard]] Plan chair_on_carpet();
 [[nodiscard]] Plan chair_led_by_three();
 [[nodiscard]] Plan teddy_on_sofa();

@@ -292,7 +292,8 @@ const std::vector<NamedPlan>& known_plans() {
                                           {"teddy_shadow", teddy_and_shadow},
                                           {"clutter_shadow", clutter_and_shadow},
                                           {"chair_led", chair_led_by_three},
-                                          {"lamp_led", lamp_led_by_two}};
+                                          {"lamp_led", lamp_led_by_two},
+                                          {"tiles", vase_on_tiles}};
   return all;
 }
 

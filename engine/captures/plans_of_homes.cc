@@ -46,6 +46,42 @@ Object covered_floor(float width, float depth, const Material& covering) {
       "floor", {}, {procedural::quad(at(-0.5f * width, 0, -0.6f * depth), {width, 0, 0}, {0, 0, depth}, covering, 1)}};
 }
 
+/// Square tiles with a flower in every other one, each a little lighter or darker than the next, and joints between.
+Material tiles(float side) {
+  return [=](const SurfacePoint& p) {
+    const float x = p.local.x / side, z = p.local.z / side, column = std::floor(x), row = std::floor(z);
+    const float u = x - column - 0.5f, v = z - row - 0.5f;
+    const bool joint = std::max(std::abs(u), std::abs(v)) > 0.47f;
+    const bool has_flower = std::fmod(std::abs(column + row), 2.0f) > 0.5f;
+    const float petal = 0.24f + 0.12f * std::cos(4 * std::atan2(v, u));
+    const bool flower = has_flower && std::hypot(u, v) < petal;
+    const float shade = 1 + 0.05f * std::sin(12.9f * column + 78.2f * row);
+    const Vec3 glaze = flower ? srgb(46, 84, 120) : has_flower ? srgb(226, 220, 204) : srgb(176, 112, 84);
+    return joint ? Finish{srgb(120, 114, 106), 0} : Finish{shade * glaze, 0.15f};
+  };
+}
+
+/// A vase with a belly.
+Object vase(Vec3 foot) {
+  const Material glaze = [](const SurfacePoint& p) {
+    const float height = -p.local.y;
+    const bool band = std::abs(height - 0.34f) < 0.03f;
+    const bool leaf = std::abs(height - 0.17f) < 0.06f && std::sin(7 * std::atan2(p.local.z, p.local.x)) > 0.4f;
+    return Finish{band ? srgb(232, 190, 92) : leaf ? srgb(236, 232, 220) : srgb(40, 96, 74), 0};
+  };
+  return {"vase",
+          {foot, 0},
+          {lathe({{0.09f, 0},
+                  {0.10f, 0.02f},
+                  {0.15f, 0.12f},
+                  {0.155f, 0.20f},
+                  {0.12f, 0.30f},
+                  {0.07f, 0.38f},
+                  {0.075f, 0.44f},
+                  {0.10f, 0.48f}},
+                 glaze, on_things, 48)}};
+}
+
 /// A printed can with a bare metal foot and lid: the parts of one thing that have nothing of their colours in common.
 Object drink_can(Vec3 foot, float turn) {
   constexpr float print_from = 0.045f, print_to = 0.405f;
@@ -89,6 +125,22 @@ Plan can_on_floor() {
   plan.grips = {{foot + dat(0, 0.25, -0.135), 0.32}};
   plan.region = standing_on(0, foot, {0.4, 0.56, 0.4});
   plan.clicks = {{foot + dat(0.02, 0.22, -0.135), foot + dat(-0.05, 0.462, 0)},
+                 {foot + dat(0, 0, -0.35), foot + dat(0.35, 0, 0), dat(-0.5, 1.1, 1.4)}};
+  return plan;
+}
+
+Plan vase_on_tiles() {
+  const DVec3 foot = dat(-0.25, 0, -0.2), shift = dat(0.6, 0, 0.1);
+  Plan plan{.what = "A vase moved along a floor of patterned tiles.", .is_test = true};
+  plan.surroundings = {procedural::make_room(-0.03f), covered_floor(4.4f, 2.4f, tiles(0.17f)),
+                       procedural::make_book({at(0.8f, 0, 0.45f), 0.3f}, {0.6f, 0.1f, 0.4f}, srgb(96, 40, 52)),
+                       procedural::make_framed_print({at(-0.4f, 1.1f, 1.40f), 0}, 1.2f, 0.9f)};
+  plan.things = {{vase(Vec3(foot)), shifted(shift)}};
+  plan.glossy = {"vase"};
+  plan.orbit = {.target = dat(0, 0.15, -0.1), .distance = 3.0, .lowest = 14, .highest = 42};
+  plan.grips = {{foot + dat(0.02, 0.22, -0.15), 0.34}};
+  plan.region = standing_on(0, foot, {0.44, 0.6, 0.44});
+  plan.clicks = {{foot + dat(0.03, 0.25, -0.13), foot + dat(-0.05, 0.08, -0.1)},
                  {foot + dat(0, 0, -0.35), foot + dat(0.35, 0, 0), dat(-0.5, 1.1, 1.4)}};
   return plan;
 }
