@@ -26,7 +26,7 @@ struct CorrectionTask {
   scene::Image picture;  ///< [3]
   scene::Mask mask;      ///< Only these pixels may change.
   /// [1] How far what a pixel shows was really observed, 0 to 1. From `trusted` on the pixel stays as it is; at 0 it
-  /// says nothing; between the two it is a hint.
+  /// says nothing; between the two it is a hint. What a repetition foretells counts as observed.
   scene::Image trust;
   std::vector<std::size_t> examples;  ///< Indices into the buffer of examples, the most alike first.
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -52,8 +53,12 @@ struct Shift {
   int x = 0, y = 0;  ///< Pixels.
 };
 
-/// A shift and how much surroundings differ from themselves under it, in the order of their worth.
-using Candidate = std::tuple<double, int, int>;  ///< Difference, y, x.
+/// A shift and how much surroundings differ from themselves under it, in the order of their worth: of equally good ones
+/// the shortest first.
+using Candidate = std::tuple<double, int, int, int>;  ///< Difference, squared length, y, x.
+Candidate candidate(double difference, Shift shift) {
+  return {difference, shift.x * shift.x + shift.y * shift.y, shift.y, shift.x};
+}
 
 /// What is around a hole, at one size.
 struct Surroundings {
@@ -185,7 +190,7 @@ std::vector<Candidate> best_of_all(const Surroundings& at) {
   for (int y = 1; y + 1 < side; ++y)
     for (int x = 1; x + 1 < side; ++x)
       if (std::hypot(x - most, y - most) >= least_shift && std::isfinite(value(x, y)) && is_least(x, y))
-        found.emplace_back(value(x, y), y - most, x - most);
+        found.push_back(candidate(value(x, y), {x - most, y - most}));
   std::sort(found.begin(), found.end());
   found.resize(std::min(found.size(), most_shifts));
   return found;
@@ -197,11 +202,11 @@ std::vector<Candidate> refined(const Surroundings& at, std::span<const Candidate
   std::vector<Candidate> out(coarse.size());
   parallel_for(coarse.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
-      const auto [difference, y, x] = coarse[k];
-      out[k] = {std::numeric_limits<double>::infinity(), 0, 0};
+      const int y = std::get<2>(coarse[k]), x = std::get<3>(coarse[k]);
+      out[k] = candidate(std::numeric_limits<double>::infinity(), {});
       for (int v = 2 * y - 1; v <= 2 * y + 1; ++v)
         for (int u = 2 * x - 1; u <= 2 * x + 1; ++u)
-          out[k] = std::min(out[k], Candidate{comparison.difference({u, v}), v, u});
+          out[k] = std::min(out[k], candidate(comparison.difference({u, v}), {u, v}));
     }
   });
   std::sort(out.begin(), out.end());
@@ -224,7 +229,7 @@ std::vector<Shift> repetitions(const Surroundings& whole, double most) {
   }
   keep_alike(most);
   std::vector<Shift> out;
-  for (const auto& [difference, y, x] : found) out.push_back({x, y});
+  for (const auto& [difference, length, y, x] : found) out.push_back({x, y});
   return out;
 }
 
@@ -275,14 +280,16 @@ void differences_around(const Surroundings& at, Shift shift, std::span<const std
       const double area = double(2 * radius + 1) * double(2 * radius + 1);
       sum += differences.around(x, y, radius) / area, share += met.around(x, y, radius) / area;
     }
-    constexpr double least_share = 1e-3;  // of the windows; sums that cancel are no smaller than a pixel's
-    if (share > least_share) out[i] = float(sum / share);
+    constexpr double least_share = 1e-3;  // of the windows, that less says nothing: a choice
+    if (share > least_share) out[i] = float(std::max(sum, 0.0) / share);  // sums of windows are differences, and round
   }
 }
 
 }  // namespace
 
 scene::Mask continue_repeats(scene::Image& picture, const scene::Mask& known, const scene::Mask& hole) {
+  assert(picture.channels == 3 && picture.width == known.width && picture.height == known.height);
+  assert(hole.width == known.width && hole.height == known.height);
   scene::Mask foretold(hole.width, hole.height);
   std::vector<std::uint32_t> wanted;
   for (std::size_t i = 0; i < hole.data.size(); ++i)
@@ -291,7 +298,9 @@ scene::Mask continue_repeats(scene::Image& picture, const scene::Mask& known, co
   if (wanted.empty() || side < least_hole) return foretold;
 
   const Surroundings whole{picture, known, nearness_to(hole)};
-  const double most = alike * Comparison(whole).by_chance();
+  const double by_chance = Comparison(whole).by_chance();
+  if (by_chance < rounding) return foretold;  // of one colour: nothing is alike more than anything else
+  const double most = alike * by_chance;
   const std::vector<Shift> shifts = repetitions(whole, most);
   std::array<int, window_parts.size()> radii{};
   for (std::size_t r = 0; r < radii.size(); ++r)

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "engine/render/project.h"
+#include "engine/repair/spots.h"
 #include "engine/scene/sh.h"
 
 namespace engine::repair {
@@ -14,25 +15,6 @@ constexpr float as_before = 0.01f;  // a change of less nobody sees
 // Extents of the part up to which a row's longest axis may lie in one light. With 0.15 more of a shadow stays: the
 // captured case can_shadow is 1.6 dB worse where the can was.
 constexpr double most_wide = 0.25;
-
-/// The middle of a row, and the ends of its two longer axes: where it is lit.
-std::array<DVec3, 5> spots_of(const scene::GaussianCloud& scene, std::size_t row) {
-  const DVec3 mean(scene.mean.get(row));
-  const Vec3 log_scale = scene.log_scale.get(row);
-  const Mat3 axes = glm::mat3_cast(glm::normalize(scene.rotation.get(row)));
-  int shortest = 0;
-  for (int axis = 1; axis < 3; ++axis)
-    if (log_scale[axis] < log_scale[shortest]) shortest = axis;
-  std::array<DVec3, 5> spots;
-  spots.fill(mean);
-  std::size_t next = 1;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (axis == shortest) continue;
-    const DVec3 way = DVec3(axes[axis]) * std::exp(double(log_scale[axis]));
-    spots[next++] = mean + way, spots[next++] = mean - way;
-  }
-  return spots;
-}
 
 /// Of each of these rows, the mean over its spots.
 ///   back  as in relit_rows(), or empty for places as they are

@@ -19,6 +19,7 @@
 #include "engine/repair/chart.h"
 #include "engine/repair/in_picture.h"
 #include "engine/repair/seed.h"
+#include "engine/repair/spots.h"
 #include "engine/repair/surfaces.h"
 #include "engine/repair/survey.h"
 #include "engine/repair/trust.h"
@@ -50,10 +51,13 @@ constexpr double closure_views = 10, telling_views = 0.75;
 constexpr float nothing = 0.05f;
 // Share of seeds in a pixel from which on it shows what the repair has decided.
 constexpr float decided = 0.5f;
-// Mean share of the part in the pixels that a row is seen in, from which on the row's colour was learnt through the
-// part's blurred outline, and makes up for it: beside a red apple the cloth is bluer. From 0.07 to 0.15 captured cases
-// are alike.
-constexpr double tainting = 0.15;
+// Mean share of the part in the pixels that a row is seen in, over the views of the edit, from which on its colour was
+// learnt through the part's blurred outline, and makes up for it: beside a red apple the cloth is bluer. From 0.07 to
+// 0.15 captured cases are alike. Rows that have less light than a pixel in all views tell nothing.
+constexpr double tainting = 0.15, least_light = 1;
+// Of the five spots of a row: those on a completed surface of a row that goes there. All of them: clutter -1.2 dB
+// where the part was, tiles -0.5; the middle alone: lamp -0.2.
+constexpr int most_of_spots = 3;
 // A stain goes so deep, in parts of its distance: the layers of a surface below the one that shows are stained as well.
 constexpr double stain_depth = 0.03;
 // So deep, in parts of its distance, is the front of a part: nine in ten depths of captures are surer than that.
@@ -276,24 +280,60 @@ void Repair::doubt_unseen(const WorkingScene& working, const Rows& rows, std::si
   }
 }
 
-void Repair::clear(WorkingScene& working, Rows& rows, const scene::Camera& camera, const scene::Image& surface,
-                   const std::function<bool(DVec2 pixel, double z)>& is_within) const {
+void Repair::clear_before(WorkingScene& working, Rows& rows, const scene::Camera& camera, const scene::Image& surface,
+                          const std::function<bool(DVec2 pixel, double z)>& is_within) const {
   const std::size_t before = rows.gone.size();
-  for (const std::uint32_t row : united(unseen_, tainted_)) {
+  const auto surface_at = [&](DVec2 pixel) { return double(surface.at(int(pixel.x), int(pixel.y))); };
+  const auto give_up = [&](std::uint32_t row) {
+    working.give_up(row);
+    rows.gone.push_back(row), rows.dragged.push_back(row);
+  };
+  for (const std::uint32_t row : unseen_) {
     if (!working::stays(working.role()[row])) continue;
     const DVec3 p = camera.cam_from_world(working.cloud().mean.get(row));
     const auto pixel = pixel_in_picture(camera, p);
     if (!pixel) continue;
-    const double inverse_depth = double(surface.at(int(pixel->x), int(pixel->y)));
+    const double inverse_depth = surface_at(*pixel);
     if (!(inverse_depth > 0) || p.z * inverse_depth > 1 + off_surface) continue;
     // What lies where the part was not, and not on the surface either, is the inside of something else.
     if (p.z * inverse_depth < 1 - off_surface && !is_within(*pixel, p.z)) continue;
-    working.give_up(row);
-    rows.gone.push_back(row), rows.dragged.push_back(row);
+    give_up(row);
   }
+  const auto is_on_it = [&](DVec3 spot) {
+    const DVec3 p = camera.cam_from_world(spot);
+    const auto pixel = pixel_in_picture(camera, p);
+    return pixel && std::abs(p.z * surface_at(*pixel) - 1) <= off_surface;
+  };
+  // What was seen before it is something else, and what reaches far beyond it would leave a gap there.
+  for (const std::uint32_t row : tainted_)
+    if (const auto spots = spots_of(working.cloud(), row); working::stays(working.role()[row]) && is_on_it(spots[0]) &&
+                                                           std::ranges::count_if(spots, is_on_it) >= most_of_spots)
+      give_up(row);
   if (rows.gone.size() == before) return;
   std::sort(rows.gone.begin(), rows.gone.end());
   std::sort(rows.dragged.begin(), rows.dragged.end());
+}
+
+Result<void> Repair::find_tainted(const WorkingScene& working, const Rows& rows,
+                                  const std::function<Result<void>()>& looked) {
+  if (mode_ != Mode::move || !tainted_.empty()) return {};
+  // Of a removal nothing has arrived. What was given up on the way is not the part.
+  std::vector<std::uint32_t> part = healed_;
+  if (!rows.moved.empty()) part.clear();
+  for (const std::uint32_t row : rows.moved) part.push_back(working.parent()[row]);
+  std::sort(part.begin(), part.end());
+  part.erase(std::unique(part.begin(), part.end()), part.end());
+  if (part.empty()) return {};
+  std::vector<double> light(original_.size()), on_part(original_.size());
+  for (const scene::Camera& view : views_) {
+    const scene::Image share = working::footprint(original_, part, view, workspace_);
+    render::add_weight_sums(original_, view, share, workspace_, light, on_part);
+    if (auto going = looked(); !going) return going;
+  }
+  for (std::uint32_t row = 0; row < original_.size(); ++row)
+    if (light[row] >= least_light && on_part[row] > tainting * light[row] && !std::ranges::binary_search(part, row))
+      tainted_.push_back(row);
+  return {};
 }
 
 void Repair::clear_veils(WorkingScene& working, Rows& rows) {
@@ -371,7 +411,7 @@ Result<std::size_t> Repair::complete_chart(WorkingScene& working, Rows& rows, co
   double front = std::numeric_limits<double>::infinity();  // of what has left
   for (const std::uint32_t row : open_)
     front = std::min(front, chart->camera.cam_from_world(original_.mean.get(row)).z);
-  clear(working, rows, chart->camera, surface, [&](DVec2, double z) { return z >= front; });
+  clear_before(working, rows, chart->camera, surface, [&](DVec2, double z) { return z >= front; });
   trust_.resize(working.size(), 1.0f);  // what has been decided stays
   return seeds;
 }
@@ -457,7 +497,7 @@ Result<Repair::Background> Repair::complete_background(WorkingScene& working, Ro
   background.picture = std::move(*picture);
   if (goes_on) {
     background.seeds = add_seeds(working, view, surface, background.picture, *originals_);
-    clear(working, rows, view, surface, [&](DVec2 pixel, double z) {
+    clear_before(working, rows, view, surface, [&](DVec2 pixel, double z) {
       const int x = int(pixel.x), y = int(pixel.y);
       return closing.at(x, y) > 0 || z <= double(far_side_[v].at(x, y));
     });
@@ -551,6 +591,7 @@ Result<Corrected> Repair::walk(WorkingScene& working, std::span<const scene::Mas
                      (in_turn ? 0 : shown_views * views);
   double done = 0;  // in views
   const auto advance_by = [&](double more) { return advance(std::min((done += more) / all, 1.0)); };
+  if (auto found = find_tainted(working, rows, [&] { return advance_by(0); }); !found) return propagate(found);
   close_place(working, rows);
   if (!open_.empty())
     if (auto going = advance_by(closure_views); !going) return propagate(going);
@@ -610,22 +651,17 @@ void Repair::note_vacated(const WorkingScene& working, const Rows& rows, std::sp
   far_side_.resize(views_.size());
   open_ = rows_left_open(original_, rows.vacating, working, rows.moved);
   const std::vector<std::uint32_t> relit = working.rows_of(Role::relit);
-  std::vector<double> light(original_.size()), through_part(original_.size());
   for (std::size_t v = 0; v < views_.size(); ++v) {
     const scene::Image share = working::footprint(original_, rows.vacating, views_[v], workspace_);
     const scene::Image open_share = working::footprint(original_, open_, views_[v], workspace_);
     vacated_[v] = mask::dilate(mask::mask2d(open_share), rim_px(views_[v]));
     mask::unite(vacated_[v], stained_[v]);
     far_side_[v] = far_side(original_, open_, views_[v]);
-    render::add_weight_sums(original_, views_[v], share, workspace_, light, through_part);
     buffer_[v].excluded = mask::mask2d(share, trace);
     // The pictures show it in the shadow of what has left.
     mask::unite(buffer_[v].excluded, mask::mask2d(working::footprint(original_, relit, views_[v], workspace_)));
     buffer_[v].box = scene::bounding_box(masks[v]);
   }
-  tainted_.clear();
-  for (std::uint32_t row = 0; row < original_.size() && mode_ == Mode::move; ++row)
-    if (through_part[row] > tainting * light[row]) tainted_.push_back(row);
 }
 
 }  // namespace engine::repair

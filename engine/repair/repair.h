@@ -160,7 +160,7 @@ class Repair {
   [[nodiscard]] Result<Telling> most_telling_view(const WorkingScene& working, const Rows& rows, const Round& round,
                                                   const std::function<Result<void>()>& looked);
   /// Completes the surface that goes on at most pixels in a chart of it, before any view does, if enough around it is
-  /// known: returns the number of seeds.
+  /// known: returns the number of seeds. What its texture repeats goes on; the corrector makes up the rest.
   [[nodiscard]] Result<std::size_t> complete_chart(WorkingScene& working, Rows& rows, const Telling& telling,
                                                    const Round& round);
   /// What has left, and rows that nobody has seen: without them shows what is known.
@@ -181,11 +181,17 @@ class Repair {
   /// Takes the trust of what view v shows in vacated pixels and no camera has seen, and of what lay right under a
   /// stain.
   void doubt_unseen(const WorkingScene& working, const Rows& rows, std::size_t v, ViewNow& now);
-  /// Rows that nobody has seen, and tainted ones, leave where a surface was completed, if they would hide it.
+  /// Finds the rows of the input that were seen through the blurred outline of what is dragged, once for an edit: it is
+  /// the same for each of its corrections.
+  ///   looked  called after each view; its error ends the search
+  [[nodiscard]] Result<void> find_tainted(const WorkingScene& working, const Rows& rows,
+                                          const std::function<Result<void>()>& looked);
+  /// Rows leave where a surface was completed: those that nobody has seen, if they would hide it, and tainted ones that
+  /// lie on it, for the most part.
   ///   surface    [1] inverse depth of it in the camera; 0: nothing was completed
   ///   is_within  was the dragged part there, at this pixel and depth?
-  void clear(WorkingScene& working, Rows& rows, const scene::Camera& camera, const scene::Image& surface,
-             const std::function<bool(DVec2 pixel, double z)>& is_within) const;
+  void clear_before(WorkingScene& working, Rows& rows, const scene::Camera& camera, const scene::Image& surface,
+                    const std::function<bool(DVec2 pixel, double z)>& is_within) const;
 
   scene::GaussianCloud original_;
   std::vector<scene::Camera> views_;
@@ -200,12 +206,11 @@ class Repair {
   std::vector<std::uint32_t> unseen_;  ///< Rows of the input that no camera has seen, ascending.
   UneditedViews unedited_;
   std::vector<correct::Example> buffer_;
-  std::vector<std::uint32_t>
-      tainted_;                       ///< Rows of the input that were seen through the rim of what has left, ascending.
-  std::vector<std::uint32_t> open_;   ///< Rows of the input whose place is empty now, ascending.
-  std::vector<scene::Mask> vacated_;  ///< Per view: what the part has left.
-  std::optional<Closure> closure_;    ///< Of what the part has left.
-  std::optional<Surveyed> surveyed_;  ///< Of the closure, where nothing else that an edit changes showed.
+  std::vector<std::uint32_t> tainted_;  ///< Rows of the input, see find_tainted(); ascending.
+  std::vector<std::uint32_t> open_;     ///< Rows of the input whose place is empty now, ascending.
+  std::vector<scene::Mask> vacated_;    ///< Per view: what the part has left.
+  std::optional<Closure> closure_;      ///< Of what the part has left.
+  std::optional<Surveyed> surveyed_;    ///< Of the closure, where nothing else that an edit changes showed.
   std::vector<scene::Image> far_side_;  ///< Per view: of what the part has left. See far_side().
   render::Workspace workspace_;
   std::vector<float> trust_;                         ///< Of the rows of the working scene, in the correction at hand.

@@ -22,11 +22,11 @@ const CapturedCase& made(const std::string& name) {
   return found != all.end() ? found->second : all.emplace(name, make_captured_case(name).value()).first->second;
 }
 
-TEST(CapturedCases, AreAtLeastTenOfWhichNineAreTheTestSet) {
+TEST(CapturedCases, AreAtLeastTenOfWhichSomeAreTheTestSet) {
   const std::set<std::string> names(captured_case_names().begin(), captured_case_names().end());
   EXPECT_GE(names.size(), 10u);
   EXPECT_EQ(names.size(), captured_case_names().size());
-  EXPECT_EQ(std::ranges::count_if(captured_case_names(), [](const auto& name) { return made(name).is_test; }), 10);
+  EXPECT_EQ(std::ranges::count_if(captured_case_names(), [](const auto& name) { return made(name).is_test; }), 11);
 }
 
 TEST(CapturedCases, AnUnknownOneIsNamedWithThoseThereAre) {
