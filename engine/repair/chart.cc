@@ -151,6 +151,13 @@ void add_view(Chart& chart, const scene::Camera& view, const Shown& shown) {
   });
 }
 
+scene::Mask untold_around(const Chart& chart, int rim_px) {
+  scene::Mask untold = mask::dilate(chart.goes_on, widened * rim_px);
+  for (std::size_t i = 0; i < untold.data.size(); ++i)
+    if (chart.weights.data[i] > 0) untold.data[i] = 0;
+  return untold;
+}
+
 bool is_surrounded(const Chart& chart, int rim_px) {
   const scene::Mask near = mask::dilate(chart.goes_on, widened * rim_px);
   const scene::Mask far = mask::dilate(chart.goes_on, widened * rim_px + ring_px);

@@ -33,6 +33,10 @@ struct Shown {
 /// Adds what a view shows of the surface itself: the more, the finer it shows it.
 void add_view(Chart& chart, const scene::Camera& view, const Shown& shown);
 
+/// Pixels that no view told anything of: where the surface goes on, and around that as far as its rim may reach.
+///   rim_px  as for is_surrounded(), after all views were added
+[[nodiscard]] scene::Mask untold_around(const Chart& chart, int rim_px);
+
 /// Is what goes on known nearly all around?
 ///   rim_px  so near to it in the view that found it, no view told anything
 [[nodiscard]] bool is_surrounded(const Chart& chart, int rim_px);

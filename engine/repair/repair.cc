@@ -305,10 +305,12 @@ void Repair::clear_before(WorkingScene& working, Rows& rows, const scene::Camera
     return pixel && std::abs(p.z * surface_at(*pixel) - 1) <= off_surface;
   };
   // What was seen before it is something else, and what reaches far beyond it would leave a gap there.
-  for (const std::uint32_t row : tainted_)
-    if (const auto spots = spots_of(working.cloud(), row); working::stays(working.role()[row]) && is_on_it(spots[0]) &&
-                                                           std::ranges::count_if(spots, is_on_it) >= most_of_spots)
-      give_up(row);
+  const auto tainted = tainted_ ? std::span<const std::uint32_t>(*tainted_) : std::span<const std::uint32_t>();
+  for (const std::uint32_t row : tainted) {
+    if (!working::stays(working.role()[row])) continue;
+    const auto spots = spots_of(working.cloud(), row);
+    if (is_on_it(spots[0]) && std::ranges::count_if(spots, is_on_it) >= most_of_spots) give_up(row);
+  }
   if (rows.gone.size() == before) return;
   std::sort(rows.gone.begin(), rows.gone.end());
   std::sort(rows.dragged.begin(), rows.dragged.end());
@@ -316,7 +318,7 @@ void Repair::clear_before(WorkingScene& working, Rows& rows, const scene::Camera
 
 Result<void> Repair::find_tainted(const WorkingScene& working, const Rows& rows,
                                   const std::function<Result<void>()>& looked) {
-  if (mode_ != Mode::move || !tainted_.empty()) return {};
+  if (mode_ != Mode::move || tainted_) return {};
   // Of a removal nothing has arrived. What was given up on the way is not the part.
   std::vector<std::uint32_t> part = healed_;
   if (!rows.moved.empty()) part.clear();
@@ -330,9 +332,10 @@ Result<void> Repair::find_tainted(const WorkingScene& working, const Rows& rows,
     render::add_weight_sums(original_, view, share, workspace_, light, on_part);
     if (auto going = looked(); !going) return going;
   }
+  tainted_.emplace();
   for (std::uint32_t row = 0; row < original_.size(); ++row)
     if (light[row] >= least_light && on_part[row] > tainting * light[row] && !std::ranges::binary_search(part, row))
-      tainted_.push_back(row);
+      tainted_->push_back(row);
   return {};
 }
 
@@ -387,12 +390,9 @@ Result<std::size_t> Repair::complete_chart(WorkingScene& working, Rows& rows, co
   correct::Example known{picture_of(*chart), scene::Mask(side, side), {0, 0, side, side}};
   scene::Image surface = chart->inverse_depth, below = surface, trust(side, side, 1);
   // What is made up around the hole matters as well: there the rim gets seeds beneath it.
-  scene::Mask told(side, side), hole = mask::dilate(chart->goes_on, 2 * untold_px);
-  for (std::size_t i = 0; i < told.data.size(); ++i) {
-    told.data[i] = chart->weights.data[i] > 0;
-    if (told.data[i] != 0) hole.data[i] = 0;
-  }
-  const scene::Mask foretold = correct::continue_repeats(known.picture, told, hole);
+  scene::Mask told(side, side);
+  for (std::size_t i = 0; i < told.data.size(); ++i) told.data[i] = chart->weights.data[i] > 0;
+  const scene::Mask foretold = correct::continue_repeats(known.picture, told, untold_around(*chart, untold_px));
   for (std::size_t i = 0; i < trust.data.size(); ++i) {
     trust.data[i] = told.data[i] != 0 || foretold.data[i] != 0 ? 1.0f : 0.0f;
     known.excluded.data[i] = told.data[i] == 0;

@@ -206,10 +206,10 @@ class Repair {
   std::vector<std::uint32_t> unseen_;  ///< Rows of the input that no camera has seen, ascending.
   UneditedViews unedited_;
   std::vector<correct::Example> buffer_;
-  std::vector<std::uint32_t> tainted_;  ///< Rows of the input, see find_tainted(); ascending.
-  std::vector<std::uint32_t> open_;     ///< Rows of the input whose place is empty now, ascending.
-  std::vector<scene::Mask> vacated_;    ///< Per view: what the part has left.
-  std::optional<Closure> closure_;      ///< Of what the part has left.
+  std::optional<std::vector<std::uint32_t>> tainted_;  ///< Rows of the input, once found: find_tainted(). Ascending.
+  std::vector<std::uint32_t> open_;                    ///< Rows of the input whose place is empty now, ascending.
+  std::vector<scene::Mask> vacated_;                   ///< Per view: what the part has left.
+  std::optional<Closure> closure_;                     ///< Of what the part has left.
   std::optional<Surveyed> surveyed_;    ///< Of the closure, where nothing else that an edit changes showed.
   std::vector<scene::Image> far_side_;  ///< Per view: of what the part has left. See far_side().
   render::Workspace workspace_;
