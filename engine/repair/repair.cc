@@ -58,6 +58,8 @@ constexpr double tainting = 0.15, least_light = 1;
 // Of the five spots of a row: those on a completed surface of a row that goes there. All of them: clutter -1.2 dB
 // where the part was, tiles -0.5; the middle alone: lamp -0.2.
 constexpr int most_of_spots = 3;
+// Part of the rows of what has left that lay in the surface completed there, from which on it was no body.
+constexpr double mostly_flat = 0.5;
 // A stain goes so deep, in parts of its distance: the layers of a surface below the one that shows are stained as well.
 constexpr double stain_depth = 0.03;
 // So deep, in parts of its distance, is the front of a part: nine in ten depths of captures are surer than that.
@@ -280,40 +282,52 @@ void Repair::doubt_unseen(const WorkingScene& working, const Rows& rows, std::si
   }
 }
 
-void Repair::clear_before(WorkingScene& working, Rows& rows, const scene::Camera& camera, const scene::Image& surface,
-                          const std::function<bool(DVec2 pixel, double z)>& is_within) const {
-  const std::size_t before = rows.gone.size();
-  const auto surface_at = [&](DVec2 pixel) { return double(surface.at(int(pixel.x), int(pixel.y))); };
-  const auto give_up = [&](std::uint32_t row) {
-    working.give_up(row);
-    rows.gone.push_back(row), rows.dragged.push_back(row);
-  };
+std::vector<std::uint32_t> Repair::unseen_before(const WorkingScene& working, const Completed& completed) const {
+  std::vector<std::uint32_t> before;
   for (const std::uint32_t row : unseen_) {
     if (!working::stays(working.role()[row])) continue;
-    const DVec3 p = camera.cam_from_world(working.cloud().mean.get(row));
-    const auto pixel = pixel_in_picture(camera, p);
+    const DVec3 p = completed.camera.cam_from_world(working.cloud().mean.get(row));
+    const auto pixel = pixel_in_picture(completed.camera, p);
     if (!pixel) continue;
-    const double inverse_depth = surface_at(*pixel);
+    const double inverse_depth = double(completed.surface.at(int(pixel->x), int(pixel->y)));
     if (!(inverse_depth > 0) || p.z * inverse_depth > 1 + off_surface) continue;
     // What lies where the part was not, and not on the surface either, is the inside of something else.
-    if (p.z * inverse_depth < 1 - off_surface && !is_within(*pixel, p.z)) continue;
-    give_up(row);
+    if (p.z * inverse_depth >= 1 - off_surface || completed.was_within(*pixel, p.z)) before.push_back(row);
   }
+  return before;
+}
+
+std::vector<std::uint32_t> Repair::tainted_on(const WorkingScene& working, const Completed& completed) const {
+  if (!tainted_) return {};
+  const auto inverse_depth_at = [&](DVec2 pixel) { return double(completed.surface.at(int(pixel.x), int(pixel.y))); };
   const auto is_on_it = [&](DVec3 spot) {
-    const DVec3 p = camera.cam_from_world(spot);
-    const auto pixel = pixel_in_picture(camera, p);
-    return pixel && std::abs(p.z * surface_at(*pixel) - 1) <= off_surface;
+    const DVec3 p = completed.camera.cam_from_world(spot);
+    const auto pixel = pixel_in_picture(completed.camera, p);
+    return pixel && std::abs(p.z * inverse_depth_at(*pixel) - 1) <= off_surface;
   };
+  // Beside what lay in the surface itself, as a stain does, nothing was seen through it.
+  std::size_t seen = 0, in_it = 0;
+  for (const std::uint32_t row : open_) {
+    const DVec3 mean(original_.mean.get(row));
+    const auto pixel = pixel_in_picture(completed.camera, completed.camera.cam_from_world(mean));
+    if (!pixel || !(inverse_depth_at(*pixel) > 0)) continue;
+    ++seen, in_it += is_on_it(mean) ? 1 : 0;
+  }
+  if (double(in_it) > mostly_flat * double(seen)) return {};
   // What was seen before it is something else, and what reaches far beyond it would leave a gap there.
-  const auto tainted = tainted_ ? std::span<const std::uint32_t>(*tainted_) : std::span<const std::uint32_t>();
-  for (const std::uint32_t row : tainted) {
+  std::vector<std::uint32_t> on_it;
+  for (const std::uint32_t row : *tainted_) {
     if (!working::stays(working.role()[row])) continue;
     const auto spots = spots_of(working.cloud(), row);
-    if (is_on_it(spots[0]) && std::ranges::count_if(spots, is_on_it) >= most_of_spots) give_up(row);
+    if (is_on_it(spots[0]) && std::ranges::count_if(spots, is_on_it) >= most_of_spots) on_it.push_back(row);
   }
-  if (rows.gone.size() == before) return;
-  std::sort(rows.gone.begin(), rows.gone.end());
-  std::sort(rows.dragged.begin(), rows.dragged.end());
+  return on_it;
+}
+
+void Repair::clear_before(WorkingScene& working, Rows& rows, const Completed& completed) const {
+  const std::vector<std::uint32_t> leaving = united(unseen_before(working, completed), tainted_on(working, completed));
+  for (const std::uint32_t row : leaving) working.give_up(row);
+  rows.gone = united(rows.gone, leaving), rows.dragged = united(rows.dragged, leaving);
 }
 
 Result<void> Repair::find_tainted(const WorkingScene& working, const Rows& rows,
@@ -411,7 +425,7 @@ Result<std::size_t> Repair::complete_chart(WorkingScene& working, Rows& rows, co
   double front = std::numeric_limits<double>::infinity();  // of what has left
   for (const std::uint32_t row : open_)
     front = std::min(front, chart->camera.cam_from_world(original_.mean.get(row)).z);
-  clear_before(working, rows, chart->camera, surface, [&](DVec2, double z) { return z >= front; });
+  clear_before(working, rows, {chart->camera, surface, [&](DVec2, double z) { return z >= front; }});
   trust_.resize(working.size(), 1.0f);  // what has been decided stays
   return seeds;
 }
@@ -497,10 +511,11 @@ Result<Repair::Background> Repair::complete_background(WorkingScene& working, Ro
   background.picture = std::move(*picture);
   if (goes_on) {
     background.seeds = add_seeds(working, view, surface, background.picture, *originals_);
-    clear_before(working, rows, view, surface, [&](DVec2 pixel, double z) {
+    const auto was_within = [&](DVec2 pixel, double z) {
       const int x = int(pixel.x), y = int(pixel.y);
       return closing.at(x, y) > 0 || z <= double(far_side_[v].at(x, y));
-    });
+    };
+    clear_before(working, rows, {view, surface, was_within});
   }
   trust_.resize(working.size(), 1.0f);  // what has been decided stays
   return background;

@@ -186,12 +186,18 @@ class Repair {
   ///   looked  called after each view; its error ends the search
   [[nodiscard]] Result<void> find_tainted(const WorkingScene& working, const Rows& rows,
                                           const std::function<Result<void>()>& looked);
-  /// Rows leave where a surface was completed: those that nobody has seen, if they would hide it, and tainted ones that
-  /// lie on it, for the most part.
-  ///   surface    [1] inverse depth of it in the camera; 0: nothing was completed
-  ///   is_within  was the dragged part there, at this pixel and depth?
-  void clear_before(WorkingScene& working, Rows& rows, const scene::Camera& camera, const scene::Image& surface,
-                    const std::function<bool(DVec2 pixel, double z)>& is_within) const;
+  /// A surface that was completed, as a camera shows it.
+  struct Completed {
+    const scene::Camera& camera;
+    const scene::Image& surface;                            ///< [1] Inverse depth; 0: nothing was completed.
+    std::function<bool(DVec2 pixel, double z)> was_within;  ///< Was the dragged part there, at this pixel and depth?
+  };
+  /// Rows that nobody has seen and that would hide it. Ascending.
+  [[nodiscard]] std::vector<std::uint32_t> unseen_before(const WorkingScene& working, const Completed& completed) const;
+  /// Tainted rows that lie on it, for the most part; none where what has left lay in it as well. Ascending.
+  [[nodiscard]] std::vector<std::uint32_t> tainted_on(const WorkingScene& working, const Completed& completed) const;
+  /// These two leave.
+  void clear_before(WorkingScene& working, Rows& rows, const Completed& completed) const;
 
   scene::GaussianCloud original_;
   std::vector<scene::Camera> views_;

@@ -117,6 +117,7 @@ TEST(EditWithACorrector, SaysHowMuchOfThePlaceCouldNotBeCompleted) {
 /// The block scene, but the block is removed, by its ball.
 BlockScene removing_the_block() {
   BlockScene block;
+  for (std::uint32_t row = 0; row < block.floor_rows; ++row) block.cloud.opacity_logit[row] = 1;  // none hides another
   block.request.mode = Mode::remove;
   block.request.handles[0].target.reset();
   return block;
@@ -217,6 +218,23 @@ TEST(EditWithACorrector, HealsAStainThatEveryCameraSaw) {
   EXPECT_GT(redness(run_with(block, nullptr)), 0.8f) << "nothing heals without a corrector";
   block.request.healed.clear();
   EXPECT_GT(redness(run_with_scene_corrector(block)), 0.8f) << "what was seen stays";
+}
+
+TEST(EditWithACorrector, BesideAStainThatIsRemovedTheSurfaceStays) {
+  BlockScene block;
+  std::vector<std::uint32_t> stain;
+  for (std::uint32_t row = 0; row < block.floor_rows; ++row) {
+    const Vec3 mean = block.cloud.mean.get(row);
+    if (std::abs(mean.x + 0.7f) < 0.2f && std::abs(mean.z) < 0.2f) stain.push_back(row);
+  }
+  ASSERT_GT(stain.size(), 20u);
+  for (std::uint32_t row = 0; row < block.floor_rows; ++row) block.cloud.opacity_logit[row] = 1;  // none hides another
+  block.request.mode = Mode::remove;
+  block.request.selected = block.request.healed = stain;
+  block.request.region.reset();
+  block.request.handles.clear();
+  give_radii({Vec3(-0.9f, 0, -0.2f), Vec3(-0.5f, 0, 0.2f)}, block.request);
+  EXPECT_EQ(run_with_scene_corrector(block).overlay.removed, stain) << "nothing was seen through it";
 }
 
 TEST(EditWithACorrector, WhatWasSeenHardlyMovesInTheOptimisation) {
