@@ -176,11 +176,10 @@ Repair::Repair(scene::GaussianCloud original, std::span<const scene::Camera> obs
   for (std::size_t v = 0; v < views_.size(); ++v)
     buffer_.push_back({std::move(unedited_.color[v]), scene::Mask(views_[v].width, views_[v].height), {}});
   unedited_.color.clear();
-  std::vector<float> shown = shown_rows(original_, observers);
+  shown_ = shown_rows(original_, observers);
   if (mode == Mode::move)
     for (std::uint32_t row = 0; row < original_.size(); ++row)
-      if (shown[row] < shows && !witnesses_.saw(original_.mean.get(row))) unseen_.push_back(row);
-  observed_ = observed_rows(std::move(shown));
+      if (shown_[row] < shows && !witnesses_.saw(original_.mean.get(row))) unseen_.push_back(row);
   if (mode == Mode::extend) healed_.clear();
   for (std::size_t v = 0; v < views_.size(); ++v) {
     const scene::Image share = working::footprint(original_, healed_, views_[v], workspace_);
@@ -263,6 +262,9 @@ void Repair::doubt_unseen(const WorkingScene& working, const Rows& rows, std::si
   layers.hidden = rows.dragged;
   const std::vector<std::uint32_t> seeds = working.rows_of(Role::seed);
   const scene::Image share = working::footprint(layers, seeds, view, workspace_);
+  std::vector<float> through(shown_);
+  through.resize(working.size(), 1.0f);
+  const scene::Image light = working::blended(layers, through, scene::bounding_box(vacated_[v]), view, workspace_);
   scene::Mask unseen(view.width, view.height);
   parallel_for(std::size_t(view.height), 4, [&](std::size_t begin, std::size_t end) {
     for (int y = int(begin); y < int(end); ++y)
@@ -271,7 +273,9 @@ void Repair::doubt_unseen(const WorkingScene& working, const Rows& rows, std::si
         if (vacated_[v].at(x, y) == 0 || !(inverse_depth > 0) || share.at(x, y) >= decided) continue;
         const bool is_under_stain =
             stained_[v].at(x, y) != 0 && inverse_depth * double(unedited_.median_depth[v].at(x, y)) > 1 - stain_depth;
-        unseen.at(x, y) = is_under_stain || !witnesses_.saw(point_at(view, {x + 0.5, y + 0.5}, inverse_depth));
+        // Depths of noisy surfaces are farther apart than a point may be behind what a camera shows.
+        unseen.at(x, y) = is_under_stain || (light.at(x, y) < shows &&
+                                             !witnesses_.saw(point_at(view, {x + 0.5, y + 0.5}, inverse_depth)));
       }
   });
   unseen = mask::dilate(mask::opened(unseen, mask::blur_radius(view.height)), rim_px(view));
@@ -599,7 +603,7 @@ Result<Corrected> Repair::walk(WorkingScene& working, std::span<const scene::Mas
   Rows rows = rows_of(working);
   note_vacated(working, rows, masks);
   if (round.arrives && round.correction == 1) clear_veils(working, rows);
-  trust_ = trust_of_rows(working, observed_, mode_);
+  trust_ = trust_of_rows(working, observed_rows(shown_), mode_);
   const OpaqueTrail opaque(working, original_, mode_);
   const auto views = double(views_.size());
   const double all = (open_.empty() ? 0 : closure_views) + (rows.gone.empty() ? 0 : telling_views * views) + views +

@@ -178,8 +178,8 @@ class Repair {
   void clear_veils(WorkingScene& working, Rows& rows);
   /// Healed rows go, for good.
   void give_up_healed(WorkingScene& working) const;
-  /// Takes the trust of what view v shows in vacated pixels and no camera has seen, and of what lay right under a
-  /// stain.
+  /// Takes the trust of what view v shows in vacated pixels and no camera has seen, neither by depth nor by the light
+  /// that came through to it, and of what lay right under a stain.
   void doubt_unseen(const WorkingScene& working, const Rows& rows, std::size_t v, ViewNow& now);
   /// Finds the rows of the input that were seen through the blurred outline of what is dragged, once for an edit: it is
   /// the same for each of its corrections.
@@ -204,7 +204,7 @@ class Repair {
   Mode mode_;
   std::uint64_t seed_;
   correct::Corrector& corrector_;
-  std::vector<float> observed_;  ///< Of observed_rows().
+  std::vector<float> shown_;  ///< Of shown_rows().
   Witnesses witnesses_;
   std::vector<std::uint32_t> healed_;  ///< Ascending.
   std::vector<scene::Mask> stained_;   ///< Per view: pixels that the healed rows made up.

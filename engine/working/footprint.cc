@@ -52,22 +52,26 @@ scene::Rect touched_rect(const render::Layers& layers, std::span<const std::uint
   return rect.empty() ? scene::Rect{} : rect;
 }
 
-scene::Image footprint(const render::Layers& layers, std::span<const std::uint32_t> rows, const scene::Camera& camera,
-                       render::Workspace& workspace) {
+scene::Image blended(const render::Layers& layers, std::span<const float> numbers, scene::Rect rect,
+                     const scene::Camera& camera, render::Workspace& workspace) {
   scene::Image picture(camera.width, camera.height, 1);
-  const scene::Rect rect = touched_rect(layers, rows, camera);
   if (rect.empty()) return picture;
-  std::vector<float> member(layers.size(), 0.0f);
-  for (const std::uint32_t row : rows) member[row] = 1.0f;
   render::ForwardOptions options;
   options.color = false;
   options.rect = rect;
   render::Rendering rendering;
-  render::forward(layers, camera, options, member, workspace, rendering);
+  render::forward(layers, camera, options, numbers, workspace, rendering);
   for (int y = 0; y < rect.height(); ++y)
     std::copy_n(rendering.weight.data.begin() + std::ptrdiff_t(y) * rect.width(), rect.width(),
                 picture.data.begin() + std::ptrdiff_t(rect.y0 + y) * picture.width + rect.x0);
   return picture;
+}
+
+scene::Image footprint(const render::Layers& layers, std::span<const std::uint32_t> rows, const scene::Camera& camera,
+                       render::Workspace& workspace) {
+  std::vector<float> member(layers.size(), 0.0f);
+  for (const std::uint32_t row : rows) member[row] = 1.0f;
+  return blended(layers, member, touched_rect(layers, rows, camera), camera, workspace);
 }
 
 }  // namespace engine::working
