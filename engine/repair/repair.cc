@@ -263,7 +263,7 @@ void Repair::doubt_unseen(const WorkingScene& working, const Rows& rows, std::si
   const std::vector<std::uint32_t> seeds = working.rows_of(Role::seed);
   const scene::Image share = working::footprint(layers, seeds, view, workspace_);
   std::vector<float> through(shown_);
-  through.resize(working.size(), 1.0f);
+  through.resize(working.size(), 1.0f);  // seeds are as if seen
   const scene::Image light = working::blended(layers, through, scene::bounding_box(vacated_[v]), view, workspace_);
   scene::Mask unseen(view.width, view.height);
   parallel_for(std::size_t(view.height), 4, [&](std::size_t begin, std::size_t end) {
@@ -286,38 +286,39 @@ void Repair::doubt_unseen(const WorkingScene& working, const Rows& rows, std::si
   }
 }
 
+std::optional<Repair::Completed::Place> Repair::Completed::place_of(DVec3 point) const {
+  const DVec3 p = camera.cam_from_world(point);
+  const auto pixel = pixel_in_picture(camera, p);
+  if (!pixel) return std::nullopt;
+  const double inverse_depth = double(surface.at(int(pixel->x), int(pixel->y)));
+  if (!(inverse_depth > 0)) return std::nullopt;
+  return Place{*pixel, p.z, p.z * inverse_depth};
+}
+
 std::vector<std::uint32_t> Repair::unseen_before(const WorkingScene& working, const Completed& completed) const {
   std::vector<std::uint32_t> before;
   for (const std::uint32_t row : unseen_) {
     if (!working::stays(working.role()[row])) continue;
-    const DVec3 p = completed.camera.cam_from_world(working.cloud().mean.get(row));
-    const auto pixel = pixel_in_picture(completed.camera, p);
-    if (!pixel) continue;
-    const double inverse_depth = double(completed.surface.at(int(pixel->x), int(pixel->y)));
-    if (!(inverse_depth > 0) || p.z * inverse_depth > 1 + off_surface) continue;
+    const auto place = completed.place_of(working.cloud().mean.get(row));
+    if (!place || place->relative > 1 + off_surface) continue;
     // What lies where the part was not, and not on the surface either, is the inside of something else.
-    if (p.z * inverse_depth >= 1 - off_surface || completed.was_within(*pixel, p.z)) before.push_back(row);
+    if (place->relative >= 1 - off_surface || completed.was_within(place->pixel, place->z)) before.push_back(row);
   }
   return before;
 }
 
 std::vector<std::uint32_t> Repair::tainted_on(const WorkingScene& working, const Completed& completed) const {
   if (!tainted_) return {};
-  const auto inverse_depth_at = [&](DVec2 pixel) { return double(completed.surface.at(int(pixel.x), int(pixel.y))); };
   const auto is_on_it = [&](DVec3 spot) {
-    const DVec3 p = completed.camera.cam_from_world(spot);
-    const auto pixel = pixel_in_picture(completed.camera, p);
-    return pixel && std::abs(p.z * inverse_depth_at(*pixel) - 1) <= off_surface;
+    const auto place = completed.place_of(spot);
+    return place && std::abs(place->relative - 1) <= off_surface;
   };
   // Beside what lay in the surface itself, as a stain does, nothing was seen through it.
-  std::size_t seen = 0, in_it = 0;
-  for (const std::uint32_t row : open_) {
-    const DVec3 mean(original_.mean.get(row));
-    const auto pixel = pixel_in_picture(completed.camera, completed.camera.cam_from_world(mean));
-    if (!pixel || !(inverse_depth_at(*pixel) > 0)) continue;
-    ++seen, in_it += is_on_it(mean) ? 1 : 0;
-  }
-  if (double(in_it) > mostly_flat * double(seen)) return {};
+  const auto count_of_open = [&](const auto& holds) {
+    return double(std::ranges::count_if(open_, [&](std::uint32_t row) { return holds(original_.mean.get(row)); }));
+  };
+  const double by_it = count_of_open([&](DVec3 mean) { return completed.place_of(mean).has_value(); });
+  if (count_of_open(is_on_it) > mostly_flat * by_it) return {};
   // What was seen before it is something else, and what reaches far beyond it would leave a gap there.
   std::vector<std::uint32_t> on_it;
   for (const std::uint32_t row : *tainted_) {

@@ -116,6 +116,21 @@ class Repair {
     Uncovered uncovered;
   };
 
+  /// A surface that was completed, as a camera shows it.
+  struct Completed {
+    const scene::Camera& camera;
+    const scene::Image& surface;                            ///< [1] Inverse depth; 0: nothing was completed.
+    std::function<bool(DVec2 pixel, double z)> was_within;  ///< Was the dragged part there, at this pixel and depth?
+
+    struct Place {
+      DVec2 pixel;
+      double z = 0;         ///< Depth, world units.
+      double relative = 0;  ///< Depth in parts of that of the surface.
+    };
+    /// Where a point lies by the surface; nothing where the camera shows none of it.
+    [[nodiscard]] std::optional<Place> place_of(DVec3 point) const;
+  };
+
   /// What a closure is made from, but for the input.
   struct Surveyed {
     std::vector<std::uint32_t> open;    ///< As open_.
@@ -186,17 +201,11 @@ class Repair {
   ///   looked  called after each view; its error ends the search
   [[nodiscard]] Result<void> find_tainted(const WorkingScene& working, const Rows& rows,
                                           const std::function<Result<void>()>& looked);
-  /// A surface that was completed, as a camera shows it.
-  struct Completed {
-    const scene::Camera& camera;
-    const scene::Image& surface;                            ///< [1] Inverse depth; 0: nothing was completed.
-    std::function<bool(DVec2 pixel, double z)> was_within;  ///< Was the dragged part there, at this pixel and depth?
-  };
-  /// Rows that nobody has seen and that would hide it. Ascending.
+  /// Rows that nobody has seen and that would hide what was completed. Ascending.
   [[nodiscard]] std::vector<std::uint32_t> unseen_before(const WorkingScene& working, const Completed& completed) const;
   /// Tainted rows that lie on it, for the most part; none where what has left lay in it as well. Ascending.
   [[nodiscard]] std::vector<std::uint32_t> tainted_on(const WorkingScene& working, const Completed& completed) const;
-  /// These two leave.
+  /// Rows of both leave.
   void clear_before(WorkingScene& working, Rows& rows, const Completed& completed) const;
 
   scene::GaussianCloud original_;

@@ -292,7 +292,7 @@ describe('by fingers, on a phone', () => {
     await id('fold').tap();
     await inSight(600);
     await page.setViewportSize({ width: 844, height: 390 });
-    await page.waitForFunction(() => document.querySelector('[data-testid=view]').dataset.quality === 'full');
+    await hand.shown(1);
     await check('on-its-side');
     await page.setViewportSize(phone.viewport);
     await hand.shown(1);

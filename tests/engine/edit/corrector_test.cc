@@ -118,7 +118,6 @@ TEST(EditWithACorrector, SaysHowMuchOfThePlaceCouldNotBeCompleted) {
 /// The block scene, but the block is removed, by its ball.
 BlockScene removing_the_block() {
   BlockScene block;
-  for (std::uint32_t row = 0; row < block.floor_rows; ++row) block.cloud.opacity_logit[row] = 1;  // none hides another
   block.request.mode = Mode::remove;
   block.request.handles[0].target.reset();
   return block;

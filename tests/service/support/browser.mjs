@@ -71,9 +71,15 @@ export const handOn = ({ page, id }) => {
     const bar = document.querySelector('[data-testid=thing-bar]');
     return !bar.hidden && bar.dataset.state === name;
   }, wanted, { timeout });
+  /// Until the page knows how large its picture is: a window that was resized tells it with the next frame.
+  const fitted = () => page.waitForFunction(() => {
+    const [view, canvas] = ['view', 'picture'].map((name) => document.getElementById(name));
+    return Math.abs(canvas.width / canvas.height - view.clientWidth / view.clientHeight) < 0.01;
+  });
   /// The camera of the picture, and where that is on the screen.
   const looksFrom = async () => {
     // It saves a little later; at once where it might be left. What is three times the same has come to rest.
+    await fitted();
     const saved = () => page.evaluate(() => {
       dispatchEvent(new Event('pagehide'));
       return localStorage.getItem(`splatdrag.scene.${location.hash.split('/').at(-1)}`);
@@ -91,10 +97,13 @@ export const handOn = ({ page, id }) => {
   return {
     state,
     /// Until the picture on the screen is the full one of a version.
-    shown: (version) => page.waitForFunction((wanted) => {
-      const view = document.querySelector('[data-testid=view]');
-      return view?.dataset.version === String(wanted) && view.dataset.quality === 'full';
-    }, version, { timeout: patience }),
+    shown: async (version) => {
+      await fitted();
+      await page.waitForFunction((wanted) => {
+        const view = document.querySelector('[data-testid=view]');
+        return view?.dataset.version === String(wanted) && view.dataset.quality === 'full';
+      }, version, { timeout: patience });
+    },
     /// Where a point of the world is on the screen, once the page has remembered where it looks from.
     onScreen: async (point) => {
       const { camera, box } = await looksFrom();
