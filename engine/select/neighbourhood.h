@@ -85,8 +85,11 @@ class Neighbourhood {
 
   /// For each node that is not given, the side at which a random walk from it rather ends; where there is no way to
   /// either, the outside. The rows that are inside, given or not, ascending.
-  ///   given  [rows().size()], by node
-  [[nodiscard]] std::vector<std::uint32_t> settle(std::span<const Given> given) const;
+  ///   given     [rows().size()], by node
+  ///   inclined  [rows().size()] 1 for nodes that are inside unless six of seven walks from them end outside. Empty:
+  ///             none
+  [[nodiscard]] std::vector<std::uint32_t> settle(std::span<const Given> given,
+                                                  std::span<const std::uint8_t> inclined = {}) const;
 
  private:
   /// What a point says of a node. Of several the least one counts: the point that the node covers most, or is nearest

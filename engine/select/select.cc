@@ -124,10 +124,13 @@ RowSet Selector::rows_of(const Masks& masks, const std::string& where, Selected&
   if (!surroundings) return std::move(masked.inside);
   const Neighbourhood& around = neighbourhood(*surroundings);
   std::vector<Given> given;
-  given.reserve(around.rows().size());
-  for (const std::uint32_t row : around.rows())
+  std::vector<std::uint8_t> shaded;
+  given.reserve(around.rows().size()), shaded.reserve(around.rows().size());
+  for (const std::uint32_t row : around.rows()) {
     given.push_back(masked.judged[row] == 0 ? Given::no : masked.inside[row] != 0 ? Given::inside : Given::outside);
-  for (const std::uint32_t row : around.settle(given)) masked.inside[row] = 1;
+    shaded.push_back(masked.shaded[row]);
+  }
+  for (const std::uint32_t row : around.settle(given, shaded)) masked.inside[row] = 1;
   if (around.is_cut_short())
     so_far.warnings.push_back({cut_short("to the middle of what the masks show: of those farther away, only what their "
                                          "views show well is taken"),

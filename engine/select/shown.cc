@@ -22,9 +22,10 @@ constexpr std::size_t grain = 4'096;  // rows of a parallel task: a choice
 // lower ones among them get a fifth and more.
 constexpr float shown_transmittance = 0.1f;
 
-// Masks judge rows in the shade of others, too, so that a thing is taken with what lies below its surface; but what
-// they say of a row that hardly anything of gets through to is chance.
-constexpr float judged_transmittance = 0.01f;
+// What lies in the shade of others within a mask may be below the surface of the thing, or behind all of it: a wall
+// shines through a thing's blurred outline. Only what gets that much light is judged (ADR 58), and of what gets next to
+// none, where it shows is chance.
+constexpr float judged_transmittance = 0.25f, shaded_transmittance = 0.01f;
 
 // So far from a mask's border its pixels count for neither side: this part of a picture's width, and at most that part
 // of the root of the mask's area, for small things. Chosen on the captured cases mug, turn, plant, rod and mouth, with
@@ -112,14 +113,17 @@ MaskedRows rows_in_masks(const scene::GaussianCloud& cloud, const Masks& masks, 
     for (std::size_t row = 0; row < cloud.size(); ++row)
       all[row] += view_all[row] / area, inside[row] += view_inside[row] / area;
   }
-  MaskedRows out{RowSet(cloud.size(), 0), RowSet(cloud.size(), 0), 0};
+  const RowSet none(cloud.size(), 0);
+  MaskedRows out{none, none, none, 0};
   for (std::size_t row = 0; row < cloud.size(); ++row) {
-    if (!(all[row] > 0) || !is_reached(cloud, row, largest[row], judged_transmittance)) continue;
+    if (!(all[row] > 0) || !is_reached(cloud, row, largest[row], shaded_transmittance)) continue;
     const double share = inside[row] / all[row];
-    const bool is_even = std::abs(share - 0.5) < undecided_margin;
-    out.undecided += is_even;
-    out.judged[row] = !is_even;
-    out.inside[row] = !is_even && share > 0.5;
+    const bool is_lit = is_reached(cloud, row, largest[row], judged_transmittance);
+    const bool is_even = std::abs(share - 0.5) < undecided_margin, is_within = !is_even && share > 0.5;
+    out.undecided += is_lit && is_even;
+    out.judged[row] = is_lit && !is_even;
+    out.inside[row] = is_lit && is_within;
+    out.shaded[row] = !is_lit && is_within;
   }
   return out;
 }

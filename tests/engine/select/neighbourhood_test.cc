@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <string>
@@ -178,6 +179,20 @@ TEST(Settle, LeavesWhatIsGiven) {
   const std::vector<Given> of_row{Given::outside, Given::inside,  Given::outside,
                                   Given::outside, Given::outside, Given::outside};
   EXPECT_EQ(around.settle(given_by_row(around, of_row)), (std::vector<std::uint32_t>{1}));
+}
+
+TEST(Settle, TakesWhatIsInclinedToUnlessItIsNearlyAllOutside) {
+  const scene::GaussianCloud cloud = line_of(11);  // between its ends a walk ends at either by how near it is
+  const Neighbourhood around(cloud, {{5, 0, 0}, 100.0});
+  std::vector<Given> of_row(11, Given::no);
+  of_row.front() = Given::inside, of_row.back() = Given::outside;
+  const std::vector<Given> given = given_by_row(around, of_row);
+  const std::vector<std::uint32_t> rather = around.settle(given);
+  const std::vector<std::uint32_t> inclined = around.settle(given, std::vector<std::uint8_t>(11, 1));
+  EXPECT_TRUE(std::ranges::includes(inclined, rather));
+  EXPECT_GE(inclined.size(), rather.size() + 2);
+  EXPECT_LT(inclined.back(), 10u) << "what is given stays";
+  EXPECT_EQ(around.settle(given, std::vector<std::uint8_t>(11, 0)), rather);
 }
 
 TEST(SurroundingsOfClicks, OfTwoClicksAtNearlyOnePlaceAreThoseOfOne) {

@@ -107,6 +107,19 @@ TEST(Select, MasksTakeAlongWhatNoViewShowsButHangsTogether) {
   EXPECT_EQ(selected(cloud, {{Op::add, Masks{{{front_camera(), left}}}}}), wanted);
 }
 
+TEST(Select, MasksLeaveAWallThatShinesThroughTheThing) {
+  scene::GaussianCloud cloud;
+  add_sheet(cloud, {0, 0, 2}, 20, 0.02f, {0.8f, 0.1f, 0.1f});  // pixels 40 to 60
+  for (float& logit : cloud.opacity_logit) logit = 0;          // several on top of each other leave a tenth
+  add_sheet(cloud, {0, 0, 2.8f}, 60, 0.02f, {0.7f, 0.7f, 0.6f});
+  scene::Mask mask(100, 100);
+  for (int y = 40; y < 60; ++y)
+    for (int x = 40; x < 60; ++x) mask.at(x, y) = 1;
+  RowList thing(400);
+  std::iota(thing.begin(), thing.end(), std::size_t{0});
+  EXPECT_EQ(selected(cloud, {{Op::add, Masks{{{front_camera(), mask}}}}}), thing);
+}
+
 TEST(Select, MasksThatReachALittleTooFarEndWhereTheThingDoes) {
   scene::GaussianCloud cloud;
   add_sheet(cloud, {-0.2f, 0, 2}, 20, 0.02f, {0.8f, 0.1f, 0.1f});  // pixels 30 to 50

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -98,6 +99,26 @@ TEST(RowsInMasks, SayNothingOfWhatIsNearTheirBorder) {
   EXPECT_FALSE(found.judged[0]);
   EXPECT_TRUE(found.judged[1]);
   EXPECT_EQ(found.undecided, 1u);
+}
+
+TEST(RowsInMasks, SayNothingOfWhatShinesThrough) {
+  const auto judge_behind = [](float alpha) {
+    scene::GaussianCloud cloud;
+    add_at(cloud, {0, 0, 2}, std::log(alpha / (1 - alpha)), -1.0f);  // wide: as good as even around the middle
+    add_at(cloud, {0, 0, 4}, 4, -2.5f);
+    scene::Mask all(100, 100);
+    std::fill(all.data.begin(), all.data.end(), std::uint8_t(1));
+    render::Workspace workspace;
+    return rows_in_masks(cloud, {{{front_camera(), all}}}, workspace);
+  };
+  const MaskedRows behind_much = judge_behind(0.9f), behind_little = judge_behind(0.6f);
+  EXPECT_TRUE(behind_much.inside[0]);
+  EXPECT_FALSE(behind_much.judged[1]) << "it may as well be a wall";
+  EXPECT_TRUE(behind_much.shaded[1]);
+  EXPECT_EQ(behind_much.undecided, 0u) << "the masks do not contradict each other";
+  EXPECT_TRUE(behind_little.inside[1] && !behind_little.shaded[1]);
+  const MaskedRows behind_all = judge_behind(0.995f);
+  EXPECT_FALSE(behind_all.judged[1] || behind_all.shaded[1]) << "where it shows is chance";
 }
 
 TEST(RowsInMasks, BelieveThinParts) {
