@@ -20,13 +20,13 @@
 namespace engine::captures {
 namespace {
 
-/// What the held-out cameras should show, without noise. What no photo before the edit shows is nobody's fault: it does
+/// What the held-out cameras should show. What no photo before the edit shows is nobody's fault: it does
 /// not count as outside.
 std::vector<evaluate::JudgedView> true_views(const CapturedCase& the_case) {
   std::vector<evaluate::JudgedView> views;
   render::Workspace workspace;
   for (const scene::Camera& camera : the_case.held_out) {
-    evaluate::JudgedView view{camera, photograph(the_case.after, camera),
+    evaluate::JudgedView view{camera, true_photograph(the_case, Side::after, camera),
                               evaluate::judged_regions({the_case.before, the_case.part_before},
                                                        {the_case.after, the_case.part_after}, camera)};
     const scene::Mask shown = mask::mask2d(working::footprint(the_case.before, the_case.shown, camera, workspace));

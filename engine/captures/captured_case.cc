@@ -1,6 +1,7 @@
 #include "engine/captures/captured_case.h"
 
 #include <algorithm>
+#include <cassert>
 #include <numbers>
 #include <numeric>
 #include <optional>
@@ -32,6 +33,10 @@ constexpr double click_noise_px = 2;  // standard deviation of each coordinate o
 constexpr float gleam = 0.30f;        // of glossy things, see add_gloss()
 // A row that photos blend with this weight or more is shown by them.
 constexpr float shown_weight = 0.02f;
+
+// Of cases that are drawn into photos.
+constexpr std::size_t hold_out = 8;
+constexpr std::size_t points_on_thing = 400;  // at most; some are lost to noise, as those of a capture are
 
 constexpr const char* kind = "captured case";  // as errors call it
 
@@ -124,6 +129,15 @@ void put_things(const Plan& plan, CapturedCase& out) {
   gloss_over(plan.glossy, objects, things.object, first, out.after);
 }
 
+/// What moves, and what photos show of it, once all is put.
+///   meant  rows of the surroundings that a person means as well
+void note_what_moves(std::vector<std::uint32_t> meant, CapturedCase& out) {
+  meant.insert(meant.end(), out.part_before.begin(), out.part_before.end());  // all of the things come after those
+  out.moving = MovingPart(out.before, meant);
+  out.shown =
+      rows_where(render::largest_weights(out.before, out.cameras), [](float weight) { return weight >= shown_weight; });
+}
+
 /// Both scenes and what moves in them.
 void put_scenes(const Plan& plan, CapturedCase& out) {
   const auto surroundings = [&](Side side) {
@@ -145,12 +159,7 @@ void put_scenes(const Plan& plan, CapturedCase& out) {
     gloss_over(plan.glossy, plan.only_after, grown.object, first, out.after);
     for (std::size_t i = 0; i < grown.cloud.size(); ++i) out.part_after.push_back(std::uint32_t(first + i));
   }
-  std::vector<std::uint32_t> moving = meant;  // all of them come before those of things
-  moving.insert(moving.end(), out.part_before.begin(), out.part_before.end());
-  out.moving = MovingPart(out.before, moving);
-
-  out.shown =
-      rows_where(render::largest_weights(out.before, out.cameras), [](float weight) { return weight >= shown_weight; });
+  note_what_moves(std::move(meant), out);
 }
 
 /// The surface that a person sees near a place and points at, from where the first photo was taken.
@@ -205,19 +214,51 @@ void place_clicks(const ClickPlan& plan, CapturedCase& out) {
   for (const DVec3& near : plan.outside) out.clicks.outside.push_back(click(near));
 }
 
+/// What a person would ask for, once the scenes are there.
+void put_wish(const Plan& plan, CapturedCase& out) {
+  out.what = plan.what, out.said = plan.said, out.textured = plan.textured;
+  out.mode = plan.mode, out.region = plan.region, out.careless = plan.careless;
+  place_handles(plan, out);
+  place_clicks(plan.clicks, out);
+}
+
 CapturedCase carry_out(const std::string& name, std::uint32_t take, const Plan& plan) {
   CapturedCase out;
-  out.name = name, out.take = take, out.what = plan.what, out.said = plan.said;
-  out.is_test = plan.is_test || take != first_take, out.textured = plan.textured;
+  out.name = name, out.take = take;
+  out.is_test = plan.is_test || take != first_take;
   out.cameras = photo_cameras(plan.orbit, seed_for(take, for_cameras));
   HeldOut held_out = held_out_cameras(plan.orbit, seed_for(take, for_cameras));
   out.held_out = std::move(held_out.within);
   out.beyond = held_out.beyond.size();
   for (scene::Camera& camera : held_out.beyond) out.held_out.push_back(std::move(camera));
   put_scenes(plan, out);
-  out.mode = plan.mode, out.region = plan.region, out.careless = plan.careless;
-  place_handles(plan, out);
-  place_clicks(plan.clicks, out);
+  put_wish(plan, out);
+  return out;
+}
+
+/// Every eighth photo judges, as is usual in the field; the one that says where the thing stands is the first of the
+/// others.
+void part_cameras(const Backdrop& backdrop, const std::string& first, CapturedCase& out) {
+  for (std::size_t i = 0; i < backdrop.photos.size(); ++i) {
+    const scene::Camera& camera = backdrop.photos[i].camera;
+    if (camera.name == first)
+      out.cameras.insert(out.cameras.begin(), camera);
+    else
+      (i % hold_out == 0 ? out.held_out : out.cameras).push_back(camera);
+  }
+}
+
+/// Photos of a case that is drawn into them, and the points that a reconstruction would find there.
+Capture drawn_capture(const CapturedCase& the_case, Side side, std::uint64_t seed_for_points) {
+  const bool is_before = side == Side::before;
+  const scene::GaussianCloud& cloud = is_before ? the_case.before : the_case.after;
+  const std::vector<std::uint32_t>& rows = is_before ? the_case.part_before : the_case.part_after;
+  Capture out;
+  for (const scene::Camera& camera : the_case.cameras)
+    out.photos.push_back(fit::to_photo(camera, true_photograph(the_case, side, camera)));
+  out.points = points_beside(*the_case.backdrop, the_case.cameras, cloud, rows);
+  const auto of_thing = sparse_points(scene::gather(cloud, rows), the_case.cameras, the_case.points, seed_for_points);
+  out.points.insert(out.points.end(), of_thing.begin(), of_thing.end());
   return out;
 }
 
@@ -238,7 +279,37 @@ Result<CapturedCase> make_captured_case(const std::string& name, std::uint32_t t
   return carry_out(name, take, (*known)->make());
 }
 
+Result<CapturedCase> make_drawn_case(const std::string& name, std::shared_ptr<const Backdrop> backdrop,
+                                     const Stand& stand) {
+  const auto known = evaluate::find_case(known_plans(), name, kind);
+  if (!known) return propagate(known);
+  const auto standing = stand_in((*known)->make(), *backdrop, stand);
+  if (!standing) return propagate(standing);
+  const auto& [plan, scale] = *standing;
+  CapturedCase out;
+  out.name = name + "_in_" + backdrop->name;
+  part_cameras(*backdrop, stand.view, out);
+  out.before = out.after = backdrop->scene;
+  put_things(plan, out);
+  note_what_moves({}, out);
+  put_wish(plan, out);
+  out.points.count = points_on_thing;
+  out.points.noise *= scale, out.points.outlier_reach *= scale;
+  out.backdrop = std::move(backdrop);
+  return out;
+}
+
+scene::Image true_photograph(const CapturedCase& the_case, Side side, const scene::Camera& camera) {
+  const bool is_before = side == Side::before;
+  const scene::GaussianCloud& cloud = is_before ? the_case.before : the_case.after;
+  if (!the_case.backdrop) return photograph(cloud, camera);
+  const auto photo = photo_named(*the_case.backdrop, camera.name);
+  assert(photo);
+  return drawn_into(**photo, cloud, is_before ? the_case.part_before : the_case.part_after);
+}
+
 Capture capture(const CapturedCase& the_case, Side side) {
+  if (the_case.backdrop) return drawn_capture(the_case, side, seed_for(the_case.take, for_points, std::uint32_t(side)));
   const scene::GaussianCloud& cloud = side == Side::before ? the_case.before : the_case.after;
   const auto number = std::uint32_t(side);
   return {take_photos(cloud, the_case.cameras, the_case.sensor, seed_for(the_case.take, for_photos, number)),

@@ -6,10 +6,12 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "engine/captures/backdrop.h"
 #include "engine/captures/moving_part.h"
 #include "engine/captures/photographs.h"
 #include "engine/captures/plan.h"
@@ -51,6 +53,9 @@ struct CapturedCase {
   std::vector<std::uint32_t> shown;        ///< Rows of `before` that photos before the edit show; ascending.
   MovingPart moving;                       ///< What part_before is, of positions.
 
+  /// Of a case that is drawn into real photos; else null. Its scene is the first rows of `before` and `after`.
+  std::shared_ptr<const Backdrop> backdrop;
+
   std::vector<scene::Camera> cameras;   ///< Of the photos.
   std::vector<scene::Camera> held_out;  ///< Take no photo; those that judge.
   std::size_t beyond = 0;               ///< So many of those, the last ones, stand outside the orbit of the photos.
@@ -77,8 +82,18 @@ struct CapturedCase {
 ///   errors  not_found: no case of that name; the message lists them
 [[nodiscard]] Result<CapturedCase> make_captured_case(const std::string& name, std::uint32_t take = first_take);
 
+/// The things of the case of that name, drawn into a backdrop: real photos, of which every eighth is held out to judge.
+///   errors  as above; those of stand_in()
+[[nodiscard]] Result<CapturedCase> make_drawn_case(const std::string& name, std::shared_ptr<const Backdrop> backdrop,
+                                                   const Stand& stand);
+
 /// Which of the two scenes is photographed. Noise, exposures and points of one have nothing to do with the other's.
 enum class Side { before, after };
+
+/// What the camera should show of a scene of the case, without noise; of a case that is drawn into photos, the noise of
+/// the photo apart. [3], 0 to 1.
+///   camera  one of the case
+[[nodiscard]] scene::Image true_photograph(const CapturedCase& the_case, Side side, const scene::Camera& camera);
 
 /// Photographs a scene of the case.
 [[nodiscard]] Capture capture(const CapturedCase& the_case, Side side);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -90,11 +91,24 @@ double f1_of(const Match& match) {
   return sum > 0 ? 2 * match.recall * match.precision / sum : 0;
 }
 
-/// The photos that were taken farthest to the left, in the middle and farthest to the right.
+/// Does the picture hold all handles that somebody would place?
+bool has_handles(const CapturedCase& the_case, const scene::Camera& camera) {
+  return std::ranges::all_of(the_case.handles, [&](const edit::Handle& handle) {
+    const DVec3 point = camera.cam_from_world(handle.source);
+    const DVec2 pixel = camera.pixel_from_cam(point);
+    return point.z > 0 && pixel.x > 0 && pixel.y > 0 && pixel.x < camera.width && pixel.y < camera.height;
+  });
+}
+
+/// The photos that were taken farthest to the left, in the middle and farthest to the right, of those that show it.
 std::vector<scene::Camera> three_photos(const CapturedCase& the_case) {
   const DVec3 right = right_of(the_case);
-  const auto [left_most, right_most] = std::ranges::minmax_element(
-      the_case.cameras, {}, [&](const scene::Camera& c) { return glm::dot(c.centre(), right); });
+  std::vector<scene::Camera> photos;
+  std::ranges::copy_if(the_case.cameras, std::back_inserter(photos),
+                       [&](const scene::Camera& camera) { return has_handles(the_case, camera); });
+  if (photos.empty()) photos = the_case.cameras;
+  const auto [left_most, right_most] =
+      std::ranges::minmax_element(photos, {}, [&](const scene::Camera& c) { return glm::dot(c.centre(), right); });
   return {*left_most, the_case.cameras.front(), *right_most};
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <functional>
 #include <iomanip>
 #include <memory>
 #include <ostream>
@@ -10,15 +11,18 @@
 #include <utility>
 #include <vector>
 
+#include "engine/captures/backdrop.h"
 #include "engine/captures/capture_trial.h"
 #include "engine/captures/captured_case.h"
 #include "engine/captures/grasp.h"
 #include "engine/captures/training.h"
 #include "engine/core/atomic_file.h"
+#include "engine/io/dataset.h"
 #include "server/cli/bench_edit.h"
 #include "server/cli/bench_report.h"
 #include "server/cli/captures_page.h"
 #include "server/cli/folders.h"
+#include "server/cli/photos.h"
 #include "server/edits/convert.h"
 
 namespace server::cli {
@@ -67,14 +71,48 @@ Result<captures::CaptureTrial> trial_of(const captures::ReadyCase& ready, const 
   return trial;
 }
 
+/// The photos of a dataset, and a scene that is trained from all of them.
+Result<std::shared_ptr<const captures::Backdrop>> backdrop_of(const CaptureOptions& options, const path& cache) {
+  const auto dataset = engine::io::read_dataset(options.photos);
+  if (!dataset) return propagate(dataset);
+  auto photos = load_photos(*dataset, options.photo_side);
+  if (!photos) return propagate(photos);
+  auto points = sparse_points_of(*dataset);
+  if (!points) return propagate(points);
+  captures::Capture capture{std::move(*photos), std::move(*points)};
+  auto trained = captures::trained(capture, captures::training_options(options.fit_iterations), cache);
+  if (!trained) return propagate(trained);
+  return std::make_shared<const captures::Backdrop>(
+      captures::Backdrop{std::filesystem::weakly_canonical(dataset->root).filename().string(),
+                         std::move(capture.photos), std::move(capture.points), std::move(trained->cloud)});
+}
+
+/// What makes a case of a name.
+using Maker = std::function<Result<captures::CapturedCase>(const std::string& name)>;
+Result<Maker> maker_of(const CaptureOptions& options, const path& cache) {
+  if (options.photos.empty())
+    return Maker([&](const std::string& name) { return captures::make_captured_case(name, options.take); });
+  const auto backdrop = backdrop_of(options, cache);
+  if (!backdrop) return propagate(backdrop);
+  captures::Stand stand = options.stand;
+  stand.at = {options.at[0], options.at[1]}, stand.to = {options.to[0], options.to[1]};
+  return Maker([stand, backdrop = *backdrop](const std::string& name) {
+    auto made = captures::make_drawn_case(name, backdrop, stand);
+    if (!made && !made.error().where.empty()) made.error().where = "--" + made.error().where;
+    return made;
+  });
+}
+
 /// Every case with every corrector. Rows are shown as they come.
 Result<std::vector<captures::CaptureTrial>> trials_of(const std::vector<std::string>& names, const path& cache,
                                                       const BenchOptions& options, const Machine& machine,
                                                       Terminal& terminal) {
   terminal.out << captures::capture_table_head() << std::flush;
   std::vector<captures::CaptureTrial> trials;
+  const auto make = maker_of(options.captures, cache);
+  if (!make) return propagate(make);
   for (const std::string& name : names) {
-    const auto made = captures::make_captured_case(name, options.captures.take);
+    const auto made = (*make)(name);
     if (!made) return propagate(made);
     const auto trained = captures::train(*made, captures::training_options(options.captures.fit_iterations), cache);
     if (!trained) return propagate(trained);
@@ -129,14 +167,37 @@ CLI::Option* add_capture_options(CLI::App& command, CaptureOptions& options) {
       ->needs(on)
       ->check(CLI::Range(1, 1'000'000))
       ->type_name("N");
+  CLI::Option* const take = command.add_option(
+      "--take", options.take,
+      "Which photos and which errors of the hand: those of the first take are what constants are chosen on; "
+      "other takes have others, of the same scenes and the same wishes. Give each its own --out");
+  take->needs(on)->check(CLI::Range(1, 1'000'000))->type_name("N");
+  CLI::Option* const photos =
+      command.add_option("--photos", options.photos,
+                         "Dataset into whose photos the things of the cases are drawn, standing on what they show at "
+                         "--at, and slid to --to: the truth is the photos that are held out, with the thing drawn in "
+                         "there. What it hides are real places");
+  photos->needs(on)->excludes(take)->type_name("DIR");
+  CLI::Option* const view = command.add_option("--view", options.stand.view, "Photo that --at and --to speak of");
+  view->needs(photos)->type_name("NAME");
+  const auto place = [&](const char* flag, std::vector<double>& at, const char* what) {
+    CLI::Option* const option = command.add_option(flag, at, what);
+    option->needs(photos)->expected(2)->delimiter(',')->check(CLI::Range(0.0, 1.0))->type_name("X,Y");
+    return option;
+  };
+  CLI::Option* const at =
+      place("--at", options.at, "Where the thing stands, in parts of the picture's width and height");
+  CLI::Option* const to = place("--to", options.to, "Where it is to be");
   command
-      .add_option(
-          "--take", options.take,
-          "Which photos and which errors of the hand: those of the first take are what constants are chosen on; "
-          "other takes have others, of the same scenes and the same wishes. Give each its own --out")
-      ->needs(on)
-      ->check(CLI::Range(1, 1'000'000))
+      .add_option("--size", options.stand.size, "Of the thing's longest side there, in parts of the picture's height")
+      ->needs(photos)
+      ->check(CLI::Range(0.01, 1.0))
+      ->type_name("X");
+  command.add_option("--photo-side", options.photo_side, "Longer side of the photos as they are used, pixels")
+      ->needs(photos)
+      ->check(CLI::Range(64, 4096))
       ->type_name("N");
+  photos->needs(view)->needs(at)->needs(to);
   return on;
 }
 
@@ -160,6 +221,9 @@ Result<path> default_capture_cache() {
 }
 
 Result<void> run_captures(const BenchOptions& options, const Machine& machine, Terminal& terminal) {
+  if (!options.captures.photos.empty() && options.cases.empty())
+    return engine::fail(engine::ErrorCode::invalid_argument, "say whose things are to be drawn into the photos",
+                        "--case");
   const auto names = captures::choose_captured_cases(options.cases);
   if (!names) return propagate(names);
   const auto cache = cache_folder(options.captures);
@@ -179,6 +243,10 @@ Result<void> run_captures(const BenchOptions& options, const Machine& machine, T
   ordered_json report = settings(options, machine);
   report["fit_iterations"] = options.captures.fit_iterations;
   report["take"] = options.captures.take;
+  if (!options.captures.photos.empty())
+    report["photos"] = {{"dataset", options.captures.photos},  {"side", options.captures.photo_side},
+                        {"view", options.captures.stand.view}, {"at", options.captures.at},
+                        {"to", options.captures.to},           {"size", options.captures.stand.size}};
   report["captures"] = std::move(all);
   if (auto saved = write_json(path(options.out) / "captures.json", report); !saved) return saved;
   if (auto saved = write_text(path(options.out) / "captures.md", table); !saved) return saved;

@@ -23,6 +23,10 @@ struct CaptureOptions {
                               "looking", "masks", "wide_masks"};  ///< Names of captures::known_grasps().
   int fit_iterations = 1500;
   std::uint32_t take = engine::captures::first_take;
+  std::string photos;    ///< Dataset whose photos the things of the cases are drawn into; empty: cases as they are.
+  int photo_side = 384;  ///< Longer side of those photos as they are used, pixels.
+  engine::captures::Stand stand;
+  std::vector<double> at, to;  ///< For `stand`: x, y.
 };
 
 /// Adds them.

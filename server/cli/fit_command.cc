@@ -28,6 +28,7 @@
 #include "server/cli/compute.h"
 #include "server/cli/fit_report.h"
 #include "server/cli/folders.h"
+#include "server/cli/photos.h"
 #include "server/cli/progress_display.h"
 
 namespace server::cli {
@@ -73,30 +74,13 @@ struct Photos {
   std::vector<fit::Photo> training, held_out;
 };
 
-Result<fit::Photo> load(const io::View& view, int max_side) {
-  auto picture = io::load_photo(view);
-  if (!picture) return propagate(picture);
-  const scene::Camera camera = scene::fit_within(view.camera, max_side);
-  if (camera.width != picture->width || camera.height != picture->height) {
-    picture = io::resized(*picture, camera.width, camera.height);
-    if (!picture) return propagate(picture);
-  }
-  return fit::to_photo(camera, *picture);
-}
-
-Result<Photos> load_photos(const io::Dataset& dataset, const FitCommandOptions& options) {
-  const std::vector<io::View>& views = dataset.views;
-  if (const auto bare = std::find_if(views.begin(), views.end(), [](const io::View& v) { return v.photo.empty(); });
-      bare != views.end())
-    return fail(ErrorCode::not_found, "this dataset has no photos, and a scene is fitted to photos", bare->camera.name);
-  std::vector<std::optional<Result<fit::Photo>>> loaded(views.size());
-  engine::parallel_for(views.size(), 1,
-                       [&](std::size_t i, std::size_t) { loaded[i] = load(views[i], options.max_side); });
+Result<Photos> parted_photos(const io::Dataset& dataset, const FitCommandOptions& options) {
+  auto loaded = load_photos(dataset, options.max_side);
+  if (!loaded) return propagate(loaded);
   Photos photos;
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    if (!*loaded[i]) return propagate(*loaded[i]);
+  for (std::size_t i = 0; i < loaded->size(); ++i) {
     const bool held_out = options.hold_out > 0 && i % std::size_t(options.hold_out) == 0;
-    (held_out ? photos.held_out : photos.training).push_back(std::move(**loaded[i]));
+    (held_out ? photos.held_out : photos.training).push_back(std::move((*loaded)[i]));
   }
   if (photos.training.empty())
     return fail(ErrorCode::invalid_argument, "all photos are held out: hold out fewer", "--hold-out");
@@ -143,15 +127,9 @@ Result<scene::GaussianCloud> load_start(const io::Dataset& dataset, const std::v
     terminal.err << "warning: this dataset has no sparse points; starting from random ones\n";
     return random_cloud(photos, options);
   }
-  std::vector<fit::ColoredPoint> points;
-  for (const io::Point& point : dataset.points) {
-    for (int axis = 0; axis < 3; ++axis)
-      if (std::abs(point.position[axis]) > fit::max_coordinate)
-        return fail(ErrorCode::corrupt_data, "this sparse point lies beyond all measure; remove it",
-                    "points3D[" + std::to_string(points.size()) + "]." + "xyz"[axis]);
-    points.push_back({point.position, point.rgb});
-  }
-  return fit::gaussians_at(points, 0);
+  const auto points = sparse_points_of(dataset);
+  if (!points) return propagate(points);
+  return fit::gaussians_at(*points, 0);
 }
 
 /// A start that the cameras do not see leads nowhere, whatever the photos show.
@@ -292,7 +270,7 @@ Result<void> run(const FitCommandOptions& options, Terminal& terminal) {
     const auto dataset =
         io::read_dataset(options.dataset, {.points = options.scene.empty() && options.init != Init::random});
     if (!dataset) return propagate(dataset);
-    auto photos = load_photos(*dataset, options);
+    auto photos = parted_photos(*dataset, options);
     if (!photos) return propagate(photos);
     const auto start = load_start(*dataset, photos->training, options, terminal);
     if (!start) return propagate(start);
