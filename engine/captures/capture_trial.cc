@@ -172,7 +172,7 @@ std::string capture_table_row(const CaptureTrial& trial) {
     number(true, db, 2);
   const std::optional<double> share = trial.share_of_ceiling();
   number(share.has_value(), 100 * share.value_or(0), 0);
-  number(true, trial.result_beyond_db, 2);
+  number(trial.ceiling_beyond_db > 0, trial.result_beyond_db, 2);  // else no camera is outside the orbit
   number(result.outside.pixels > 0, result.outside.psnr_db, 2);
   number(result.vacated.pixels > 0, result.vacated.psnr_db, 2);
   const std::optional<double> vacated_gain = trial.vacated_gain_db(), vacated_share = trial.vacated_share();

@@ -148,9 +148,9 @@ CLI::Option* add_capture_options(CLI::App& command, CaptureOptions& options) {
                   "splatdrag/captures below $XDG_CACHE_HOME or ~/.cache")
       ->needs(on)
       ->type_name("DIR");
-  command.add_option("--page", options.page, "Also write what --captures finds as a page for people")
-      ->needs(on)
-      ->type_name("FILE");
+  CLI::Option* const page =
+      command.add_option("--page", options.page, "Also write what --captures finds as a page for people");
+  page->needs(on)->type_name("FILE");
   std::vector<std::string> ways;
   for (const captures::NamedGrasp& way : captures::known_grasps()) ways.push_back(way.name);
   command
@@ -177,7 +177,7 @@ CLI::Option* add_capture_options(CLI::App& command, CaptureOptions& options) {
                          "Dataset into whose photos the things of the cases are drawn, standing on what they show at "
                          "--at, and slid to --to: the truth is the photos that are held out, with the thing drawn in "
                          "there. What it hides are real places");
-  photos->needs(on)->excludes(take)->type_name("DIR");
+  photos->needs(on)->excludes(take)->excludes(page)->type_name("DIR");
   CLI::Option* const view = command.add_option("--view", options.stand.view, "Photo that --at and --to speak of");
   view->needs(photos)->type_name("NAME");
   const auto place = [&](const char* flag, std::vector<double>& at, const char* what) {

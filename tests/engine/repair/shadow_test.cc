@@ -39,6 +39,11 @@ TEST(Shadow, IsNotAStainThatDoesNotComeFromThePart) {
   EXPECT_TRUE(ShadowedBlock(stain).shadow().empty());
 }
 
+TEST(Shadow, IsNotADarkThingThatThePartIsBeside) {
+  const auto board = [](float x, float z) { return x > 0 && x < 1.2f && std::abs(z) < 0.3f ? 0.6f : 1.0f; };
+  EXPECT_TRUE(ShadowedBlock(board).shadow().empty());
+}
+
 TEST(Shadow, IsNotWhatIsBrighter) {
   const auto gleam = [](float x, float z) { return beside_block(x, z) < 1 ? 1.3f : 1.0f; };
   EXPECT_TRUE(ShadowedBlock(gleam).shadow().empty());

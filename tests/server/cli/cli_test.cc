@@ -242,6 +242,30 @@ TEST_F(Cli, BenchEditJudgesEditsWhoseRightResultIsKnown) {
   EXPECT_LT(json::parse(support::read_file(at("bench/bench.json")))["cases"][0]["seconds"], 70);
 }
 
+TEST_F(Cli, BenchEditDrawsThingsIntoPhotos) {
+  const std::string bench = "bench-edit --captures --case can --photos " + at("demo") +
+                            " --at 0.4,0.75 --to 0.6,0.75 --size 0.3 --fit-iterations 100 --preset preview "
+                            "--corrector none --by masks --cache " +
+                            at("trained") + " --out " + at("drawn");
+  const Finished run = splatdrag(bench + " --view view_01.png");
+  ASSERT_EQ(run.status, 0) << run.err;
+  const json said = json::parse(support::read_file(at("drawn/captures.json")));
+  EXPECT_EQ(said["photos"]["view"], "view_01.png");
+  ASSERT_EQ(said["captures"].size(), 1u);
+  const json& found = said["captures"][0];
+  EXPECT_EQ(found["case"], "can_in_demo");
+  EXPECT_GT(found["deformed"]["edited"]["psnr_db"], found["untouched"]["edited"]["psnr_db"]) << found;
+  EXPECT_GT(found["ceiling"]["edited"]["psnr_db"], found["untouched"]["edited"]["psnr_db"]) << found;
+  EXPECT_TRUE(io::read_image(at("drawn/can_in_demo_masks_none_view_00.png.png")));
+  EXPECT_EQ(std::distance(fs::directory_iterator(at("trained")), fs::directory_iterator()), 3)
+      << "the photos as they are, before and after";
+  const Finished wrong = splatdrag(bench + " --view view_99.png");
+  EXPECT_EQ(wrong.status, 3);
+  EXPECT_NE(wrong.err.find("there is no photo \"view_99.png\"; the first is \"view_00.png\" (--view)"),
+            std::string::npos)
+      << wrong.err;
+}
+
 TEST_F(Cli, BenchEditJudgesEditsOfScenesThatItTrains) {
   const std::string bench =
       "bench-edit --captures --case mug --fit-iterations 60 --preset preview --corrector none "

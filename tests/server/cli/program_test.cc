@@ -161,6 +161,20 @@ TEST(Program, RefusesWrongOptionsOfCaptures) {
   refused({"--captures", "--fit-iterations", "nan"}, 2, "--fit-iterations");
   refused({"--captures", "--cache", out, "--case", "slide"}, 3, "no captured case \"slide\"");
   refused({"--case", "mug"}, 3, "no case \"mug\"");
+  refused({"--photos", "d", "--view", "a.jpg", "--at", "0.5,0.5", "--to", "0.6,0.5"}, 2, "--captures");
+  refused({"--captures", "--photos", "d", "--at", "0.5,0.5", "--to", "0.6,0.5"}, 2, "--view");
+  const std::vector<std::string> drawn{"--captures", "--cache", out,    "--photos", (folder.path() / "none").string(),
+                                       "--view",     "a.jpg",   "--at", "0.5,0.5",  "--to",
+                                       "0.6,0.5"};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), drawn.begin(), drawn.end());
+    return more;
+  };
+  refused(with({}), 2, "--case");
+  refused(with({"--case", "can"}), 3, "none");
+  refused(with({"--case", "can", "--take", "2"}), 2, "--take");
+  refused(with({"--case", "can", "--page", "page.md"}), 2, "--page");
+  refused(with({"--case", "can", "--at", "0.5,1.5"}), 2, "--at");
   refused({"--case", "slide", "--corrector", "sd"}, 2, "--model-dir");
   refused({"--captures", "--cache", file}, 2, "file");
   refused({"--captures", "--cache", file + "/below"}, 2, "file");
