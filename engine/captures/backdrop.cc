@@ -1,10 +1,12 @@
 #include "engine/captures/backdrop.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
 #include "engine/captures/photographs.h"
+#include "engine/captures/plan_parts.h"
 #include "engine/render/pick.h"
 #include "engine/scene/sh.h"
 #include "engine/working/footprint.h"
@@ -15,6 +17,7 @@ namespace {
 // A point shows where a thing covers less of its pixel than this, and is found by so many photos at least.
 constexpr float covering = 0.5f;
 constexpr int least_photos = 2;
+constexpr double least_shift = 0.05;  // of the thing's longest side: less is no edit
 
 /// Corners of the box around all of a plan's things before the edit: a grid of places of each patch says how far it
 /// reaches, to a hundredth or so.
@@ -37,9 +40,14 @@ Extent extent_of(const std::vector<Thing>& things) {
 }
 
 /// The rotation that takes the plan's height (-y) to `up`, and what faces the plan's viewer (-z) as nearly as it can to
-/// `facing`.
-DMat3 upright(DVec3 up, DVec3 facing) {
-  const DVec3 to_viewer = glm::normalize(facing - glm::dot(facing, up) * up);
+/// the camera's: on a floor that is where the camera is, on a wall down.
+DMat3 upright(DVec3 up, const scene::Camera& camera) {
+  const DMat3 axes = glm::transpose(camera.rotation);  // right, down, away
+  DVec3 to_viewer = axes[1] - axes[2];
+  to_viewer -= glm::dot(to_viewer, up) * up;
+  constexpr double least = 1e-3;  // of a vector of about 1: a surface that is tilted halfway between the two
+  if (glm::length(to_viewer) < least) to_viewer = axes[1] - glm::dot(axes[1], up) * up;
+  to_viewer = glm::normalize(to_viewer);
   return DMat3(glm::cross(up, to_viewer), -up, -to_viewer);
 }
 
@@ -79,8 +87,12 @@ Result<const fit::Photo*> photo_named(const Backdrop& backdrop, const std::strin
 
 Result<Standing> stand_in(Plan plan, const Backdrop& backdrop, const Stand& stand) {
   if (plan.mode != edit::Mode::move || plan.drawn_from || !plan.only_after.empty())
-    return fail(ErrorCode::unprocessable, "its things do not move as they are, and cannot be drawn into photos",
-                "case");
+    return fail(ErrorCode::unprocessable, "what it moves is drawn out, and cannot be drawn into photos", "case");
+  const auto is_finite = [](DVec2 place) { return std::isfinite(place.x) && std::isfinite(place.y); };
+  if (!is_finite(stand.at)) return fail(ErrorCode::invalid_argument, "expected two finite numbers", "at");
+  if (!is_finite(stand.to)) return fail(ErrorCode::invalid_argument, "expected two finite numbers", "to");
+  if (!(stand.size > 0) || !std::isfinite(stand.size))
+    return fail(ErrorCode::invalid_argument, "expected a finite number above 0", "size");
   const auto photo = photo_named(backdrop, stand.view);
   if (!photo) return propagate(photo);
   const scene::Camera& camera = (*photo)->camera;
@@ -93,20 +105,22 @@ Result<Standing> stand_in(Plan plan, const Backdrop& backdrop, const Stand& stan
   const DVec3 size = high - low, foot{0.5 * (low.x + high.x), high.y, 0.5 * (low.z + high.z)};
   const double longest = std::max({size.x, size.y, size.z});
   const double scale = stand.size * camera.height * at->depth / camera.fy / longest;
-  // Down in the picture is towards the viewer on a floor, and down on a wall.
-  const DMat3 turn = upright(at->normal, glm::transpose(camera.rotation)[1]);
+  const DVec3 shift = to->point - at->point;
+  if (glm::length(shift) < least_shift * scale * longest)
+    return fail(ErrorCode::unprocessable, "the thing is there before the edit", "to");
+  const DMat3 turn = upright(at->normal, camera);
   const Motion into = [=, there = at->point](DVec3 point) { return there + scale * (turn * (point - foot)); };
 
   for (Thing& thing : plan.things) {
     thing.pose = thing.pose ? Motion([into, pose = thing.pose](DVec3 point) { return into(pose(point)); }) : into;
-    thing.motion = [shift = to->point - at->point](DVec3 point) { return point + shift; };
+    thing.motion = shifted(shift);
   }
   for (Grip& grip : plan.grips) grip.near = into(grip.near), grip.radius *= scale;
   std::erase_if(plan.grips, [](const Grip& grip) { return grip.anchor; });
   for (auto* places : {&plan.clicks.inside, &plan.clicks.outside})
     for (DVec3& place : *places) place = into(place);
   plan.what = "The thing of a case, drawn into photos of " + backdrop.name + " and slid along what it stands on.";
-  plan.surroundings.clear();
+  plan.said.clear(), plan.glossy.clear(), plan.surroundings.clear();
   plan.region.reset(), plan.careless.reset(), plan.casts_shadows = false;
   return Standing{std::move(plan), scale};
 }

@@ -38,13 +38,15 @@ struct Stand {
 [[nodiscard]] Result<const fit::Photo*> photo_named(const Backdrop& backdrop, const std::string& name);
 
 /// A plan's things, grips and clicks in a backdrop. Upright on the surface that the photo shows at `stand.at`, turned
-/// to its viewer, and slid to `stand.to` as they are. Surroundings, region, orbit and carelessness are gone.
+/// to its viewer, and slid to `stand.to` as they are, whatever the plan does with them. Surroundings, region, orbit and
+/// carelessness are gone, and gloss, which is of another light.
 struct Standing {
   Plan plan;
   double scale = 1;  ///< Of the things, world units of the backdrop per one of the plan.
 };
-///   errors  those of photo_named(); unprocessable: no surface shows at a place ("at", "to"), or the plan is not one of
-///           things that move and stay as they are ("case")
+///   errors  those of photo_named(); invalid_argument: numbers that are not finite, or no size ("at", "to", "size");
+///           unprocessable: no surface shows at a place ("at", "to"), both are one place ("to"), or the plan draws out
+///           or grows what it moves ("case")
 [[nodiscard]] Result<Standing> stand_in(Plan plan, const Backdrop& backdrop, const Stand& stand);
 
 /// The photo with rows of a scene drawn into it: their light, over what of the photo they do not cover. Whatever of the
@@ -52,7 +54,8 @@ struct Standing {
 [[nodiscard]] scene::Image drawn_into(const fit::Photo& photo, const scene::GaussianCloud& scene,
                                       std::span<const std::uint32_t> rows);
 
-/// The points of the backdrop that a reconstruction still finds with these rows in the scene: that two photos show.
+/// The points of the backdrop that a reconstruction may still find with these rows in the scene: two photos have them
+/// in the picture, and not behind these rows.
 [[nodiscard]] std::vector<fit::ColoredPoint> points_beside(const Backdrop& backdrop,
                                                            std::span<const scene::Camera> cameras,
                                                            const scene::GaussianCloud& scene,

@@ -108,7 +108,8 @@ std::vector<procedural::Object> all_objects(const Plan& plan, Side side) {
 }
 
 /// Appends the things as they are before the edit, and after it, with all gloss.
-void put_things(const Plan& plan, CapturedCase& out) {
+///   unit  of the plan, world units
+void put_things(const Plan& plan, double unit, CapturedCase& out) {
   std::vector<procedural::Object> objects;
   objects.reserve(plan.things.size());
   for (const Thing& thing : plan.things) objects.push_back(thing.object);
@@ -121,7 +122,7 @@ void put_things(const Plan& plan, CapturedCase& out) {
   for (std::size_t i = 0; i < count; ++i) {
     carry_along(plan.things[things.object[i]].motion, first + i, out.after);
     const auto row = std::uint32_t(first + i);
-    if (glm::distance(DVec3(out.before.mean.get(row)), DVec3(out.after.mean.get(row))) < least_motion) continue;
+    if (glm::distance(DVec3(out.before.mean.get(row)), DVec3(out.after.mean.get(row))) < least_motion * unit) continue;
     out.part_before.push_back(row);
     out.part_after.push_back(row);
   }
@@ -131,9 +132,10 @@ void put_things(const Plan& plan, CapturedCase& out) {
 
 /// What moves, and what photos show of it, once all is put.
 ///   meant  rows of the surroundings that a person means as well
-void note_what_moves(std::vector<std::uint32_t> meant, CapturedCase& out) {
+///   unit   of the plan, world units
+void note_what_moves(std::vector<std::uint32_t> meant, double unit, CapturedCase& out) {
   meant.insert(meant.end(), out.part_before.begin(), out.part_before.end());  // all of the things come after those
-  out.moving = MovingPart(out.before, meant);
+  out.moving = MovingPart(out.before, meant, belongs_within * unit);
   out.shown =
       rows_where(render::largest_weights(out.before, out.cameras), [](float weight) { return weight >= shown_weight; });
 }
@@ -151,7 +153,7 @@ void put_scenes(const Plan& plan, CapturedCase& out) {
   std::vector<std::uint32_t> meant;
   for (std::uint32_t i = 0; plan.drawn_from && i < out.before.size(); ++i)
     if (plan.drawn_from(DVec3(out.before.mean.get(i)))) meant.push_back(i);
-  put_things(plan, out);
+  put_things(plan, 1, out);
   if (!plan.only_after.empty()) {
     const Covered grown = cover(plan.only_after, out.cameras, seed + 2);
     const std::size_t first = out.after.size();
@@ -159,7 +161,7 @@ void put_scenes(const Plan& plan, CapturedCase& out) {
     gloss_over(plan.glossy, plan.only_after, grown.object, first, out.after);
     for (std::size_t i = 0; i < grown.cloud.size(); ++i) out.part_after.push_back(std::uint32_t(first + i));
   }
-  note_what_moves(std::move(meant), out);
+  note_what_moves(std::move(meant), 1, out);
 }
 
 /// The surface that a person sees near a place and points at, from where the first photo was taken.
@@ -288,10 +290,16 @@ Result<CapturedCase> make_drawn_case(const std::string& name, std::shared_ptr<co
   const auto& [plan, scale] = *standing;
   CapturedCase out;
   out.name = name + "_in_" + backdrop->name;
+  out.is_test = plan.is_test;
   part_cameras(*backdrop, stand.view, out);
+  if (out.held_out.empty())
+    return fail(ErrorCode::unprocessable,
+                "every eighth photo is to judge, but for the one named, and of " +
+                    std::to_string(backdrop->photos.size()) + " that leaves none: name another, or bring more",
+                "view");
   out.before = out.after = backdrop->scene;
-  put_things(plan, out);
-  note_what_moves({}, out);
+  put_things(plan, scale, out);
+  note_what_moves({}, scale, out);
   put_wish(plan, out);
   out.points.count = points_on_thing;
   out.points.noise *= scale, out.points.outlier_reach *= scale;

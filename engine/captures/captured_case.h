@@ -57,7 +57,7 @@ struct CapturedCase {
   std::shared_ptr<const Backdrop> backdrop;
 
   std::vector<scene::Camera> cameras;   ///< Of the photos.
-  std::vector<scene::Camera> held_out;  ///< Take no photo; those that judge.
+  std::vector<scene::Camera> held_out;  ///< Those that judge: no fit sees what they do.
   std::size_t beyond = 0;               ///< So many of those, the last ones, stand outside the orbit of the photos.
   Sensor sensor;
   PointOptions points;
@@ -83,11 +83,12 @@ struct CapturedCase {
 [[nodiscard]] Result<CapturedCase> make_captured_case(const std::string& name, std::uint32_t take = first_take);
 
 /// The things of the case of that name, drawn into a backdrop: real photos, of which every eighth is held out to judge.
-///   errors  as above; those of stand_in()
+///   errors  as above; those of stand_in(); unprocessable, `where` is "view": too few photos, none is held out
 [[nodiscard]] Result<CapturedCase> make_drawn_case(const std::string& name, std::shared_ptr<const Backdrop> backdrop,
                                                    const Stand& stand);
 
-/// Which of the two scenes is photographed. Noise, exposures and points of one have nothing to do with the other's.
+/// Which of the two scenes is photographed. Noise, exposures and points of one have nothing to do with the other's,
+/// but in a drawn case, where both sides are the same photos.
 enum class Side { before, after };
 
 /// What the camera should show of a scene of the case, without noise; of a case that is drawn into photos, the noise of

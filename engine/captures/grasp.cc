@@ -91,16 +91,17 @@ double f1_of(const Match& match) {
   return sum > 0 ? 2 * match.recall * match.precision / sum : 0;
 }
 
-/// Does the picture hold all handles that somebody would place?
+/// Are all places that somebody would take hold of within the picture?
 bool has_handles(const CapturedCase& the_case, const scene::Camera& camera) {
   return std::ranges::all_of(the_case.handles, [&](const edit::Handle& handle) {
     const DVec3 point = camera.cam_from_world(handle.source);
+    if (!(point.z > 0)) return false;
     const DVec2 pixel = camera.pixel_from_cam(point);
-    return point.z > 0 && pixel.x > 0 && pixel.y > 0 && pixel.x < camera.width && pixel.y < camera.height;
+    return pixel.x > 0 && pixel.y > 0 && pixel.x < camera.width && pixel.y < camera.height;
   });
 }
 
-/// The photos that were taken farthest to the left, in the middle and farthest to the right, of those that show it.
+/// The photos that were taken farthest to the left, in the middle and farthest to the right, of those that it is in.
 std::vector<scene::Camera> three_photos(const CapturedCase& the_case) {
   const DVec3 right = right_of(the_case);
   std::vector<scene::Camera> photos;

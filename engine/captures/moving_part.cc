@@ -12,8 +12,8 @@
 
 namespace engine::captures {
 
-MovingPart::MovingPart(const scene::GaussianCloud& before, std::span<const std::uint32_t> part)
-    : surface_(interleaved(before.mean), 3), moves_(before.size(), 0) {
+MovingPart::MovingPart(const scene::GaussianCloud& before, std::span<const std::uint32_t> part, double within)
+    : surface_(interleaved(before.mean), 3), moves_(before.size(), 0), within_(within) {
   for (const std::uint32_t row : part) moves_[row] = 1;
 }
 
@@ -22,7 +22,7 @@ std::vector<std::uint8_t> MovingPart::holds(const Array3& places) const {
   if (surface_.size() == 0 || places.size() == 0) return out;
   const auto nearest = surface_.nearest(interleaved(places), 1);
   for (std::size_t i = 0; i < out.size(); ++i)
-    out[i] = moves_[nearest[i].index] != 0 && double(nearest[i].squared_distance) <= belongs_within * belongs_within;
+    out[i] = moves_[nearest[i].index] != 0 && double(nearest[i].squared_distance) <= within_ * within_;
   return out;
 }
 

@@ -26,7 +26,8 @@ class MovingPart {
   MovingPart() : MovingPart({}, {}) {}
   ///   before  the true scene
   ///   part    rows of it that move
-  MovingPart(const scene::GaussianCloud& before, std::span<const std::uint32_t> part);
+  ///   within  see belongs_within, world units: another scene has another unit
+  MovingPart(const scene::GaussianCloud& before, std::span<const std::uint32_t> part, double within = belongs_within);
 
   /// [N] 1 for each place that moves. The same for any number of threads.
   [[nodiscard]] std::vector<std::uint8_t> holds(const Array3& places) const;
@@ -35,6 +36,7 @@ class MovingPart {
  private:
   neighbours::PointIndex surface_;
   std::vector<std::uint8_t> moves_;  ///< By point of surface_.
+  double within_ = belongs_within;
 };
 
 /// How much of a picture each Gaussian can fill: its opacity times the area of its two longer axes (pi sigma_1 sigma_2,

@@ -40,7 +40,8 @@ constexpr float darkest = -1.5f;  // less light than a fifth leaves no texture t
 // is dark there is the shadow of something else as well.
 constexpr float touches = 0.12f, fades_from = 0.6f, fades_until = 1.0f;
 // Where more than this share of what is dark lies farther away than where shadows begin to fade, it is another thing,
-// or its shadow: a dark board that a mug is beside has 0.7 to 0.8 there, shadows of captured cases up to 0.13 (ADR 60).
+// or its shadow: a dark board that a mug or crate is beside has 0.7 to 0.8 there, shadows of captured cases up to 0.13
+// (ADR 60).
 constexpr double most_far = 0.4;
 constexpr std::size_t joined = 16;                   // neighbours that a shadow may go on to,
 constexpr float joined_within = 2 * spacing_around;  // and how near they are

@@ -121,7 +121,7 @@ RowSet Selector::rows_of(const Masks& masks, const std::string& where, Selected&
   MaskedRows masked = rows_in_masks(cloud_, masks, workspace_);
   so_far.undecided += masked.undecided;
   const auto surroundings = surroundings_of(cloud_.mean, masked.inside);
-  if (!surroundings) return std::move(masked.inside);
+  if (!surroundings) return std::move(masked.shaded);  // all of it lies behind glass, or haze
   const Neighbourhood& around = neighbourhood(*surroundings);
   std::vector<Given> given;
   std::vector<std::uint8_t> shaded;

@@ -24,7 +24,8 @@ namespace engine::select {
 struct MaskedRows {
   RowSet inside;  ///< [N] 1 for rows that are judged to be inside.
   RowSet judged;  ///< [N] 1 where the masks say enough for a judgement, either way.
-  RowSet shaded;  ///< [N] 1 for rows that are not judged because little light gets through to them, most of it inside.
+  RowSet
+      shaded;  ///< [N] 1 for rows that are not judged because little light gets through to them, three fifths inside.
   /// Rows that the views show, of which the share inside lies within 0.1 of one half: masks that contradict each other,
   /// or a row across a border. Not judged.
   std::size_t undecided = 0;
@@ -35,8 +36,8 @@ struct MaskedRows {
 /// mask's border (a fiftieth of the picture's width, or a tenth of the root of the mask's area if that is less) count
 /// for either side by half, unless an opening of the mask by two thirds of that removes them: legs, stems, and corners.
 /// What no view shows is not judged, nor a row to which less than a quarter of the light gets through in all of them:
-/// where a hundredth does it is shaded. A forward pass for each view. Source: Shen et al. 2024, "FlashSplat": which
-/// label of a row renders the masks best is known in closed form. Precondition: as above.
+/// where a hundredth does, three fifths of it inside, it is shaded. A forward pass for each view. Source: Shen et al.
+/// 2024, "FlashSplat": which label of a row renders the masks best is known in closed form. Precondition: as above.
 [[nodiscard]] MaskedRows rows_in_masks(const scene::GaussianCloud& cloud, const Masks& masks,
                                        render::Workspace& workspace);
 

@@ -135,6 +135,38 @@ Result<void> write_text(const path& file, const std::string& text) {
   return engine::write_file(file, std::as_bytes(std::span(text)));
 }
 
+/// Those of cases that are drawn into photos.
+///   returns  the one that switches them on
+CLI::Option* add_drawn_options(CLI::App& command, CaptureOptions& options) {
+  CLI::Option* const photos =
+      command.add_option("--photos", options.photos,
+                         "Dataset into whose photos the things of the cases are drawn, standing on what they show at "
+                         "--at, and slid to --to: the truth is the photos that are held out, with the thing drawn in "
+                         "there. What it hides are real places");
+  photos->type_name("DIR");
+  CLI::Option* const view = command.add_option("--view", options.stand.view, "Photo that --at and --to speak of");
+  view->needs(photos)->type_name("NAME");
+  const auto place = [&](const char* flag, std::vector<double>& at, const char* what) {
+    CLI::Option* const option = command.add_option(flag, at, what);
+    option->needs(photos)->expected(2)->delimiter(',')->check(CLI::Range(0.0, 1.0))->type_name("X,Y");
+    return option;
+  };
+  CLI::Option* const at =
+      place("--at", options.at, "Where the thing stands, in parts of the picture's width and height");
+  CLI::Option* const to = place("--to", options.to, "Where it is to be");
+  command
+      .add_option("--size", options.stand.size, "Of the thing's longest side there, in parts of the picture's height")
+      ->needs(photos)
+      ->check(CLI::Range(0.01, 1.0))
+      ->type_name("X");
+  command.add_option("--photo-side", options.photo_side, "Longer side of the photos as they are used, pixels")
+      ->needs(photos)
+      ->check(CLI::Range(64, 4096))
+      ->type_name("N");
+  photos->needs(view)->needs(at)->needs(to);
+  return photos;
+}
+
 }  // namespace
 
 CLI::Option* add_capture_options(CLI::App& command, CaptureOptions& options) {
@@ -172,32 +204,7 @@ CLI::Option* add_capture_options(CLI::App& command, CaptureOptions& options) {
       "Which photos and which errors of the hand: those of the first take are what constants are chosen on; "
       "other takes have others, of the same scenes and the same wishes. Give each its own --out");
   take->needs(on)->check(CLI::Range(1, 1'000'000))->type_name("N");
-  CLI::Option* const photos =
-      command.add_option("--photos", options.photos,
-                         "Dataset into whose photos the things of the cases are drawn, standing on what they show at "
-                         "--at, and slid to --to: the truth is the photos that are held out, with the thing drawn in "
-                         "there. What it hides are real places");
-  photos->needs(on)->excludes(take)->excludes(page)->type_name("DIR");
-  CLI::Option* const view = command.add_option("--view", options.stand.view, "Photo that --at and --to speak of");
-  view->needs(photos)->type_name("NAME");
-  const auto place = [&](const char* flag, std::vector<double>& at, const char* what) {
-    CLI::Option* const option = command.add_option(flag, at, what);
-    option->needs(photos)->expected(2)->delimiter(',')->check(CLI::Range(0.0, 1.0))->type_name("X,Y");
-    return option;
-  };
-  CLI::Option* const at =
-      place("--at", options.at, "Where the thing stands, in parts of the picture's width and height");
-  CLI::Option* const to = place("--to", options.to, "Where it is to be");
-  command
-      .add_option("--size", options.stand.size, "Of the thing's longest side there, in parts of the picture's height")
-      ->needs(photos)
-      ->check(CLI::Range(0.01, 1.0))
-      ->type_name("X");
-  command.add_option("--photo-side", options.photo_side, "Longer side of the photos as they are used, pixels")
-      ->needs(photos)
-      ->check(CLI::Range(64, 4096))
-      ->type_name("N");
-  photos->needs(view)->needs(at)->needs(to);
+  add_drawn_options(command, options)->needs(on)->excludes(take)->excludes(page);
   return on;
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -69,6 +70,32 @@ TEST(StandIn, SaysWhatIsWrongWithAPlaceOrACase) {
   empty.scene.resize(0);
   EXPECT_EQ(stand_in(plan_of("can"), empty, in_the_middle).error().where, "at");
   EXPECT_EQ(stand_in(plan_of("rod"), backdrop, in_the_middle).error().where, "case");
+  const auto where = [&](const Stand& wrong) { return stand_in(plan_of("can"), backdrop, wrong).error().where; };
+  stand = in_the_middle, stand.to = {0.51, 0.5};
+  EXPECT_EQ(where(stand), "to") << "it is there";
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  stand = in_the_middle, stand.at.y = nan;
+  EXPECT_EQ(where(stand), "at");
+  for (const double size : {nan, 0.0, -1.0, std::numeric_limits<double>::infinity()}) {
+    stand = in_the_middle, stand.size = size;
+    EXPECT_EQ(where(stand), "size") << size;
+  }
+}
+
+TEST(StandIn, TurnsAThingOnAFloorToTheCamera) {
+  // The wall is a floor to cameras that look down at it, and upright ones would see it edge-on.
+  Backdrop backdrop = wall();
+  for (const double pitch : {0.3, 0.7, 1.2}) {
+    scene::Camera& camera = backdrop.photos[4].camera;
+    const DVec3 eye = DVec3(0, 0, 3) + 3.0 * DVec3(0, std::cos(pitch), -std::sin(pitch));
+    camera = scene::look_at(eye, {0, 0, 3}, {0, 0, -1}, 0.9, 120, 90);
+    camera.name = "photo_4";
+    const Standing standing = stand_in(plan_of("can"), backdrop, in_the_middle).value();
+    const Thing& can = standing.plan.things[0];
+    const DVec3 foot = can.pose(DVec3(can.object.placement.world({0, 0, 0})));
+    const DVec3 before_it = can.pose(DVec3(can.object.placement.world({0, 0, 0})) + DVec3(0, 0, -1));
+    EXPECT_GT(glm::dot(glm::normalize(before_it - foot), DVec3(0, 1, 0)), 0.9) << pitch;
+  }
 }
 
 TEST(DrawnInto, CoversThePhotoWhereTheThingIsInFront) {
@@ -122,6 +149,14 @@ TEST(DrawnCase, IsJudgedByPhotosThatNoFitSees) {
   EXPECT_GT(made.part_before.size(), 500u);
   EXPECT_TRUE(made.moving.holds(made.handles[0].source)) << "a person points at the thing";
   EXPECT_NEAR(made.handles[0].target->x - made.handles[0].source.x, 0.78, 0.1);
+
+  Backdrop few = *backdrop;
+  few.photos.resize(5);
+  Stand of_the_first = in_the_middle;
+  of_the_first.view = "photo_0";
+  EXPECT_EQ(make_drawn_case("can", std::make_shared<const Backdrop>(few), of_the_first).error().where, "view")
+      << "no photo is left to judge";
+  EXPECT_TRUE(make_drawn_case("teddy", backdrop, in_the_middle)->is_test);
 
   const Capture before = capture(made, Side::before), after = capture(made, Side::after);
   EXPECT_EQ(before.photos.size(), 7u);

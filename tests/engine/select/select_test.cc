@@ -120,6 +120,18 @@ TEST(Select, MasksLeaveAWallThatShinesThroughTheThing) {
   EXPECT_EQ(selected(cloud, {{Op::add, Masks{{{front_camera(), mask}}}}}), thing);
 }
 
+TEST(Select, MasksTakeWhatLiesBehindGlassWhereThereIsNothingElse) {
+  scene::GaussianCloud cloud;
+  add_at(cloud, {0, 0, 1}, 2.2f, -1.0f);  // wide, far beyond the mask: a tenth of the light gets through
+  add_sheet(cloud, {0, 0, 2}, 10, 0.02f, {0.8f, 0.1f, 0.1f});
+  scene::Mask mask(100, 100);
+  for (int y = 43; y < 57; ++y)
+    for (int x = 43; x < 57; ++x) mask.at(x, y) = 1;
+  const RowList found = selected(cloud, {{Op::add, Masks{{{front_camera(), mask}}}}});
+  EXPECT_GT(found.size(), 80u);
+  EXPECT_NE(found.front(), 0u) << "not the glass";
+}
+
 TEST(Select, MasksThatReachALittleTooFarEndWhereTheThingDoes) {
   scene::GaussianCloud cloud;
   add_sheet(cloud, {-0.2f, 0, 2}, 20, 0.02f, {0.8f, 0.1f, 0.1f});  // pixels 30 to 50

@@ -174,7 +174,8 @@ TEST(Program, RefusesWrongOptionsOfCaptures) {
   refused(with({"--case", "can"}), 3, "none");
   refused(with({"--case", "can", "--take", "2"}), 2, "--take");
   refused(with({"--case", "can", "--page", "page.md"}), 2, "--page");
-  refused(with({"--case", "can", "--at", "0.5,1.5"}), 2, "--at");
+  refused({"--captures", "--photos", "d", "--view", "a.jpg", "--at", "0.5,1.5", "--to", "0.6,0.5"}, 2, "--at");
+  refused(with({"--case", "can", "--size", "0"}), 2, "--size");
   refused({"--case", "slide", "--corrector", "sd"}, 2, "--model-dir");
   refused({"--captures", "--cache", file}, 2, "file");
   refused({"--captures", "--cache", file + "/below"}, 2, "file");
