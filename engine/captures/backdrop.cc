@@ -8,6 +8,7 @@
 #include "engine/captures/photographs.h"
 #include "engine/captures/plan_parts.h"
 #include "engine/render/pick.h"
+#include "engine/scene/in_picture.h"
 #include "engine/scene/sh.h"
 #include "engine/working/footprint.h"
 
@@ -143,11 +144,8 @@ std::vector<fit::ColoredPoint> points_beside(const Backdrop& backdrop, std::span
   for (const scene::Camera& camera : cameras) {
     const scene::Image share = working::footprint(scene, rows, camera, workspace);
     for (std::size_t i = 0; i < photos.size(); ++i) {
-      const DVec3 point = camera.cam_from_world(backdrop.points[i].position);
-      if (!(point.z > 0)) continue;
-      const DVec2 pixel = camera.pixel_from_cam(point);
-      if (!(pixel.x >= 0 && pixel.y >= 0 && pixel.x < camera.width && pixel.y < camera.height)) continue;
-      photos[i] += share.at(int(pixel.x), int(pixel.y)) < covering;
+      const auto pixel = scene::pixel_in_picture(camera, camera.cam_from_world(backdrop.points[i].position));
+      if (pixel) photos[i] += share.at(int(pixel->x), int(pixel->y)) < covering;
     }
   }
   std::vector<fit::ColoredPoint> out;

@@ -20,8 +20,8 @@
 namespace engine::captures {
 namespace {
 
-/// What the held-out cameras should show. What no photo before the edit shows is nobody's fault: it does
-/// not count as outside.
+/// What the held-out cameras should show. What no photo before the edit shows is nobody's fault: it does not count as
+/// outside.
 std::vector<evaluate::JudgedView> true_views(const CapturedCase& the_case) {
   std::vector<evaluate::JudgedView> views;
   render::Workspace workspace;

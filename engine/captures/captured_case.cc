@@ -250,11 +250,19 @@ void part_cameras(const Backdrop& backdrop, const std::string& first, CapturedCa
   }
 }
 
+/// The scene of one side, and the rows of it that move.
+struct Shown {
+  const scene::GaussianCloud& cloud;
+  const std::vector<std::uint32_t>& rows;
+};
+Shown shown_of(const CapturedCase& the_case, Side side) {
+  if (side == Side::before) return {the_case.before, the_case.part_before};
+  return {the_case.after, the_case.part_after};
+}
+
 /// Photos of a case that is drawn into them, and the points that a reconstruction would find there.
 Capture drawn_capture(const CapturedCase& the_case, Side side, std::uint64_t seed_for_points) {
-  const bool is_before = side == Side::before;
-  const scene::GaussianCloud& cloud = is_before ? the_case.before : the_case.after;
-  const std::vector<std::uint32_t>& rows = is_before ? the_case.part_before : the_case.part_after;
+  const auto& [cloud, rows] = shown_of(the_case, side);
   Capture out;
   for (const scene::Camera& camera : the_case.cameras)
     out.photos.push_back(fit::to_photo(camera, true_photograph(the_case, side, camera)));
@@ -308,17 +316,16 @@ Result<CapturedCase> make_drawn_case(const std::string& name, std::shared_ptr<co
 }
 
 scene::Image true_photograph(const CapturedCase& the_case, Side side, const scene::Camera& camera) {
-  const bool is_before = side == Side::before;
-  const scene::GaussianCloud& cloud = is_before ? the_case.before : the_case.after;
+  const auto& [cloud, rows] = shown_of(the_case, side);
   if (!the_case.backdrop) return photograph(cloud, camera);
   const auto photo = photo_named(*the_case.backdrop, camera.name);
   assert(photo);
-  return drawn_into(**photo, cloud, is_before ? the_case.part_before : the_case.part_after);
+  return drawn_into(**photo, cloud, rows);
 }
 
 Capture capture(const CapturedCase& the_case, Side side) {
   if (the_case.backdrop) return drawn_capture(the_case, side, seed_for(the_case.take, for_points, std::uint32_t(side)));
-  const scene::GaussianCloud& cloud = side == Side::before ? the_case.before : the_case.after;
+  const scene::GaussianCloud& cloud = shown_of(the_case, side).cloud;
   const auto number = std::uint32_t(side);
   return {take_photos(cloud, the_case.cameras, the_case.sensor, seed_for(the_case.take, for_photos, number)),
           sparse_points(cloud, the_case.cameras, the_case.points, seed_for(the_case.take, for_points, number))};

@@ -14,6 +14,7 @@
 #include "engine/edit/drag.h"
 #include "engine/edit/handles.h"
 #include "engine/mask/mask.h"
+#include "engine/scene/in_picture.h"
 #include "engine/select/select.h"
 
 namespace engine::captures {
@@ -94,10 +95,7 @@ double f1_of(const Match& match) {
 /// Are all places that somebody would take hold of within the picture?
 bool has_handles(const CapturedCase& the_case, const scene::Camera& camera) {
   return std::ranges::all_of(the_case.handles, [&](const edit::Handle& handle) {
-    const DVec3 point = camera.cam_from_world(handle.source);
-    if (!(point.z > 0)) return false;
-    const DVec2 pixel = camera.pixel_from_cam(point);
-    return pixel.x > 0 && pixel.y > 0 && pixel.x < camera.width && pixel.y < camera.height;
+    return scene::pixel_in_picture(camera, camera.cam_from_world(handle.source)).has_value();
   });
 }
 

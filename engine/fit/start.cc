@@ -10,6 +10,7 @@
 
 #include "engine/core/median.h"
 #include "engine/neighbours/point_index.h"
+#include "engine/scene/in_picture.h"
 #include "engine/scene/opacity.h"
 #include "engine/scene/sh.h"
 #include "engine/train/random_streams.h"
@@ -71,9 +72,7 @@ Result<DVec3> focus_of(std::span<const scene::Camera> cameras) {
 
 bool is_in_picture(const scene::Camera& camera, DVec3 point, double nearest_depth) {
   const DVec3 in_cam = camera.cam_from_world(point);
-  if (!(in_cam.z >= nearest_depth)) return false;
-  const DVec2 pixel = camera.pixel_from_cam(in_cam);
-  return pixel.x >= 0 && pixel.y >= 0 && pixel.x < camera.width && pixel.y < camera.height;
+  return in_cam.z >= nearest_depth && scene::pixel_in_picture(camera, in_cam);
 }
 
 DVec3 median_position(std::span<const ColoredPoint> points) {

@@ -7,9 +7,9 @@
 #include "engine/core/parallel.h"
 #include "engine/core/vec.h"
 #include "engine/mask/mask.h"
-#include "engine/repair/in_picture.h"
 #include "engine/repair/plane.h"
 #include "engine/repair/seed.h"
+#include "engine/scene/in_picture.h"
 
 namespace engine::repair {
 namespace {

@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "engine/core/parallel.h"
-#include "engine/repair/in_picture.h"
 #include "engine/repair/thin_plate.h"
+#include "engine/scene/in_picture.h"
 
 namespace engine::repair {
 namespace {

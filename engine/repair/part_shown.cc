@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-#include "engine/repair/in_picture.h"
+#include "engine/scene/in_picture.h"
 
 namespace engine::repair {
 namespace {

@@ -17,7 +17,6 @@
 #include "engine/render/forward.h"
 #include "engine/render/weight_sums.h"
 #include "engine/repair/chart.h"
-#include "engine/repair/in_picture.h"
 #include "engine/repair/seed.h"
 #include "engine/repair/spots.h"
 #include "engine/repair/surfaces.h"
@@ -26,6 +25,7 @@
 #include "engine/repair/vacated.h"
 #include "engine/repair/veils.h"
 #include "engine/repair/view_order.h"
+#include "engine/scene/in_picture.h"
 #include "engine/train/densify.h"
 #include "engine/working/footprint.h"
 

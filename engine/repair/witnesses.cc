@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "engine/render/forward.h"
-#include "engine/repair/in_picture.h"
+#include "engine/scene/in_picture.h"
 
 namespace engine::repair {
 namespace {

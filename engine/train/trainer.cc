@@ -9,6 +9,7 @@
 
 #include "engine/mask/mask.h"
 #include "engine/optim/picture_view.h"
+#include "engine/scene/in_picture.h"
 
 namespace engine::train {
 namespace {
@@ -277,12 +278,11 @@ void Trainer::remove_floaters() {
     const bool floats = std::any_of(views_.begin(), views_.end(), [&](const TrainingView& view) {
       const scene::Camera& camera = view.frozen.camera();
       const DVec3 p = camera.cam_from_world(DVec3(cloud_.mean.get(row)));
-      if (!(p.z > 0) || view.nearest == 0) return false;
-      const DVec2 pixel = camera.pixel_from_cam(p);
-      if (!(pixel.x >= 0 && pixel.x < camera.width && pixel.y >= 0 && pixel.y < camera.height)) return false;
+      const auto pixel = scene::pixel_in_picture(camera, p);
+      if (!pixel || view.nearest == 0) return false;
       const auto tile =
-          std::size_t(int(pixel.y) / render::tile_size) * std::size_t(render::tile_columns(camera.width)) +
-          std::size_t(int(pixel.x) / render::tile_size);
+          std::size_t(int(pixel->y) / render::tile_size) * std::size_t(render::tile_columns(camera.width)) +
+          std::size_t(int(pixel->x) / render::tile_size);
       const float near = view.near_by_tile[tile] != 0 ? view.near_by_tile[tile] : view.nearest;
       return p.z < double(near) - margin;
     });

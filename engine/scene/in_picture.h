@@ -6,10 +6,10 @@
 #include "engine/core/vec.h"
 #include "engine/scene/camera.h"
 
-namespace engine::repair {
+namespace engine::scene {
 
 /// The pixel position of a point in camera space, if it lies before the camera and within its picture.
-[[nodiscard]] inline std::optional<DVec2> pixel_in_picture(const scene::Camera& camera, DVec3 point) {
+[[nodiscard]] inline std::optional<DVec2> pixel_in_picture(const Camera& camera, DVec3 point) {
   if (!(point.z > 0)) return std::nullopt;
   const DVec2 pixel = camera.pixel_from_cam(point);
   // Compared as numbers: one far beside the picture has no place that an int could hold.
@@ -17,4 +17,4 @@ namespace engine::repair {
   return pixel;
 }
 
-}  // namespace engine::repair
+}  // namespace engine::scene
