@@ -39,10 +39,11 @@ constexpr float darkest = -1.5f;  // less light than a fifth leaves no texture t
 // It begins within so much of the part. From the first of these distances on it fades, to nothing at the second: what
 // is dark there is the shadow of something else as well.
 constexpr float touches = 0.12f, fades_from = 0.6f, fades_until = 1.0f;
-// Where more than this share of what is dark lies farther away than where shadows begin to fade, it is another thing,
-// or its shadow: a dark board that a mug or crate is beside has 0.7 to 0.8 there, shadows of captured cases up to 0.13
-// (ADR 60).
-constexpr double most_far = 0.4;
+// A shadow has its root at the part, and ends. Where more than the first share of what is dark lies farther away than
+// where shadows begin to fade, or less than the second within where they begin, it is another thing, or its shadow: a
+// dark board that a mug, a crate or a can is beside has a third to 0.8 and 0.01 to 0.09, shadows of captured cases up to
+// 0.15 and from 0.19 on (ADR 60, 61).
+constexpr double most_far = 0.3, least_near = 0.1;
 constexpr std::size_t joined = 16;                   // neighbours that a shadow may go on to,
 constexpr float joined_within = 2 * spacing_around;  // and how near they are
 // A point of a scene is on a surface that is so near: trained Gaussians stand off what they show.
@@ -61,24 +62,30 @@ Vec3 shade_of(Vec3 color) {
 }
 Vec3 hue_of(Vec3 color) { return shade_of(color) - mean_of(shade_of(color)); }
 
-/// Which dark points hang together with one beside the part, through dark ones; none where most of that is far away.
+/// Which dark points hang together with one beside the part, through dark ones of where shadows are; none where little
+/// of that is beside the part, or much of it far away.
 ///   nearest  [n][asked] points to each
 std::vector<std::uint8_t> from_the_part(const AroundPart& around, std::span<const neighbours::Neighbour> nearest,
                                         std::size_t asked, const std::vector<std::uint8_t>& dark) {
+  const auto may_be_shadow = [&](std::size_t i) { return dark[i] != 0 && around.distance[i] < fades_until; };
   neighbours::Pieces pieces(around.size());
   for (std::uint32_t i = 0; i < around.size(); ++i)
     for (const auto& n : nearest.subspan(i * asked, std::min(joined, asked)))
-      if (dark[i] != 0 && dark[n.index] != 0 && n.squared_distance < joined_within * joined_within)
+      if (may_be_shadow(i) && may_be_shadow(n.index) && n.squared_distance < joined_within * joined_within)
         pieces.join(i, n.index);
   std::vector<std::uint8_t> touching(around.size(), 0), out(around.size(), 0);
   for (std::uint32_t i = 0; i < around.size(); ++i)
-    if (dark[i] != 0 && around.distance[i] < touches) touching[pieces.of(i)] = 1;
-  std::size_t points = 0, far = 0;
+    if (may_be_shadow(i) && around.distance[i] < touches) touching[pieces.of(i)] = 1;
+  std::size_t points = 0, near = 0, far = 0;
   for (std::uint32_t i = 0; i < around.size(); ++i) {
-    out[i] = dark[i] != 0 && touching[pieces.of(i)] != 0;
-    if (out[i] != 0) ++points, far += around.distance[i] > fades_from ? 1 : 0;
+    out[i] = may_be_shadow(i) && touching[pieces.of(i)] != 0;
+    if (out[i] == 0) continue;
+    ++points;
+    if (around.distance[i] < touches) ++near;
+    if (around.distance[i] > fades_from) ++far;
   }
-  if (double(far) > most_far * double(points)) std::ranges::fill(out, std::uint8_t{0});
+  if (double(far) > most_far * double(points) || double(near) < least_near * double(points))
+    std::ranges::fill(out, std::uint8_t{0});
   return out;
 }
 

@@ -44,6 +44,24 @@ TEST(Shadow, IsNotADarkThingThatThePartIsBeside) {
   EXPECT_TRUE(ShadowedBlock(board).shadow().empty());
 }
 
+TEST(Shadow, IsNotAStainThatReachesThePartByLittle) {
+  const auto stain = [](float x, float z) {
+    const bool reaches = x > 0.3f && x < 0.5f && std::abs(z) < 0.07f;
+    return std::hypot(x - 0.56f, z) < 0.2f ? 0.5f : reaches ? 0.3f : 1.0f;
+  };
+  EXPECT_TRUE(ShadowedBlock(stain).shadow().empty());
+}
+
+TEST(Shadow, EndsWhereAnotherDarkThingBegins) {
+  const auto both = [](float x, float z) {
+    const bool joins = x > 0.55f && x < 1.3f && std::abs(z)<0.12f, other = x> 1.15f && x < 1.5f;
+    return joins || other ? 0.6f : beside_block(x, z);
+  };
+  const Shadow shadow = ShadowedBlock(both).shadow();
+  EXPECT_NEAR(brightness(shadow, in_shadow), 0.6f, 0.06f);
+  EXPECT_EQ(brightness(shadow, {1.3, 0, 0}), 1);
+}
+
 TEST(Shadow, IsNotWhatIsBrighter) {
   const auto gleam = [](float x, float z) { return beside_block(x, z) < 1 ? 1.3f : 1.0f; };
   EXPECT_TRUE(ShadowedBlock(gleam).shadow().empty());
