@@ -41,8 +41,8 @@ constexpr float darkest = -1.5f;  // less light than a fifth leaves no texture t
 constexpr float touches = 0.12f, fades_from = 0.6f, fades_until = 1.0f;
 // A shadow has its root at the part, and ends. Where more than the first share of what is dark lies farther away than
 // where shadows begin to fade, or less than the second within where they begin, it is another thing, or its shadow: a
-// dark board that a mug, a crate or a can is beside has a third to 0.8 and 0.01 to 0.09, shadows of captured cases up to
-// 0.15 and from 0.19 on (ADR 60, 61).
+// dark board that a mug, a crate or a can is beside has a third to 0.8 and 0.01 to 0.09, shadows of captured cases up
+// to 0.15 and from 0.19 on (ADR 60, 61).
 constexpr double most_far = 0.3, least_near = 0.1;
 constexpr std::size_t joined = 16;                   // neighbours that a shadow may go on to,
 constexpr float joined_within = 2 * spacing_around;  // and how near they are
@@ -87,6 +87,23 @@ std::vector<std::uint8_t> from_the_part(const AroundPart& around, std::span<cons
   if (double(far) > most_far * double(points) || double(near) < least_near * double(points))
     std::ranges::fill(out, std::uint8_t{0});
   return out;
+}
+
+/// Whether what is dark is darker away from the part than beside it: its farthest third, than the rest.
+///   light  [n] logarithm of what is left of it
+bool darkens_outwards(const AroundPart& around, const std::vector<std::uint8_t>& dark, const std::vector<Vec3>& light) {
+  std::vector<std::uint32_t> points;
+  for (std::uint32_t i = 0; i < around.size(); ++i)
+    if (dark[i] != 0) points.push_back(i);
+  const auto farther = points.begin() + std::ptrdiff_t(points.size() - points.size() / 3);
+  if (farther == points.end()) return false;
+  std::ranges::nth_element(points, farther, {}, [&](std::uint32_t i) { return std::pair(around.distance[i], i); });
+  const auto mean = [&](auto begin, auto end) {
+    double sum = 0;
+    for (auto it = begin; it != end; ++it) sum += double(mean_of(light[*it]));
+    return sum / double(end - begin);
+  };
+  return mean(farther, points.end()) < mean(points.begin(), farther);
 }
 
 /// Finds how dark each point is: the logarithm of what is left of the light, over a window.
@@ -205,6 +222,7 @@ Shadow::Shadow(AroundPart around) : around_(std::move(around)), light_(around_.s
   std::vector<std::uint8_t> dark(around_.size());
   for (std::size_t i = 0; i < around_.size(); ++i) dark[i] = mean_of(darkness.mean()[i]) < -darkness.threshold(i);
   const std::vector<std::uint8_t> cast = from_the_part(around_, nearest, asked, dark);
+  if (darkens_outwards(around_, cast, darkness.mean())) return;
   for (std::size_t i = 0; i < around_.size(); ++i) {
     if (cast[i] == 0) continue;
     const Vec3 mean = darkness.mean()[i];

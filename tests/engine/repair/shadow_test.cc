@@ -52,6 +52,15 @@ TEST(Shadow, IsNotAStainThatReachesThePartByLittle) {
   EXPECT_TRUE(ShadowedBlock(stain).shadow().empty());
 }
 
+TEST(Shadow, DoesNotDarkenAwayFromThePart) {
+  const auto edge_of_a_board = [](float x, float z) {
+    return beside_block(x, z) == 1 ? 1.0f : x < 0.4f ? 0.85f : 0.25f;
+  };
+  EXPECT_TRUE(ShadowedBlock(edge_of_a_board).shadow().empty());
+  const auto fading = [](float x, float z) { return beside_block(x, z) == 1 ? 1.0f : x < 0.4f ? 0.25f : 0.85f; };
+  EXPECT_FALSE(ShadowedBlock(fading).shadow().empty());
+}
+
 TEST(Shadow, EndsWhereAnotherDarkThingBegins) {
   const auto both = [](float x, float z) {
     const bool joins = x > 0.55f && x < 1.3f && std::abs(z)<0.12f, other = x> 1.15f && x < 1.5f;
