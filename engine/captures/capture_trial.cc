@@ -147,11 +147,12 @@ Result<CaptureOutcome> carry_out(const ReadyCase& ready, const edit::Request& re
 std::string capture_table_head() {
   return "| case | set | by | corrector | before, dB | deformed, dB | edited, dB | gain, dB | least gain, dB "
          "| ceiling, dB | share, % | beyond, dB | outside, dB | vacated, dB | vacated gain, dB | vacated share, % "
+         "| vacated detail, % "
          "| arrived, dB | SSIM | recall, % | precision, % | recall of shown, "
          "% "
          "| precision of shown, % | s |\n"
          "| --- | --- | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: "
-         "| ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n";
+         "| ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n";
 }
 
 std::string capture_table_row(const CaptureTrial& trial) {
@@ -178,6 +179,7 @@ std::string capture_table_row(const CaptureTrial& trial) {
   const std::optional<double> vacated_gain = trial.vacated_gain_db(), vacated_share = trial.vacated_share();
   number(vacated_gain.has_value(), vacated_gain.value_or(0), 2);
   number(vacated_share.has_value(), 100 * vacated_share.value_or(0), 0);
+  number(result.vacated.detail.has_value(), 100 * result.vacated.detail.value_or(0), 0);
   number(result.arrived.pixels > 0, result.arrived.psnr_db, 2);
   number(true, result.edited.ssim, 4);
   for (const Match& match : {trial.match, trial.shown}) {

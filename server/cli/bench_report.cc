@@ -15,8 +15,17 @@ namespace captures = engine::captures;
 namespace evaluate = engine::evaluate;
 using nlohmann::ordered_json;
 
+ordered_json encode(const std::optional<double>& number) { return number ? ordered_json(*number) : ordered_json(); }
+
+std::optional<double> number_or_null(const ordered_json& from) {
+  return from.is_null() ? std::nullopt : std::optional(from.get<double>());
+}
+
 ordered_json encode(const evaluate::RegionQuality& likeness) {
-  return {{"psnr_db", likeness.psnr_db}, {"ssim", likeness.ssim}, {"pixels", likeness.pixels}};
+  return {{"psnr_db", likeness.psnr_db},
+          {"ssim", likeness.ssim},
+          {"detail", encode(likeness.detail)},
+          {"pixels", likeness.pixels}};
 }
 
 ordered_json encode(const evaluate::Quality& quality) {
@@ -25,12 +34,6 @@ ordered_json encode(const evaluate::Quality& quality) {
           {"arrived", encode(quality.arrived)},
           {"outside", encode(quality.outside)},
           {"miss", quality.miss}};
-}
-
-ordered_json encode(const std::optional<double>& number) { return number ? ordered_json(*number) : ordered_json(); }
-
-std::optional<double> number_or_null(const ordered_json& from) {
-  return from.is_null() ? std::nullopt : std::optional(from.get<double>());
 }
 
 ordered_json encode(const std::vector<engine::edit::StageTime>& times) {
@@ -42,6 +45,7 @@ ordered_json encode(const std::vector<engine::edit::StageTime>& times) {
 void decode(const ordered_json& from, evaluate::RegionQuality& likeness) {
   from.at("psnr_db").get_to(likeness.psnr_db);
   from.at("ssim").get_to(likeness.ssim);
+  likeness.detail = number_or_null(from.at("detail"));
   from.at("pixels").get_to(likeness.pixels);
 }
 

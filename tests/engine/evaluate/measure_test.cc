@@ -42,6 +42,40 @@ TEST(Judge, TheTruthIsPerfect) {
   EXPECT_EQ(quality.miss, 0);
 }
 
+/// Stripes of so many pixels, of which the first are so far from the left.
+scene::Image stripes(int width, int shift, float low = 0.2f, float high = 0.8f) {
+  scene::Image picture(48, 32, 3);
+  for (int c = 0; c < 3; ++c)
+    for (int y = 0; y < picture.height; ++y)
+      for (int x = 0; x < picture.width; ++x) picture.at(x, y, c) = (x + shift) / width % 2 == 0 ? low : high;
+  return picture;
+}
+
+/// Of the whole picture.
+RegionQuality quality_of(const scene::Image& result, const scene::Image& truth) {
+  RegionQualitySum sum;
+  sum.add(result, truth, complement(scene::Mask(truth.width, truth.height)));
+  return sum.quality();
+}
+
+TEST(RegionQuality, DetailIsLessInASmearAndNotWherePhasesAreOff) {
+  const scene::Image truth = stripes(4, 0);
+  EXPECT_EQ(quality_of(truth, truth).detail, 1);
+  const RegionQuality shifted = quality_of(stripes(4, 4), truth),
+                      smeared = quality_of(stripes(4, 0, 0.5f, 0.5f), truth);
+  EXPECT_GT(smeared.psnr_db, shifted.psnr_db + 5) << "dB are best for a smear";
+  EXPECT_NEAR(shifted.detail.value(), 1, 0.05);
+  EXPECT_NEAR(smeared.detail.value(), 0, 1e-6);
+  EXPECT_NEAR(quality_of(stripes(4, 0, 0.35f, 0.65f), truth).detail.value(), 0.5, 1e-4);
+  EXPECT_GT(quality_of(truth, stripes(4, 0, 0.35f, 0.65f)).detail.value(), 1.9) << "rough";
+}
+
+TEST(RegionQuality, DetailOfOneColorIsUnknown) {
+  const scene::Image truth = stripes(4, 0, 0.3f, 0.3f);
+  EXPECT_EQ(quality_of(stripes(4, 0), truth).detail, std::nullopt);
+  EXPECT_EQ(RegionQualitySum().quality().detail, std::nullopt);
+}
+
 TEST(Judge, DoingNothingIsRightOutsideAndWrongInside) {
   const Quality quality = judge(views(), speck().before);
   EXPECT_GT(quality.outside.psnr_db, 45);
