@@ -14,6 +14,7 @@
 
 #include "engine/core/parallel.h"
 #include "engine/correct/pyramid.h"
+#include "engine/scene/window_sums.h"
 
 namespace engine::correct {
 namespace {
@@ -233,37 +234,12 @@ std::vector<Shift> repetitions(const Surroundings& whole, double most) {
   return out;
 }
 
-/// Sums over windows of a picture.
-class WindowSums {
- public:
-  WindowSums(int width, int height)
-      : width_(width), height_(height), sums_(std::size_t(width + 1) * std::size_t(height + 1), 0.0) {}
-
-  /// In the order of rows, each from the left.
-  void add(int x, int y, double value) { at(x + 1, y + 1) = value + at(x, y + 1) + at(x + 1, y) - at(x, y); }
-
-  [[nodiscard]] double around(int x, int y, int radius) const {
-    const int x0 = std::max(x - radius, 0), x1 = std::min(x + radius + 1, width_);
-    const int y0 = std::max(y - radius, 0), y1 = std::min(y + radius + 1, height_);
-    return at(x1, y1) - at(x0, y1) - at(x1, y0) + at(x0, y0);
-  }
-
- private:
-  [[nodiscard]] double& at(int x, int y) { return sums_[std::size_t(y) * std::size_t(width_ + 1) + std::size_t(x)]; }
-  [[nodiscard]] double at(int x, int y) const {
-    return sums_[std::size_t(y) * std::size_t(width_ + 1) + std::size_t(x)];
-  }
-
-  int width_, height_;
-  std::vector<double> sums_;  ///< Over all pixels above and to the left.
-};
-
 /// Mean differences around pixels under a shift; infinite where it leads to nothing known, or nothing is around.
 void differences_around(const Surroundings& at, Shift shift, std::span<const std::uint32_t> pixels,
                         std::span<const int> radii, std::span<float> out) {
   const Shifted shifted(at.known, shift);
   const int width = at.known.width, height = at.known.height;
-  WindowSums differences(width, height), met(width, height);
+  scene::WindowSums differences(width, height), met(width, height);
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
       const std::size_t here = std::size_t(y) * std::size_t(width) + std::size_t(x);

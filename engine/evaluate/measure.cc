@@ -11,6 +11,7 @@
 #include "engine/optim/picture_view.h"
 #include "engine/render/forward.h"
 #include "engine/repair/seed.h"
+#include "engine/scene/window_sums.h"
 #include "engine/working/footprint.h"
 
 namespace engine::evaluate {
@@ -33,28 +34,21 @@ double miss(const Case& the_case, const scene::GaussianCloud& result) {
   return sum / double(nearest.size());
 }
 
-/// The mean of one channel over a square around a pixel, as far as it is in the picture.
-double mean_around(const scene::Image& picture, int x, int y, int channel, int radius) {
-  const int x0 = std::max(x - radius, 0), x1 = std::min(x + radius + 1, picture.width);
-  const int y0 = std::max(y - radius, 0), y1 = std::min(y + radius + 1, picture.height);
-  double sum = 0;
-  for (int v = y0; v < y1; ++v)
-    for (int u = x0; u < x1; ++u) sum += double(picture.at(u, v, channel));
-  return sum / (double(x1 - x0) * double(y1 - y0));
-}
-
 /// Sum over these pixels of the squares of what a mean over 3 x 3 pixels has, and one over 9 x 9 has not: single pixels
 /// are noise of a camera, and what is larger is no detail.
 double fine_structure(const scene::Image& picture, const scene::Mask& counts) {
   double sum = 0;
-  for (int y = 0; y < picture.height; ++y)
-    for (int x = 0; x < picture.width; ++x) {
-      if (counts.at(x, y) == 0) continue;
-      for (int c = 0; c < 3; ++c) {
-        const double fine = mean_around(picture, x, y, c, 1) - mean_around(picture, x, y, c, 4);
+  for (int c = 0; c < 3; ++c) {
+    scene::WindowSums sums(picture.width, picture.height);
+    for (int y = 0; y < picture.height; ++y)
+      for (int x = 0; x < picture.width; ++x) sums.add(x, y, double(picture.at(x, y, c)));
+    for (int y = 0; y < picture.height; ++y)
+      for (int x = 0; x < picture.width; ++x) {
+        if (counts.at(x, y) == 0) continue;
+        const double fine = sums.mean_around(x, y, 1) - sums.mean_around(x, y, 4);
         sum += fine * fine;
       }
-    }
+  }
   return sum;
 }
 
@@ -126,7 +120,7 @@ void RegionQualitySum::add(const scene::Image& result, const scene::Image& truth
 RegionQuality RegionQualitySum::quality() const {
   if (pixels_ == 0) return {};
   RegionQuality quality{psnr_db(squares_ / double(pixels_)), 1 - dissimilarity_ / double(pixels_), {}, pixels_};
-  constexpr double one_color = 1e-6;  // a hundredth of a step of 255, squared: what is less is rounding
+  constexpr double one_color = 1e-6;  // a quarter of a step of 255, squared: what is less is rounding
   if (true_structure_ > one_color * double(pixels_)) quality.detail = std::sqrt(structure_ / true_structure_);
   return quality;
 }

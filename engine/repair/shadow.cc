@@ -62,23 +62,22 @@ Vec3 shade_of(Vec3 color) {
 }
 Vec3 hue_of(Vec3 color) { return shade_of(color) - mean_of(shade_of(color)); }
 
-/// Which dark points hang together with one beside the part, through dark ones of where shadows are; none where little
-/// of that is beside the part, or much of it far away.
+/// Which dark points hang together with one beside the part, through dark ones; none where little of that is beside
+/// the part, or much of it far away.
 ///   nearest  [n][asked] points to each
 std::vector<std::uint8_t> from_the_part(const AroundPart& around, std::span<const neighbours::Neighbour> nearest,
                                         std::size_t asked, const std::vector<std::uint8_t>& dark) {
-  const auto may_be_shadow = [&](std::size_t i) { return dark[i] != 0 && around.distance[i] < fades_until; };
   neighbours::Pieces pieces(around.size());
   for (std::uint32_t i = 0; i < around.size(); ++i)
     for (const auto& n : nearest.subspan(i * asked, std::min(joined, asked)))
-      if (may_be_shadow(i) && may_be_shadow(n.index) && n.squared_distance < joined_within * joined_within)
+      if (dark[i] != 0 && dark[n.index] != 0 && n.squared_distance < joined_within * joined_within)
         pieces.join(i, n.index);
   std::vector<std::uint8_t> touching(around.size(), 0), out(around.size(), 0);
   for (std::uint32_t i = 0; i < around.size(); ++i)
-    if (may_be_shadow(i) && around.distance[i] < touches) touching[pieces.of(i)] = 1;
+    if (dark[i] != 0 && around.distance[i] < touches) touching[pieces.of(i)] = 1;
   std::size_t points = 0, near = 0, far = 0;
   for (std::uint32_t i = 0; i < around.size(); ++i) {
-    out[i] = may_be_shadow(i) && touching[pieces.of(i)] != 0;
+    out[i] = dark[i] != 0 && touching[pieces.of(i)] != 0;
     if (out[i] == 0) continue;
     ++points;
     if (around.distance[i] < touches) ++near;
@@ -220,7 +219,9 @@ Shadow::Shadow(AroundPart around) : around_(std::move(around)), light_(around_.s
   const auto nearest = around_.index->nearest(around_.place, asked);
   const Darkness darkness(around_, nearest, asked);
   std::vector<std::uint8_t> dark(around_.size());
-  for (std::size_t i = 0; i < around_.size(); ++i) dark[i] = mean_of(darkness.mean()[i]) < -darkness.threshold(i);
+  // What is dark where shadows have faded says nothing of them.
+  for (std::size_t i = 0; i < around_.size(); ++i)
+    dark[i] = around_.distance[i] < fades_until && mean_of(darkness.mean()[i]) < -darkness.threshold(i);
   const std::vector<std::uint8_t> cast = from_the_part(around_, nearest, asked, dark);
   if (darkens_outwards(around_, cast, darkness.mean())) return;
   for (std::size_t i = 0; i < around_.size(); ++i) {

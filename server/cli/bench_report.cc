@@ -134,8 +134,7 @@ ordered_json encode(const captures::CaptureTrial& trial) {
   out["deformed"] = encode(trial.deformed);
   out["ceiling"] = encode(trial.ceiling);
   out["gain_db"] = trial.gain_db();
-  const auto share = trial.share_of_ceiling();
-  out["share_of_ceiling"] = share ? ordered_json(*share) : ordered_json(nullptr);
+  out["share_of_ceiling"] = encode(trial.share_of_ceiling());
   out["beyond_db"] = {{"untouched", trial.untouched_beyond_db},
                       {"deformed", trial.deformed_beyond_db},
                       {"result", trial.result_beyond_db},

@@ -63,7 +63,8 @@ TEST(Shadow, DoesNotDarkenAwayFromThePart) {
 
 TEST(Shadow, EndsWhereAnotherDarkThingBegins) {
   const auto both = [](float x, float z) {
-    const bool joins = x > 0.55f && x < 1.3f && std::abs(z)<0.12f, other = x> 1.15f && x < 1.5f;
+    const bool joins = x > 0.55f && x < 1.3f && std::abs(z) < 0.12f;
+    const bool other = x > 1.15f && x < 1.5f;
     return joins || other ? 0.6f : beside_block(x, z);
   };
   const Shadow shadow = ShadowedBlock(both).shadow();
