@@ -34,7 +34,8 @@ TEST(CaptureTrial, TheShareOfTheCeilingIsAPartOfTheWay) {
 TEST(CaptureTrial, HarmIsSeenInTheRegionWhereItIs) {
   CaptureTrial trial;
   const auto in = [](evaluate::Quality& quality, double edited, double vacated, double outside) {
-    quality.edited = {edited, 0, 10}, quality.vacated = {vacated, 0, 10}, quality.outside = {outside, 0, 10};
+    const auto of = [](double db) { return evaluate::RegionQuality{.psnr_db = db, .pixels = 10}; };
+    quality.edited = of(edited), quality.vacated = of(vacated), quality.outside = of(outside);
   };
   in(trial.deformed, 20, 18, 33);
   in(trial.trial.result, 21, 22, 32.5);
