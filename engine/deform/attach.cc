@@ -23,9 +23,12 @@ constexpr double firm = 0.12;
 // to 0.020 of it, at 0.11 to 0.13; with 0.014 the guitar's neck is held at 0.19.
 constexpr double little = 0.02, firm_by_little = 0.16;
 // It hangs on by less: a doll's head by its neck, a sleeve, at 0.08 to 0.09; the ball among 20,000 Gaussians has 0.07.
-// Whether somebody who takes it means to bend it or to take it away, the way says: a nudge bends.
 constexpr double hanging = 0.075;
-constexpr double nudge = 0.2;  // of its size
+// Whether somebody who takes a part means to bend it or to take it away, the way says: a nudge bends whatever hangs on,
+// in parts of its size, and what is this firm, as a fox's ear and its head, bends until it is drawn out to twice its
+// size. Between them the way goes with the firmness: a lamp before a wall has 0.128 if rows of the wall were taken with
+// it, and goes by three quarters of its size (docs/adr/0062-the-looser-the-sooner-it-goes.md).
+constexpr double nudge = 0.2, firmly = 0.2;
 
 /// Does each handle turn and grow as it asks for?
 bool turns_as_asked(std::span<const Drag> drags, int group, const RigidMotion& motion) {
@@ -45,10 +48,16 @@ bool goes_on(const Contact& contact, double firmness) {
 
 bool touches_by_little(const Contact& contact) { return double(contact.touches) < little * double(contact.shown); }
 
-/// Is a part shifted by little?
+/// The longest way, world units, by which a part that hangs on is bent; what goes farther comes off.
+double bends_by(const Contact& contact) {
+  const double share = (contact.firmness - hanging) / (firmly - hanging);
+  return contact.size * std::lerp(nudge, 1.0, std::clamp(share, 0.0, 1.0));
+}
+
+/// Is a part shifted by so little that it bends?
 bool is_nudged(std::span<const Drag> drags, int group, const Contact& contact) {
   const std::optional<DVec3> pull = pull_of(drags, group);
-  return pull && glm::length(*pull) < nudge * contact.size;
+  return pull && glm::length(*pull) < bends_by(contact);
 }
 
 }  // namespace
@@ -114,9 +123,10 @@ Attachment attach(std::span<const Drag> drags, int group, const Contact& contact
   if (draws_out && touches) return {group, How::held, false, grows_out, "it is drawn out of what it touches"};
   if (is_one_piece && places.from.size() > 2 && span_a_plane(places.from))
     return {group, How::one_piece, scales, grows_out, "one motion takes all its handles to their targets"};
-  // Held, it would be drawn out to more than twice its size: it is half of a thing that somebody means to take away.
-  if (is_one_piece && grows_out && places.longest > contact.size)
-    return {group, How::one_piece, scales, grows_out, "it goes farther than it is long (attach \"held\" keeps it)"};
+  // It is half of a thing that somebody means to take away, or was selected with a piece of what it stands on.
+  if (is_one_piece && grows_out && places.longest > bends_by(contact))
+    return {group, How::one_piece, scales, grows_out,
+            "it goes farther than a part that is held like this bends (attach \"held\" keeps it)"};
   if (grows_out) return {group, How::held, false, grows_out, "its surface goes on into what stays"};
   if (hangs && is_nudged(drags, group, contact))
     return {group, How::held, false, true, "it hangs on to what stays, and is nudged"};

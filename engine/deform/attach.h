@@ -20,7 +20,7 @@ struct Contact {
   std::size_t touches = 0;  ///< Those of them next to a row that stays.
   std::size_t goes_on = 0;  ///< Those of these where the surface goes on there.
   double firmness = 0;      ///< Of its weakest border, of what is usual within it (select::Contact).
-  double size = 0;          ///< Longest edge of the box around the part, world units.
+  double size = 0;          ///< Longest edge of the box around the part, but for what lies astray, world units.
 };
 
 /// How a group moves.

@@ -40,7 +40,7 @@ TEST(Attach, ACupGoesAsItIsAndAnEarIsHeld) {
 TEST(Attach, WhatHangsOnByLittleBendsWhereItIsNudgedAndGoesWhereItIsTaken) {
   const auto shifted = [](double way) { return drags_of({DVec3(0.0)}, [=](DVec3 p) { return p + DVec3(way, 0, 0); }); };
   EXPECT_EQ(how(shifted(0.3), hangs_there), How::held);
-  EXPECT_EQ(how(shifted(0.5), hangs_there), How::one_piece);
+  EXPECT_EQ(how(shifted(0.8), hangs_there), How::one_piece);
   EXPECT_EQ(how(shifted(0.3), hangs_there, Attach::free), How::one_piece);
   EXPECT_EQ(how(shifted(0.3), stands_there), How::one_piece) << "a cup that is pushed";
   EXPECT_TRUE(attach(shifted(0.3), 0, hangs_there, Attach::automatic).grows_out);
@@ -72,6 +72,23 @@ TEST(Attach, WhatGoesFartherThanItIsLongIsTakenAway) {
   const auto one = drags_of({DVec3(0.0)}, [](DVec3 p) { return p + DVec3(2.5, 0, 0); });
   EXPECT_EQ(how(one, grows_there), How::one_piece);
   EXPECT_EQ(how(one, grows_there, Attach::held), How::held);
+}
+
+TEST(Attach, TheLooserItIsHeldTheSoonerItGoes) {
+  const auto shifted = [](double way) { return drags_of({DVec3(0.0)}, [=](DVec3 p) { return p + DVec3(way, 0, 0); }); };
+  Contact contact = grows_there;  // of size 2
+  const auto longest_bend = [&](double firmness) {
+    contact.firmness = firmness;
+    double way = 0.01;
+    while (how(shifted(way), contact) == How::held) way += 0.01;
+    return way;
+  };
+  EXPECT_NEAR(longest_bend(0.075), 0.4, 0.02);
+  EXPECT_NEAR(longest_bend(0.1), 0.72, 0.02);
+  EXPECT_NEAR(longest_bend(0.119), longest_bend(0.121), 0.04) << "no step where it begins to grow out";
+  EXPECT_NEAR(longest_bend(0.128), 1.08, 0.02) << "a lamp taken with some of the wall goes by three quarters";
+  EXPECT_NEAR(longest_bend(0.2), 2, 0.02);
+  EXPECT_NEAR(longest_bend(0.9), 2, 0.02);
 }
 
 TEST(Attach, ThreeHandlesThatTurnOutweighWhatTheBorderLooksLike) {

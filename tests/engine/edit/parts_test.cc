@@ -75,6 +75,22 @@ TEST(PartsOf, HoldWhatGrowsOutOfTheRestNearTheirAnchors) {
   EXPECT_LE(anchored.second, 8u) << "as far from the anchor as from half of the part";
 }
 
+TEST(PartsOf, CrumbsFarAwayMakeAPartNoLonger) {
+  auto cloud = wall();
+  // Taken with what it is a piece of, it goes farther than it is long.
+  Request request = pulled(cloud, {0, 0, 3});
+  ASSERT_EQ(parts_of(cloud, assign(cloud, request)->handle, request).attachments.at(0).how, How::one_piece);
+  for (const float far : {40.0f, -40.0f}) {  // two of four hundred
+    request.selected->push_back(std::uint32_t(cloud.size()));
+    cloud.resize(cloud.size() + 1);
+    cloud.mean.set(cloud.size() - 1, {far, far, far});
+    cloud.log_scale.set(cloud.size() - 1, {-2.7f, -2.7f, -5.0f});
+    cloud.rotation.set(cloud.size() - 1, {1, 0, 0, 0});
+    cloud.opacity_logit[cloud.size() - 1] = 4;
+  }
+  EXPECT_EQ(parts_of(cloud, assign(cloud, request)->handle, request).attachments.at(0).how, How::one_piece);
+}
+
 TEST(PartsOf, AreNoneForOtherInterpolations) {
   const auto cloud = wall();
   Request request = pulled(cloud, {0, 0, 1});
