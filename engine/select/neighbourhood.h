@@ -73,9 +73,12 @@ class Neighbourhood {
   /// otherwise; outside points beyond it count for nothing.
   ///   cloud    that this was made of
   ///   grow     with this object's surroundings
+  ///   taken    [any] rows, ascending, that the inside points alone take. Where an outside point is on one of them, and
+  ///            more rows than these would come of it, only some of these do
   ///   errors   unprocessable, `where` = "inside[1]": no row within reach, the point is beyond it, or outside points
   ///            cover all rows around the inside points more
-  [[nodiscard]] Result<Grown> grow(const scene::GaussianCloud& cloud, const Grow& grow) const;
+  [[nodiscard]] Result<Grown> grow(const scene::GaussianCloud& cloud, const Grow& grow,
+                                   std::span<const std::uint32_t> taken = {}) const;
 
   /// The same, where rows are inside already: up to the border so many farther out than they end, counted from 1; for 0
   /// just those. All of them stay.
@@ -105,6 +108,8 @@ class Neighbourhood {
     ClickedNodes clicked;      ///< The node that each point is on, where no point of the other side has it.
     std::vector<float> leak;   ///< [nodes] Of the walk, by the points alone, not by far ends; empty: none.
     double smallness = 0;      ///< BorderChoice::smallness, by the points alone.
+    /// [nodes] 1: outside, wherever a walk from it ends. Empty: none.
+    std::vector<std::uint8_t> kept_out = {};
   };
   struct FarEnds {
     std::vector<double> squared;  ///< [n] Distance of each node from the nearest of so many clicks.
@@ -115,6 +120,8 @@ class Neighbourhood {
   std::uint32_t claim(const scene::GaussianCloud& cloud, DVec3 point, Given side,
                       std::map<std::uint32_t, Claim>& claims) const;
   [[nodiscard]] NaturalBorder border_of(const Seeds& seeds, BorderChoice choice) const;
+  /// The border of the thing, or of the whole.
+  [[nodiscard]] NaturalBorder border_for(const Seeds& seeds, const Grow& grow) const;
   /// select::take_leftovers(), but where many outside clicks say where the thing ends.
   void take_leftovers(const Seeds& seeds, std::vector<std::uint8_t>& inside) const;
   [[nodiscard]] DVec3 place_of(std::uint32_t node) const;  ///< Relative to the middle.

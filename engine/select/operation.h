@@ -71,6 +71,7 @@ struct Grow {
   std::optional<double> reach;  ///< No row farther than this from inside[0] is taken. Above 0.
   bool whole = false;           ///< Rather all of the thing than a part of it that ends as sharply: see BorderChoice.
   int wider = 0;  ///< So many natural borders farther out than that of the whole; below 0: in. 0 without `whole`.
+  bool operator==(const Grow&) const = default;
 };
 
 /// Which pixels of a view belong to the thing.

@@ -75,10 +75,23 @@ const Neighbourhood& Selector::neighbourhood(const Surroundings& surroundings) {
   return *neighbourhoods_.back();
 }
 
+std::span<const std::uint32_t> Selector::rows_by_inside_alone(Grow grow) {
+  grow.outside.clear();
+  if (!inside_alone_ || inside_alone_->grow != grow) {
+    auto found = grown(grow);
+    // In their own surroundings, inside points may be too far from each other: then nobody has seen them without the
+    // outside ones.
+    inside_alone_ = {std::move(grow), found ? std::move(found->rows) : std::vector<std::uint32_t>{}};
+  }
+  return inside_alone_->rows;
+}
+
 Result<Grown> Selector::grown(const Grow& grow) {
+  std::span<const std::uint32_t> taken;
+  if (!grow.outside.empty()) taken = rows_by_inside_alone(grow);
   Surroundings surroundings = surroundings_of(cloud_.mean, grow);
   const Neighbourhood* around = &neighbourhood(surroundings);
-  auto out = around->grow(cloud_, grow);
+  auto out = around->grow(cloud_, grow, taken);
   if (!grow.whole || grow.reach) return out;
   int reaches = 0;
   const auto is_more_to_look_at = [&] {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -66,6 +67,8 @@ class Selector {
   /// Of a whole without a reach: where its surroundings have no border farther out, the next ones are looked for in
   /// twice the reach, and again.
   [[nodiscard]] Result<Grown> grown(const Grow& grow);
+  /// What a person sees who has not clicked beside the thing yet. Ascending; stays until the next call.
+  [[nodiscard]] std::span<const std::uint32_t> rows_by_inside_alone(Grow grow);
   [[nodiscard]] RowSet rows_of(const Masks& masks, const std::string& where, Selected& so_far);
   [[nodiscard]] const Neighbourhood& neighbourhood(const Surroundings& surroundings);
 
@@ -73,6 +76,11 @@ class Selector {
   bool is_checked_ = false;  ///< Are all values finite?
   render::Workspace workspace_;
   std::vector<std::unique_ptr<const Neighbourhood>> neighbourhoods_;  ///< The latest, latest last.
+  struct InsideAlone {
+    Grow grow;
+    std::vector<std::uint32_t> rows;
+  };
+  std::optional<InsideAlone> inside_alone_;  ///< The last one: outside clicks come one after the other.
 };
 
 /// The same, for a single selection.
