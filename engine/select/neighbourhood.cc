@@ -229,14 +229,13 @@ Result<Grown> Neighbourhood::grow(const scene::GaussianCloud& cloud, const Grow&
   }
   NaturalBorder border = border_for(*seeds, grow);
   const auto was_taken = [&](std::uint32_t node) { return std::ranges::binary_search(taken, rows_[node]); };
-  if (std::ranges::any_of(seeds->clicked.outside, was_taken) && size_of(border) > taken.size()) {
+  const bool takes_away = std::ranges::any_of(seeds->clicked.outside, was_taken);
+  if (takes_away && size_of(border) > taken.size()) {
     seeds->kept_out.resize(rows_.size());
     for (std::uint32_t node = 0; node < rows_.size(); ++node) seeds->kept_out[node] = !was_taken(node);
     border = border_for(*seeds, grow);
   }
-  // Who asks for less is not to get back just what that leaves out.
-  if (border.wider >= 0) take_leftovers(*seeds, border.inside);
-  return Grown{rows_where_marked(border.inside), border.wider, border.more, border.less, is_cut_short_};
+  return Grown{rows_where_marked(border.inside), border.wider, border.more, border.less, is_cut_short_, takes_away};
 }
 
 Result<Grown> Neighbourhood::grow_beyond(const scene::GaussianCloud& cloud, const Grow& grow,
@@ -251,7 +250,10 @@ Result<Grown> Neighbourhood::grow_beyond(const scene::GaussianCloud& cloud, cons
 }
 
 NaturalBorder Neighbourhood::border_for(const Seeds& seeds, const Grow& grow) const {
-  return grow.whole ? whole_border(seeds, grow.wider) : border_of(seeds, {false, grow.wider});
+  NaturalBorder border = grow.whole ? whole_border(seeds, grow.wider) : border_of(seeds, {false, grow.wider});
+  // Who asks for less is not to get back just what that leaves out.
+  if (border.wider >= 0 && seeds.kept_out.empty()) take_leftovers(seeds, border.inside);
+  return border;
 }
 
 void Neighbourhood::take_leftovers(const Seeds& seeds, std::vector<std::uint8_t>& inside) const {

@@ -53,6 +53,7 @@ struct Grown {
   bool more = false;          ///< NaturalBorder::more, within the surroundings.
   bool less = false;          ///< NaturalBorder::less
   bool is_cut_short = false;  ///< Neighbourhood::is_cut_short().
+  bool takes_away = false;    ///< An outside point is on rows that the inside points alone take.
 };
 
 /// The rows around a point, joined to their neighbours by edges that are the weaker the more likely a border runs
@@ -120,7 +121,7 @@ class Neighbourhood {
   std::uint32_t claim(const scene::GaussianCloud& cloud, DVec3 point, Given side,
                       std::map<std::uint32_t, Claim>& claims) const;
   [[nodiscard]] NaturalBorder border_of(const Seeds& seeds, BorderChoice choice) const;
-  /// The border of the thing, or of the whole.
+  /// The border of the thing, or of the whole, with its leftovers.
   [[nodiscard]] NaturalBorder border_for(const Seeds& seeds, const Grow& grow) const;
   /// select::take_leftovers(), but where many outside clicks say where the thing ends.
   void take_leftovers(const Seeds& seeds, std::vector<std::uint8_t>& inside) const;

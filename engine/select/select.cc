@@ -92,7 +92,8 @@ Result<Grown> Selector::grown(const Grow& grow) {
   Surroundings surroundings = surroundings_of(cloud_.mean, grow);
   const Neighbourhood* around = &neighbourhood(surroundings);
   auto out = around->grow(cloud_, grow, taken);
-  if (!grow.whole || grow.reach) return out;
+  // Who takes away from a whole does not look for more of it.
+  if (!out || !grow.whole || grow.reach || out->takes_away) return out;
   int reaches = 0;
   const auto is_more_to_look_at = [&] {
     return reaches < farther_reaches && !around->is_cut_short() && around->rows().size() < cloud_.size();
