@@ -27,7 +27,7 @@ constexpr double hanging = 0.075;
 // Whether somebody who takes a part means to bend it or to take it away, the way says: a nudge bends whatever hangs on,
 // in parts of its size, and what is this firm, as a fox's ear and its head, bends until it is drawn out to twice its
 // size. Between them the way goes with the firmness: a lamp before a wall has 0.128 if rows of the wall were taken with
-// it, and goes by three quarters of its size (docs/adr/0062-the-looser-the-sooner-it-goes.md).
+// it, and goes by nine tenths of its size (docs/adr/0062-the-looser-the-sooner-it-goes.md).
 constexpr double nudge = 0.2, firmly = 0.2;
 
 /// Does each handle turn and grow as it asks for?

@@ -27,7 +27,7 @@ struct Parts {
   std::vector<std::uint32_t> rim;               ///< Rows of the input that are held where they are, ascending.
   std::vector<Continuation> continuations;      ///< Of the groups with Attachment::How::continued.
   std::vector<std::size_t> idle;  ///< Anchors that hold nothing, as nothing of their group is within their grip.
-  /// A handle farther from all that it moves than that is long: most likely a slip.
+  /// A handle farther from all that it moves than that is long, but for what lies astray itself: most likely a slip.
   struct Astray {
     std::size_t handle = 0;  ///< From 0.
     double away = 0;         ///< From the nearest row, world units.

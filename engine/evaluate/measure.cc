@@ -119,8 +119,8 @@ void RegionQualitySum::add(const scene::Image& result, const scene::Image& truth
 
 RegionQuality RegionQualitySum::quality() const {
   if (pixels_ == 0) return {};
-  RegionQuality quality{psnr_db(squares_ / double(pixels_)), 1 - dissimilarity_ / double(pixels_), {}, pixels_};
-  constexpr double one_color = 1e-6;  // a quarter of a step of 255, squared: what is less is rounding
+  RegionQuality quality{psnr_db(squares_ / double(pixels_)), 1 - dissimilarity_ / double(pixels_), pixels_, {}};
+  constexpr double one_color = 1e-6;  // over three channels, a seventh of a step of 255 each: what is less is rounding
   if (true_structure_ > one_color * double(pixels_)) quality.detail = std::sqrt(structure_ / true_structure_);
   return quality;
 }

@@ -19,13 +19,13 @@ namespace engine::evaluate {
 
 /// How near pictures come to the truth over one region, all held-out views together.
 struct RegionQuality {
-  double psnr_db = 0;  ///< Of the mean square error over its pixels; 100 where nothing differs.
-  double ssim = 0;     ///< Mean of SSIM's map; windows reach beyond the pixels that count.
+  double psnr_db = 0;      ///< Of the mean square error over its pixels; 100 where nothing differs.
+  double ssim = 0;         ///< Mean of SSIM's map; windows reach beyond the pixels that count.
+  std::size_t pixels = 0;  ///< Pixels of the region. 0: the rest says nothing.
   /// How much finer structure there is than in the truth, both as root mean squares of what a mean of 3 x 3 pixels has
   /// and one of 9 x 9 has not: below 1 it is smeared, above it is rough. Errors of phase, which dB are full of, do not
   /// matter. Nothing where the truth is of one colour.
   std::optional<double> detail = {};
-  std::size_t pixels = 0;  ///< Pixels of the region. 0: the rest says nothing.
 };
 
 /// Sums a RegionQuality up, picture by picture.

@@ -15,7 +15,7 @@ namespace engine::repair {
 namespace {
 
 // Lengths are in extents of the part. Chosen on three captured cases with shadows (mug_shadow, can_shadow,
-// chair_shadow), two without (pouf, can), and three toys of a real capture.
+// chair_shadow), two without (pouf, can), three toys of a real capture, and things drawn beside the board of the fox.
 
 // The surface farther away: from so far from the part on, and that near to a place in the mean.
 constexpr float far_from = 0.3f, about = 0.7f;

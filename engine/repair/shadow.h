@@ -10,8 +10,9 @@
 namespace engine::repair {
 
 /// A surface beside a part is in its shadow where it is darker than the same surface farther away is, by more than its
-/// texture is from place to place, all the way from the part. The same surface: what lies in one plane with it, or
-/// bends as gently, and has colours as like.
+/// texture is from place to place, all the way from the part, within one extent of it. The same surface: what lies in
+/// one plane with it, or bends as gently, and has colours as like. What begins beside the part, or darkens away from
+/// it, is no shadow of it (docs/adr/0061-a-shadow-begins-at-the-part-and-fades.md).
 class Shadow {
  public:
   explicit Shadow(AroundPart around);

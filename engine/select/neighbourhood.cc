@@ -83,10 +83,6 @@ std::vector<std::uint32_t> distinct(std::span<const std::uint32_t> nodes) {
   return out;
 }
 
-std::size_t size_of(const NaturalBorder& border) {
-  return std::size_t(std::ranges::count(border.inside, std::uint8_t{1}));
-}
-
 double smallness_of(std::size_t clicks) { return std::min(smallness_per_click * double(clicks - 1), most_smallness); }
 
 /// So much or a little more, so that the next click rarely asks for other surroundings.
@@ -219,23 +215,29 @@ void Neighbourhood::take_far_nodes(std::vector<Given>& given) const {
   }
 }
 
-Result<Grown> Neighbourhood::grow(const scene::GaussianCloud& cloud, const Grow& grow,
-                                  std::span<const std::uint32_t> taken) const {
+Result<Grown> Neighbourhood::grow(const scene::GaussianCloud& cloud, const Grow& grow) const {
   auto seeds = seeds_of(cloud, grow);
   if (!seeds) return propagate(seeds);
-  if (distinct(seeds->clicked.outside).size() < clicks_around) {
-    seeds->leak = leak_beyond(seeds->clicked.inside);
-    seeds->smallness = smallness_of(distinct(seeds->clicked.inside).size());
-  }
-  NaturalBorder border = border_for(*seeds, grow);
-  const auto was_taken = [&](std::uint32_t node) { return std::ranges::binary_search(taken, rows_[node]); };
-  const bool takes_away = std::ranges::any_of(seeds->clicked.outside, was_taken);
-  if (takes_away && size_of(border) > taken.size()) {
-    seeds->kept_out.resize(rows_.size());
-    for (std::uint32_t node = 0; node < rows_.size(); ++node) seeds->kept_out[node] = !was_taken(node);
-    border = border_for(*seeds, grow);
-  }
-  return Grown{rows_where_marked(border.inside), border.wider, border.more, border.less, is_cut_short_, takes_away};
+  suppose_extent(*seeds);
+  NaturalBorder border = grow.whole ? whole_border(*seeds, grow.wider) : border_of(*seeds, {false, grow.wider});
+  // Who asks for less is not to get back just what that leaves out.
+  if (border.wider >= 0) take_leftovers(*seeds, border.inside);
+  return Grown{rows_where_marked(border.inside), border.wider, border.more, border.less, is_cut_short_};
+}
+
+Result<std::optional<Grown>> Neighbourhood::left_of(const scene::GaussianCloud& cloud, const Grow& grow,
+                                                    std::span<const std::uint32_t> rows) const {
+  auto seeds = seeds_of(cloud, grow);
+  if (!seeds) return propagate(seeds);
+  const auto was_taken = [&](std::uint32_t node) { return std::ranges::binary_search(rows, rows_[node]); };
+  if (std::ranges::none_of(seeds->clicked.outside, was_taken)) return std::nullopt;
+  suppose_extent(*seeds);
+  std::vector<double> potential = random_walk(graph_, weight_, seeds->given, seeds->leak);
+  // The walk goes where it would; what was not taken is outside wherever it ends.
+  for (std::uint32_t node = 0; node < rows_.size(); ++node)
+    if (seeds->given[node] == Given::no && !was_taken(node)) seeds->given[node] = Given::outside, potential[node] = 0;
+  const NaturalBorder border = border_of(*seeds, potential, {.whole = grow.whole});
+  return Grown{rows_where_marked(border.inside), 0, border.more, border.less, is_cut_short_};
 }
 
 Result<Grown> Neighbourhood::grow_beyond(const scene::GaussianCloud& cloud, const Grow& grow,
@@ -249,11 +251,10 @@ Result<Grown> Neighbourhood::grow_beyond(const scene::GaussianCloud& cloud, cons
   return Grown{rows_where_marked(border.inside), border.wider, border.more, border.less, is_cut_short_};
 }
 
-NaturalBorder Neighbourhood::border_for(const Seeds& seeds, const Grow& grow) const {
-  NaturalBorder border = grow.whole ? whole_border(seeds, grow.wider) : border_of(seeds, {false, grow.wider});
-  // Who asks for less is not to get back just what that leaves out.
-  if (border.wider >= 0 && seeds.kept_out.empty()) take_leftovers(seeds, border.inside);
-  return border;
+void Neighbourhood::suppose_extent(Seeds& seeds) const {
+  if (distinct(seeds.clicked.outside).size() >= clicks_around) return;
+  seeds.leak = leak_beyond(seeds.clicked.inside);
+  seeds.smallness = smallness_of(distinct(seeds.clicked.inside).size());
 }
 
 void Neighbourhood::take_leftovers(const Seeds& seeds, std::vector<std::uint8_t>& inside) const {
@@ -262,13 +263,14 @@ void Neighbourhood::take_leftovers(const Seeds& seeds, std::vector<std::uint8_t>
 }
 
 NaturalBorder Neighbourhood::border_of(const Seeds& seeds, BorderChoice choice) const {
+  return border_of(seeds, random_walk(graph_, weight_, seeds.given, seeds.leak), choice);
+}
+
+NaturalBorder Neighbourhood::border_of(const Seeds& seeds, std::span<const double> potential,
+                                       BorderChoice choice) const {
   choice.leaks = !seeds.leak.empty();
   choice.smallness = seeds.smallness;
-  const std::vector<double> potential = random_walk(graph_, weight_, seeds.given, seeds.leak);
-  std::vector<Given> given = seeds.given;
-  for (std::size_t node = 0; node < seeds.kept_out.size(); ++node)
-    if (seeds.kept_out[node] != 0 && given[node] == Given::no) given[node] = Given::outside;
-  return natural_border(graph_, weight_, potential, given, seeds.clicked, choice);
+  return natural_border(graph_, weight_, potential, seeds.given, seeds.clicked, choice);
 }
 
 DVec3 Neighbourhood::place_of(std::uint32_t node) const {
@@ -304,10 +306,13 @@ NaturalBorder Neighbourhood::whole_border(const Seeds& seeds, int wider) const {
   for (std::uint32_t node = 0; node < best.inside.size(); ++node)
     if (best.inside[node] != 0) found.push_back(node);
   FarEnds ends;
-  const double most = more_by_far_ends * double(size_of(best));
+  const auto size = [](const NaturalBorder& border) {
+    return double(std::count(border.inside.begin(), border.inside.end(), std::uint8_t{1}));
+  };
+  const double most = more_by_far_ends * size(best);
   for (int i = 0; i < far_ends && click_far_end(found, tried, ends); ++i) {
     NaturalBorder border = border_of(tried, {true, 0});
-    if (double(size_of(border)) > most || size_of(border) <= size_of(best)) continue;
+    if (size(border) > most || size(border) <= size(best)) continue;
     best = std::move(border), best_seeds = tried;
   }
   return wider == 0 ? best : border_of(best_seeds, {true, wider});

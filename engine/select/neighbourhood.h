@@ -31,7 +31,7 @@ struct Surroundings {
 };
 
 /// Rows: the nearest to the middle count. A first click then takes 1.2 s of one core, the next ones 0.35 s; one that
-/// means the whole walks three times.
+/// means the whole walks three times, a first one outside about twice as often.
 constexpr std::size_t max_neighbourhood = 250'000;
 
 /// The surroundings of an operation. Without a reach: a quarter of the distance within which half of the scene's rows
@@ -53,7 +53,6 @@ struct Grown {
   bool more = false;          ///< NaturalBorder::more, within the surroundings.
   bool less = false;          ///< NaturalBorder::less
   bool is_cut_short = false;  ///< Neighbourhood::is_cut_short().
-  bool takes_away = false;    ///< An outside point is on rows that the inside points alone take.
 };
 
 /// The rows around a point, joined to their neighbours by edges that are the weaker the more likely a border runs
@@ -74,12 +73,17 @@ class Neighbourhood {
   /// otherwise; outside points beyond it count for nothing.
   ///   cloud    that this was made of
   ///   grow     with this object's surroundings
-  ///   taken    [any] rows, ascending, that the inside points alone take. Where an outside point is on one of them, and
-  ///            more rows than these would come of it, only some of these do
   ///   errors   unprocessable, `where` = "inside[1]": no row within reach, the point is beyond it, or outside points
   ///            cover all rows around the inside points more
-  [[nodiscard]] Result<Grown> grow(const scene::GaussianCloud& cloud, const Grow& grow,
-                                   std::span<const std::uint32_t> taken = {}) const;
+  [[nodiscard]] Result<Grown> grow(const scene::GaussianCloud& cloud, const Grow& grow) const;
+
+  /// What of the rows that inside points have taken is left where outside points are on some of them: up to the natural
+  /// border among these rows, without leftovers, and without `wider`, which they have gone by. Nothing where no outside
+  /// point is on one of them.
+  ///   rows    [any] ascending, as grow() gave them for the inside points alone
+  ///   errors  those of grow()
+  [[nodiscard]] Result<std::optional<Grown>> left_of(const scene::GaussianCloud& cloud, const Grow& grow,
+                                                     std::span<const std::uint32_t> rows) const;
 
   /// The same, where rows are inside already: up to the border so many farther out than they end, counted from 1; for 0
   /// just those. All of them stay.
@@ -109,8 +113,6 @@ class Neighbourhood {
     ClickedNodes clicked;      ///< The node that each point is on, where no point of the other side has it.
     std::vector<float> leak;   ///< [nodes] Of the walk, by the points alone, not by far ends; empty: none.
     double smallness = 0;      ///< BorderChoice::smallness, by the points alone.
-    /// [nodes] 1: outside, wherever a walk from it ends. Empty: none.
-    std::vector<std::uint8_t> kept_out = {};
   };
   struct FarEnds {
     std::vector<double> squared;  ///< [n] Distance of each node from the nearest of so many clicks.
@@ -120,9 +122,12 @@ class Neighbourhood {
   /// Claims the nodes that a point lies on; returns the one that covers it most.
   std::uint32_t claim(const scene::GaussianCloud& cloud, DVec3 point, Given side,
                       std::map<std::uint32_t, Claim>& claims) const;
+  /// The clicks say how far a thing may extend, unless several outside ones do.
+  void suppose_extent(Seeds& seeds) const;
   [[nodiscard]] NaturalBorder border_of(const Seeds& seeds, BorderChoice choice) const;
-  /// The border of the thing, or of the whole, with its leftovers.
-  [[nodiscard]] NaturalBorder border_for(const Seeds& seeds, const Grow& grow) const;
+  /// The same by potentials of a walk that has been gone.
+  [[nodiscard]] NaturalBorder border_of(const Seeds& seeds, std::span<const double> potential,
+                                        BorderChoice choice) const;
   /// select::take_leftovers(), but where many outside clicks say where the thing ends.
   void take_leftovers(const Seeds& seeds, std::vector<std::uint8_t>& inside) const;
   [[nodiscard]] DVec3 place_of(std::uint32_t node) const;  ///< Relative to the middle.

@@ -75,25 +75,11 @@ const Neighbourhood& Selector::neighbourhood(const Surroundings& surroundings) {
   return *neighbourhoods_.back();
 }
 
-std::span<const std::uint32_t> Selector::rows_by_inside_alone(Grow grow) {
-  grow.outside.clear();
-  if (!inside_alone_ || inside_alone_->grow != grow) {
-    auto found = grown(grow);
-    // In their own surroundings, inside points may be too far from each other: then nobody has seen them without the
-    // outside ones.
-    inside_alone_ = {std::move(grow), found ? std::move(found->rows) : std::vector<std::uint32_t>{}};
-  }
-  return inside_alone_->rows;
-}
-
-Result<Grown> Selector::grown(const Grow& grow) {
-  std::span<const std::uint32_t> taken;
-  if (!grow.outside.empty()) taken = rows_by_inside_alone(grow);
-  Surroundings surroundings = surroundings_of(cloud_.mean, grow);
+Result<Grown> Selector::grown_anywhere(const Grow& grow, Surroundings& surroundings) {
+  surroundings = surroundings_of(cloud_.mean, grow);
   const Neighbourhood* around = &neighbourhood(surroundings);
-  auto out = around->grow(cloud_, grow, taken);
-  // Who takes away from a whole does not look for more of it.
-  if (!out || !grow.whole || grow.reach || out->takes_away) return out;
+  auto out = around->grow(cloud_, grow);
+  if (!grow.whole || grow.reach) return out;
   int reaches = 0;
   const auto is_more_to_look_at = [&] {
     return reaches < farther_reaches && !around->is_cut_short() && around->rows().size() < cloud_.size();
@@ -109,6 +95,33 @@ Result<Grown> Selector::grown(const Grow& grow) {
   }
   // Not looked for: it would cost a walk that nobody has asked for.
   if (out) out->more = out->more || (out->wider >= grow.wider && is_more_to_look_at());
+  return out;
+}
+
+const std::optional<Selector::InsideAlone>& Selector::by_inside_alone(Grow grow) {
+  grow.outside.clear();
+  if (inside_alone_ && inside_alone_->grow == grow) return inside_alone_;
+  inside_alone_.reset();
+  Surroundings surroundings;
+  // In their own surroundings, inside points may be too far from each other: nobody has seen them without the others.
+  if (auto found = grown_anywhere(grow, surroundings))
+    inside_alone_ = {std::move(grow), *std::move(found), surroundings};
+  return inside_alone_;
+}
+
+Result<Grown> Selector::grown(const Grow& grow) {
+  Surroundings surroundings;
+  auto out = grown_anywhere(grow, surroundings);
+  if (!out || grow.outside.empty()) return out;
+  const std::optional<InsideAlone>& before = by_inside_alone(grow);
+  if (!before || out->rows.size() <= before->grown.rows.size()) return out;
+  // Whoever clicks outside on what is taken wants less of it.
+  surroundings.reach = std::max(surroundings.reach, before->surroundings.reach);
+  auto left = neighbourhood(surroundings).left_of(cloud_, grow, before->grown.rows);
+  if (!left) return propagate(left);
+  if (!*left) return out;
+  out->rows = std::move((*left)->rows);
+  out->wider = before->grown.wider, out->more = before->grown.more, out->less = before->grown.less;
   return out;
 }
 

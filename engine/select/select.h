@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -64,11 +63,20 @@ class Selector {
  private:
   [[nodiscard]] Result<void> carry_out(const Operation& operation, const std::string& where, Selected& so_far);
   [[nodiscard]] Result<RowSet> rows_of(const Grow& grow, const std::string& where, Selected& so_far);
+  /// Grows; where an outside point is on what the inside points alone take, no more than that.
+  [[nodiscard]] Result<Grown> grown(const Grow& grow);
   /// Of a whole without a reach: where its surroundings have no border farther out, the next ones are looked for in
   /// twice the reach, and again.
-  [[nodiscard]] Result<Grown> grown(const Grow& grow);
-  /// What a person sees who has not clicked beside the thing yet. Ascending; stays until the next call.
-  [[nodiscard]] std::span<const std::uint32_t> rows_by_inside_alone(Grow grow);
+  ///   surroundings  set to those that were looked at last
+  [[nodiscard]] Result<Grown> grown_anywhere(const Grow& grow, Surroundings& surroundings);
+  struct InsideAlone {
+    Grow grow;
+    Grown grown;
+    Surroundings surroundings;
+  };
+  /// What a person sees who has not clicked beside the thing yet; nothing where that is refused. Stays until the next
+  /// call.
+  [[nodiscard]] const std::optional<InsideAlone>& by_inside_alone(Grow grow);
   [[nodiscard]] RowSet rows_of(const Masks& masks, const std::string& where, Selected& so_far);
   [[nodiscard]] const Neighbourhood& neighbourhood(const Surroundings& surroundings);
 
@@ -76,10 +84,6 @@ class Selector {
   bool is_checked_ = false;  ///< Are all values finite?
   render::Workspace workspace_;
   std::vector<std::unique_ptr<const Neighbourhood>> neighbourhoods_;  ///< The latest, latest last.
-  struct InsideAlone {
-    Grow grow;
-    std::vector<std::uint32_t> rows;
-  };
   std::optional<InsideAlone> inside_alone_;  ///< The last one: outside clicks come one after the other.
 };
 

@@ -80,13 +80,13 @@ TEST(Attach, TheLooserItIsHeldTheSoonerItGoes) {
   const auto longest_bend = [&](double firmness) {
     contact.firmness = firmness;
     double way = 0.01;
-    while (how(shifted(way), contact) == How::held) way += 0.01;
+    while (way < 5 && how(shifted(way), contact) == How::held) way += 0.01;
     return way;
   };
   EXPECT_NEAR(longest_bend(0.075), 0.4, 0.02);
   EXPECT_NEAR(longest_bend(0.1), 0.72, 0.02);
   EXPECT_NEAR(longest_bend(0.119), longest_bend(0.121), 0.04) << "no step where it begins to grow out";
-  EXPECT_NEAR(longest_bend(0.128), 1.08, 0.02) << "a lamp taken with some of the wall goes by three quarters";
+  EXPECT_NEAR(longest_bend(0.128), 1.08, 0.02) << "a lamp taken with some of the wall goes farther";
   EXPECT_NEAR(longest_bend(0.2), 2, 0.02);
   EXPECT_NEAR(longest_bend(0.9), 2, 0.02);
 }

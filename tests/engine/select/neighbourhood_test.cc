@@ -173,6 +173,8 @@ TEST(Grow, AnOutsideClickOnWhatIsTakenTakesNoMore) {
         if (!found) continue;  // nearer to the inside point than that point itself
         const RowList then = rows_of(found->rows);
         ++asked, more += then.size() > rows.size(), less += then.size() < rows.size();
+        clicks.outside.push_back(DVec3(demo.cloud.mean.get(rows.back())));
+        if (const auto twice = selector.select({{Op::add, clicks}})) more += rows_of(twice->rows).size() > rows.size();
       }
     }
   }
