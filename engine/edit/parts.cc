@@ -49,10 +49,12 @@ double distance_to(const Array3& means, std::span<const std::uint32_t> rows, DVe
 /// Where a part is held: where it grows out of what stays, or, if nowhere, where it stands. What it merely lies against
 /// may come apart. Anchors say which of it is meant: of an arm whose shoulder is anchored not the helmet that it holds
 /// against a leg.
-void hold(const Array3& means, std::span<const std::uint32_t> rows, std::span<const select::Touch> touches,
-          std::span<const deform::Drag> drags, deform::Attachment& attachment, Parts& parts) {
-  constexpr double near_anchor = 0.5;  // of the part's longest edge
-  const double near = near_anchor * longest_edge(means, rows);
+///   length  longest_edge() of the rows
+void hold(const Array3& means, std::span<const std::uint32_t> rows, double length,
+          std::span<const select::Touch> touches, std::span<const deform::Drag> drags, deform::Attachment& attachment,
+          Parts& parts) {
+  constexpr double near_anchor = 0.5;  // of the length
+  const double near = near_anchor * length;
   const bool has_anchors = std::ranges::any_of(drags, &deform::Drag::anchor);
   const auto is_meant = [&](std::uint32_t row) {
     return !has_anchors || std::ranges::any_of(drags, [&](const deform::Drag& drag) {
@@ -152,7 +154,7 @@ Parts parts_of(const scene::LayeredCloud& scene, std::span<const std::uint16_t> 
                                                    request.attach, request.mode == Mode::extend);
     if (request.mode == Mode::extend) draw_out(scene, rows, contact.touches, own, request.attach, attachment, parts);
     if (attachment.how == How::held || attachment.how == How::drawn_out)
-      hold(means, rows, contact.touches, own, attachment, parts);
+      hold(means, rows, length, contact.touches, own, attachment, parts);
     if (attachment.how == How::one_piece && settles(request))
       set_down(scene, means, memory.stance_of(scene, means, rows, contact.touches, dragged), handles, drags, attachment,
                parts);

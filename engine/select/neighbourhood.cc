@@ -225,21 +225,6 @@ Result<Grown> Neighbourhood::grow(const scene::GaussianCloud& cloud, const Grow&
   return Grown{rows_where_marked(border.inside), border.wider, border.more, border.less, is_cut_short_};
 }
 
-Result<std::optional<Grown>> Neighbourhood::left_of(const scene::GaussianCloud& cloud, const Grow& grow,
-                                                    std::span<const std::uint32_t> rows) const {
-  auto seeds = seeds_of(cloud, grow);
-  if (!seeds) return propagate(seeds);
-  const auto was_taken = [&](std::uint32_t node) { return std::ranges::binary_search(rows, rows_[node]); };
-  if (std::ranges::none_of(seeds->clicked.outside, was_taken)) return std::nullopt;
-  suppose_extent(*seeds);
-  std::vector<double> potential = random_walk(graph_, weight_, seeds->given, seeds->leak);
-  // The walk goes where it would; what was not taken is outside wherever it ends.
-  for (std::uint32_t node = 0; node < rows_.size(); ++node)
-    if (seeds->given[node] == Given::no && !was_taken(node)) seeds->given[node] = Given::outside, potential[node] = 0;
-  const NaturalBorder border = border_of(*seeds, potential, {.whole = grow.whole});
-  return Grown{rows_where_marked(border.inside), 0, border.more, border.less, is_cut_short_};
-}
-
 Result<Grown> Neighbourhood::grow_beyond(const scene::GaussianCloud& cloud, const Grow& grow,
                                          std::span<const std::uint32_t> rows, int farther) const {
   auto seeds = seeds_of(cloud, grow);
@@ -249,6 +234,20 @@ Result<Grown> Neighbourhood::grow_beyond(const scene::GaussianCloud& cloud, cons
   NaturalBorder border = border_of(*seeds, {.wider = farther, .beyond = true});
   if (border.wider > 0) take_leftovers(*seeds, border.inside);
   return Grown{rows_where_marked(border.inside), border.wider, border.more, border.less, is_cut_short_};
+}
+
+Result<std::vector<std::uint32_t>> Neighbourhood::left_of(const scene::GaussianCloud& cloud, const Grow& grow,
+                                                          std::span<const std::uint32_t> rows) const {
+  auto seeds = seeds_of(cloud, grow);
+  if (!seeds) return propagate(seeds);
+  const auto was_taken = [&](std::uint32_t node) { return std::ranges::binary_search(rows, rows_[node]); };
+  if (std::ranges::none_of(seeds->clicked.outside, was_taken)) return std::vector<std::uint32_t>{};
+  suppose_extent(*seeds);
+  std::vector<double> potential = random_walk(graph_, weight_, seeds->given, seeds->leak);
+  // The walk goes where it would; what was not taken is outside wherever it ends.
+  for (std::uint32_t node = 0; node < rows_.size(); ++node)
+    if (seeds->given[node] == Given::no && !was_taken(node)) seeds->given[node] = Given::outside, potential[node] = 0;
+  return rows_where_marked(border_of(*seeds, potential, {.whole = grow.whole}).inside);
 }
 
 void Neighbourhood::suppose_extent(Seeds& seeds) const {

@@ -31,7 +31,7 @@ struct Surroundings {
 };
 
 /// Rows: the nearest to the middle count. A first click then takes 1.2 s of one core, the next ones 0.35 s; one that
-/// means the whole walks three times, a first one outside about twice as often.
+/// means the whole walks three times. One outside walks once more where it would make more of the thing.
 constexpr std::size_t max_neighbourhood = 250'000;
 
 /// The surroundings of an operation. Without a reach: a quarter of the distance within which half of the scene's rows
@@ -77,19 +77,19 @@ class Neighbourhood {
   ///            cover all rows around the inside points more
   [[nodiscard]] Result<Grown> grow(const scene::GaussianCloud& cloud, const Grow& grow) const;
 
-  /// What of the rows that inside points have taken is left where outside points are on some of them: up to the natural
-  /// border among these rows, without leftovers, and without `wider`, which they have gone by. Nothing where no outside
-  /// point is on one of them.
-  ///   rows    [any] ascending, as grow() gave them for the inside points alone
-  ///   errors  those of grow()
-  [[nodiscard]] Result<std::optional<Grown>> left_of(const scene::GaussianCloud& cloud, const Grow& grow,
-                                                     std::span<const std::uint32_t> rows) const;
-
   /// The same, where rows are inside already: up to the border so many farther out than they end, counted from 1; for 0
   /// just those. All of them stay.
   ///   rows  [any] within reach, ascending, as grow() gave them for the same clicks
   [[nodiscard]] Result<Grown> grow_beyond(const scene::GaussianCloud& cloud, const Grow& grow,
                                           std::span<const std::uint32_t> rows, int farther) const;
+
+  /// What of the rows that inside points have taken is left where outside points are on some of them: up to the natural
+  /// border among these rows, without leftovers, and without `wider`, which they have gone by. Ascending; empty where
+  /// no outside point is on one of them.
+  ///   rows    [any] ascending, as grow() gave them for the inside points alone
+  ///   errors  those of grow()
+  [[nodiscard]] Result<std::vector<std::uint32_t>> left_of(const scene::GaussianCloud& cloud, const Grow& grow,
+                                                           std::span<const std::uint32_t> rows) const;
 
   /// For each node that is not given, the side at which a random walk from it rather ends; where there is no way to
   /// either, the outside. The rows that are inside, given or not, ascending.

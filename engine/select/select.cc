@@ -14,6 +14,8 @@ namespace {
 
 /// Kept between selections: of a list that grows several things, and no more than some 100 MB.
 constexpr std::size_t neighbourhoods_kept = 4;
+/// The same of what inside points alone take: a megabyte each at most.
+constexpr std::size_t grown_kept = 4;
 
 /// So often the reach of a whole is doubled in search of a border farther out: then it holds nearly all of a scene, or
 /// as much as is ever looked at.
@@ -98,30 +100,39 @@ Result<Grown> Selector::grown_anywhere(const Grow& grow, Surroundings& surroundi
   return out;
 }
 
-const std::optional<Selector::InsideAlone>& Selector::by_inside_alone(Grow grow) {
+Result<const Selector::InsideAlone*> Selector::by_inside_alone(Grow grow) {
   grow.outside.clear();
-  if (inside_alone_ && inside_alone_->grow == grow) return inside_alone_;
-  inside_alone_.reset();
-  Surroundings surroundings;
-  // In their own surroundings, inside points may be too far from each other: nobody has seen them without the others.
-  if (auto found = grown_anywhere(grow, surroundings))
-    inside_alone_ = {std::move(grow), *std::move(found), surroundings};
-  return inside_alone_;
+  const auto kept = std::ranges::find(inside_alone_, grow, &InsideAlone::grow);
+  if (kept != inside_alone_.end()) {
+    std::rotate(kept, kept + 1, inside_alone_.end());
+  } else {
+    Surroundings surroundings;
+    auto found = grown_anywhere(grow, surroundings);
+    if (!found) return propagate(found);
+    if (inside_alone_.size() == grown_kept) inside_alone_.erase(inside_alone_.begin());
+    inside_alone_.push_back({std::move(grow), *std::move(found), surroundings});
+  }
+  return &inside_alone_.back();
 }
 
 Result<Grown> Selector::grown(const Grow& grow) {
+  const auto alone = by_inside_alone(grow);
+  if (grow.outside.empty()) {
+    if (!alone) return propagate(alone);
+    return (*alone)->grown;
+  }
   Surroundings surroundings;
   auto out = grown_anywhere(grow, surroundings);
-  if (!out || grow.outside.empty()) return out;
-  const std::optional<InsideAlone>& before = by_inside_alone(grow);
-  if (!before || out->rows.size() <= before->grown.rows.size()) return out;
+  // In their own surroundings, inside points may be too far from each other: nobody has seen them without the others.
+  if (!out || !alone || out->rows.size() <= (*alone)->grown.rows.size()) return out;
   // Whoever clicks outside on what is taken wants less of it.
-  surroundings.reach = std::max(surroundings.reach, before->surroundings.reach);
-  auto left = neighbourhood(surroundings).left_of(cloud_, grow, before->grown.rows);
+  const InsideAlone& before = **alone;
+  surroundings.reach = std::max(surroundings.reach, before.surroundings.reach);
+  auto left = neighbourhood(surroundings).left_of(cloud_, grow, before.grown.rows);
   if (!left) return propagate(left);
-  if (!*left) return out;
-  out->rows = std::move((*left)->rows);
-  out->wider = before->grown.wider, out->more = before->grown.more, out->less = before->grown.less;
+  if (left->empty()) return out;
+  out->rows = *std::move(left);
+  out->wider = before.grown.wider, out->more = before.grown.more, out->less = before.grown.less;
   return out;
 }
 

@@ -74,9 +74,8 @@ class Selector {
     Grown grown;
     Surroundings surroundings;
   };
-  /// What a person sees who has not clicked beside the thing yet; nothing where that is refused. Stays until the next
-  /// call.
-  [[nodiscard]] const std::optional<InsideAlone>& by_inside_alone(Grow grow);
+  /// What a person sees who has not clicked beside the thing yet. Stays until the next call.
+  [[nodiscard]] Result<const InsideAlone*> by_inside_alone(Grow grow);
   [[nodiscard]] RowSet rows_of(const Masks& masks, const std::string& where, Selected& so_far);
   [[nodiscard]] const Neighbourhood& neighbourhood(const Surroundings& surroundings);
 
@@ -84,7 +83,7 @@ class Selector {
   bool is_checked_ = false;  ///< Are all values finite?
   render::Workspace workspace_;
   std::vector<std::unique_ptr<const Neighbourhood>> neighbourhoods_;  ///< The latest, latest last.
-  std::optional<InsideAlone> inside_alone_;  ///< The last one: outside clicks come one after the other.
+  std::vector<InsideAlone> inside_alone_;  ///< The latest, latest last: outside clicks come one after the other.
 };
 
 /// The same, for a single selection.

@@ -26,6 +26,11 @@ DVec3 turned(DVec3 point) { return glm::angleAxis(0.9, DVec3(0, 0, 1)) * point +
 DVec3 grown(DVec3 point) { return 1.5 * point; }
 DVec3 bent(DVec3 point) { return point + DVec3(0, 0, point.x * point.x + 0.5 * point.y); }
 
+/// One handle, shifted.
+std::vector<Drag> shifted(double way) {
+  return drags_of({DVec3(0.0)}, [=](DVec3 p) { return p + DVec3(way, 0, 0); });
+}
+
 How how(const std::vector<Drag>& drags, const Contact& contact, Attach asked = Attach::automatic) {
   return attach(drags, 0, contact, asked).how;
 }
@@ -38,7 +43,6 @@ TEST(Attach, ACupGoesAsItIsAndAnEarIsHeld) {
 }
 
 TEST(Attach, WhatHangsOnByLittleBendsWhereItIsNudgedAndGoesWhereItIsTaken) {
-  const auto shifted = [](double way) { return drags_of({DVec3(0.0)}, [=](DVec3 p) { return p + DVec3(way, 0, 0); }); };
   EXPECT_EQ(how(shifted(0.3), hangs_there), How::held);
   EXPECT_EQ(how(shifted(0.8), hangs_there), How::one_piece);
   EXPECT_EQ(how(shifted(0.3), hangs_there, Attach::free), How::one_piece);
@@ -75,7 +79,6 @@ TEST(Attach, WhatGoesFartherThanItIsLongIsTakenAway) {
 }
 
 TEST(Attach, TheLooserItIsHeldTheSoonerItGoes) {
-  const auto shifted = [](double way) { return drags_of({DVec3(0.0)}, [=](DVec3 p) { return p + DVec3(way, 0, 0); }); };
   Contact contact = grows_there;  // of size 2
   const auto longest_bend = [&](double firmness) {
     contact.firmness = firmness;

@@ -17,18 +17,20 @@ namespace {
 
 using How = deform::Attachment::How;
 
+void add_disc(scene::GaussianCloud& cloud, Vec3 mean) {
+  const std::size_t row = cloud.size();
+  cloud.resize(row + 1);
+  cloud.mean.set(row, mean);
+  cloud.log_scale.set(row, {-2.7f, -2.7f, -5.0f});
+  cloud.rotation.set(row, {1, 0, 0, 0});
+  cloud.opacity_logit[row] = 4;
+}
+
 /// A wall of Gaussians; what is right of the middle is selected, and dragged at its far end.
 scene::GaussianCloud wall() {
   scene::GaussianCloud cloud;
   for (int y = 0; y < 20; ++y)
-    for (int x = 0; x < 40; ++x) {
-      const std::size_t row = cloud.size();
-      cloud.resize(row + 1);
-      cloud.mean.set(row, {0.1f * float(x), 0.1f * float(y), 0});
-      cloud.log_scale.set(row, {-2.7f, -2.7f, -5.0f});
-      cloud.rotation.set(row, {1, 0, 0, 0});
-      cloud.opacity_logit[row] = 4;
-    }
+    for (int x = 0; x < 40; ++x) add_disc(cloud, {0.1f * float(x), 0.1f * float(y), 0});
   return cloud;
 }
 
@@ -82,11 +84,7 @@ TEST(PartsOf, CrumbsFarAwayMakeAPartNoLonger) {
   ASSERT_EQ(parts_of(cloud, assign(cloud, request)->handle, request).attachments.at(0).how, How::one_piece);
   for (const float far : {40.0f, -40.0f}) {  // two of four hundred
     request.selected->push_back(std::uint32_t(cloud.size()));
-    cloud.resize(cloud.size() + 1);
-    cloud.mean.set(cloud.size() - 1, {far, far, far});
-    cloud.log_scale.set(cloud.size() - 1, {-2.7f, -2.7f, -5.0f});
-    cloud.rotation.set(cloud.size() - 1, {1, 0, 0, 0});
-    cloud.opacity_logit[cloud.size() - 1] = 4;
+    add_disc(cloud, Vec3(far));
   }
   EXPECT_EQ(parts_of(cloud, assign(cloud, request)->handle, request).attachments.at(0).how, How::one_piece);
 }
