@@ -141,7 +141,8 @@ bool may_change(const State& state, const Edit& edit, std::uint32_t row) {
          state.scene.role()[row] == working::Role::frozen;
 }
 
-/// What pictures show to be of the part goes with it, and what they never showed of it does not arrive.
+/// What pictures show to be of the part goes with it, what they never showed of it does not arrive, and what the part
+/// has tinged gets other colours.
 ///   advance  called with the part that is done; its error ends it
 Result<void> look_at_outskirts(State& state, Edit& edit, const ViewChoice& choice,
                                const std::function<Result<void>(double)>& advance) {
@@ -156,6 +157,10 @@ Result<void> look_at_outskirts(State& state, Edit& edit, const ViewChoice& choic
   edit.given_up = united(edit.given_up, outskirts->backing);
   if (!outskirts->backing.empty() || !edit.buried.empty())
     state.report.warnings.push_back(outskirts_go(outskirts->backing.size(), edit.buried.size()));
+  const repair::Tinged& tinged = outskirts->tinged;
+  for (std::size_t i = 0; i < tinged.rows.size(); ++i)
+    if (may_change(state, edit, tinged.rows[i]))
+      edit.tinged.rows.push_back(tinged.rows[i]), edit.tinged.like.push_back(tinged.like[i]);
   return {};
 }
 
@@ -263,7 +268,7 @@ Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Cam
                                       [&](double part) { return edit.progress.advance((3 + part) / 4); });
         !looked)
       return looked;
-  Rows vanishing = united(united(edit.given_up, edit.buried), edit.relit.rows);
+  Rows vanishing = united(united(edit.given_up, edit.buried), united(edit.relit.rows, edit.tinged.rows));
   if (edit.corrector != nullptr) vanishing = united(vanishing, edit.request.healed);
   if (vanishing.empty()) return {};
   return unite_masks(state.scene, vanishing, state.views, state.masks,
@@ -285,7 +290,10 @@ Result<Rows> paste(State& state, Edit& edit, int u, const PlannedMotion& motion)
   if (u == 1 && !motion.moving.empty())
     for (const std::uint32_t row : edit.given_up) state.scene.give_up(row);
   if (u == 1) leave_buried(state.scene, edit.buried);
-  if (u == 1 && !motion.moving.empty()) state.report.relit = repair::relight(state.scene, edit.relit);
+  if (u == 1 && !motion.moving.empty()) {
+    repair::recolour(state.scene, edit.tinged);
+    state.report.relit = repair::relight(state.scene, edit.relit);
+  }
   // An elastic body has drawn its Gaussians out already.
   if (edit.corrector != nullptr && edit.optimises() && edit.params().interpolation != Interpolation::arap)
     repair::draw_out(state.scene);

@@ -18,6 +18,7 @@
 #include "engine/optim/perceptual.h"
 #include "engine/repair/relight.h"
 #include "engine/repair/repair.h"
+#include "engine/repair/tinged.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/gaussian_cloud.h"
 #include "engine/scene/image.h"
@@ -38,6 +39,7 @@ struct Edit {
   Parts parts = {};                            ///< How what moves hangs on to what stays.
   Rows given_up = {};                          ///< Crumbs and backing that go away, in the first interval.
   repair::Relit relit = {};                    ///< Rows that the part's shadow leaves or reaches, in that interval.
+  repair::Tinged tinged = {};                  ///< Rows around the part that get other colours, in that interval.
   Rows buried = {};                            ///< Rows of the part that no picture shows: they do not arrive.
   std::vector<scene::Camera> candidates = {};  ///< That views are chosen from; they have seen the scene.
   std::optional<repair::Repair> repair = {};   ///< What the unedited scene looks like to a corrector.

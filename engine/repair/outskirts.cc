@@ -28,6 +28,9 @@ constexpr std::size_t nearest_asked = 8;  // rows whose mean colour is compared:
 // Of the part's light where it shows: what backs it has less, or what would stick out of it, where nobody would see it.
 // Three toys of a capture have 0.3 to 1.4 % and 31 to 125 %; captured cases, which need neither, 0.5 and 9 % at most.
 constexpr double seen_as_backing = 0.002, seen_as_haze = 0.1;
+// Part of a row's light that falls on pixels of the part, from which on its colour was learnt through the part's
+// outline. From 0.02 to 0.05 captured cases are alike.
+constexpr double seen_through = 0.05;
 
 /// What pictures tell: sums of blending weights over their pixels, and numbers of pictures.
 struct Told {
@@ -160,6 +163,13 @@ Result<Outskirts> outskirts_of(const scene::GaussianCloud& scene, std::span<cons
   for (const std::uint32_t row : out.backing) of_backing += told.on_part[row];
   if (of_backing < seen_as_backing * of_part) out.backing.clear();
   if (of_haze < seen_as_haze * of_part) out.buried.clear();
+
+  std::vector<std::uint32_t> through, known;
+  for (std::uint32_t row = 0; row < scene.size(); ++row)
+    if (told.light[row] >= least_light && told.in_front[row] <= told.behind[row] &&
+        !std::ranges::binary_search(part, row) && !std::ranges::binary_search(out.backing, row))
+      (told.on_part[row] > seen_through * told.light[row] ? through : known).push_back(row);
+  out.tinged = tinged_among(scene, through, known);
   return out;
 }
 

@@ -3,7 +3,7 @@
 // A trainer explains the outline of a thing by Gaussians that nobody sees whole: large ones of its colour behind it,
 // which show through it and around its rim, and ones of the thing itself that are buried in what it stands on or hangs
 // before. When the thing goes, the former stay as its outline in the air; the latter come out, and are a haze around
-// it.
+// it. And what is around its outline has got colours that make up for the outline's blur.
 #pragma once
 
 #include <cstdint>
@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/repair/tinged.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/gaussian_cloud.h"
 
@@ -21,13 +22,14 @@ namespace engine::repair {
 constexpr std::size_t outskirts_cameras = 48;
 constexpr int outskirts_side = 320;
 
-/// Rows by what pictures show of them. All ascending.
+/// Rows by what pictures show of them. All ascending, none twice.
 struct Outskirts {
   /// Not of the part: what is seen of them is seen mostly on the part, from behind, and they have its colour.
   std::vector<std::uint32_t> backing;
   /// Of the part: none of the pictures shows half of them, as they lie in what stays or behind it; without that they
   /// show beside the part.
   std::vector<std::uint32_t> buried;
+  Tinged tinged;  ///< Not of the part: seen through its outline, with a colour that nothing around them has.
 };
 
 /// Looks at a part from an even choice of the cameras: two forward passes and two

@@ -62,7 +62,7 @@ std::size_t relight(WorkingScene& working, const Relit& relit) {
   std::size_t count = 0;
   for (std::size_t k = 0; k < relit.rows.size(); ++k) {
     const std::uint32_t row = relit.rows[k];
-    if (working.role()[row] != working::Role::frozen) continue;
+    if (!working::stays(working.role()[row])) continue;
     working.relight(row);
     const std::span<float> sh = working.gaussians().sh_row(row);
     for (std::size_t c = 0; c < 3; ++c) {

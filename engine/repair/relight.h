@@ -31,7 +31,7 @@ struct Relit {
 [[nodiscard]] Relit relit_rows(const scene::GaussianCloud& scene, std::span<const std::uint32_t> part,
                                const Shadow& shadow, const std::function<DVec3(DVec3)>& back);
 
-/// Each of these rows that is frozen gets colours of the new light (Role::relit).
+/// Each of these rows that stays gets colours of the new light (Role::relit).
 ///   returns  how many
 std::size_t relight(WorkingScene& working, const Relit& relit);
 

@@ -83,7 +83,7 @@ void WorkingScene::leave_behind(std::uint32_t row) {
 }
 
 void WorkingScene::relight(std::uint32_t row) {
-  assert(role_[row] == Role::frozen);
+  assert(stays(role_[row]));
   role_[row] = Role::relit;
 }
 

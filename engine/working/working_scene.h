@@ -25,7 +25,7 @@ enum class Role : std::uint8_t {
               ///< a child that the optimisation gave an original.
   seed,       ///< New, of the repair: a surface that nobody has seen goes on there. So are its children.
   continued,  ///< New, of the deformation: what a part was drawn out of goes on there. So are its children.
-  relit       ///< An input row that stays, in another light.
+  relit       ///< An input row that stays, in other colours.
 };
 
 /// Are rows of this role members of P_h?
@@ -86,7 +86,7 @@ class WorkingScene {
                        std::span<const Role> role, std::span<const std::uint32_t> ancestor);
   /// The row leaves P_h and stays where it is: as an original if it is the input's, else as a trail.
   void leave_behind(std::uint32_t row);
-  /// A frozen row is to be given other colours.
+  /// A row that is frozen or relit is to be given other colours.
   void relight(std::uint32_t row);
   /// A row that is frozen or relit is to go, though nothing of it moves: it becomes an original, its opacity lowered as
   /// in a move.

@@ -1,0 +1,36 @@
+// Rows that a part has tinged: around its blurred outline every picture shows a mixture, and a trainer makes up for it
+// in the colours of what is behind. Beside a red can cloth is cyan, which shows as a ring where the can has gone.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/scene/gaussian_cloud.h"
+#include "engine/working/working_scene.h"
+
+namespace engine::repair {
+
+using working::WorkingScene;
+
+/// A tinged row takes on the mean colour of so many: a choice. The mean of 10 or 20 blurs what is drawn on a wall.
+constexpr std::size_t colors_alike = 4;
+
+struct Tinged {
+  std::vector<std::uint32_t> rows;
+  std::vector<std::array<std::uint32_t, colors_alike>>
+      like;  ///< [rows] Rows around it whose colours are nearest to it.
+};
+
+/// Those of some rows whose colour nothing around them has. What is drawn on a wall it has elsewhere, too.
+///   rows   that may be tinged, ascending
+///   known  that are not: nothing is found where these are fewer than `colors_alike`
+[[nodiscard]] Tinged tinged_among(const scene::GaussianCloud& scene, std::span<const std::uint32_t> rows,
+                                  std::span<const std::uint32_t> known);
+
+/// Each of these rows that is frozen gets the mean of its like's colours, seen from anywhere (Role::relit).
+void recolour(WorkingScene& working, const Tinged& tinged);
+
+}  // namespace engine::repair
