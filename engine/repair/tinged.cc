@@ -12,8 +12,8 @@ namespace {
 
 // Known rows around a row that it is compared with. With 64 captured cases are alike.
 constexpr std::size_t rows_around = 32;
-// Distance of a colour from the mean of its like, from which on it is none of those around it. From 0.03 to 0.08 captured
-// cases are alike: the fewer are changed.
+// Distance of a colour from the mean of its like, from which on it is none of those around it. From 0.03 to 0.08
+// captured cases are alike: the fewer are changed.
 constexpr float odd_color = 0.08f;
 
 }  // namespace
