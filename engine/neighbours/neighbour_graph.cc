@@ -113,6 +113,16 @@ std::vector<float> points_of(const Array3& mean, std::span<const std::uint32_t> 
   return points;
 }
 
+std::vector<std::uint32_t> nearest_rows(const Array3& mean, std::span<const std::uint32_t> rows,
+                                        std::span<const std::uint32_t> of, std::size_t k) {
+  if (rows.empty() || of.empty()) return {};
+  const DVec3 origin = mean.get(of[0]);
+  std::vector<std::uint32_t> nearest;
+  for (const Neighbour& found : PointIndex(points_of(mean, rows, origin), 3).nearest(points_of(mean, of, origin), k))
+    nearest.push_back(rows[found.index]);
+  return nearest;
+}
+
 NeighbourGraph join_nearest(std::span<const float> points, const PointIndex& index, std::size_t k, bool bridged) {
   const std::size_t n = index.size();
   const std::size_t each = std::min(k, n > 0 ? n - 1 : 0);

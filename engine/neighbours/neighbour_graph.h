@@ -31,6 +31,10 @@ struct NeighbourGraph {
 [[nodiscard]] std::array<float, 3> point_of(DVec3 point, DVec3 origin);
 [[nodiscard]] std::vector<float> points_of(const Array3& mean, std::span<const std::uint32_t> rows, DVec3 origin);
 
+/// Those of `rows` whose means are nearest to that of each row of `of`: [of][min(k, rows)], nearest first.
+[[nodiscard]] std::vector<std::uint32_t> nearest_rows(const Array3& mean, std::span<const std::uint32_t> rows,
+                                                      std::span<const std::uint32_t> of, std::size_t k);
+
 /// So many spacings apart, of either, nodes still hang together: a gap of two missing rows.
 constexpr float joining_spacings = 3.0f;
 

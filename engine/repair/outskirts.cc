@@ -8,7 +8,6 @@
 #include "engine/core/rows.h"
 #include "engine/mask/mask.h"
 #include "engine/neighbours/neighbour_graph.h"
-#include "engine/neighbours/point_index.h"
 #include "engine/render/forward.h"
 #include "engine/render/weight_sums.h"
 #include "engine/repair/part_shown.h"
@@ -59,12 +58,9 @@ std::vector<Vec3> colors_around(const scene::GaussianCloud& cloud, std::span<con
                                 std::span<const std::uint32_t> of) {
   const std::size_t asked = std::min(nearest_asked, rows.size());
   std::vector<Vec3> out(of.size(), Vec3(asked > 0 ? 0.0f : std::numeric_limits<float>::infinity()));
-  if (asked == 0 || of.empty()) return out;
-  const DVec3 origin = cloud.mean.get(of[0]);
-  const auto nearest = neighbours::PointIndex(neighbours::points_of(cloud.mean, rows, origin), 3)
-                           .nearest(neighbours::points_of(cloud.mean, of, origin), asked);
+  const std::vector<std::uint32_t> nearest = neighbours::nearest_rows(cloud.mean, rows, of, asked);
   for (std::size_t k = 0; k < nearest.size(); ++k)
-    out[k / asked] += scene::base_color(cloud, rows[nearest[k].index]) / float(asked);
+    out[k / asked] += scene::base_color(cloud, nearest[k]) / float(asked);
   return out;
 }
 

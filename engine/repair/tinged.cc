@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "engine/neighbours/neighbour_graph.h"
-#include "engine/neighbours/point_index.h"
 #include "engine/scene/base_color.h"
 
 namespace engine::repair {
@@ -21,20 +20,18 @@ constexpr float odd_color = 0.08f;
 Tinged tinged_among(const scene::GaussianCloud& scene, std::span<const std::uint32_t> rows,
                     std::span<const std::uint32_t> known) {
   Tinged out;
-  if (known.size() < colors_alike || rows.empty()) return out;
+  if (known.size() < colors_alike) return out;
   const std::size_t around = std::min(rows_around, known.size());
-  const DVec3 origin = scene.mean.get(rows[0]);
-  const auto nearest = neighbours::PointIndex(neighbours::points_of(scene.mean, known, origin), 3)
-                           .nearest(neighbours::points_of(scene.mean, rows, origin), around);
+  const std::vector<std::uint32_t> nearest = neighbours::nearest_rows(scene.mean, known, rows, around);
   std::vector<std::pair<float, std::uint32_t>> by_color(around);  // distance, row
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const Vec3 own = scene::base_color(scene, rows[i]);
     for (std::size_t k = 0; k < around; ++k) {
-      const std::uint32_t row = known[nearest[i * around + k].index];
+      const std::uint32_t row = nearest[i * around + k];
       by_color[k] = {glm::distance(own, scene::base_color(scene, row)), row};
     }
     std::ranges::partial_sort(by_color, by_color.begin() + colors_alike);
-    std::array<std::uint32_t, colors_alike> like{};
+    Like like{};
     Vec3 mean(0.0f);
     for (std::size_t k = 0; k < colors_alike; ++k) {
       like[k] = by_color[k].second;

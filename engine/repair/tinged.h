@@ -18,10 +18,12 @@ using working::WorkingScene;
 /// A tinged row takes on the mean colour of so many: a choice. The mean of 10 or 20 blurs what is drawn on a wall.
 constexpr std::size_t colors_alike = 4;
 
+/// Rows around a row whose colours are nearest to its own.
+using Like = std::array<std::uint32_t, colors_alike>;
+
 struct Tinged {
-  std::vector<std::uint32_t> rows;
-  std::vector<std::array<std::uint32_t, colors_alike>>
-      like;  ///< [rows] Rows around it whose colours are nearest to it.
+  std::vector<std::uint32_t> rows;  ///< Ascending.
+  std::vector<Like> like;           ///< [rows]
 };
 
 /// Those of some rows whose colour nothing around them has. What is drawn on a wall it has elsewhere, too.

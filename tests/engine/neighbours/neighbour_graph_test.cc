@@ -92,6 +92,17 @@ TEST(JoinNearest, OfFewOrEqualPointsIsFine) {
   for (std::uint32_t node = 0; node < 40; ++node) EXPECT_LT(same.begin[node], same.begin[node + 1]) << node;
 }
 
+TEST(NearestRows, AreRowsNearestFirst) {
+  Array3 mean;
+  mean.resize(6);
+  for (std::size_t row = 0; row < 6; ++row) mean.set(row, {1e6f + float(row), 0, 0});
+  const std::vector<std::uint32_t> rows{1, 3, 5}, of{4, 0};
+  EXPECT_EQ(nearest_rows(mean, rows, of, 2), (std::vector<std::uint32_t>{3, 5, 1, 3}));
+  EXPECT_EQ(nearest_rows(mean, rows, of, 9).size(), 6u) << "no more than there are";
+  EXPECT_TRUE(nearest_rows(mean, {}, of, 2).empty());
+  EXPECT_TRUE(nearest_rows(mean, rows, {}, 2).empty());
+}
+
 TEST(PointsOf, KeepTheDigitsFarFromTheOriginAndAnEnd) {
   Array3 mean;
   mean.push_back({1e6f, 0, 0});

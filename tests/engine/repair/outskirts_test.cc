@@ -127,6 +127,8 @@ TEST(Outskirts, AreTheSameForAnyNumberOfThreads) {
   WorkArena(3).run([&] { many = of(scene); });
   EXPECT_EQ(one.backing, many.backing);
   EXPECT_EQ(one.buried, many.buried);
+  EXPECT_EQ(one.tinged.rows, many.tinged.rows);
+  EXPECT_EQ(one.tinged.like, many.tinged.like);
 }
 
 /// What an edit made of the thing.

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -66,10 +65,15 @@ TEST(Tinged, IsNothingWhereNothingIsKnown) {
 }
 
 TEST(Tinged, IsTheSameForAnyNumberOfThreads) {
-  const Wall wall;
+  Wall wall;
+  for (int i = 0; i < 300; ++i) {  // several chunks of queries, many of them alike
+    wall.add(DVec3(0.003 * (i % 100), 0.26, 0), i % 3 == 0 ? gray : cyan, 0.3f);
+    wall.rows.push_back(std::uint32_t(wall.cloud.size() - 1));
+  }
   Tinged one, many;
   WorkArena(1).run([&] { one = tinged_among(wall.cloud, wall.rows, wall.known); });
   WorkArena(3).run([&] { many = tinged_among(wall.cloud, wall.rows, wall.known); });
+  EXPECT_EQ(one.rows.size(), 201u);
   EXPECT_EQ(one.rows, many.rows);
   EXPECT_EQ(one.like, many.like);
 }
@@ -79,7 +83,7 @@ TEST(Recolour, TakesTheMeanOfAllBandsAndTouchesNothingThatMoves) {
   working::HandleColumn handle(wall.cloud.size());
   handle[wall.rows[1]] = 1;
   WorkingScene working(wall.cloud, {}, std::move(handle));
-  const std::array<std::uint32_t, colors_alike> like{0, 1, 2, 3};  // of a rose the first three
+  const Like like{0, 1, 2, 3};  // of a rose the first three
   recolour(working, {{wall.rows[0], wall.rows[1]}, {like, like}});
   EXPECT_EQ(working.role()[wall.rows[0]], working::Role::relit);
   const Vec3 color = scene::base_color(working.cloud(), wall.rows[0]);
