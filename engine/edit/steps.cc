@@ -1,6 +1,7 @@
 #include "engine/edit/steps.h"
 
 #include <algorithm>
+#include <cassert>
 #include <functional>
 #include <iterator>
 #include <optional>
@@ -21,9 +22,30 @@
 #include "engine/repair/outskirts.h"
 #include "engine/repair/shadow.h"
 #include "engine/repair/stretch.h"
+#include "engine/repair/vacated.h"
 
 namespace engine::edit {
 namespace {
+
+/// The rows whose place the drag leaves open in the end; none where it goes at once, and what is open is seen.
+Rows left_open_in_the_end(const State& state, const Edit& edit) {
+  const int intervals = state.report.resolved.intervals;
+  if (intervals == 1 || departure_of(edit.request) != Mode::move) return {};
+  const auto taken = assign(edit.input, edit.request);  // as it was before any row had left
+  assert(taken);
+  Rows rows = rows_in_use(taken->handle, edit.parts);
+  const scene::GaussianCloud gaussians = scene::gather(edit.input, rows);
+  Memory memory;
+  const DraggedAlone drag = drag_alone(std::move(rows), gaussians, taken->handle, edit.request, edit.parts, intervals,
+                                       /*rotate_sh=*/false, memory);
+  const WorkingScene& alone = drag.working;
+  Rows arrived;
+  for (auto row = std::uint32_t(alone.input_rows()); row < alone.size(); ++row)
+    if (working::has_arrived(alone.role()[row])) arrived.push_back(row);
+  Rows open = repair::rows_left_open(alone.cloud(), alone.rows_of(working::Role::original), alone, arrived);
+  for (std::uint32_t& row : open) row = drag.rows[row];
+  return open;
+}
 
 /// What a corrector is to know of the unedited scene.
 repair::Repair make_repair(const State& state, const Edit& edit) {
@@ -34,8 +56,8 @@ repair::Repair make_repair(const State& state, const Edit& edit) {
       out.push_back(scene::fit_within(frame.edit_from_world(camera), edit.params().max_image_side));
     return out;
   };
-  return {frame.edit_from_world(edit.input), in_frame(edit.candidates), in_frame(state.views), edit.request.healed,
-          departure_of(edit.request),        edit.params().seed,        *edit.corrector};
+  return {frame.edit_from_world(edit.input), in_frame(edit.candidates),  in_frame(state.views), edit.request.healed,
+          left_open_in_the_end(state, edit), departure_of(edit.request), edit.params().seed,    *edit.corrector};
 }
 
 /// Makes the repair, if there is none yet.

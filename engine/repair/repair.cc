@@ -163,8 +163,8 @@ struct Repair::ViewNow {
 };
 
 Repair::Repair(scene::GaussianCloud original, std::span<const scene::Camera> observers,
-               std::vector<scene::Camera> views, std::span<const std::uint32_t> healed, Mode mode, std::uint64_t seed,
-               correct::Corrector& corrector)
+               std::vector<scene::Camera> views, std::span<const std::uint32_t> healed,
+               std::vector<std::uint32_t> left_open, Mode mode, std::uint64_t seed, correct::Corrector& corrector)
     : original_(std::move(original)),
       views_(std::move(views)),
       mode_(mode),
@@ -172,6 +172,7 @@ Repair::Repair(scene::GaussianCloud original, std::span<const scene::Camera> obs
       corrector_(corrector),
       witnesses_(original_, mode == Mode::move ? observers : observers.first(0)),
       healed_(healed.begin(), healed.end()),
+      left_open_(std::move(left_open)),
       unedited_(render_unedited(original_, views_)) {
   for (std::size_t v = 0; v < views_.size(); ++v)
     buffer_.push_back({std::move(unedited_.color[v]), scene::Mask(views_[v].width, views_[v].height), {}});
@@ -670,6 +671,10 @@ void Repair::note_vacated(const WorkingScene& working, const Rows& rows, std::sp
   vacated_.resize(views_.size());
   far_side_.resize(views_.size());
   open_ = rows_left_open(original_, rows.vacating, working, rows.moved);
+  // What is made up from a sliver of its place stays: once the whole is open it would be a stain (ADR 65).
+  std::vector<std::uint32_t> open_later;
+  std::ranges::set_intersection(left_open_, rows.vacating, std::back_inserter(open_later));
+  open_ = united(open_, open_later);
   const std::vector<std::uint32_t> relit = working.rows_of(Role::relit);
   for (std::size_t v = 0; v < views_.size(); ++v) {
     const scene::Image share = working::footprint(original_, rows.vacating, views_[v], workspace_);

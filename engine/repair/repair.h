@@ -67,10 +67,12 @@ class Repair {
   ///   observers  cameras that have seen it, in that frame
   ///   views      of the edit, in that frame, best first
   ///   healed     rows of it that are made anew although they were seen, in a move
+  ///   left_open  rows of it whose place will be empty in the end: it is completed as soon as they leave. Ascending
   ///   seed       of all random choices
   ///   corrector  outlives this
   Repair(scene::GaussianCloud original, std::span<const scene::Camera> observers, std::vector<scene::Camera> views,
-         std::span<const std::uint32_t> healed, Mode mode, std::uint64_t seed, correct::Corrector& corrector);
+         std::span<const std::uint32_t> healed, std::vector<std::uint32_t> left_open, Mode mode, std::uint64_t seed,
+         correct::Corrector& corrector);
 
   /// One correction of all views. Appends seeds to the working scene, and gives up what hides what is completed, or the
   /// part where it arrives.
@@ -215,14 +217,15 @@ class Repair {
   correct::Corrector& corrector_;
   std::vector<float> shown_;  ///< Of shown_rows().
   Witnesses witnesses_;
-  std::vector<std::uint32_t> healed_;  ///< Ascending.
-  std::vector<scene::Mask> stained_;   ///< Per view: pixels that the healed rows made up.
-  std::vector<std::uint32_t> veils_;   ///< Rows of the input that were given up as veils, ascending.
-  std::vector<std::uint32_t> unseen_;  ///< Rows of the input that no camera has seen, ascending.
+  std::vector<std::uint32_t> healed_;     ///< Ascending.
+  std::vector<std::uint32_t> left_open_;  ///< Rows of the input whose place will be empty in the end, ascending.
+  std::vector<scene::Mask> stained_;      ///< Per view: pixels that the healed rows made up.
+  std::vector<std::uint32_t> veils_;      ///< Rows of the input that were given up as veils, ascending.
+  std::vector<std::uint32_t> unseen_;     ///< Rows of the input that no camera has seen, ascending.
   UneditedViews unedited_;
   std::vector<correct::Example> buffer_;
   std::optional<std::vector<std::uint32_t>> tainted_;  ///< Rows of the input, once found: find_tainted(). Ascending.
-  std::vector<std::uint32_t> open_;                    ///< Rows of the input whose place is empty now, ascending.
+  std::vector<std::uint32_t> open_;                    ///< Those whose place is empty, now or in the end, ascending.
   std::vector<scene::Mask> vacated_;                   ///< Per view: what the part has left.
   std::optional<Closure> closure_;                     ///< Of what the part has left.
   std::optional<Surveyed> surveyed_;    ///< Of the closure, where nothing else that an edit changes showed.

@@ -81,6 +81,35 @@ TEST(EditWithACorrector, ClosesTheHoleThatAMoveUncoversInTheColourOfWhatIsAround
   EXPECT_FALSE(scene::first_not_finite(closed.overlay.rows));
 }
 
+TEST(EditWithACorrector, CompletesAPlaceAsSoonAsThePartBeginsToLeaveIt) {
+  BlockScene block;
+  block.request.params.intervals = 18;  // by a tenth of the block's side each
+  std::optional<State> after_first;
+  Observer observer;
+  observer.interval_done = [&](const IntervalDone& done) {
+    if (done.interval == 1) after_first = done.state;
+    return Result<void>{};
+  };
+  observer.keep = [&] { return after_first.has_value(); };
+  (void)run_with_scene_corrector(block, observer);
+  ASSERT_TRUE(after_first);
+  // Below the block, which still is on most of it.
+  const std::vector<std::uint32_t> block_rows = after_first->scene.rows_of(working::Role::copy);
+  render::Layers without_block(after_first->scene.cloud());
+  without_block.hidden = block_rows;
+  int closed = 0, all = 0;
+  for (const scene::Camera& view : block.cameras) {
+    render::Workspace workspace;
+    render::Rendering shown;
+    render::forward(without_block, view, {}, {}, workspace, shown);
+    for (const DVec3 point : BlockScene::below_block()) {
+      const DVec2 at = view.pixel_from_cam(view.cam_from_world(point));
+      closed += shown.alpha.at(int(at.x), int(at.y)) > 0.9f, ++all;
+    }
+  }
+  EXPECT_GT(closed, 0.95 * all);
+}
+
 TEST(EditWithACorrector, RowsThatWereSeenStayTheInputs) {
   const BlockScene block;
   const Outcome outcome = run_with_scene_corrector(block);

@@ -58,6 +58,7 @@ struct Moved {
   scene::GaussianCloud original;
   WorkingScene working;
   std::vector<scene::Mask> masks;
+  std::vector<std::uint32_t> left_open;
   Recorder corrector;
 
   explicit Moved(float gap = 0, Mode mode = Mode::move) : Moved(BlockScene(gap, mode)) {}
@@ -74,7 +75,13 @@ struct Moved {
     masks = edit::dilated(masks);
   }
   [[nodiscard]] Repair repair() {
-    return {original, block.cameras, block.cameras, block.request.healed, block.request.mode, block.request.params.seed,
+    return {original,
+            block.cameras,
+            block.cameras,
+            block.request.healed,
+            left_open,
+            block.request.mode,
+            block.request.params.seed,
             corrector};
   }
   Result<Corrected> correct(const Round& round = {1, 1, 0.5}) {
@@ -129,6 +136,15 @@ BlockScene on_spotted_floor() {
 
 scene::Image shown(const WorkingScene& working, const scene::Camera& camera) {
   return render::forward(working.cloud(), camera).color;
+}
+
+TEST(Repair, WhatWillBeOpenIsOnlyOnceItHasLeft) {
+  Moved moved, told;
+  for (std::uint32_t row = 0; row < told.block.floor_rows; ++row) told.left_open.push_back(row);  // which stays
+  const auto outcome = moved.correct(), same = told.correct();
+  ASSERT_TRUE(outcome && same);
+  EXPECT_EQ(outcome->seeds, same->seeds);
+  EXPECT_EQ(outcome->pictures, same->pictures);
 }
 
 TEST(Repair, AsksForAChartOfTheFloorFirst) {
