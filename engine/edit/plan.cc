@@ -32,7 +32,7 @@ constexpr double observe_frames = 1.1;         // largest weights, or depth besi
 constexpr double look_frames = 1.3;            // depth and trust beside colour
 constexpr double outskirts_frames = 3;         // depths of the rest, weights of all; the part alone takes little
 constexpr double surface_seconds = 8e-3;       // to find the surfaces that go on in a view
-constexpr double index_row_seconds = 4e-7;     // a search tree of the scene, for seeds
+constexpr double index_row_seconds = 4e-7;     // a search tree of the scene, for seeds and outskirts
 // The chart, the closure, and rows that nobody has seen, which are looked at in each view. Measured beside other work,
 // on edits of the demo scene whose frames took as long as planned.
 constexpr double unseen_row_seconds = 2.5e-7;
@@ -96,13 +96,14 @@ class Maker {
   [[nodiscard]] bool looks_around() const {
     return work_.selected && work_.corrected && work_.vacates && work_.iterations > 0;
   }
-  /// What cameras show of the part, of the rest, and of both.
+  /// What cameras show of the part, of the rest, and of both; and what is around what they show through its outline.
   [[nodiscard]] double outskirts() const {
     if (!looks_around()) return 0;
     const double pixels = std::min(double(repair::outskirts_side * repair::outskirts_side), pixels_);
     const double frame = work_.frame.gaussians + work_.frame.pixel * pixels;
     return double(std::min(work_.candidates, repair::outskirts_cameras)) *
-           (outskirts_frames * frame + slow(row_seconds * n_));
+               (outskirts_frames * frame + slow(row_seconds * n_)) +
+           slow(index_row_seconds * n_);
   }
 
   /// What views show around the part without it.

@@ -179,10 +179,11 @@ Result<void> look_at_outskirts(State& state, Edit& edit, const ViewChoice& choic
   edit.given_up = united(edit.given_up, outskirts->backing);
   if (!outskirts->backing.empty() || !edit.buried.empty())
     state.report.warnings.push_back(outskirts_go(outskirts->backing.size(), edit.buried.size()));
-  const repair::Tinged& tinged = outskirts->tinged;
-  for (std::size_t i = 0; i < tinged.rows.size(); ++i)
-    if (may_change(state, edit, tinged.rows[i]))
-      edit.tinged.rows.push_back(tinged.rows[i]), edit.tinged.like.push_back(tinged.like[i]);
+  // What is healed goes, and lends its colour to nothing.
+  std::erase_if(outskirts->through, [&](std::uint32_t row) { return !may_change(state, edit, row); });
+  Rows clear;
+  std::ranges::set_difference(outskirts->clear, request.healed, std::back_inserter(clear));
+  edit.tinged = repair::tinged_among(edit.input, outskirts->through, clear, !has_shadow(state, edit));
   return {};
 }
 
@@ -313,8 +314,8 @@ Result<Rows> paste(State& state, Edit& edit, int u, const PlannedMotion& motion)
     for (const std::uint32_t row : edit.given_up) state.scene.give_up(row);
   if (u == 1) leave_buried(state.scene, edit.buried);
   if (u == 1 && !motion.moving.empty()) {
-    repair::recolour(state.scene, edit.tinged);
     state.report.relit = repair::relight(state.scene, edit.relit);
+    repair::recolour(state.scene, edit.tinged);  // what its like lend it is in the light by then
   }
   // An elastic body has drawn its Gaussians out already.
   if (edit.corrector != nullptr && edit.optimises() && edit.params().interpolation != Interpolation::arap)

@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "engine/core/result.h"
-#include "engine/repair/tinged.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/gaussian_cloud.h"
 
@@ -29,11 +28,13 @@ struct Outskirts {
   /// Of the part: none of the pictures shows half of them, as they lie in what stays or behind it; without that they
   /// show beside the part.
   std::vector<std::uint32_t> buried;
-  Tinged tinged;  ///< Not of the part: seen through its outline, with a colour that nothing around them has.
+  /// Neither of the part nor before it: rows seen through its blurred outline, no larger than it is; and those seen
+  /// clear of it.
+  std::vector<std::uint32_t> through, clear;
 };
 
-/// Looks at a part from an even choice of the cameras: two forward passes and two
-/// sums of weights for each. Nothing where none shows it, nor where it is so little that nobody would see it.
+/// Looks at a part from an even choice of the cameras: two forward passes and two sums of weights for each. Nothing
+/// where none shows it; no backing nor buried rows where they are so little that nobody would see them.
 ///   part     rows, ascending
 ///   cameras  best those that show some of the part: what the others show is not asked
 ///   looked   called after each camera with the part that is done, 0 to 1; its error ends it

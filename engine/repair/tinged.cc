@@ -15,10 +15,16 @@ constexpr std::size_t rows_around = 32;
 // captured cases are alike: the fewer are changed.
 constexpr float odd_color = 0.08f;
 
+/// A colour in as much of its light as makes it most like another; never in more.
+Vec3 in_less_light(Vec3 color, Vec3 other) {
+  const float all = glm::dot(color, color);
+  return all > 0 ? std::clamp(glm::dot(color, other) / all, 0.0f, 1.0f) * color : color;
+}
+
 }  // namespace
 
 Tinged tinged_among(const scene::GaussianCloud& scene, std::span<const std::uint32_t> rows,
-                    std::span<const std::uint32_t> known) {
+                    std::span<const std::uint32_t> known, bool shade_stays) {
   Tinged out;
   if (known.size() < colors_alike) return out;
   const std::size_t around = std::min(rows_around, known.size());
@@ -26,9 +32,12 @@ Tinged tinged_among(const scene::GaussianCloud& scene, std::span<const std::uint
   std::vector<std::pair<float, std::uint32_t>> by_color(around);  // distance, row
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const Vec3 own = scene::base_color(scene, rows[i]);
+    const auto difference = [&](Vec3 color) {
+      return glm::distance(own, shade_stays ? in_less_light(color, own) : color);
+    };
     for (std::size_t k = 0; k < around; ++k) {
       const std::uint32_t row = nearest[i * around + k];
-      by_color[k] = {glm::distance(own, scene::base_color(scene, row)), row};
+      by_color[k] = {difference(scene::base_color(scene, row)), row};
     }
     std::ranges::partial_sort(by_color, by_color.begin() + colors_alike);
     Like like{};
@@ -37,7 +46,7 @@ Tinged tinged_among(const scene::GaussianCloud& scene, std::span<const std::uint
       like[k] = by_color[k].second;
       mean += scene::base_color(scene, like[k]) / float(colors_alike);
     }
-    if (glm::distance(own, mean) > odd_color) out.rows.push_back(rows[i]), out.like.push_back(like);
+    if (difference(mean) > odd_color) out.rows.push_back(rows[i]), out.like.push_back(like);
   }
   return out;
 }
@@ -45,7 +54,7 @@ Tinged tinged_among(const scene::GaussianCloud& scene, std::span<const std::uint
 void recolour(WorkingScene& working, const Tinged& tinged) {
   for (std::size_t i = 0; i < tinged.rows.size(); ++i) {
     const std::uint32_t row = tinged.rows[i];
-    if (working.role()[row] != working::Role::frozen) continue;
+    if (!working::stays(working.role()[row])) continue;
     working.relight(row);
     const std::span<float> sh = working.gaussians().sh_row(row);
     std::ranges::fill(sh, 0.0f);

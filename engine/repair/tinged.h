@@ -27,12 +27,13 @@ struct Tinged {
 };
 
 /// Those of some rows whose colour nothing around them has. What is drawn on a wall it has elsewhere, too.
-///   rows   that may be tinged, ascending
-///   known  that are not: nothing is found where these are fewer than `colors_alike`
+///   rows         that may be tinged, ascending
+///   known        that are not: nothing is found where these are fewer than `colors_alike`
+///   shade_stays  what has a colour of those around it, but darker, is not tinged either
 [[nodiscard]] Tinged tinged_among(const scene::GaussianCloud& scene, std::span<const std::uint32_t> rows,
-                                  std::span<const std::uint32_t> known);
+                                  std::span<const std::uint32_t> known, bool shade_stays);
 
-/// Each of these rows that is frozen gets the mean of its like's colours, seen from anywhere (Role::relit).
+/// Each of these rows that stays gets the mean of its like's colours as they are by now, all bands (Role::relit).
 void recolour(WorkingScene& working, const Tinged& tinged);
 
 }  // namespace engine::repair

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -36,8 +37,8 @@ inline scene::GaussianCloud ball_before_wall(std::size_t ball, Vec3 center = Vec
       do mean = {rng.uniform(-0.2f, 0.2f), rng.uniform(-0.2f, 0.2f), rng.uniform(-0.2f, 0.2f)};
       while (glm::length(mean) > 0.19f);
     } else {
-      const auto column = float(walls_made % wall_side), row = float(walls_made / wall_side);
-      mean = {(column / (wall_side - 1) - 0.5f) * 4, (row / (wall_side - 1) - 0.5f) * 4, 2};
+      const std::size_t column = walls_made % wall_side, row = walls_made / wall_side;
+      mean = {(float(column) / (wall_side - 1) - 0.5f) * 4, (float(row) / (wall_side - 1) - 0.5f) * 4, 2};
       ++walls_made;
     }
     cloud.mean.set(i, mean + center);
@@ -74,7 +75,7 @@ inline std::vector<std::uint32_t> survivors_of(std::size_t input_rows, const sce
 /// Row a of `left` and row b of `right` hold the same bytes.
 inline bool same_row(const scene::GaussianCloud& left, std::size_t a, const scene::GaussianCloud& right,
                      std::size_t b) {
-  const auto same = [](const auto& x, const auto& y) { return std::memcmp(&x, &y, sizeof x) == 0; };
+  const auto same = [](float x, float y) { return std::bit_cast<std::uint32_t>(x) == std::bit_cast<std::uint32_t>(y); };
   return same(left.mean.x[a], right.mean.x[b]) && same(left.mean.y[a], right.mean.y[b]) &&
          same(left.mean.z[a], right.mean.z[b]) && same(left.log_scale.x[a], right.log_scale.x[b]) &&
          same(left.log_scale.y[a], right.log_scale.y[b]) && same(left.log_scale.z[a], right.log_scale.z[b]) &&

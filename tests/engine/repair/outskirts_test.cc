@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <span>
 #include <string>
@@ -34,6 +35,32 @@ TEST(Outskirts, AreWhatBacksAThingAndWhatOfItIsBuriedInTheWall) {
   const Outskirts found = of(scene);
   EXPECT_EQ(found.backing, Rows{scene.backing}) << "and nothing of the wall, nor what is on its front";
   EXPECT_EQ(found.buried, scene.in_wall);
+}
+
+TEST(Outskirts, WhatIsSeenThroughTheOutlineIsAroundIt) {
+  BackedThing scene;
+  const auto sheet = std::uint32_t(scene.cloud.size());  // of the wall, and much larger than the thing
+  edit::add_gaussian(scene.cloud, {0, 0, 0.39f}, {0.9f, 0.9f, 0.01f}, -2, {0.8f, 0.8f, 0.75f});
+  const Outskirts found = of(scene);
+  const auto is_through = [&](std::uint32_t row) { return std::ranges::binary_search(found.through, row); };
+  const auto is_clear = [&](std::uint32_t row) { return std::ranges::binary_search(found.clear, row); };
+  for (const std::uint32_t row : found.through) {
+    const Vec3 mean = scene.cloud.mean.get(row);
+    EXPECT_LT(std::max(std::abs(mean.x), std::abs(mean.y)), 0.8f) << row;
+    EXPECT_FALSE(is_clear(row)) << row;
+  }
+  for (std::uint32_t row = 0; row < scene.cloud.size(); ++row) {
+    const Vec3 mean = scene.cloud.mean.get(row);
+    // Just beside the thing, whose cameras look at it from 26 degrees on either side; and far from it.
+    if (mean.z > 0.3f && std::abs(std::abs(mean.x) - 0.4f) < 0.03f && std::abs(mean.y) < 0.2f && row != sheet) {
+      EXPECT_TRUE(is_through(row)) << row;
+    }
+    if (mean.z > 0.3f && std::abs(std::abs(mean.y) - 0.7f) < 0.05f && std::abs(mean.x) < 0.5f) {
+      EXPECT_TRUE(is_clear(row)) << row;
+    }
+  }
+  EXPECT_FALSE(is_through(sheet) || is_clear(sheet));
+  for (const std::uint32_t row : scene.thing) EXPECT_FALSE(is_through(row) || is_clear(row)) << row;
 }
 
 TEST(Outskirts, AreNotWhatNobodyWouldSee) {
@@ -127,8 +154,8 @@ TEST(Outskirts, AreTheSameForAnyNumberOfThreads) {
   WorkArena(3).run([&] { many = of(scene); });
   EXPECT_EQ(one.backing, many.backing);
   EXPECT_EQ(one.buried, many.buried);
-  EXPECT_EQ(one.tinged.rows, many.tinged.rows);
-  EXPECT_EQ(one.tinged.like, many.tinged.like);
+  EXPECT_EQ(one.through, many.through);
+  EXPECT_EQ(one.clear, many.clear);
 }
 
 /// What an edit made of the thing.
