@@ -98,9 +98,10 @@ Result<State> begin(Edit& edit, std::span<const scene::Camera> cameras, std::opt
   if (from) {
     edit.progress.go_on_after(from->interval);
     if (auto going = edit.progress.enter(Stage::assign, from->interval); !going) return propagate(going);
-    const auto taken = assign(edit.input, edit.request);
+    auto taken = assign(edit.input, edit.request);
     if (!taken) return propagate(taken);
     edit.parts = parts_of(edit.input, taken->handle, edit.request);
+    edit.handle = std::move(taken->handle);
     from->report.parts = edit.parts.attachments;
     if (edit.corrector != nullptr) edit.candidates = candidate_cameras(edit.input, cameras, edit.request);
     plan_ahead(*from, edit);

@@ -153,10 +153,13 @@ class Maker {
 
   void add_correction(int u, int a) {
     const bool first = u == work_.finished + 1 && a == 1;
+    // Between the first interval and the last, nothing that the drag leaves is left to complete, mostly.
+    const bool completes = work_.vacates && (u == 1 || u == work_.intervals);
     const double witnesses = work_.vacates ? double(std::min(work_.candidates, repair::most_witnesses)) : 0;
     if (first)
       add(Stage::observe, u,
           observe_frames * (double(work_.candidates) + witnesses + views_) * frame() +
+              (work_.intervals > 1 ? motion() * work_.intervals : 0) +
               slow((row_seconds + (work_.vacates ? index_row_seconds : 0)) * n_));
     const RepaintTime& repaint = work_.repaint_time;
     if (work_.repainted && a == 1)
@@ -165,9 +168,9 @@ class Maker {
                std::max(repaint.training_step, least_training_step_seconds)));
     // In a move each view is looked at without the part as well: to find the one that shows most of the hole, and to
     // fill it. Footprints say what was vacated, and which of it is filled already.
-    const double filled = work_.vacates ? 2 * (look_frames * frame() + slow(surface_seconds)) + 5 * footprint(pixels_) +
-                                              slow(fill_seconds * std::pow(box_, fill_power) + unseen_row_seconds * n_)
-                                        : 0;
+    const double filled = completes ? 2 * (look_frames * frame() + slow(surface_seconds)) + 5 * footprint(pixels_) +
+                                          slow(fill_seconds * std::pow(box_, fill_power) + unseen_row_seconds * n_)
+                                    : 0;
     add(Stage::correct, u, views_ * (look_frames * frame() + filled));
     if (work_.repainted)
       add(Stage::repaint, u, slow(views_ * std::max(repaint.of_picture(work_.mean_strength), least_picture_seconds)));

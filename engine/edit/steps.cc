@@ -1,7 +1,6 @@
 #include "engine/edit/steps.h"
 
 #include <algorithm>
-#include <cassert>
 #include <functional>
 #include <iterator>
 #include <optional>
@@ -22,29 +21,21 @@
 #include "engine/repair/outskirts.h"
 #include "engine/repair/shadow.h"
 #include "engine/repair/stretch.h"
-#include "engine/repair/vacated.h"
 
 namespace engine::edit {
 namespace {
 
-/// The rows whose place the drag leaves open in the end; none where it goes at once, and what is open is seen.
-Rows left_open_in_the_end(const State& state, const Edit& edit) {
+/// Where a move in several intervals takes its rows in the end: [n][3], in the frame of the edit. Empty for others:
+/// where they go at once, everybody sees what they leave.
+std::vector<float> arrival_of(const State& state, const Edit& edit) {
   const int intervals = state.report.resolved.intervals;
   if (intervals == 1 || departure_of(edit.request) != Mode::move) return {};
-  const auto taken = assign(edit.input, edit.request);  // as it was before any row had left
-  assert(taken);
-  Rows rows = rows_in_use(taken->handle, edit.parts);
+  Rows rows = rows_in_use(edit.handle, edit.parts);
   const scene::GaussianCloud gaussians = scene::gather(edit.input, rows);
   Memory memory;
-  const DraggedAlone drag = drag_alone(std::move(rows), gaussians, taken->handle, edit.request, edit.parts, intervals,
+  const DraggedAlone drag = drag_alone(std::move(rows), gaussians, edit.handle, edit.request, edit.parts, intervals,
                                        /*rotate_sh=*/false, memory);
-  const WorkingScene& alone = drag.working;
-  Rows arrived;
-  for (auto row = std::uint32_t(alone.input_rows()); row < alone.size(); ++row)
-    if (working::has_arrived(alone.role()[row])) arrived.push_back(row);
-  Rows open = repair::rows_left_open(alone.cloud(), alone.rows_of(working::Role::original), alone, arrived);
-  for (std::uint32_t& row : open) row = drag.rows[row];
-  return open;
+  return interleaved(drag.working.cloud().mean, rows_where(drag.working.role(), working::has_arrived));
 }
 
 /// What a corrector is to know of the unedited scene.
@@ -57,7 +48,7 @@ repair::Repair make_repair(const State& state, const Edit& edit) {
     return out;
   };
   return {frame.edit_from_world(edit.input), in_frame(edit.candidates),  in_frame(state.views), edit.request.healed,
-          left_open_in_the_end(state, edit), departure_of(edit.request), edit.params().seed,    *edit.corrector};
+          arrival_of(state, edit),           departure_of(edit.request), edit.params().seed,    *edit.corrector};
 }
 
 /// Makes the repair, if there is none yet.
@@ -179,11 +170,11 @@ Result<void> look_at_outskirts(State& state, Edit& edit, const ViewChoice& choic
   edit.given_up = united(edit.given_up, outskirts->backing);
   if (!outskirts->backing.empty() || !edit.buried.empty())
     state.report.warnings.push_back(outskirts_go(outskirts->backing.size(), edit.buried.size()));
-  // What is healed goes, and lends its colour to nothing.
   std::erase_if(outskirts->through, [&](std::uint32_t row) { return !may_change(state, edit, row); });
-  Rows clear;
-  std::ranges::set_difference(outskirts->clear, request.healed, std::back_inserter(clear));
-  edit.tinged = repair::tinged_among(edit.input, outskirts->through, clear, !has_shadow(state, edit));
+  // What is healed goes, and lends its colour to nothing.
+  std::erase_if(outskirts->clear, [&](std::uint32_t row) { return std::ranges::binary_search(request.healed, row); });
+  const bool shade_stays = request.shadow == ShadowOfPart::keep;
+  edit.tinged = repair::tinged_among(edit.input, outskirts->through, outskirts->clear, shade_stays);
   return {};
 }
 
@@ -241,6 +232,7 @@ Result<State> assign_and_divide(Edit& edit) {
   auto taken = assign(edit.input, edit.request);
   if (!taken) return propagate(taken);
   edit.parts = parts_of(edit.input, taken->handle, edit.request);
+  edit.handle = taken->handle;
   edit.given_up = std::move(taken->given_up);
   State state;
   state.report.parts = edit.parts.attachments;
@@ -364,6 +356,7 @@ Result<repair::Corrected> correct(State& state, Edit& edit, std::span<const scen
                                              : edit.repair->correct(state.scene, masks, round, advance);
   if (!corrected) return corrected;
   state.report.seeds += corrected->seeds;
+  if (corrected->uncovered.empty()) return corrected;  // as it was before
   state.report.uncovered.clear();
   for (std::size_t v = 0; v < corrected->uncovered.size(); ++v)
     if (corrected->uncovered[v].pixels > 0)

@@ -36,6 +36,7 @@ struct Edit {
   correct::Corrector* corrector;
   correct::Repainter* repainter;
   ProgressMeter progress;
+  deform::HandleColumn handle = {};            ///< [N] P_h of every handle, as it was before any row left.
   Parts parts = {};                            ///< How what moves hangs on to what stays.
   Rows given_up = {};                          ///< Crumbs and backing that go away, in the first interval.
   repair::Relit relit = {};                    ///< Rows that the part's shadow leaves or reaches, in that interval.

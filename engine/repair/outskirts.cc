@@ -1,7 +1,6 @@
 #include "engine/repair/outskirts.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <utility>
@@ -12,6 +11,7 @@
 #include "engine/render/forward.h"
 #include "engine/render/weight_sums.h"
 #include "engine/repair/part_shown.h"
+#include "engine/repair/spots.h"
 #include "engine/repair/survey.h"
 #include "engine/scene/base_color.h"
 
@@ -33,14 +33,9 @@ constexpr double seen_as_backing = 0.002, seen_as_haze = 0.1;
 // outline. From 0.02 to 0.05 captured cases are alike.
 constexpr double seen_through = 0.05;
 
-// Extents of the part up to which a row's longest axis may be: one that spans a floor has little of its colour from an
-// outline. With 0.6 captured cases are as without; with 0.25 a pouf's place is 0.15 dB worse.
+// Of the diagonal of the part's box, up to which a row's longest axis may be: one that spans a floor has little of its
+// colour from an outline. With 0.6 captured cases are as without; with 0.25 a pouf's place is 0.15 dB worse.
 constexpr double most_wide = 0.6;
-
-double longest_axis(const scene::GaussianCloud& scene, std::uint32_t row) {
-  const Vec3 log_scale = scene.log_scale.get(row);
-  return std::exp(double(std::max({log_scale.x, log_scale.y, log_scale.z})));
-}
 
 /// Diagonal of the box that holds nearly all of these rows, world units.
 double extent_of(const scene::GaussianCloud& scene, std::span<const std::uint32_t> rows) {

@@ -28,8 +28,8 @@ struct Outskirts {
   /// Of the part: none of the pictures shows half of them, as they lie in what stays or behind it; without that they
   /// show beside the part.
   std::vector<std::uint32_t> buried;
-  /// Neither of the part nor before it: rows seen through its blurred outline, no larger than it is; and those seen
-  /// clear of it.
+  /// Neither of the part nor before it: rows seen through its blurred outline, but for those with a standard
+  /// deviation of more than 0.6 of its diagonal; and those seen clear of it.
   std::vector<std::uint32_t> through, clear;
 };
 

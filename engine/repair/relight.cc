@@ -42,9 +42,8 @@ Relit relit_rows(const scene::GaussianCloud& scene, std::span<const std::uint32_
     const bool was_near = glm::distance(mean, shadow.middle()) < shadow.reach();
     const bool is_near = back && glm::distance(back(mean), shadow.middle()) < shadow.reach();
     if (!(was_near || is_near) || std::ranges::binary_search(part, row)) continue;
-    const Vec3 log_scale = scene.log_scale.get(row);
-    const double longest = std::exp(double(std::max({log_scale.x, log_scale.y, log_scale.z})));
-    if (longest < most_wide * shadow.extent() && render::opacity<float>(scene.opacity_logit[row]) >= render::min_alpha)
+    if (longest_axis(scene, row) < most_wide * shadow.extent() &&
+        render::opacity<float>(scene.opacity_logit[row]) >= render::min_alpha)
       near.push_back(row);
   }
   const std::vector<Vec3> before = light_on(scene, near, shadow, {});

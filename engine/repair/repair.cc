@@ -163,8 +163,8 @@ struct Repair::ViewNow {
 };
 
 Repair::Repair(scene::GaussianCloud original, std::span<const scene::Camera> observers,
-               std::vector<scene::Camera> views, std::span<const std::uint32_t> healed,
-               std::vector<std::uint32_t> left_open, Mode mode, std::uint64_t seed, correct::Corrector& corrector)
+               std::vector<scene::Camera> views, std::span<const std::uint32_t> healed, std::vector<float> arrival,
+               Mode mode, std::uint64_t seed, correct::Corrector& corrector)
     : original_(std::move(original)),
       views_(std::move(views)),
       mode_(mode),
@@ -172,7 +172,7 @@ Repair::Repair(scene::GaussianCloud original, std::span<const scene::Camera> obs
       corrector_(corrector),
       witnesses_(original_, mode == Mode::move ? observers : observers.first(0)),
       healed_(healed.begin(), healed.end()),
-      left_open_(std::move(left_open)),
+      arrival_(std::move(arrival)),
       unedited_(render_unedited(original_, views_)) {
   for (std::size_t v = 0; v < views_.size(); ++v)
     buffer_.push_back({std::move(unedited_.color[v]), scene::Mask(views_[v].width, views_[v].height), {}});
@@ -443,14 +443,9 @@ std::vector<std::uint32_t> Repair::left_out(const Rows& rows) const {
 }
 
 void Repair::close_place(const WorkingScene& working, const Rows& rows) {
-  const std::vector<std::uint32_t> hidden = left_out(rows);
-  std::optional<Surveyed> surveyed;
-  // Seeds, which each optimisation changes, would show: only where nothing but the input does, all is as it was.
-  if (std::ranges::includes(hidden, working.member_rows())) surveyed = {open_, hidden};
-  if (closure_ && surveyed && surveyed == surveyed_) return;
   closure_.reset();
-  surveyed_ = std::move(surveyed);
   if (open_.empty()) return;
+  const std::vector<std::uint32_t> hidden = left_out(rows);
   render::Layers known(working.cloud());
   known.hidden = hidden;
   closure_.emplace(most_of(original_, open_), survey(known, original_, open_, witnesses_, workspace_));
@@ -607,26 +602,25 @@ Result<Corrected> Repair::walk(WorkingScene& working, std::span<const scene::Mas
   if (round.arrives && round.correction == 1) clear_veils(working, rows);
   trust_ = trust_of_rows(working, observed_rows(shown_), mode_);
   const OpaqueTrail opaque(working, original_, mode_);
+  const bool opens = round.correction == 1 && (round.interval == 1 || round.arrives || opens_more(working, rows));
   const auto views = double(views_.size());
-  const double all = (open_.empty() ? 0 : closure_views) + (rows.gone.empty() ? 0 : telling_views * views) + views +
-                     (in_turn ? 0 : shown_views * views);
+  const double surveyed =
+      !opens ? 0 : (open_.empty() ? 0 : closure_views) + (rows.gone.empty() ? 0 : telling_views * views);
+  const double all = surveyed + views + (in_turn ? 0 : shown_views * views);
   double done = 0;  // in views
   const auto advance_by = [&](double more) { return advance(std::min((done += more) / all, 1.0)); };
-  if (auto found = find_tainted(working, rows, [&] { return advance_by(0); }); !found) return propagate(found);
-  close_place(working, rows);
-  if (!open_.empty())
-    if (auto going = advance_by(closure_views); !going) return propagate(going);
-  const auto telling = most_telling_view(working, rows, round, [&] { return advance_by(telling_views); });
-  if (!telling) return propagate(telling);
-  auto charted = complete_chart(working, rows, *telling, round);
-  if (!charted) return propagate(charted);
-  corrected.seeds += *charted;
+  std::vector<std::size_t> order = outward(views_, 0);
+  if (opens) {
+    auto surveyed_order = survey_place(working, rows, round, advance_by, corrected.seeds);
+    if (!surveyed_order) return propagate(surveyed_order);
+    order = std::move(*surveyed_order);
+    if (!rows.gone.empty()) corrected.uncovered.resize(views_.size());
+  }
   if (auto tuned = corrector_.fine_tune(buffer_, 0); !tuned) return propagate(tuned);
-  const std::vector<std::size_t> order = outward(views_, telling->view);
-  if (!rows.gone.empty()) corrected.uncovered.resize(views_.size());
   std::vector<Background> backgrounds(views_.size());
   for (const std::size_t v : order) {
-    if (!rows.gone.empty()) {
+    backgrounds[v].filled = scene::Mask(views_[v].width, views_[v].height);
+    if (opens && !rows.gone.empty()) {
       auto completed = complete_background(working, rows, v, round);
       if (!completed) return propagate(completed);
       backgrounds[v] = std::move(*completed);
@@ -649,9 +643,41 @@ Result<Corrected> Repair::walk(WorkingScene& working, std::span<const scene::Mas
   corrected.trust = std::move(trust_);  // seeds, trails and originals are what the optimisation is to change
   for (std::size_t i = 0; i < working.size(); ++i)
     if (!working::is_dragged(working.role()[i]) && working.role()[i] != Role::continued &&
-        working.role()[i] != Role::relit)
+        working.role()[i] != Role::relit && (opens || working.role()[i] != Role::seed))
       corrected.trust[i] = 0;
   return corrected;
+}
+
+Result<std::vector<std::size_t>> Repair::survey_place(WorkingScene& working, Rows& rows, const Round& round,
+                                                      const std::function<Result<void>(double)>& advance_by,
+                                                      std::size_t& seeds) {
+  if (auto found = find_tainted(working, rows, [&] { return advance_by(0); }); !found) return propagate(found);
+  close_place(working, rows);
+  if (!open_.empty())
+    if (auto going = advance_by(closure_views); !going) return propagate(going);
+  const auto telling = most_telling_view(working, rows, round, [&] { return advance_by(telling_views); });
+  if (!telling) return propagate(telling);
+  auto charted = complete_chart(working, rows, *telling, round);
+  if (!charted) return propagate(charted);
+  seeds += *charted;
+  return outward(views_, telling->view);
+}
+
+std::vector<std::uint32_t> Repair::open_among(std::span<const std::uint32_t> left, const Array3& means,
+                                              const Rows& rows) const {
+  std::vector<std::uint32_t> open = rows_left_open(original_, left, interleaved(means, rows.moved));
+  return arrival_.empty() ? open : united(open, rows_left_open(original_, left, arrival_));
+}
+
+bool Repair::opens_more(const WorkingScene& working, const Rows& rows) const {
+  std::vector<std::uint32_t> leaving;  // in this interval
+  for (const std::uint32_t row : rows.moved)
+    if (working.mean_at_deform().get(row) == original_.mean.get(working.parent()[row]))
+      leaving.push_back(working.parent()[row]);
+  std::sort(leaving.begin(), leaving.end());
+  std::vector<std::uint32_t> had_left;
+  std::ranges::set_difference(rows.vacating, leaving, std::back_inserter(had_left));
+  return !std::ranges::includes(open_among(had_left, working.mean_at_deform(), rows), open_);
 }
 
 Repair::Rows Repair::rows_of(const WorkingScene& working) const {
@@ -670,11 +696,8 @@ Repair::Rows Repair::rows_of(const WorkingScene& working) const {
 void Repair::note_vacated(const WorkingScene& working, const Rows& rows, std::span<const scene::Mask> masks) {
   vacated_.resize(views_.size());
   far_side_.resize(views_.size());
-  open_ = rows_left_open(original_, rows.vacating, working, rows.moved);
   // What is made up from a sliver of its place stays: once the whole is open it would be a stain (ADR 65).
-  std::vector<std::uint32_t> open_later;
-  std::ranges::set_intersection(left_open_, rows.vacating, std::back_inserter(open_later));
-  open_ = united(open_, open_later);
+  open_ = open_among(rows.vacating, working.cloud().mean, rows);
   const std::vector<std::uint32_t> relit = working.rows_of(Role::relit);
   for (std::size_t v = 0; v < views_.size(); ++v) {
     const scene::Image share = working::footprint(original_, rows.vacating, views_[v], workspace_);

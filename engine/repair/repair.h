@@ -34,7 +34,8 @@ using working::WorkingScene;
 
 /// What one view shows of the place that the part has left.
 struct Uncovered {
-  std::size_t pixels = 0;  ///< What the part covered there, and covers no more, but for mere air.
+  std::size_t pixels =
+      0;  ///< What the part covered there, and covers no more or will not in the end, but for mere air.
   /// Those of them that show what no camera has seen, and where no surface was found to go on: what is there was
   /// painted in this view alone.
   std::size_t open = 0;
@@ -47,7 +48,7 @@ struct Corrected {
   /// [rows of the working scene] 0 to 1: the more, the slower a row may change. Empty: all may as they are drawn.
   std::vector<float> trust;
   std::size_t seeds = 0;             ///< Rows that the correction appended.
-  std::vector<Uncovered> uncovered;  ///< Of each view; empty in `extend`, where nothing leaves its place.
+  std::vector<Uncovered> uncovered;  ///< Of each view; empty where nothing has left its place since it was last told.
 };
 
 /// Which correction it is.
@@ -59,23 +60,24 @@ struct Round {
 };
 
 /// Corrects the views of one edit. What it knows of the unedited scene is made once; from one correction to the next
-/// nothing else is carried but a closure that would be the same, so an edit that goes on after an interval makes a new
-/// one.
+/// nothing else is carried, so an edit that goes on after an interval makes a new one.
 class Repair {
  public:
   ///   original   the scene as the edit found it, in the frame of the edit
   ///   observers  cameras that have seen it, in that frame
   ///   views      of the edit, in that frame, best first
   ///   healed     rows of it that are made anew although they were seen, in a move
-  ///   left_open  rows of it whose place will be empty in the end: it is completed as soon as they leave. Ascending
+  ///   arrival    [n][3] means of what moves, where it arrives in the end, if that is known: what it will have left is
+  ///              completed as soon as it has begun to leave
   ///   seed       of all random choices
   ///   corrector  outlives this
   Repair(scene::GaussianCloud original, std::span<const scene::Camera> observers, std::vector<scene::Camera> views,
-         std::span<const std::uint32_t> healed, std::vector<std::uint32_t> left_open, Mode mode, std::uint64_t seed,
+         std::span<const std::uint32_t> healed, std::vector<float> arrival, Mode mode, std::uint64_t seed,
          correct::Corrector& corrector);
 
   /// One correction of all views. Appends seeds to the working scene, and gives up what hides what is completed, or the
-  /// part where it arrives.
+  /// part where it arrives. In its first correction an interval completes what it opens, the last one once more what
+  /// has been left open; else seeds stay as they are.
   ///   masks    per view, dilated; views without a set pixel stay as they are
   ///   advance  called with the part that is done, after each view of either pass; its error ends the correction
   ///   errors   those of the corrector and of `advance`; internal: the corrector gave back something else than a
@@ -133,13 +135,6 @@ class Repair {
     [[nodiscard]] std::optional<Place> place_of(DVec3 point) const;
   };
 
-  /// What a closure is made from, but for the input.
-  struct Surveyed {
-    std::vector<std::uint32_t> open;    ///< As open_.
-    std::vector<std::uint32_t> hidden;  ///< left_out()
-    bool operator==(const Surveyed&) const = default;
-  };
-
   struct Telling {
     std::size_t view = 0;
     ContinuedSurfaces surfaces;  ///< In it.
@@ -156,6 +151,17 @@ class Repair {
   [[nodiscard]] Rows rows_of(const WorkingScene& working) const;
   /// Notes in each view what has been left so far, and keeps it from being learned from.
   void note_vacated(const WorkingScene& working, const Rows& rows, std::span<const scene::Mask> masks);
+  /// Those of these rows of the input whose place is empty with the moved rows at these means, or will be in the end.
+  [[nodiscard]] std::vector<std::uint32_t> open_among(std::span<const std::uint32_t> left, const Array3& means,
+                                                      const Rows& rows) const;
+  /// Is a place empty, or will be, that was not before this interval? Else all that is to be completed has been.
+  [[nodiscard]] bool opens_more(const WorkingScene& working, const Rows& rows) const;
+  /// Completes what is to be before any view is, and finds out how the rest goes on.
+  ///   advance_by  called with what is done, in views; its error ends it
+  ///   returns     the order of the views
+  [[nodiscard]] Result<std::vector<std::size_t>> survey_place(WorkingScene& working, Rows& rows, const Round& round,
+                                                              const std::function<Result<void>(double)>& advance_by,
+                                                              std::size_t& seeds);
   [[nodiscard]] ViewNow look(const WorkingScene& working, std::span<const std::uint32_t> hidden, std::size_t v);
   /// What view v shows now, what was filled in as it was filled in.
   [[nodiscard]] ViewNow completed_view(const WorkingScene& working, const Rows& rows, const Background& background,
@@ -182,7 +188,7 @@ class Repair {
                                                    const Round& round);
   /// What has left, and rows that nobody has seen: without them shows what is known.
   [[nodiscard]] std::vector<std::uint32_t> left_out(const Rows& rows) const;
-  /// Makes the closure of what the part has left, or keeps it where it would be the same.
+  /// Makes the closure of what the part has left.
   void close_place(const WorkingScene& working, const Rows& rows);
   /// What closes the place in view v where no surface goes on: [1] inverse depth; 0: nothing does.
   ///   surface  the same of those that go on
@@ -217,18 +223,17 @@ class Repair {
   correct::Corrector& corrector_;
   std::vector<float> shown_;  ///< Of shown_rows().
   Witnesses witnesses_;
-  std::vector<std::uint32_t> healed_;     ///< Ascending.
-  std::vector<std::uint32_t> left_open_;  ///< Rows of the input whose place will be empty in the end, ascending.
-  std::vector<scene::Mask> stained_;      ///< Per view: pixels that the healed rows made up.
-  std::vector<std::uint32_t> veils_;      ///< Rows of the input that were given up as veils, ascending.
-  std::vector<std::uint32_t> unseen_;     ///< Rows of the input that no camera has seen, ascending.
+  std::vector<std::uint32_t> healed_;  ///< Ascending.
+  std::vector<float> arrival_;         ///< [n][3] Means of what moves, where it arrives in the end, or empty.
+  std::vector<scene::Mask> stained_;   ///< Per view: pixels that the healed rows made up.
+  std::vector<std::uint32_t> veils_;   ///< Rows of the input that were given up as veils, ascending.
+  std::vector<std::uint32_t> unseen_;  ///< Rows of the input that no camera has seen, ascending.
   UneditedViews unedited_;
   std::vector<correct::Example> buffer_;
   std::optional<std::vector<std::uint32_t>> tainted_;  ///< Rows of the input, once found: find_tainted(). Ascending.
-  std::vector<std::uint32_t> open_;                    ///< Those whose place is empty, now or in the end, ascending.
-  std::vector<scene::Mask> vacated_;                   ///< Per view: what the part has left.
-  std::optional<Closure> closure_;                     ///< Of what the part has left.
-  std::optional<Surveyed> surveyed_;    ///< Of the closure, where nothing else that an edit changes showed.
+  std::vector<std::uint32_t> open_;     ///< Those whose place is empty, or will be in the end, ascending.
+  std::vector<scene::Mask> vacated_;    ///< Per view: what the part has left.
+  std::optional<Closure> closure_;      ///< Of what the part has left.
   std::vector<scene::Image> far_side_;  ///< Per view: of what the part has left. See far_side().
   render::Workspace workspace_;
   std::vector<float> trust_;                         ///< Of the rows of the working scene, in the correction at hand.

@@ -1,5 +1,6 @@
 #include "engine/repair/spots.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace engine::repair {
@@ -20,6 +21,11 @@ std::array<DVec3, 5> spots_of(const scene::GaussianCloud& scene, std::size_t row
     spots[next++] = mean + way, spots[next++] = mean - way;
   }
   return spots;
+}
+
+double longest_axis(const scene::GaussianCloud& scene, std::size_t row) {
+  const Vec3 log_scale = scene.log_scale.get(row);
+  return std::exp(double(std::max({log_scale.x, log_scale.y, log_scale.z})));
 }
 
 }  // namespace engine::repair

@@ -1,7 +1,9 @@
 #include "engine/repair/tinged.h"
 
 #include <algorithm>
+#include <functional>
 #include <utility>
+#include <vector>
 
 #include "engine/neighbours/neighbour_graph.h"
 #include "engine/scene/base_color.h"
@@ -21,6 +23,25 @@ Vec3 in_less_light(Vec3 color, Vec3 other) {
   return all > 0 ? std::clamp(glm::dot(color, other) / all, 0.0f, 1.0f) * color : color;
 }
 
+struct Alike {
+  Like rows{};
+  Vec3 mean{0.0f};
+};
+
+/// Those of some rows whose colours differ least.
+Alike most_alike(const scene::GaussianCloud& scene, std::span<const std::uint32_t> rows,
+                 const std::function<float(Vec3)>& difference) {
+  std::vector<std::pair<float, std::uint32_t>> by_color;  // difference, row
+  for (const std::uint32_t row : rows) by_color.emplace_back(difference(scene::base_color(scene, row)), row);
+  std::ranges::partial_sort(by_color, by_color.begin() + colors_alike);
+  Alike out;
+  for (std::size_t k = 0; k < colors_alike; ++k) {
+    out.rows[k] = by_color[k].second;
+    out.mean += scene::base_color(scene, out.rows[k]) / float(colors_alike);
+  }
+  return out;
+}
+
 }  // namespace
 
 Tinged tinged_among(const scene::GaussianCloud& scene, std::span<const std::uint32_t> rows,
@@ -29,24 +50,17 @@ Tinged tinged_among(const scene::GaussianCloud& scene, std::span<const std::uint
   if (known.size() < colors_alike) return out;
   const std::size_t around = std::min(rows_around, known.size());
   const std::vector<std::uint32_t> nearest = neighbours::nearest_rows(scene.mean, known, rows, around);
-  std::vector<std::pair<float, std::uint32_t>> by_color(around);  // distance, row
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const Vec3 own = scene::base_color(scene, rows[i]);
-    const auto difference = [&](Vec3 color) {
-      return glm::distance(own, shade_stays ? in_less_light(color, own) : color);
+    const auto beside = std::span(nearest).subspan(i * around, around);
+    const auto is_odd_among = [&](const auto& difference) {
+      return difference(most_alike(scene, beside, difference).mean) > odd_color;
     };
-    for (std::size_t k = 0; k < around; ++k) {
-      const std::uint32_t row = nearest[i * around + k];
-      by_color[k] = {difference(scene::base_color(scene, row)), row};
-    }
-    std::ranges::partial_sort(by_color, by_color.begin() + colors_alike);
-    Like like{};
-    Vec3 mean(0.0f);
-    for (std::size_t k = 0; k < colors_alike; ++k) {
-      like[k] = by_color[k].second;
-      mean += scene::base_color(scene, like[k]) / float(colors_alike);
-    }
-    if (difference(mean) > odd_color) out.rows.push_back(rows[i]), out.like.push_back(like);
+    const auto plain = [&](Vec3 color) { return glm::distance(own, color); };
+    if (!is_odd_among(plain)) continue;
+    if (shade_stays && !is_odd_among([&](Vec3 color) { return plain(in_less_light(color, own)); })) continue;
+    // Rather those in as much light as it has: what is tinged in a shadow stays in it.
+    out.rows.push_back(rows[i]), out.like.push_back(most_alike(scene, beside, plain).rows);
   }
   return out;
 }

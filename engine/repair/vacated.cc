@@ -18,23 +18,15 @@ constexpr double taken_within = 1.5;
 // Pixels around its mean in which a row counts as being there: those between neighbouring means of a part, mostly.
 constexpr int far_side_px = 2;
 
-std::vector<float> means_of(const scene::GaussianCloud& cloud, std::span<const std::uint32_t> rows) {
-  std::vector<float> points;
-  points.reserve(3 * rows.size());
-  for (const std::uint32_t row : rows)
-    for (int axis = 0; axis < 3; ++axis) points.push_back(cloud.mean.get(row)[axis]);
-  return points;
-}
-
 }  // namespace
 
 std::vector<std::uint32_t> rows_left_open(const scene::GaussianCloud& original, std::span<const std::uint32_t> left,
-                                          const WorkingScene& working, std::span<const std::uint32_t> arrived) {
+                                          std::span<const float> arrived) {
   if (left.empty() || arrived.empty()) return {left.begin(), left.end()};
-  const std::vector<float> places = means_of(original, left);
+  const std::vector<float> places = interleaved(original.mean, left);
   const std::size_t asked = std::min(left.size(), neighbours_asked + 1);  // the nearest is the row itself
   const auto beside = neighbours::PointIndex(places, 3).nearest(places, asked);
-  const auto now = neighbours::PointIndex(means_of(working.cloud(), arrived), 3).nearest(places, 1);
+  const auto now = neighbours::PointIndex(arrived, 3).nearest(places, 1);
   std::vector<std::uint32_t> open;
   for (std::size_t k = 0; k < left.size(); ++k) {
     double spacing = 0;

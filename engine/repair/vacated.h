@@ -8,22 +8,18 @@
 #include "engine/scene/camera.h"
 #include "engine/scene/gaussian_cloud.h"
 #include "engine/scene/image.h"
-#include "engine/working/working_scene.h"
 
 namespace engine::repair {
 
-using working::WorkingScene;
-
-/// Those of `left`, rows of the input that have left their place, whose place is empty now: no row of `arrived` is as
-/// near to it as its neighbours were. What slides along itself, is stretched or stays beside an anchor leaves open only
-/// what it no longer covers.
+/// Those of `left`, rows of the input that have left their place, whose place is empty now: nothing that has arrived is
+/// as near to it as its neighbours were. What slides along itself, is stretched or stays beside an anchor leaves open
+/// only what it no longer covers.
 ///   original  the scene as the edit found it, in the frame of the edit
 ///   left      ascending
-///   arrived   rows of the working scene
+///   arrived   [n][3] in that frame
 [[nodiscard]] std::vector<std::uint32_t> rows_left_open(const scene::GaussianCloud& original,
                                                         std::span<const std::uint32_t> left,
-                                                        const WorkingScene& working,
-                                                        std::span<const std::uint32_t> arrived);
+                                                        std::span<const float> arrived);
 
 /// How far the far side of these rows is in each pixel, world units along the axis: that of the farthest mean within
 /// two pixels. 0: there is none. [1]

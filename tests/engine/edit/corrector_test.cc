@@ -110,6 +110,30 @@ TEST(EditWithACorrector, CompletesAPlaceAsSoonAsThePartBeginsToLeaveIt) {
   EXPECT_GT(closed, 0.95 * all);
 }
 
+TEST(EditWithACorrector, KnowsWhatTheDragWillLeaveAfterAnInterruption) {
+  BlockScene block;
+  block.request.params.intervals = 18;
+  std::optional<State> after_first;
+  int done = 0;
+  Observer observer;
+  observer.interval_done = [&](const IntervalDone& interval) {
+    done = interval.interval;
+    if (done == 1) after_first = interval.state;
+    return Result<void>{};
+  };
+  observer.keep = [&] { return done == 3; };
+  const Outcome whole = run_with_scene_corrector(block, observer);
+  ASSERT_TRUE(after_first);
+  const auto from = decode(encode(*after_first), block.cloud, block.request);
+  ASSERT_TRUE(from);
+  done = 1;
+  const Outcome resumed = run_with_scene_corrector(block, observer, *from);
+  EXPECT_EQ(resumed.overlay, whole.overlay);
+  EXPECT_EQ(resumed.report.seeds, whole.report.seeds);
+  EXPECT_EQ(whole.report.seeds, after_first->report.seeds) << "the first interval has completed it all";
+  EXPECT_EQ(resumed.report.uncovered.size(), block.cameras.size());
+}
+
 TEST(EditWithACorrector, RowsThatWereSeenStayTheInputs) {
   const BlockScene block;
   const Outcome outcome = run_with_scene_corrector(block);

@@ -58,7 +58,7 @@ struct Moved {
   scene::GaussianCloud original;
   WorkingScene working;
   std::vector<scene::Mask> masks;
-  std::vector<std::uint32_t> left_open;
+  std::vector<float> arrival;
   Recorder corrector;
 
   explicit Moved(float gap = 0, Mode mode = Mode::move) : Moved(BlockScene(gap, mode)) {}
@@ -79,7 +79,7 @@ struct Moved {
             block.cameras,
             block.cameras,
             block.request.healed,
-            left_open,
+            arrival,
             block.request.mode,
             block.request.params.seed,
             corrector};
@@ -136,15 +136,6 @@ BlockScene on_spotted_floor() {
 
 scene::Image shown(const WorkingScene& working, const scene::Camera& camera) {
   return render::forward(working.cloud(), camera).color;
-}
-
-TEST(Repair, WhatWillBeOpenIsOnlyOnceItHasLeft) {
-  Moved moved, told;
-  for (std::uint32_t row = 0; row < told.block.floor_rows; ++row) told.left_open.push_back(row);  // which stays
-  const auto outcome = moved.correct(), same = told.correct();
-  ASSERT_TRUE(outcome && same);
-  EXPECT_EQ(outcome->seeds, same->seeds);
-  EXPECT_EQ(outcome->pictures, same->pictures);
 }
 
 TEST(Repair, AsksForAChartOfTheFloorFirst) {
@@ -420,10 +411,9 @@ TEST(Repair, WhatIsOpenedIsNotClosedAgain) {
 }
 
 TEST(Repair, CorrectsAgainAsOneMadeAnewWould) {
-  const auto correct = [](Repair& repair, const Moved& moved, WorkingScene& working, int correction) {
-    return repair.correct(working, moved.masks, {1, correction, 0.5}, [](double) { return Result<void>{}; });
+  const auto correct = [](Repair& repair, const Moved& moved, WorkingScene& working, int interval) {
+    return repair.correct(working, moved.masks, {interval, 1, 0.5}, [](double) { return Result<void>{}; });
   };
-  // It may keep its closure where there are no seeds; below the hatch there are.
   struct Sample {
     BlockScene block;
     bool is_seeded;
@@ -491,13 +481,37 @@ TEST(Repair, ClearsTheVeilBeforeThePartOnlyWhereItStays) {
     Repair repair = moved.repair();
     const auto go_on = [](double) { return Result<void>{}; };
     ASSERT_TRUE(repair.correct(moved.working, moved.masks, {1, 1, 0.5, arrives}, go_on));
-    const auto second_time = repair.correct(moved.working, moved.masks, {1, 2, 0.5, arrives}, go_on);
+    const auto second_time = repair.correct(moved.working, moved.masks, {2, 1, 0.5, arrives}, go_on);
     ASSERT_TRUE(second_time);
     left[std::size_t(arrives)] = second_time->uncovered[0].pixels;
     for (std::uint32_t row = first; row < moved.working.input_rows(); ++row)
       EXPECT_EQ(moved.working.role()[row], arrives ? Role::original : Role::frozen) << row;
   }
   EXPECT_EQ(left[1], left[0]) << "the veil was not the part's";
+}
+
+TEST(Repair, CompletesAPlaceOnce) {
+  Moved moved;
+  Repair repair = moved.repair();
+  const auto correct = [&](const Round& round) {
+    return repair.correct(moved.working, moved.masks, round, [](double) { return Result<void>{}; });
+  };
+  const auto first = correct({1, 1, 0.5});
+  ASSERT_TRUE(first);
+  const std::vector<std::uint32_t> seeds = moved.working.rows_of(Role::seed);
+  ASSERT_FALSE(seeds.empty());
+  for (const std::uint32_t row : seeds) EXPECT_EQ(first->trust[row], 0.0f) << "to be optimised";
+  for (const std::uint32_t row : moved.working.rows_of(Role::copy)) moved.working.note_mean(row);  // the next interval
+  for (const Round& round : {Round{1, 2, 0.4}, Round{2, 1, 0.5}}) {
+    const auto again = correct(round);
+    ASSERT_TRUE(again);
+    EXPECT_EQ(again->seeds, 0u);
+    EXPECT_TRUE(again->uncovered.empty());
+    for (const std::uint32_t row : seeds) EXPECT_EQ(again->trust[row], 1.0f) << "it stays";
+  }
+  const auto last = correct({2, 1, 0.5, /*arrives=*/true});
+  ASSERT_TRUE(last);
+  EXPECT_EQ(last->uncovered.size(), moved.block.cameras.size());
 }
 
 TEST(Repair, TellsWhatIsLeftOpenAndWhere) {

@@ -7,12 +7,13 @@
 #include <span>
 #include <string_view>
 
+#include "engine/working/working_scene.h"
 #include "tests/engine/edit/block.h"
 
 namespace engine::repair {
 namespace {
 
-using working::Role;
+using working::Role, working::WorkingScene;
 
 constexpr int length = 40, width = 6;
 constexpr float spacing = 0.1f;
@@ -37,7 +38,9 @@ struct Strip {
       working.leave_behind(row);
     }
   }
-  [[nodiscard]] std::vector<std::uint32_t> open() const { return rows_left_open(original, left, working, arrived); }
+  [[nodiscard]] std::vector<std::uint32_t> open() const {
+    return rows_left_open(original, left, interleaved(working.cloud().mean, arrived));
+  }
 };
 
 TEST(RowsLeftOpen, AreAllIfThePartWentAway) {
@@ -59,14 +62,14 @@ TEST(RowsLeftOpen, AreTheEndOfWhatSlidAlongItself) {
 
 TEST(RowsLeftOpen, OfNothingAreNoneAndWithoutAnArrivalAll) {
   const Strip strip({0, 0, 0});
-  EXPECT_TRUE(rows_left_open(strip.original, {}, strip.working, strip.arrived).empty());
-  EXPECT_EQ(rows_left_open(strip.original, strip.left, strip.working, {}), strip.left);
+  EXPECT_TRUE(rows_left_open(strip.original, {}, interleaved(strip.working.cloud().mean, strip.arrived)).empty());
+  EXPECT_EQ(rows_left_open(strip.original, strip.left, {}), strip.left);
 }
 
 TEST(RowsLeftOpen, OneRowAloneIsOpenOnceItHasMoved) {
   const Strip strip({0.01f, 0, 0});
   const std::vector<std::uint32_t> one{7}, now{strip.arrived[7]};
-  EXPECT_EQ(rows_left_open(strip.original, one, strip.working, now), one);
+  EXPECT_EQ(rows_left_open(strip.original, one, interleaved(strip.working.cloud().mean, now)), one);
 }
 
 TEST(FarSide, IsThatOfTheFarthestRowWithinTwoPixels) {
