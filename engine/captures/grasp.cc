@@ -174,9 +174,15 @@ Result<Grasp> grasp_by_clicks(const CapturedCase& the_case, const scene::Gaussia
 }
 
 Result<Grasp> grasp_by_looking(const CapturedCase& the_case, const scene::GaussianCloud& scene) {
-  auto clicks = clicks_of_a_looking_person(the_case, scene);
+  auto clicks = clicks_of_a_looking_person(the_case, scene, WhenWorse::undone);
   if (!clicks) return propagate(clicks);
   return grasp_by_selection("looking", {{select::Op::add, *std::move(clicks)}}, the_case, scene);
+}
+
+Result<Grasp> grasp_by_correcting(const CapturedCase& the_case, const scene::GaussianCloud& scene) {
+  auto clicks = clicks_of_a_looking_person(the_case, scene, WhenWorse::corrected);
+  if (!clicks) return propagate(clicks);
+  return grasp_by_selection("correcting", {{select::Op::add, *std::move(clicks)}}, the_case, scene);
 }
 
 Result<Grasp> grasp_by_masks(const CapturedCase& the_case, const scene::GaussianCloud& scene) {
@@ -188,10 +194,10 @@ Result<Grasp> grasp_by_wide_masks(const CapturedCase& the_case, const scene::Gau
 }
 
 const std::vector<NamedGrasp>& known_grasps() {
-  static const std::vector<NamedGrasp> all{{"balls", grasp_by_balls},          {"bare", grasp_by_bare_balls},
-                                           {"click", grasp_by_a_click},        {"clicks", grasp_by_clicks},
-                                           {"looking", grasp_by_looking},      {"masks", grasp_by_masks},
-                                           {"wide_masks", grasp_by_wide_masks}};
+  static const std::vector<NamedGrasp> all{{"balls", grasp_by_balls},     {"bare", grasp_by_bare_balls},
+                                           {"click", grasp_by_a_click},   {"clicks", grasp_by_clicks},
+                                           {"looking", grasp_by_looking}, {"correcting", grasp_by_correcting},
+                                           {"masks", grasp_by_masks},     {"wide_masks", grasp_by_wide_masks}};
   return all;
 }
 

@@ -15,7 +15,7 @@ namespace engine::captures {
 
 /// What is asked for, and what that takes along.
 struct Grasp {
-  std::string by;         ///< How: "balls", "bare", "click", "clicks", "looking", "masks", "wide_masks".
+  std::string by;         ///< How: the name of one of known_grasps().
   edit::Request request;  ///< Without parameters: those are a preset's.
   std::vector<std::uint32_t>
       rows;  ///< Of the trained scene: selected ones, or those in balls that have a target. Ascending.
@@ -48,9 +48,11 @@ using GraspBy = std::function<Result<Grasp>(const CapturedCase& the_case, const 
 ///   errors  those of select::select() and edit::assign()
 [[nodiscard]] Result<Grasp> grasp_by_clicks(const CapturedCase& the_case, const scene::GaussianCloud& scene);
 
-/// By the same, from the clicks of a person who looks where it is wrong: see looking.h.
+/// By the same, from the clicks of a person who looks where it is wrong, and undoes what makes it worse or corrects it
+/// by another click: see looking.h.
 ///   errors  those of clicks_of_a_looking_person(), select::select() and edit::assign()
 [[nodiscard]] Result<Grasp> grasp_by_looking(const CapturedCase& the_case, const scene::GaussianCloud& scene);
+[[nodiscard]] Result<Grasp> grasp_by_correcting(const CapturedCase& the_case, const scene::GaussianCloud& scene);
 
 /// By masks of three photos, those taken farthest to the left, in the middle and farthest to the right: the true
 /// outline of what moves; or that and all pixels within 5 of it. Carelessly: as clicks.

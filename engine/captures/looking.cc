@@ -123,35 +123,53 @@ class Looking {
   render::Workspace workspace_;
 };
 
+/// What a person has clicked on, and sees of it.
+struct Clicked {
+  select::Grow clicks;
+  Looking::Seen seen;
+};
+
+/// The largest patch that is wrong the other way.
+std::optional<Patch> to_correct(const Clicked& worse, bool is_missed) {
+  const auto found = std::ranges::find(worse.seen.patches, !is_missed, &Patch::is_missed);
+  return found != worse.seen.patches.end() ? std::optional(*found) : std::nullopt;
+}
+
 }  // namespace
 
-Result<select::Grow> clicks_of_a_looking_person(const CapturedCase& the_case, const scene::GaussianCloud& scene) {
+Result<select::Grow> clicks_of_a_looking_person(const CapturedCase& the_case, const scene::GaussianCloud& scene,
+                                                WhenWorse when_worse) {
   Looking eyes(the_case, scene);
   select::Selector selector(scene);
-  select::Grow clicks;
-  Looking::Seen seen = eyes.look_at(std::vector<std::uint8_t>(scene.size(), 0));
+  Clicked kept{{}, eyes.look_at(std::vector<std::uint8_t>(scene.size(), 0))};
+  std::optional<Clicked> worse;  // since the last click, which is to be corrected by the next
+  Patch patch;
   std::size_t next = 0;  // patch to click on
   std::optional<Error> refusal;
-  for (int click = 0; click < most_clicks && next < seen.patches.size(); ++click) {
+  for (int click = 0; click < most_clicks && (worse || next < kept.seen.patches.size()); ++click) {
     Rng rng(seed, std::uint64_t(click));
-    const Patch patch = seen.patches[next++];
+    const auto correction = worse ? to_correct(*worse, patch.is_missed) : std::nullopt;
+    patch = correction ? *correction : kept.seen.patches[next++];
+    Clicked tried{worse ? std::move(worse->clicks) : kept.clicks, {}};
+    worse.reset();
     const auto point = eyes.click(patch, rng);
     if (!point) continue;
-    select::Grow tried = clicks;
-    (patch.is_missed ? tried.inside : tried.outside).push_back(*point);
-    const auto selected = selector.select({{select::Op::add, tried}});
+    (patch.is_missed ? tried.clicks.inside : tried.clicks.outside).push_back(*point);
+    const auto selected = selector.select({{select::Op::add, tried.clicks}});
     if (!selected) {  // undone
       refusal = selected.error();
       continue;
     }
-    Looking::Seen then = eyes.look_at(selected->rows);
-    if (then.wrong >= seen.wrong && !clicks.inside.empty()) continue;
-    clicks = std::move(tried), seen = std::move(then), next = 0;
+    tried.seen = eyes.look_at(selected->rows);
+    if (tried.seen.wrong < kept.seen.wrong || kept.clicks.inside.empty())
+      kept = std::move(tried), next = 0;
+    else if (when_worse == WhenWorse::corrected && !correction && to_correct(tried, patch.is_missed))
+      worse = std::move(tried);
   }
-  if (clicks.inside.empty() && refusal) return fail(refusal->code, refusal->message, refusal->where);
-  if (clicks.inside.empty())
+  if (kept.clicks.inside.empty() && refusal) return fail(refusal->code, refusal->message, refusal->where);
+  if (kept.clicks.inside.empty())
     return fail(ErrorCode::unprocessable, "no photo shows the part to select wider than a few pixels");
-  return clicks;
+  return std::move(kept.clicks);
 }
 
 }  // namespace engine::captures

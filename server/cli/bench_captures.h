@@ -19,8 +19,8 @@ struct CaptureOptions {
   bool on = false;
   std::string cache;  ///< Folder of trained scenes; empty: default_capture_cache().
   std::string page;   ///< File; empty: none is written.
-  std::vector<std::string> by{"balls",   "bare",  "click",     "clicks",
-                              "looking", "masks", "wide_masks"};  ///< Names of captures::known_grasps().
+  std::vector<std::string> by{"balls",   "bare",       "click", "clicks",
+                              "looking", "correcting", "masks", "wide_masks"};  ///< Names of captures::known_grasps().
   int fit_iterations = 1500;
   std::uint32_t take = engine::captures::first_take;
   std::string photos;    ///< Dataset whose photos the things of the cases are drawn into; empty: cases as they are.

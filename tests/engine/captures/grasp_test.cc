@@ -233,12 +233,29 @@ TEST(GraspByLooking, ClicksAtMostSixTimesAndTheSameEachTime) {
     one_color.mean.x[i] -= 0.95f;
     for (std::size_t c = 0; c < 3; ++c) one_color.sh_row(i)[c] = one_color.sh_row(0)[c];
   }
-  const auto clicks = clicks_of_a_looking_person(the_case, one_color);
-  ASSERT_TRUE(clicks) << clicks.error().message;
-  EXPECT_LE(clicks->inside.size() + clicks->outside.size(), std::size_t(most_clicks));
-  const auto again = clicks_of_a_looking_person(the_case, one_color);
-  EXPECT_EQ(again->inside, clicks->inside);
-  EXPECT_EQ(again->outside, clicks->outside);
+  for (const WhenWorse when_worse : {WhenWorse::undone, WhenWorse::corrected}) {
+    const auto clicks = clicks_of_a_looking_person(the_case, one_color, when_worse);
+    ASSERT_TRUE(clicks) << clicks.error().message;
+    EXPECT_LE(clicks->inside.size() + clicks->outside.size(), std::size_t(most_clicks));
+    const auto again = clicks_of_a_looking_person(the_case, one_color, when_worse);
+    EXPECT_EQ(again->inside, clicks->inside);
+    EXPECT_EQ(again->outside, clicks->outside);
+  }
+}
+
+TEST(GraspByCorrecting, AClickThatTookTooMuchIsCorrectedByOneThatSaysWhatItIsNot) {
+  const scene::GaussianCloud balls = two_balls();
+  CapturedCase the_case = seen_by_cameras();
+  std::vector<std::uint32_t> part = rows_below(300);  // and a slice of the other ball, smaller than the rest of it
+  for (std::uint32_t row = 300; row < balls.size(); ++row)
+    if (balls.mean.x[row] < 1.45f) part.push_back(row);
+  the_case.moving = MovingPart(balls, part);
+  const auto undone = grasp_by_looking(the_case, balls), corrected = grasp_by_correcting(the_case, balls);
+  ASSERT_TRUE(undone && corrected);
+  EXPECT_EQ(corrected->by, "correcting");
+  EXPECT_EQ(undone->rows, rows_below(300)) << "all of the other ball is worse than none";
+  EXPECT_GT(corrected->rows.size(), 300 + (part.size() - 300) / 2);
+  EXPECT_LT(corrected->rows.size(), 500u);
 }
 
 TEST(GraspByLooking, NothingToBeSeenIsAnError) {
