@@ -414,7 +414,7 @@ describe('by fingers, on a tablet', () => {
     assert.ok(slid.target.some((x, i) => Math.abs(x - near.target[i]) > 0.01), 'together they take it aside');
     await pressAfterADrag('reset-view');
     await hand.shown(0);
-    await page.touchscreen.tap(...await middle('look-minus-y'));
+    await pressAfterADrag('look-minus-y');
     const { camera } = await hand.looksFrom();
     const above = camera.eye.map((x, i) => x - camera.target[i]);
     assert.ok(above[1] < 0 && Math.hypot(above[0], above[2]) < 1e-6, `from above: ${above}`);
