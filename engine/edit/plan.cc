@@ -154,12 +154,12 @@ class Maker {
   void add_correction(int u, int a) {
     const bool first = u == work_.finished + 1 && a == 1;
     // Between the first interval and the last, nothing that the drag leaves is left to complete, mostly.
-    const bool completes = work_.vacates && (u == 1 || u == work_.intervals);
+    const bool completes = work_.vacates && (work_.repainted || (a == 1 && (u == 1 || u == work_.intervals)));
     const double witnesses = work_.vacates ? double(std::min(work_.candidates, repair::most_witnesses)) : 0;
     if (first)
       add(Stage::observe, u,
           observe_frames * (double(work_.candidates) + witnesses + views_) * frame() +
-              (work_.intervals > 1 ? motion() * work_.intervals : 0) +
+              (work_.vacates && work_.intervals > 1 ? motion() * work_.intervals : 0) +
               slow((row_seconds + (work_.vacates ? index_row_seconds : 0)) * n_));
     const RepaintTime& repaint = work_.repaint_time;
     if (work_.repainted && a == 1)

@@ -338,7 +338,8 @@ void Repair::clear_before(WorkingScene& working, Rows& rows, const Completed& co
 
 Result<void> Repair::find_tainted(const WorkingScene& working, const Rows& rows,
                                   const std::function<Result<void>()>& looked) {
-  if (mode_ != Mode::move || tainted_) return {};
+  tainted_.reset();
+  if (mode_ != Mode::move) return {};
   // Of a removal nothing has arrived. What was given up on the way is not the part.
   std::vector<std::uint32_t> part = healed_;
   if (!rows.moved.empty()) part.clear();
@@ -602,7 +603,9 @@ Result<Corrected> Repair::walk(WorkingScene& working, std::span<const scene::Mas
   if (round.arrives && round.correction == 1) clear_veils(working, rows);
   trust_ = trust_of_rows(working, observed_rows(shown_), mode_);
   const OpaqueTrail opaque(working, original_, mode_);
-  const bool opens = round.correction == 1 && (round.interval == 1 || round.arrives || opens_more(working, rows));
+  // Pictures for a repainter show what is painted where nothing can be completed: that is in no scene, and made anew.
+  const bool opens =
+      !in_turn || (round.correction == 1 && (round.interval == 1 || round.arrives || opens_more(working, rows)));
   const auto views = double(views_.size());
   const double surveyed =
       !opens ? 0 : (open_.empty() ? 0 : closure_views) + (rows.gone.empty() ? 0 : telling_views * views);

@@ -204,8 +204,7 @@ class Repair {
   /// Takes the trust of what view v shows in vacated pixels and no camera has seen, neither by depth nor by the light
   /// that came through to it, and of what lay right under a stain.
   void doubt_unseen(const WorkingScene& working, const Rows& rows, std::size_t v, ViewNow& now);
-  /// Finds the rows of the input that were seen through the blurred outline of what is dragged, once for an edit: it is
-  /// the same for each of its corrections.
+  /// Finds the rows of the input that were seen through the blurred outline of what has moved by now.
   ///   looked  called after each view; its error ends the search
   [[nodiscard]] Result<void> find_tainted(const WorkingScene& working, const Rows& rows,
                                           const std::function<Result<void>()>& looked);

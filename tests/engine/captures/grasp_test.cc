@@ -183,7 +183,8 @@ TEST(GraspByAClick, AsksForMoreOrLessUntilItIsWhatIsMeant) {
   scene::GaussianCloud strip;
   strip.resize(1800);
   for (std::size_t i = 0; i < strip.size(); ++i) {
-    strip.mean.set(i, 0.02f * Vec3(float(i / 15), float(i % 15), 0));
+    const std::size_t column = i / 15, place = i % 15;
+    strip.mean.set(i, 0.02f * Vec3(float(column), float(place), 0));
     strip.rotation.set(i, {1, 0, 0, 0});
     strip.log_scale.set(i, Vec3(-4.2f));
     strip.opacity_logit[i] = 4;

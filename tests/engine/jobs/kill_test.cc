@@ -115,7 +115,7 @@ TEST_P(Kill, LosesNoAcceptedJobAndChangesNoResult) {
     }
     int status = 0;
     ASSERT_EQ(::waitpid(child, &status, 0), child);
-    ::close(saved[0]);  // not before: whoever writes there would end
+    ::close(saved[0]);
     if (round < kills && WIFSIGNALED(status)) {
       ++killed;
     } else {
