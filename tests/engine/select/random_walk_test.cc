@@ -14,8 +14,8 @@
 namespace engine::select {
 namespace {
 
-std::vector<double> walk(const WeightedGraph& on, std::vector<std::uint32_t> inside,
-                         std::vector<std::uint32_t> outside) {
+std::vector<double> walk(const WeightedGraph& on, const std::vector<std::uint32_t>& inside,
+                         const std::vector<std::uint32_t>& outside) {
   std::vector<Given> given(on.graph.size(), Given::no);
   for (const std::uint32_t node : inside) given[node] = Given::inside;
   for (const std::uint32_t node : outside) given[node] = Given::outside;
