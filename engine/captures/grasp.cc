@@ -121,6 +121,13 @@ Result<Grasp> grasp_by_outlines(std::string by, int beyond_px, const CapturedCas
   return grasp_by_selection(std::move(by), {{select::Op::add, std::move(masks)}}, the_case, scene);
 }
 
+Result<Grasp> grasp_by_a_look(std::string by, WhenWorse when_worse, const CapturedCase& the_case,
+                              const scene::GaussianCloud& scene) {
+  auto clicks = clicks_of_a_looking_person(the_case, scene, when_worse);
+  if (!clicks) return propagate(clicks);
+  return grasp_by_selection(std::move(by), {{select::Op::add, *std::move(clicks)}}, the_case, scene);
+}
+
 }  // namespace
 
 Result<Grasp> grasp_by_balls(const CapturedCase& the_case, const scene::GaussianCloud& scene) {
@@ -174,15 +181,11 @@ Result<Grasp> grasp_by_clicks(const CapturedCase& the_case, const scene::Gaussia
 }
 
 Result<Grasp> grasp_by_looking(const CapturedCase& the_case, const scene::GaussianCloud& scene) {
-  auto clicks = clicks_of_a_looking_person(the_case, scene, WhenWorse::undone);
-  if (!clicks) return propagate(clicks);
-  return grasp_by_selection("looking", {{select::Op::add, *std::move(clicks)}}, the_case, scene);
+  return grasp_by_a_look("looking", WhenWorse::undone, the_case, scene);
 }
 
 Result<Grasp> grasp_by_correcting(const CapturedCase& the_case, const scene::GaussianCloud& scene) {
-  auto clicks = clicks_of_a_looking_person(the_case, scene, WhenWorse::corrected);
-  if (!clicks) return propagate(clicks);
-  return grasp_by_selection("correcting", {{select::Op::add, *std::move(clicks)}}, the_case, scene);
+  return grasp_by_a_look("correcting", WhenWorse::corrected, the_case, scene);
 }
 
 Result<Grasp> grasp_by_masks(const CapturedCase& the_case, const scene::GaussianCloud& scene) {

@@ -202,4 +202,12 @@ DraggedAlone drag_alone(std::vector<std::uint32_t> rows, const scene::GaussianCl
   return drag;
 }
 
+DraggedAlone drag_alone(const scene::GaussianCloud& scene, std::span<const std::uint16_t> handle,
+                        const Request& request, const Parts& parts, int intervals) {
+  std::vector<std::uint32_t> rows = rows_in_use(handle, parts);
+  const scene::GaussianCloud gaussians = scene::gather(scene, rows);
+  Memory memory;
+  return drag_alone(std::move(rows), gaussians, handle, request, parts, intervals, /*rotate_sh=*/false, memory);
+}
+
 }  // namespace engine::edit

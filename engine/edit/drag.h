@@ -68,4 +68,8 @@ struct DraggedAlone {
                                       std::span<const std::uint16_t> handle, const Request& request, const Parts& parts,
                                       int intervals, bool rotate_sh, Memory& memory);
 
+/// The same of the scene itself, of which only shapes matter: a dry run.
+[[nodiscard]] DraggedAlone drag_alone(const scene::GaussianCloud& scene, std::span<const std::uint16_t> handle,
+                                      const Request& request, const Parts& parts, int intervals);
+
 }  // namespace engine::edit

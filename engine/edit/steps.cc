@@ -30,11 +30,7 @@ namespace {
 std::vector<float> arrival_of(const State& state, const Edit& edit) {
   const int intervals = state.report.resolved.intervals;
   if (intervals == 1 || departure_of(edit.request) != Mode::move) return {};
-  Rows rows = rows_in_use(edit.handle, edit.parts);
-  const scene::GaussianCloud gaussians = scene::gather(edit.input, rows);
-  Memory memory;
-  const DraggedAlone drag = drag_alone(std::move(rows), gaussians, edit.handle, edit.request, edit.parts, intervals,
-                                       /*rotate_sh=*/false, memory);
+  const DraggedAlone drag = drag_alone(edit.input, edit.handle, edit.request, edit.parts, intervals);
   return interleaved(drag.working.cloud().mean, rows_where(drag.working.role(), working::has_arrived));
 }
 

@@ -35,11 +35,7 @@ struct DryRun {
 /// Where the whole drag would take the dragged rows: a function of what moves alone.
 DryRun dry_run(const WorkingScene& begun, const scene::GaussianCloud& input, const Request& request, const Parts& parts,
                int intervals) {
-  std::vector<std::uint32_t> rows = rows_in_use(begun.handle(), parts);
-  const scene::GaussianCloud gaussians = scene::gather(input, rows);
-  Memory memory;
-  const DraggedAlone drag =
-      drag_alone(std::move(rows), gaussians, begun.handle(), request, parts, intervals, /*rotate_sh=*/false, memory);
+  const DraggedAlone drag = drag_alone(input, begun.handle(), request, parts, intervals);
   const WorkingScene& alone = drag.working;
 
   const std::vector<std::uint32_t> originals = alone.rows_of(working::Role::original);

@@ -309,7 +309,7 @@ std::vector<std::uint32_t> Repair::unseen_before(const WorkingScene& working, co
 }
 
 std::vector<std::uint32_t> Repair::tainted_on(const WorkingScene& working, const Completed& completed) const {
-  if (!tainted_) return {};
+  if (tainted_.empty()) return {};
   const auto is_on_it = [&](DVec3 spot) {
     const auto place = completed.place_of(spot);
     return place && std::abs(place->relative - 1) <= off_surface;
@@ -322,7 +322,7 @@ std::vector<std::uint32_t> Repair::tainted_on(const WorkingScene& working, const
   if (count_of_open(is_on_it) > mostly_flat * by_it) return {};
   // What was seen before it is something else, and what reaches far beyond it would leave a gap there.
   std::vector<std::uint32_t> on_it;
-  for (const std::uint32_t row : *tainted_) {
+  for (const std::uint32_t row : tainted_) {
     if (!working::stays(working.role()[row])) continue;
     const auto spots = spots_of(working.cloud(), row);
     if (is_on_it(spots[0]) && std::ranges::count_if(spots, is_on_it) >= most_of_spots) on_it.push_back(row);
@@ -338,7 +338,7 @@ void Repair::clear_before(WorkingScene& working, Rows& rows, const Completed& co
 
 Result<void> Repair::find_tainted(const WorkingScene& working, const Rows& rows,
                                   const std::function<Result<void>()>& looked) {
-  tainted_.reset();
+  tainted_.clear();
   if (mode_ != Mode::move) return {};
   // Of a removal nothing has arrived. What was given up on the way is not the part.
   std::vector<std::uint32_t> part = healed_;
@@ -353,10 +353,9 @@ Result<void> Repair::find_tainted(const WorkingScene& working, const Rows& rows,
     render::add_weight_sums(original_, view, share, workspace_, light, on_part);
     if (auto going = looked(); !going) return going;
   }
-  tainted_.emplace();
   for (std::uint32_t row = 0; row < original_.size(); ++row)
     if (light[row] >= least_light && on_part[row] > tainting * light[row] && !std::ranges::binary_search(part, row))
-      tainted_->push_back(row);
+      tainted_.push_back(row);
   return {};
 }
 
@@ -612,16 +611,16 @@ Result<Corrected> Repair::walk(WorkingScene& working, std::span<const scene::Mas
   const double all = surveyed + views + (in_turn ? 0 : shown_views * views);
   double done = 0;  // in views
   const auto advance_by = [&](double more) { return advance(std::min((done += more) / all, 1.0)); };
-  std::vector<std::size_t> order = outward(views_, 0);
+  std::size_t first = 0;
   if (opens) {
-    auto surveyed_order = survey_place(working, rows, round, advance_by, corrected.seeds);
-    if (!surveyed_order) return propagate(surveyed_order);
-    order = std::move(*surveyed_order);
+    const auto telling = survey_place(working, rows, round, advance_by, corrected.seeds);
+    if (!telling) return propagate(telling);
+    first = *telling;
     if (!rows.gone.empty()) corrected.uncovered.resize(views_.size());
   }
   if (auto tuned = corrector_.fine_tune(buffer_, 0); !tuned) return propagate(tuned);
   std::vector<Background> backgrounds(views_.size());
-  for (const std::size_t v : order) {
+  for (const std::size_t v : outward(views_, first)) {
     backgrounds[v].filled = scene::Mask(views_[v].width, views_[v].height);
     if (opens && !rows.gone.empty()) {
       auto completed = complete_background(working, rows, v, round);
@@ -651,9 +650,8 @@ Result<Corrected> Repair::walk(WorkingScene& working, std::span<const scene::Mas
   return corrected;
 }
 
-Result<std::vector<std::size_t>> Repair::survey_place(WorkingScene& working, Rows& rows, const Round& round,
-                                                      const std::function<Result<void>(double)>& advance_by,
-                                                      std::size_t& seeds) {
+Result<std::size_t> Repair::survey_place(WorkingScene& working, Rows& rows, const Round& round,
+                                         const std::function<Result<void>(double)>& advance_by, std::size_t& seeds) {
   if (auto found = find_tainted(working, rows, [&] { return advance_by(0); }); !found) return propagate(found);
   close_place(working, rows);
   if (!open_.empty())
@@ -663,7 +661,7 @@ Result<std::vector<std::size_t>> Repair::survey_place(WorkingScene& working, Row
   auto charted = complete_chart(working, rows, *telling, round);
   if (!charted) return propagate(charted);
   seeds += *charted;
-  return outward(views_, telling->view);
+  return telling->view;
 }
 
 std::vector<std::uint32_t> Repair::open_among(std::span<const std::uint32_t> left, const Array3& means,

@@ -34,8 +34,8 @@ using working::WorkingScene;
 
 /// What one view shows of the place that the part has left.
 struct Uncovered {
-  std::size_t pixels =
-      0;  ///< What the part covered there, and covers no more or will not in the end, but for mere air.
+  /// What the part covered there, and covers no more or will not in the end, but for mere air.
+  std::size_t pixels = 0;
   /// Those of them that show what no camera has seen, and where no surface was found to go on: what is there was
   /// painted in this view alone.
   std::size_t open = 0;
@@ -158,10 +158,11 @@ class Repair {
   [[nodiscard]] bool opens_more(const WorkingScene& working, const Rows& rows) const;
   /// Completes what is to be before any view is, and finds out how the rest goes on.
   ///   advance_by  called with what is done, in views; its error ends it
-  ///   returns     the order of the views
-  [[nodiscard]] Result<std::vector<std::size_t>> survey_place(WorkingScene& working, Rows& rows, const Round& round,
-                                                              const std::function<Result<void>(double)>& advance_by,
-                                                              std::size_t& seeds);
+  ///   seeds       the number of those appended is added
+  ///   returns     the view that tells most
+  [[nodiscard]] Result<std::size_t> survey_place(WorkingScene& working, Rows& rows, const Round& round,
+                                                 const std::function<Result<void>(double)>& advance_by,
+                                                 std::size_t& seeds);
   [[nodiscard]] ViewNow look(const WorkingScene& working, std::span<const std::uint32_t> hidden, std::size_t v);
   /// What view v shows now, what was filled in as it was filled in.
   [[nodiscard]] ViewNow completed_view(const WorkingScene& working, const Rows& rows, const Background& background,
@@ -229,7 +230,7 @@ class Repair {
   std::vector<std::uint32_t> unseen_;  ///< Rows of the input that no camera has seen, ascending.
   UneditedViews unedited_;
   std::vector<correct::Example> buffer_;
-  std::optional<std::vector<std::uint32_t>> tainted_;  ///< Rows of the input, once found: find_tainted(). Ascending.
+  std::vector<std::uint32_t> tainted_;  ///< Rows of the input: find_tainted(). Ascending.
   std::vector<std::uint32_t> open_;     ///< Those whose place is empty, or will be in the end, ascending.
   std::vector<scene::Mask> vacated_;    ///< Per view: what the part has left.
   std::optional<Closure> closure_;      ///< Of what the part has left.

@@ -1,7 +1,6 @@
 #include "engine/repair/tinged.h"
 
 #include <algorithm>
-#include <functional>
 #include <utility>
 #include <vector>
 
@@ -29,8 +28,8 @@ struct Alike {
 };
 
 /// Those of some rows whose colours differ least.
-Alike most_alike(const scene::GaussianCloud& scene, std::span<const std::uint32_t> rows,
-                 const std::function<float(Vec3)>& difference) {
+template <class Difference>
+Alike most_alike(const scene::GaussianCloud& scene, std::span<const std::uint32_t> rows, const Difference& difference) {
   std::vector<std::pair<float, std::uint32_t>> by_color;  // difference, row
   for (const std::uint32_t row : rows) by_color.emplace_back(difference(scene::base_color(scene, row)), row);
   std::ranges::partial_sort(by_color, by_color.begin() + colors_alike);
@@ -53,14 +52,13 @@ Tinged tinged_among(const scene::GaussianCloud& scene, std::span<const std::uint
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const Vec3 own = scene::base_color(scene, rows[i]);
     const auto beside = std::span(nearest).subspan(i * around, around);
-    const auto is_odd_among = [&](const auto& difference) {
-      return difference(most_alike(scene, beside, difference).mean) > odd_color;
-    };
     const auto plain = [&](Vec3 color) { return glm::distance(own, color); };
-    if (!is_odd_among(plain)) continue;
-    if (shade_stays && !is_odd_among([&](Vec3 color) { return plain(in_less_light(color, own)); })) continue;
+    const auto in_shade = [&](Vec3 color) { return plain(in_less_light(color, own)); };
+    const Alike alike = most_alike(scene, beside, plain);
+    if (plain(alike.mean) <= odd_color) continue;
+    if (shade_stays && in_shade(most_alike(scene, beside, in_shade).mean) <= odd_color) continue;
     // Rather those in as much light as it has: what is tinged in a shadow stays in it.
-    out.rows.push_back(rows[i]), out.like.push_back(most_alike(scene, beside, plain).rows);
+    out.rows.push_back(rows[i]), out.like.push_back(alike.rows);
   }
   return out;
 }

@@ -47,10 +47,15 @@ class Child {
   void tell(char word) const { (void)!::write(down_[1], &word, 1); }
   void signal(int number) const { ::kill(process_, number); }
   void kill() const { signal(SIGKILL); }
-  /// Whether it ended by itself, without complaint.
-  [[nodiscard]] bool ended_well() const {
+  /// Waits for its end: the status that waitpid() tells.
+  [[nodiscard]] int end() const {
     int status = 0;
     ::waitpid(process_, &status, 0);
+    return status;
+  }
+  /// Whether it ended by itself, without complaint.
+  [[nodiscard]] bool ended_well() const {
+    const int status = end();
     return WIFEXITED(status) && WEXITSTATUS(status) == 0;
   }
 

@@ -5,12 +5,15 @@
 #include <unistd.h>
 
 #include <set>
+#include <stdexcept>
+#include <string>
 #include <thread>
 
 #include "engine/core/rng.h"
 #include "engine/jobs/worker.h"
 #include "tests/engine/jobs/jobs_support.h"
 #include "tests/engine/jobs/store_kind.h"
+#include "tests/support/child.h"
 
 namespace engine::jobs {
 namespace {
@@ -34,8 +37,8 @@ std::string undisturbed(int intervals) {
 }
 
 /// The payload is the number of intervals.
-///   saved_by_long_job  where a byte is written for each of them that is saved, of jobs that are not short
-Result<JobResult> count_intervals(JobContext& context, int saved_by_long_job) {
+///   self  says 'i' for each of them that is saved, of jobs that are not short
+Result<JobResult> count_intervals(JobContext& context, const support::Child& self) {
   const int intervals = std::stoi(context.payload());
   std::uint64_t state = 1;
   if (context.finished_intervals() > 0) {
@@ -48,31 +51,26 @@ Result<JobResult> count_intervals(JobContext& context, int saved_by_long_job) {
     std::this_thread::sleep_for(std::chrono::milliseconds(4));
     context.publish_progress(std::to_string(u));
     if (auto saved = context.save_checkpoint(u, std::to_string(state)); !saved) return propagate(saved);
-    if (intervals > intervals_of_short_jobs) (void)!::write(saved_by_long_job, "i", 1);
+    if (intervals > intervals_of_short_jobs) self.say('i');
   }
   return JobResult{.text = std::to_string(state)};
 }
 
 /// The process that is killed: accepts one job more, tells its id, works until all is done.
-int serve(StorePlace& place, const fs::path& folder, int round, int accepted, int saved_by_long_job) {
-  try {
-    // The one before may still be dying; its lock goes with it.
-    const auto store = value(place.open({.max_deaths = 0}));
-    const auto queue = open_queue(*store, folder);
-    Worker worker(*queue, [=](JobContext& context) { return count_intervals(context, saved_by_long_job); },
-                  {.progress_period = std::chrono::milliseconds(5)});
-    const std::string id = value(queue->submit({.lane = "b",
-                                                .payload = std::to_string(intervals_of_short_jobs),
-                                                .idempotency_key = "round " + std::to_string(round)}))
-                               .job.id;
-    if (::write(accepted, id.data(), id_length) != id_length) return 2;
-    for (const Job& job : value(queue->list()))
-      if (wait_for_end(*queue, job.id).state != JobState::succeeded) return 3;
-    return 0;
-  } catch (const std::exception& e) {
-    std::fprintf(stderr, "round %d: %s\n", round, e.what());
-    return 1;
-  }
+void serve(StorePlace& place, const fs::path& folder, int round, int accepted, const support::Child& self) {
+  // The one before may still be dying; its lock goes with it.
+  const auto store = value(place.open({.max_deaths = 0}));
+  const auto queue = open_queue(*store, folder);
+  Worker worker(*queue, [&](JobContext& context) { return count_intervals(context, self); },
+                {.progress_period = std::chrono::milliseconds(5)});
+  const std::string id = value(queue->submit({.lane = "b",
+                                              .payload = std::to_string(intervals_of_short_jobs),
+                                              .idempotency_key = "round " + std::to_string(round)}))
+                             .job.id;
+  if (::write(accepted, id.data(), id_length) != id_length) throw std::runtime_error("its id is not told");
+  for (const Job& job : value(queue->list()))
+    if (wait_for_end(*queue, job.id).state != JobState::succeeded)
+      throw std::runtime_error(job.id + " did not succeed");
 }
 
 class Kill : public testing::TestWithParam<StoreKind> {};
@@ -97,25 +95,19 @@ TEST_P(Kill, LosesNoAcceptedJobAndChangesNoResult) {
   std::set<std::string> promises;
   for (int round = 0; round <= kills; ++round) {
     SCOPED_TRACE(round);
-    int saved[2];
-    ASSERT_EQ(::pipe2(saved, O_CLOEXEC), 0);
-    const pid_t child = ::fork();
-    ASSERT_GE(child, 0);
-    if (child == 0) ::_exit(serve(*place, dir.path(), round, accepted[1], saved[1]));
-    ::close(saved[1]);
+    const support::Child child(
+        [&](const support::Child& self) { serve(*place, dir.path(), round, accepted[1], self); });
     if (round < kills) {
       // At any moment; in each other round once the long job has made some way, which a busy machine takes its time
       // for.
-      char interval = 0;
-      if (round % 2 == 1) {
-        EXPECT_EQ(::read(saved[0], &interval, 1), 1);
+      const bool has_made_way = round % 2 == 1;
+      if (has_made_way) {
+        EXPECT_EQ(child.hear(), 'i');
       }
-      std::this_thread::sleep_for(std::chrono::microseconds(rng.below(round % 2 == 1 ? 50'000 : 150'000)));
-      ::kill(child, SIGKILL);
+      std::this_thread::sleep_for(std::chrono::microseconds(rng.below(has_made_way ? 50'000 : 150'000)));
+      child.kill();
     }
-    int status = 0;
-    ASSERT_EQ(::waitpid(child, &status, 0), child);
-    ::close(saved[0]);
+    const int status = child.end();
     if (round < kills && WIFSIGNALED(status)) {
       ++killed;
     } else {

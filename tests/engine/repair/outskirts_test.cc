@@ -13,9 +13,9 @@
 #include "engine/core/parallel.h"
 #include "engine/core/rows.h"
 #include "engine/correct/scene_corrector.h"
-#include "engine/edit/checkpoint.h"
 #include "engine/edit/edit.h"
 #include "tests/engine/edit/backed.h"
+#include "tests/engine/edit/interrupted.h"
 
 namespace engine::repair {
 namespace {
@@ -207,28 +207,7 @@ TEST(Outskirts, GoWithTheThing) {
   }
 }
 
-TEST(Outskirts, AreTheSameAfterAnInterruption) {
-  BackedThing scene;
-  scene.request.params.intervals = 2;
-  correct::SceneCorrector corrector;
-  std::string checkpoint;
-  edit::Observer observer;
-  observer.interval_done = [&](const edit::IntervalDone& done) {
-    EXPECT_TRUE(done.state.scene.check());
-    if (done.interval == 1) checkpoint = edit::encode(done.state);
-    return Result<void>{};
-  };
-  const auto whole = edit::run(scene.cloud, scene.cameras, scene.request, {.corrector = &corrector}, observer);
-  ASSERT_TRUE(whole);
-  auto state = edit::decode(checkpoint, scene.cloud, scene.request);
-  ASSERT_TRUE(state);
-  const auto resumed =
-      edit::run(scene.cloud, scene.cameras, scene.request, {.corrector = &corrector}, {}, std::move(*state));
-  ASSERT_TRUE(resumed);
-  EXPECT_EQ(whole->overlay, resumed->overlay);
-  EXPECT_EQ(whole->report.crumbs, resumed->report.crumbs);
-  EXPECT_EQ(whole->report.warnings, resumed->report.warnings);
-}
+TEST(Outskirts, AreTheSameAfterAnInterruption) { edit::expect_same_after_an_interruption(BackedThing()); }
 
 TEST(Outskirts, OfWhatIsRemovedGoToo) {
   BackedThing scene;

@@ -58,7 +58,6 @@ struct Moved {
   scene::GaussianCloud original;
   WorkingScene working;
   std::vector<scene::Mask> masks;
-  std::vector<float> arrival;
   Recorder corrector;
 
   explicit Moved(float gap = 0, Mode mode = Mode::move) : Moved(BlockScene(gap, mode)) {}
@@ -79,7 +78,7 @@ struct Moved {
             block.cameras,
             block.cameras,
             block.request.healed,
-            arrival,
+            /*arrival=*/{},
             block.request.mode,
             block.request.params.seed,
             corrector};

@@ -4,18 +4,17 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <string>
 #include <utility>
 #include <vector>
 
 #include "engine/core/parallel.h"
 #include "engine/correct/scene_corrector.h"
-#include "engine/edit/checkpoint.h"
 #include "engine/edit/edit.h"
 #include "engine/repair/relight.h"
 #include "engine/scene/base_color.h"
 #include "engine/scene/sh.h"
 #include "tests/engine/edit/backed.h"
+#include "tests/engine/edit/interrupted.h"
 
 namespace engine::repair {
 namespace {
@@ -207,25 +206,7 @@ TEST(Tinged, TakesNoColorFromWhatIsHealed) {
   EXPECT_LT(outlined.hue_after(), 0.1f);
 }
 
-TEST(Tinged, IsTheSameAfterAnInterruption) {
-  Outlined outlined;
-  outlined.request.params.intervals = 2;
-  correct::SceneCorrector corrector;
-  std::string checkpoint;
-  edit::Observer observer;
-  observer.interval_done = [&](const edit::IntervalDone& done) {
-    if (done.interval == 1) checkpoint = edit::encode(done.state);
-    return Result<void>{};
-  };
-  const edit::Tools tools{.corrector = &corrector};
-  const auto whole = edit::run(outlined.cloud, outlined.cameras, outlined.request, tools, observer);
-  ASSERT_TRUE(whole);
-  auto state = edit::decode(checkpoint, outlined.cloud, outlined.request);
-  ASSERT_TRUE(state);
-  const auto resumed = edit::run(outlined.cloud, outlined.cameras, outlined.request, tools, {}, std::move(*state));
-  ASSERT_TRUE(resumed);
-  EXPECT_EQ(whole->overlay, resumed->overlay);
-}
+TEST(Tinged, IsTheSameAfterAnInterruption) { edit::expect_same_after_an_interruption(Outlined()); }
 
 }  // namespace
 }  // namespace engine::repair
