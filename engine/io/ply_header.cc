@@ -113,7 +113,9 @@ class HeaderParser {
     element.count_begin = std::size_t(words[2].data() - bytes_.data());
     element.count_size = words[2].size();
     header_.elements.push_back(std::move(element));
-    property_names_ = {};  // clear() would go over all the buckets that the widest element before needed
+    // A new one, for clear() goes over all the buckets that the widest element before needed; so does "= {}", a
+    // clear().
+    property_names_ = std::unordered_set<std::string>();
     return {};
   }
 

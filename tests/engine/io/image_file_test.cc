@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <ctime>
 #include <limits>
 #include <string>
 #include <string_view>
@@ -465,22 +464,19 @@ std::vector<std::byte> promising_exr(std::uint32_t width, std::uint32_t height, 
   return {first, first + text.size()};
 }
 
-// 16 KB with tiles of 8192x8192 took half a second; larger ones were reported to take 2 to 8.
+// 16 KB with tiles of 8192x8192 took half a second, larger ones 2 to 8: the library made room for tiles and lines, and
+// began to read, before it saw that the file ends. Whoever is refused by the header alone pays for none of it.
 TEST(DecodeImage, BelievesNoHeaderThatPromisesMoreThanItsBytesCanHold) {
-#ifdef __SANITIZE_ADDRESS__
-  constexpr double most_seconds = 5;  // one of them goes into the sanitizer's own account of what the library allocates
-#else
-  constexpr double most_seconds = 1;
-#endif
   for (const int compression : {0, 3, 4, 9})
     for (const std::uint32_t tile : {0u, 8192u, 16384u, 0x40000000u})
       for (const std::uint32_t width : {16384u, 1448u}) {
         SCOPED_TRACE(std::to_string(compression) + " " + std::to_string(tile) + " " + std::to_string(width));
-        const std::clock_t begin = std::clock();  // the processor's time: other work on the machine is none of it
         const auto image = decode_image(promising_exr(width, width / 2, compression, tile, 1, 16384), "a.exr", {});
-        EXPECT_LT(double(std::clock() - begin) / CLOCKS_PER_SEC, most_seconds);
         ASSERT_FALSE(image);
         EXPECT_EQ(image.error().code, ErrorCode::corrupt_data) << image.error().message;
+        const bool is_believable = tile == 0 && width == 1448;  // 4 MB of pixels in 16 KB: zeros could be packed so
+        EXPECT_EQ(image.error().message.find("its pixels") != std::string::npos, is_believable)
+            << image.error().message;
       }
   const auto promised = decode_image(promising_exr(16384, 8192, 3, 0, 1, 16384), "a.exr", {});
   EXPECT_NE(promised.error().message.find("16384x8192 pixels and 1 channels; a file of 16384 bytes cannot hold them"),

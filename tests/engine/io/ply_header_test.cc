@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
+#include <algorithm>
+#include <ctime>
+#include <limits>
 #include <string>
 
 namespace engine::io {
@@ -31,26 +33,34 @@ TEST(PlyHeader, KeepsTheTextAndLaysOutTheRows) {
   EXPECT_TRUE(header->elements[1].has_list());
 }
 
-/// Seconds that parsing takes.
+/// Seconds of the processor that parsing takes, the least of three: other work on the machine is none of it.
 double seconds_to_parse(const std::string& text) {
-  const auto begin = std::chrono::steady_clock::now();
-  (void)parse_ply_header(text, "a.ply");
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 3; ++i) {
+    const std::clock_t begin = std::clock();
+    EXPECT_TRUE(parse_ply_header(text, "a.ply"));
+    least = std::min(least, double(std::clock() - begin) / CLOCKS_PER_SEC);
+  }
+  return least;
 }
 
-// The largest header has room for 60,000 elements. Held against each other they took 9 s; the bound is far above what
-// they take now under a sanitizer, and far below that.
+std::string header_of(int properties, int elements) {
+  std::string text = start + "element wide 1\n";
+  for (int i = 0; i < properties; ++i) text += "property char p" + std::to_string(i) + "\n";
+  for (int i = 0; i < elements; ++i) text += "element e" + std::to_string(i) + " 0\n";
+  return text + "end_header\n";
+}
+
+// The largest header has room for 60,000 elements. Held against each other they took 9 s, 900 times as long as a
+// thirtieth of them; in proportion it is 30 times, more where the long one leaves the caches, and on any machine.
 TEST(PlyHeader, TakesTimeInProportionToItsLength) {
-  std::string elements = start, mixed = start + "element wide 1\n";
-  for (int i = 0; i < 60'000; ++i) elements += "element e" + std::to_string(i) + " 0\n";
-  for (int i = 0; i < 30'000; ++i) mixed += "property char p" + std::to_string(i) + "\n";
-  for (int i = 0; i < 25'000; ++i) mixed += "element e" + std::to_string(i) + " 0\n";
-  ASSERT_TRUE(parse_ply_header(elements + "end_header\n", "a.ply"));
-  EXPECT_LT(seconds_to_parse(elements + "end_header\n"), 2);
-  EXPECT_LT(seconds_to_parse(mixed + "end_header\n"), 2);
-  const auto twice = parse_ply_header(elements + "element e7 0\nend_header\n", "a.ply");
+  EXPECT_LT(seconds_to_parse(header_of(0, 60'000)), 200 * seconds_to_parse(header_of(0, 2'000)));
+  EXPECT_LT(seconds_to_parse(header_of(30'000, 25'000)), 200 * seconds_to_parse(header_of(1'000, 833)));
+  std::string text = header_of(0, 60'000);
+  text.insert(text.size() - std::string("end_header\n").size(), "element e7 0\n");
+  const auto twice = parse_ply_header(text, "a.ply");
   ASSERT_FALSE(twice);
-  EXPECT_EQ(twice.error().message, "line 60003 of the header: a second element 'e7'");
+  EXPECT_EQ(twice.error().message, "line 60004 of the header: a second element 'e7'");
 }
 
 TEST(PlyHeader, NamesTheLineThatIsWrong) {

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <cmath>
+#include <ctime>
 
 #include "engine/core/parallel.h"
 #include "engine/core/rng.h"
@@ -90,10 +90,10 @@ GaussianCloud ball(std::size_t count) {
 TEST(VirtualCameras, LookAtNoMoreGaussiansThanTheyMay) {
   const std::vector<DVec3> points{{0, 0, 0}, {0.1, 0, 0}};
   const GaussianCloud many = ball(400'000);
-  const auto seconds = [&](std::size_t most) {
-    const auto begin = std::chrono::steady_clock::now();
+  const auto seconds = [&](std::size_t most) {  // of the processor: other work on the machine is none of it
+    const std::clock_t begin = std::clock();
     EXPECT_FALSE(virtual_cameras(many, points, {.count = 20, .radius = 0.05, .max_gaussians = most}).empty());
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    return double(std::clock() - begin) / CLOCKS_PER_SEC;
   };
   const double bounded = seconds(5'000), all = seconds(0);
   EXPECT_LT(bounded, all / 10);
