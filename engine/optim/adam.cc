@@ -42,19 +42,19 @@ inline float moved(float value, float gradient, float& first, float& second, flo
 }
 
 /// Steps rows [begin, end) of a group. False if something in them is not finite any more.
-bool step_rows(const AdamGroup& group, std::span<const float> rate, std::span<const float> mobility, std::size_t begin,
-               std::size_t end, const StepFactors& factors, float* first, float* second) {
+bool step_rows(const AdamGroup& group, std::span<const float> rate, std::size_t begin, std::size_t end,
+               const StepFactors& factors, float* first, float* second) {
   float* value = group.value.data();
   const float* gradient = group.gradient.data();
   std::uint32_t bad = 0;
   const std::size_t columns = rate.size();
-  if (group.rate.size() == 1 && mobility.empty()) {
+  if (group.rate.size() == 1 && group.mobility.empty()) {
     for (std::size_t i = begin * columns; i < end * columns; ++i)
       value[i] = moved(value[i], gradient[i], first[i], second[i], rate[0], factors, bad);
     return bad == 0;
   }
   for (std::size_t row = begin; row < end; ++row) {
-    const float factor = mobility.empty() ? 1.0f : mobility[row];
+    const float factor = group.mobility.empty() ? 1.0f : group.mobility[row];
     for (std::size_t k = 0; k < columns; ++k) {
       const std::size_t i = row * columns + k;
       value[i] = moved(value[i], gradient[i], first[i], second[i], factor * rate[k], factors, bad);
@@ -98,8 +98,8 @@ void Adam::fit_buffers() {
   bad_.resize(chunks);
 }
 
-Result<void> Adam::step(std::span<const AdamGroup> groups, std::span<const float> mobility) {
-  assert(groups.size() == groups_.size() && (mobility.empty() || mobility.size() == rows_));
+Result<void> Adam::step(std::span<const AdamGroup> groups) {
+  assert(groups.size() == groups_.size());
   ++steps_;
   const double correction1 = 1 / (1 - std::pow(options_.beta1, double(steps_)));
   const double correction2 = 1 / (1 - std::pow(options_.beta2, double(steps_)));
@@ -111,11 +111,12 @@ Result<void> Adam::step(std::span<const AdamGroup> groups, std::span<const float
     const std::size_t columns = moments.layout.columns, grain = rows_per_chunk(columns);
     assert(group.value.size() == rows_ * columns && group.gradient.size() == rows_ * columns);
     assert(group.rate.size() == 1 || group.rate.size() == columns);
+    assert(group.mobility.empty() || group.mobility.size() == rows_);
     for (std::size_t k = 0; k < columns; ++k)
       rate_[k] = float(group.rate[group.rate.size() == 1 ? 0 : k] * correction1);
     parallel_for(rows_, grain, [&](std::size_t begin, std::size_t end) {
       bad_[begin / grain] = none;
-      if (step_rows(group, std::span(rate_).first(columns), mobility, begin, end, factors, moments.first.data(),
+      if (step_rows(group, std::span(rate_).first(columns), begin, end, factors, moments.first.data(),
                     moments.second.data()))
         return;
       const std::size_t first = begin * columns, n = (end - begin) * columns;

@@ -33,9 +33,10 @@ struct AdamLayout {
 
 /// A group at one step.
 struct AdamGroup {
-  std::span<float> value;           ///< [rows][columns], updated in place.
-  std::span<const float> gradient;  ///< [rows][columns]
-  std::span<const double> rate;     ///< [1] or [columns]: learning rate of all, or of each column; 0 or more.
+  std::span<float> value;                ///< [rows][columns], updated in place.
+  std::span<const float> gradient;       ///< [rows][columns]
+  std::span<const double> rate;          ///< [1] or [columns]: learning rate of all, or of each column; 0 or more.
+  std::span<const float> mobility = {};  ///< [rows] What each row's rates are multiplied by, 0 or more; empty: 1.
 };
 
 /// Holds the moments of all groups, which all have the same rows (Gaussians of the 3D mask). Each step
@@ -48,11 +49,10 @@ class Adam {
   Adam(std::vector<AdamLayout> layout, std::size_t rows, const AdamOptions& options = {});
 
   /// One step over all groups, in the order of the layout (sizes asserted).
-  ///   mobility  [rows] what each row's rates are multiplied by, 0 or more; empty: 1
   ///   errors  internal: a gradient, a value or a moment is not finite. `where` names the first by group, then row
   ///           ("[1204].mean.x", "[3].sh[17]"); groups up to it have been stepped: parameters and moments are spoilt
   /// Allocates nothing. Costs a pass over four arrays: bound by memory from some ten thousand rows on.
-  [[nodiscard]] Result<void> step(std::span<const AdamGroup> groups, std::span<const float> mobility = {});
+  [[nodiscard]] Result<void> step(std::span<const AdamGroup> groups);
 
   /// Rows with keep[i] != 0 stay, in order. keep: [rows()].
   void keep_rows(std::span<const std::uint8_t> keep);

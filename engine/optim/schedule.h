@@ -40,6 +40,7 @@ struct LearningRates {
   double log_scale = 5e-3;       ///< Natural logarithm of world units.
   double rotation = 1e-3;        ///< Quaternion components.
   double mask_radii = 5;         ///< c of position_scale(): radii of the 3D mask that its extent counts as. A choice.
+  double widths = 0.05;          ///< Most that a position moves in a step, in widths of the row: share_of_position().
   double last = 0.01;            ///< Factor of all rates at the end of a correction; above 0, at most 1.
 };
 [[nodiscard]] Result<void> validate(const LearningRates& rates);
@@ -52,6 +53,14 @@ struct LearningRates {
 [[nodiscard]] inline double position_scale(const LearningRates& rates, double scene_extent, double mask_radius) {
   const double of_mask = rates.mask_radii * mask_radius;
   return scene_extent > 0 ? std::min(scene_extent, of_mask) : of_mask;
+}
+
+/// Share of the position rate that is a row's: with all of it, one that is small would jump by its own size at each
+/// step, whichever way noise has it, and a surface of many such would come apart.
+///   rate   LearningRates::position times position_scale(), world units
+///   width  of the row: the second of its three extents (standard deviations), world units
+[[nodiscard]] inline double share_of_position(const LearningRates& rates, double rate, double width) {
+  return rate > rates.widths * width ? rates.widths * width / rate : 1.0;  // also where the rate is 0
 }
 
 }  // namespace engine::optim

@@ -22,24 +22,24 @@ CloudAdam::CloudAdam(std::size_t rows, int sh_degree, const optim::AdamOptions& 
     : adam_(layout(sh_degree), rows, options) {}
 
 Result<void> CloudAdam::step(scene::GaussianCloud& cloud, const render::Gradients& g, const IterationRates& rates,
-                             std::span<const float> mobility) {
+                             const Mobility& mobility) {
   const std::array<double, 1> position{rates.position}, scale{rates.log_scale}, rotation{rates.rotation},
       opacity{rates.opacity_logit};
   std::vector<double> sh(cloud.sh_stride(), rates.sh_rest);
   for (std::size_t c = 0; c < 3; ++c) sh[c * scene::sh_coefficients(cloud.sh_degree)] = rates.sh_dc;
-  const std::array<optim::AdamGroup, 12> groups{{{cloud.mean.x, g.mean.x, position},
-                                                 {cloud.mean.y, g.mean.y, position},
-                                                 {cloud.mean.z, g.mean.z, position},
-                                                 {cloud.log_scale.x, g.log_scale.x, scale},
-                                                 {cloud.log_scale.y, g.log_scale.y, scale},
-                                                 {cloud.log_scale.z, g.log_scale.z, scale},
-                                                 {cloud.rotation.w, g.rotation.w, rotation},
-                                                 {cloud.rotation.x, g.rotation.x, rotation},
-                                                 {cloud.rotation.y, g.rotation.y, rotation},
-                                                 {cloud.rotation.z, g.rotation.z, rotation},
-                                                 {cloud.opacity_logit, g.opacity_logit, opacity},
-                                                 {cloud.sh, g.sh, sh}}};
-  return adam_.step(groups, mobility);
+  const std::array<optim::AdamGroup, 12> groups{{{cloud.mean.x, g.mean.x, position, mobility.position},
+                                                 {cloud.mean.y, g.mean.y, position, mobility.position},
+                                                 {cloud.mean.z, g.mean.z, position, mobility.position},
+                                                 {cloud.log_scale.x, g.log_scale.x, scale, mobility.others},
+                                                 {cloud.log_scale.y, g.log_scale.y, scale, mobility.others},
+                                                 {cloud.log_scale.z, g.log_scale.z, scale, mobility.others},
+                                                 {cloud.rotation.w, g.rotation.w, rotation, mobility.others},
+                                                 {cloud.rotation.x, g.rotation.x, rotation, mobility.others},
+                                                 {cloud.rotation.y, g.rotation.y, rotation, mobility.others},
+                                                 {cloud.rotation.z, g.rotation.z, rotation, mobility.others},
+                                                 {cloud.opacity_logit, g.opacity_logit, opacity, mobility.others},
+                                                 {cloud.sh, g.sh, sh, mobility.others}}};
+  return adam_.step(groups);
 }
 
 }  // namespace engine::train

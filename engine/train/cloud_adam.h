@@ -24,6 +24,12 @@ struct IterationRates {
   double rotation = 0;       ///< Quaternion components.
 };
 
+/// What each row's rates are multiplied by, 0 or more; empty: 1.
+struct Mobility {
+  std::span<const float> position = {};  ///< [rows]
+  std::span<const float> others = {};    ///< [rows] Of all other parameters.
+};
+
 /// optim::Adam with a group for each array of a cloud.
 class CloudAdam {
  public:
@@ -32,11 +38,10 @@ class CloudAdam {
 
   /// One step of all rows.
   ///   cloud, gradients  of rows() rows and the degree
-  ///   mobility          as in optim::Adam::step()
   ///   errors  internal: a gradient, parameter or moment is not finite; `where` is the first, with the property names
   ///           of a .ply file where it has one: "[12].opacity", "[3].sh[17]". Parameters are spoilt then.
   [[nodiscard]] Result<void> step(scene::GaussianCloud& cloud, const render::Gradients& gradients,
-                                  const IterationRates& rates, std::span<const float> mobility = {});
+                                  const IterationRates& rates, const Mobility& mobility = {});
 
   /// Rows with keep[i] != 0 stay, in order. keep: [rows()].
   void keep_rows(std::span<const std::uint8_t> keep) { adam_.keep_rows(keep); }

@@ -28,6 +28,12 @@ double radius_of(const scene::GaussianCloud& cloud) {
   return radius;
 }
 
+/// The second of three extents, world units.
+double width_of(Vec3 log_scale) {
+  const auto [lesser, greater] = std::minmax(log_scale.x, log_scale.y);
+  return std::exp(double(std::clamp(log_scale.z, lesser, greater)));
+}
+
 void shape_like(const scene::Image& image, scene::Image& out) {
   out.width = image.width, out.height = image.height, out.channels = image.channels;
   out.data.assign(image.data.size(), 0.0f);
@@ -202,6 +208,16 @@ Result<double> Trainer::differentiate(TrainingView& view) {
   return background.total + options_.perceptual_weight * *edit;
 }
 
+std::span<const float> Trainer::position_mobility() {
+  const double rate = options_.rates.position * position_scale_;
+  position_mobility_.resize(cloud_.size());
+  for (std::size_t row = 0; row < cloud_.size(); ++row) {
+    const double share = optim::share_of_position(options_.rates, rate, width_of(cloud_.log_scale.get(row)));
+    position_mobility_[row] = (mobility_.empty() ? 1.0f : mobility_[row]) * float(share);
+  }
+  return position_mobility_;
+}
+
 Result<void> Trainer::adam_step(double decay) {
   const optim::LearningRates& rates = options_.rates;
   auto stepped = adam_.step(cloud_, gradients_,
@@ -211,7 +227,7 @@ Result<void> Trainer::adam_step(double decay) {
                              .opacity_logit = rates.opacity_logit * decay,
                              .log_scale = rates.log_scale * decay,
                              .rotation = rates.rotation * decay},
-                            mobility_);
+                            {.position = position_mobility(), .others = mobility_});
   if (stepped) return {};
   // "[12].opacity" -> "gaussian[12].opacity", with the name of the row.
   Error error = std::move(stepped.error());

@@ -103,6 +103,8 @@ class Trainer {
   /// Lets go of what other views keep, until all of them stay within TrainOptions::frozen_memory.
   void evict_for(TrainingView& view);
   Result<double> differentiate(TrainingView& view);
+  /// [rows] What the position rate of each is multiplied by, as it is now.
+  std::span<const float> position_mobility();
   Result<void> adam_step(double decay);
   void densify();
   void remove_floaters();
@@ -111,7 +113,8 @@ class Trainer {
   FrozenScene frozen_;
   scene::GaussianCloud cloud_;
   std::vector<std::uint32_t> name_;
-  std::vector<float> mobility_;  ///< [rows] Children included; or empty.
+  std::vector<float> mobility_;           ///< [rows] Children included; or empty.
+  std::vector<float> position_mobility_;  ///< Of the last step.
   TrainOptions options_;
   optim::PerceptualLoss& loss_;
   std::size_t initial_rows_;

@@ -87,7 +87,7 @@ TEST(Adam, MobilityMultipliesTheRatesOfARow) {
   std::vector<ScalarAdam> scalar_a(rows), scalar_b(rows * columns);
   for (std::uint64_t t = 0; t < 50; ++t) {
     const auto v_a = normals(rows, 100 + t), v_b = normals(rows * columns, 200 + t);
-    ASSERT_TRUE(adam.step(std::vector<AdamGroup>{{a, v_a, one_rate}, {b, v_b, rates}}, mobility));
+    ASSERT_TRUE(adam.step(std::vector<AdamGroup>{{a, v_a, one_rate, mobility}, {b, v_b, rates, mobility}}));
     for (std::size_t i = 0; i < rows; ++i)
       expected_a[i] = scalar_a[i].step(expected_a[i], v_a[i], 0.01 * double(mobility[i]));
     for (std::size_t i = 0; i < b.size(); ++i)
@@ -99,6 +99,17 @@ TEST(Adam, MobilityMultipliesTheRatesOfARow) {
   for (std::size_t i = 0; i < rows; i += 5) EXPECT_EQ(b[columns * i], first_b[columns * i]) << "row " << i;
 }
 
+TEST(Adam, EveryGroupHasAMobilityOfItsOwn) {
+  const std::vector<double> rate{0.25};
+  const std::vector<float> gradient{1, 1}, first_alone{1, 0};
+  std::vector<float> a{0, 0}, b{0, 0};
+  Adam adam({{"a"}, {"b"}}, 2);
+  ASSERT_TRUE(adam.step(std::vector<AdamGroup>{{a, gradient, rate, first_alone}, {b, gradient, rate}}));
+  EXPECT_LT(a[0], 0.0f);
+  EXPECT_EQ(a[1], 0.0f);
+  EXPECT_EQ(b, (std::vector<float>{a[0], a[0]}));
+}
+
 TEST(Adam, AMobilityOfOneEverywhereIsTheSameAsNone) {
   constexpr std::size_t rows = 300;
   const std::vector<double> rate{0.01}, rates{0.1, 0.2};
@@ -107,7 +118,7 @@ TEST(Adam, AMobilityOfOneEverywhereIsTheSameAsNone) {
     std::vector<float> a = normals(rows, 1), b = normals(rows * 2, 2);
     for (std::uint64_t t = 0; t < 3; ++t) {
       const auto v_a = normals(rows, 10 + t), v_b = normals(rows * 2, 20 + t);
-      EXPECT_TRUE(adam.step(std::vector<AdamGroup>{{a, v_a, rate}, {b, v_b, rates}}, mobility));
+      EXPECT_TRUE(adam.step(std::vector<AdamGroup>{{a, v_a, rate, mobility}, {b, v_b, rates, mobility}}));
     }
     return std::pair{a, b};
   };
@@ -119,7 +130,8 @@ TEST(Adam, ARowThatMayNotMoveRemembersItsGradientsAllTheSame) {
   const std::vector<float> gradient{1, 1}, none(2);
   std::vector<float> value{0, 0};
   Adam adam({{"x"}}, 2);
-  ASSERT_TRUE(adam.step(std::vector<AdamGroup>{{value, gradient, rate}}, std::vector<float>{0, 1}));
+  const std::vector<float> second_alone{0, 1};
+  ASSERT_TRUE(adam.step(std::vector<AdamGroup>{{value, gradient, rate, second_alone}}));
   EXPECT_EQ(value[0], 0.0f);
   const float before = value[1];
   ASSERT_TRUE(adam.step(std::vector<AdamGroup>{{value, none, rate}}));
@@ -138,7 +150,7 @@ TEST(Adam, HasTheSameBytesForAnyNumberOfThreads) {
       Adam adam({{"a", 1}, {"b", 4}}, rows);
       for (std::uint64_t t = 0; t < 3; ++t) {
         const auto v_a = normals(rows, 10 + t), v_b = normals(rows * 4, 20 + t);
-        EXPECT_TRUE(adam.step(std::vector<AdamGroup>{{a, v_a, rate}, {b, v_b, rates}}, mobility));
+        EXPECT_TRUE(adam.step(std::vector<AdamGroup>{{a, v_a, rate, mobility}, {b, v_b, rates, mobility}}));
       }
     });
     return std::pair{a, b};
