@@ -23,7 +23,7 @@ struct FitOptions {
   std::uint64_t seed = 0;
   Vec3 background{0.0f};  ///< Colour behind the scene, display-referred.
 
-  optim::LearningRates rates = {};  ///< mask_radii is not used: positions go by the capture's extent.
+  optim::LearningRates rates = {};  ///< Positions go by the capture's extent: mask_radii and most_widths are not used.
   optim::AdamOptions adam = {};
   optim::BackgroundLossOptions loss = {.l1_weight = 0.8, .ssim_weight = 0.2, .l1 = {}};  ///< INRIA's weights.
   /// Here `until` is a part of all iterations and `dense` a part of the capture's extent; most_growth is not used.

@@ -31,7 +31,8 @@ namespace engine::optim {
   return exponential_decay(1, last, double(iteration) / double(iterations - 1));
 }
 
-/// Learning rates per parameter, in the parameter's stored form. Defaults: INRIA's, but for mask_radii.
+/// Learning rates per parameter, in the parameter's stored form. Defaults: INRIA's, but for
+/// mask_radii and most_widths.
 struct LearningRates {
   double position = 1.6e-4;      ///< Per unit of position_scale(); dimensionless.
   double sh_dc = 2.5e-3;         ///< SH coefficient 0.
@@ -40,7 +41,7 @@ struct LearningRates {
   double log_scale = 5e-3;       ///< Natural logarithm of world units.
   double rotation = 1e-3;        ///< Quaternion components.
   double mask_radii = 5;         ///< c of position_scale(): radii of the 3D mask that its extent counts as. A choice.
-  double widths = 0.05;          ///< Most that a position moves in a step, in widths of the row: share_of_position().
+  double most_widths = 0.05;     ///< Largest position rate of a row, in its own widths; may be infinite. A choice.
   double last = 0.01;            ///< Factor of all rates at the end of a correction; above 0, at most 1.
 };
 [[nodiscard]] Result<void> validate(const LearningRates& rates);
@@ -55,12 +56,13 @@ struct LearningRates {
   return scene_extent > 0 ? std::min(scene_extent, of_mask) : of_mask;
 }
 
-/// Share of the position rate that is a row's: with all of it, one that is small would jump by its own size at each
-/// step, whichever way noise has it, and a surface of many such would come apart.
-///   rate   LearningRates::position times position_scale(), world units
-///   width  of the row: the second of its three extents (standard deviations), world units
-[[nodiscard]] inline double share_of_position(const LearningRates& rates, double rate, double width) {
-  return rate > rates.widths * width ? rates.widths * width / rate : 1.0;  // also where the rate is 0
+/// Share of the position rate that is a row's, min(1, most_widths * width / rate), of logarithms. With all of it, a
+/// small row would jump by its own size at each step, whichever way noise has it, and a surface of many such come
+/// apart.
+///   log_width       of the row: the second of its three extents (standard deviations), log of world units
+///   log_full_width  log of rate / most_widths, from which width on a row has the whole rate; -infinity: all have
+[[nodiscard]] inline double share_of_position(double log_width, double log_full_width) {
+  return std::exp(std::min(log_width - log_full_width, 0.0));
 }
 
 }  // namespace engine::optim

@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "engine/core/parallel.h"
 #include "engine/mask/mask.h"
 #include "engine/optim/picture_view.h"
 #include "engine/scene/in_picture.h"
@@ -15,7 +16,8 @@ namespace engine::train {
 namespace {
 
 const Vec3 black(0.0f);
-constexpr float free_to_split = 0.5f;  // smallest mobility of a row that may get a child: a choice
+constexpr float free_to_split = 0.5f;         // smallest mobility of a row that may get a child: a choice
+constexpr std::size_t rows_per_task = 4'096;  // a choice
 
 /// Largest distance of a mean from their centre.
 double radius_of(const scene::GaussianCloud& cloud) {
@@ -28,10 +30,10 @@ double radius_of(const scene::GaussianCloud& cloud) {
   return radius;
 }
 
-/// The second of three extents, world units.
-double width_of(Vec3 log_scale) {
+/// The second of three extents: where rows lie side by side, what a needle's neighbour and a disc's is away.
+double log_width_of(Vec3 log_scale) {
   const auto [lesser, greater] = std::minmax(log_scale.x, log_scale.y);
-  return std::exp(double(std::clamp(log_scale.z, lesser, greater)));
+  return double(std::clamp(log_scale.z, lesser, greater));
 }
 
 void shape_like(const scene::Image& image, scene::Image& out) {
@@ -209,12 +211,14 @@ Result<double> Trainer::differentiate(TrainingView& view) {
 }
 
 std::span<const float> Trainer::position_mobility() {
-  const double rate = options_.rates.position * position_scale_;
+  const double log_full_width = std::log(options_.rates.position * position_scale_ / options_.rates.most_widths);
   position_mobility_.resize(cloud_.size());
-  for (std::size_t row = 0; row < cloud_.size(); ++row) {
-    const double share = optim::share_of_position(options_.rates, rate, width_of(cloud_.log_scale.get(row)));
-    position_mobility_[row] = (mobility_.empty() ? 1.0f : mobility_[row]) * float(share);
-  }
+  parallel_for(cloud_.size(), rows_per_task, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t row = begin; row < end; ++row) {
+      const double share = optim::share_of_position(log_width_of(cloud_.log_scale.get(row)), log_full_width);
+      position_mobility_[row] = (mobility_.empty() ? 1.0f : mobility_[row]) * float(share);
+    }
+  });
   return position_mobility_;
 }
 

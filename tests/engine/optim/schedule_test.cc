@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
 namespace engine::optim {
@@ -28,15 +29,16 @@ TEST(PositionScale, IsTheSmallerOfTheSceneAndTheMask) {
   EXPECT_DOUBLE_EQ(position_scale(rates, 0.0, 3.0), 15.0);
 }
 
-TEST(ShareOfPosition, NoStepIsLongerThanAShareOfTheWidth) {
-  const LearningRates rates{.widths = 0.5};
-  EXPECT_DOUBLE_EQ(share_of_position(rates, 4.0, 2.0), 0.25);
-  EXPECT_DOUBLE_EQ(share_of_position(rates, 1.0, 2.0), 1.0);
-  EXPECT_DOUBLE_EQ(share_of_position(rates, 0.1, 2.0), 1.0);
-  EXPECT_EQ(share_of_position(rates, 0.0, 0.0), 1.0) << "nothing moves: any share will do, but no NaN";
-  EXPECT_EQ(share_of_position(rates, 1.0, 0.0), 0.0);
-  constexpr double most = std::numeric_limits<double>::max();
-  EXPECT_EQ(share_of_position(LearningRates{.widths = most}, 1.0, most), 1.0) << "infinite widths bound nothing";
+TEST(ShareOfPosition, NoRateIsLargerThanAShareOfTheWidth) {
+  EXPECT_DOUBLE_EQ(share_of_position(std::log(2.0), std::log(8.0)), 0.25);
+  EXPECT_EQ(share_of_position(std::log(8.0), std::log(8.0)), 1.0);
+  EXPECT_EQ(share_of_position(std::log(9.0), std::log(8.0)), 1.0);
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  constexpr double most = std::numeric_limits<float>::max();
+  EXPECT_EQ(share_of_position(most, -infinity), 1.0) << "a rate of 0, or any number of widths";
+  EXPECT_EQ(share_of_position(-most, -infinity), 1.0);
+  EXPECT_EQ(share_of_position(-most, 0.0), 0.0);
+  EXPECT_EQ(share_of_position(most, 0.0), 1.0);
 }
 
 TEST(LearningRates, ThatMakeNoSenseAreNamed) {
@@ -44,7 +46,7 @@ TEST(LearningRates, ThatMakeNoSenseAreNamed) {
   EXPECT_EQ(validate(LearningRates{.sh_rest = -1}).error().where, "sh_rest");
   EXPECT_EQ(validate(LearningRates{.mask_radii = 0}).error().where, "mask_radii");
   EXPECT_EQ(validate(LearningRates{.last = 0}).error().where, "last");
-  EXPECT_EQ(validate(LearningRates{.widths = 0}).error().where, "widths");
+  EXPECT_EQ(validate(LearningRates{.most_widths = 0}).error().where, "most_widths");
 }
 
 }  // namespace
