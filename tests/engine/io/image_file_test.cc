@@ -53,7 +53,7 @@ Image decoded(const std::vector<std::byte>& bytes, const ImageOptions& options =
 }
 
 /// Written by the library itself, for forms that we read and do not write.
-void write_with_library(const std::filesystem::path& path, OIIO::ImageSpec spec,
+void write_with_library(const std::filesystem::path& path, const OIIO::ImageSpec& spec,
                         const std::vector<float>& interleaved) {
   auto writer = OIIO::ImageOutput::create(path.string());
   ASSERT_TRUE(writer && writer->open(path.string(), spec));
