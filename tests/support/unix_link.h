@@ -85,8 +85,12 @@ class UnixLink {
     const int client = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC);
     const int server = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
     const sockaddr_un address = address_of(to_);
-    (void)::connect(server, reinterpret_cast<const sockaddr*>(&address), sizeof address);
-    pairs_.push_back({client, server});
+    if (::connect(server, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) {
+      pairs_.push_back({client, server});
+    } else {  // nobody listens there: the client is told as if it had asked there
+      ::close(client);
+      ::close(server);
+    }
   }
   bool pass_on(Pair& pair, bool from_client) {
     char bytes[65536];

@@ -169,7 +169,7 @@ TEST(ColmapCameras, RefuseOtherModelsByName) {
 }
 
 TEST(ColmapCameras, RefuseWhatIsDescribedTwiceOrHasNoSize) {
-  const auto where = [](std::vector<samples::ColmapCamera> cameras) {
+  const auto where = [](const std::vector<samples::ColmapCamera>& cameras) {
     const std::string bytes = samples::binary(cameras);
     return parse_colmap_cameras(as_bytes(bytes), ColmapEncoding::binary, "cameras.bin").error().where;
   };

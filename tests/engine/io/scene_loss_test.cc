@@ -87,7 +87,8 @@ TEST(SceneLoss, IsNoClippingWhereOnlyTheEndIsRounded) {
     // To the ends of what the format holds, and half a step farther.
     for (std::size_t i = 0; i < before.cloud.size(); ++i) {
       const float sign = i % 2 == 0 ? 1.0f : -1.0f;
-      const double share = double(i / 2) / 99;  // of that half step
+      const std::size_t pair = i / 2;
+      const double share = double(pair) / 99;  // of that half step
       const auto reach = [&](const StoredRange& range) {
         return float(sign * (std::min(range.high, -range.low) + 0.999 * share * range.step / 2));
       };

@@ -168,8 +168,8 @@ double colour(const float* sh, DVec3 d) {
 TEST(Spz, CountsWhatItUnpacksToBeforeItDoes) {
   Parts parts;
   parts.count = 1'000'000;
-  parts.attributes = {std::string(9'000'000, '\0'), std::string(1'000'000, '\0'), std::string(3'000'000, '\0'),
-                      std::string(3'000'000, '\0'), std::string(3'000'000, '\0'), ""};
+  const auto zeros = [&](std::size_t bytes_per_row) { return std::string(bytes_per_row * parts.count, '\0'); };
+  parts.attributes = {zeros(9), zeros(1), zeros(3), zeros(3), zeros(3), ""};
   const std::string unpacked = parts.unpacked();
   const auto bytes = gzip(std::as_bytes(std::span(unpacked)));
   EXPECT_LT(bytes.size(), std::size_t{50'000});

@@ -11,7 +11,6 @@ namespace engine::mask {
 namespace {
 
 using scene::Mask;
-using scene::Rect;
 
 Mask random_mask(int width, int height, float density, std::uint64_t seed) {
   Mask mask(width, height);
