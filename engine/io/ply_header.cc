@@ -113,8 +113,7 @@ class HeaderParser {
     element.count_begin = std::size_t(words[2].data() - bytes_.data());
     element.count_size = words[2].size();
     header_.elements.push_back(std::move(element));
-    // A new one, for clear() goes over all the buckets that the widest element before needed; so does "= {}", a
-    // clear().
+    // A new one: clear(), and "= {}" as well, go over all the buckets that the widest element before needed.
     property_names_ = std::unordered_set<std::string>();
     return {};
   }

@@ -31,8 +31,8 @@ namespace engine::optim {
   return exponential_decay(1, last, double(iteration) / double(iterations - 1));
 }
 
-/// Learning rates per parameter, in the parameter's stored form. Defaults: INRIA's, but for
-/// mask_radii and most_widths.
+/// Learning rates per parameter, in the parameter's stored form. Defaults: INRIA's, but for mask_radii and
+/// most_widths.
 struct LearningRates {
   double position = 1.6e-4;      ///< Per unit of position_scale(); dimensionless.
   double sh_dc = 2.5e-3;         ///< SH coefficient 0.

@@ -78,19 +78,15 @@ class UnixLink {
       if (files[2 * i + 1].revents != 0 && !pass_on(pairs_[i], /*from_client=*/true)) return false;
       if (files[2 * i + 2].revents != 0 && !pass_on(pairs_[i], /*from_client=*/false)) return false;
     }
-    if (files.front().revents != 0) accept_one();
-    return true;
+    return files.front().revents == 0 || accept_one();
   }
-  void accept_one() {
+  /// Whether somebody listens at the other end.
+  bool accept_one() {
     const int client = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC);
     const int server = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
     const sockaddr_un address = address_of(to_);
-    if (::connect(server, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) {
-      pairs_.push_back({client, server});
-    } else {  // nobody listens there: the client is told as if it had asked there
-      ::close(client);
-      ::close(server);
-    }
+    pairs_.push_back({client, server});
+    return ::connect(server, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
   }
   bool pass_on(Pair& pair, bool from_client) {
     char bytes[65536];

@@ -1,12 +1,11 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
-#include <ctime>
 
 #include "engine/core/parallel.h"
 #include "engine/core/rng.h"
 #include "engine/views/views.h"
+#include "tests/support/processor_time.h"
 
 namespace engine::views {
 namespace {
@@ -91,13 +90,11 @@ GaussianCloud ball(std::size_t count) {
 TEST(VirtualCameras, LookAtNoMoreGaussiansThanTheyMay) {
   const std::vector<DVec3> points{{0, 0, 0}, {0.1, 0, 0}};
   const GaussianCloud many = ball(400'000);
-  const auto seconds = [&](std::size_t most) {  // of the processor: other work on the machine is none of it
-    const std::clock_t begin = std::clock();
+  const auto place = [&](std::size_t most) {
     EXPECT_FALSE(virtual_cameras(many, points, {.count = 20, .radius = 0.05, .max_gaussians = most}).empty());
-    return double(std::clock() - begin) / CLOCKS_PER_SEC;
   };
-  static_cast<void>(seconds(5'000));  // threads have to start once
-  const double bounded = std::min({seconds(5'000), seconds(5'000), seconds(5'000)}), all = seconds(0);
+  const double bounded = support::processor_seconds([&] { place(5'000); }, 4);
+  const double all = support::processor_seconds([&] { place(0); });
   EXPECT_LT(bounded, all / 10);
 }
 
