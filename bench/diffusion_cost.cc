@@ -166,7 +166,7 @@ int main(int argc, char** argv) {
     }
   }
   const auto adapter = diffusion::Adapter::fresh(weights::tensors_of(configs.unet), {"to_q", "to_v"}, 8, 32, 1);
-  unet.adapter = &adapter;
+  unet.adapters = {adapter};
   std::vector<Tensor> trained;
   adapter.collect(trained);
   diffusion::AdamW optimiser(trained, {});

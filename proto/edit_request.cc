@@ -50,9 +50,9 @@ Region read_region(const JsonField& field, std::string_view size_name) {
   return region;
 }
 
-constexpr std::array<std::string_view, 16> request_fields{
-    "scene",     "version", "mode",   "preset", "prompt", "negative_prompt", "allow_slow", "handles",
-    "selection", "heal",    "attach", "crumbs", "shadow", "settle",          "region",     "params"};
+constexpr std::array<std::string_view, 17> request_fields{
+    "scene",     "version", "mode",   "preset", "prompt", "negative_prompt", "lora",   "allow_slow", "handles",
+    "selection", "heal",    "attach", "crumbs", "shadow", "settle",          "region", "params"};
 constexpr std::array<std::string_view, 6> config_fields{"start",   "direction",  "voxel_size",
                                                         "cluster", "local_mask", "mode"};
 
@@ -71,6 +71,7 @@ EditRequest read_request(const JsonField& field, Wanted wanted) {
   if (const auto f = members.optional("preset")) request.preset = f->one_of(engine::names<Preset>);
   if (const auto f = members.optional("prompt"); f && !f->is_null()) request.prompt = f->text();
   if (const auto f = members.optional("negative_prompt"); f && !f->is_null()) request.negative_prompt = f->text();
+  if (const auto f = members.optional("lora"); f && !f->is_null()) request.lora = f->text();
   if (const auto f = members.optional("allow_slow")) request.allow_slow = f->boolean();
   const auto selection = members.optional("selection");
   // What is selected can be removed without a word on where it is.
@@ -367,6 +368,7 @@ std::string to_json(const EditRequest& request) {
   if (request.preset) out["preset"] = name_of(*request.preset);
   if (request.prompt) out["prompt"] = *request.prompt;
   if (request.negative_prompt) out["negative_prompt"] = *request.negative_prompt;
+  if (request.lora) out["lora"] = *request.lora;
   if (request.allow_slow) out["allow_slow"] = true;
   ordered_json& handles = out["handles"] = ordered_json::array();
   for (const Handle& handle : request.handles) handles.push_back(encode(handle));

@@ -62,6 +62,7 @@ struct EditRequest {
   std::optional<Preset> preset;                     ///< None: standard.
   std::optional<std::string> prompt;                ///< For a corrector that reads one.
   std::optional<std::string> negative_prompt = {};  ///< The same: what should not be seen.
+  std::optional<std::string> lora = {};             ///< Adapter that the same paints with, by name.
   bool allow_slow = false;                          ///< Its networks, of `sd` or of `lpips`, may work for hours.
   std::vector<Handle> handles;                      ///< 1 to max_handles
   std::optional<Selection> selection;               ///< What moves. None: the handles' spheres.

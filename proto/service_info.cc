@@ -45,6 +45,7 @@ std::string to_json(const ServiceInfo& info, bool session) {
       {"devices", info.devices},
       {"correctors", list(info.correctors)},
       {"perceptual", list(info.perceptual)},
+      {"loras", info.loras},
       {"formats", {{"read", info.read_formats}, {"write", info.write_formats}, {"pictures", info.picture_formats}}},
       {"presets", info.presets},
       {"parameters", describe_parameters()},

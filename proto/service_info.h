@@ -30,6 +30,7 @@ struct ServiceInfo {
   int threads = 0;
   std::vector<std::string> devices = {"cpu"};
   std::vector<Capability> correctors, perceptual;
+  std::vector<std::string> loras;  ///< Adapters that the corrector `sd` can paint with, by name.
   std::vector<std::string> read_formats, write_formats, picture_formats, presets;
   ServiceLimits limits;
   bool token_required = false;

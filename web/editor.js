@@ -61,6 +61,7 @@ export const NOTHING_OPEN = {
   preset: "",
   prompt: null,
   negative_prompt: null,
+  lora: null, // The adapter that the diffusion model paints with.
   allow_slow: false, // Networks may work for hours.
   attach: null,
   crumbs: null, // What becomes of what the selection has left out; null: it goes along.
@@ -91,14 +92,14 @@ export const NOTHING_OPEN = {
 /** What undo brings back, all at once: a drag is meant on a version, in a mode, with settings. */
 const PLACED_KEYS = [
   ...["version", "handles", "selection", "region", "mode", "preset", "prompt", "params", "heal", "attach", "crumbs", "shadow", "settle"],
-  ...["negative_prompt", "allow_slow"],
+  ...["negative_prompt", "lora", "allow_slow"],
 ];
 /** What goes from the screen when another version comes. */
 const OF_THE_VERSION = { comparing: false, compareWith: null, preview: null, problem: null, estimate: null };
 
 // What outlives a reload: as it is; and all, of which open() puts back what still fits the scene.
 const LASTING_KEYS = [
-  ...["region", "mode", "preset", "crumbs", "shadow", "prompt", "negative_prompt", "params", "autoPreview", "layer", "tab"],
+  ...["region", "mode", "preset", "crumbs", "shadow", "prompt", "negative_prompt", "lora", "params", "autoPreview", "layer", "tab"],
   ...["constraint", "gizmo", "frame", "thingMode", "selectTool", "selectDepth", "brushRadius", "tinted", "draftOnRelease", "drafts"],
 ];
 const STORED_KEYS = ["pose", "version", "handles", "selection", "viewName", ...LASTING_KEYS];
@@ -892,6 +893,7 @@ export class Editor {
       preset: request.preset ?? "",
       prompt: request.prompt ?? null,
       negative_prompt: request.negative_prompt ?? null,
+      lora: request.lora ?? null,
       allow_slow: request.allow_slow ?? false,
       region: request.region ?? null,
       params: request.params ?? {},

@@ -109,13 +109,21 @@ export function buildRequestPanel(editor) {
     title: "What the scene shows: the diffusion model is trained and asked with it",
   });
   promptField.addEventListener("change", () => editor.settle({ prompt: promptField.value.trim() || null }));
+  const lora = choice({
+    label: "Adapter",
+    testid: "lora",
+    options: [["", "none"]],
+    changed: (value) => editor.settle({ lora: value || null }),
+  });
+  const loraField = labelled("Adapter", lora.element);
+  loraField.title = "What the diffusion model paints with beside what it learns of the scene, such as one for few steps";
   const slow = toggle({
     label: "It may take hours",
     testid: "allow-slow",
     title: "Without a graphics card networks work for hours: Estimate tells for how long",
     changed: (on) => editor.settle({ allow_slow: on }),
   });
-  const painted = h("div", { testid: "painted" }, labelled("Prompt", promptField));
+  const painted = h("div", { testid: "painted" }, labelled("Prompt", promptField), loraField);
   const paramProblem = problemPlace("param-problem");
   const settings = h(
     "details",
@@ -204,7 +212,7 @@ export function buildRequestPanel(editor) {
   store.watch(
     [
       ...["constraint", "mode", "region", "preset", "crumbs", "shadow", "settle", "selection", "params", "autoPreview", "draftOnRelease"],
-      ...["info", "handles", "scene", "prompt", "allow_slow"],
+      ...["info", "handles", "scene", "prompt", "lora", "allow_slow"],
     ],
     (state) => {
       constraint.update(state.constraint);
@@ -224,12 +232,18 @@ export function buildRequestPanel(editor) {
       params.update(state.info, state.params, state.preset);
       painted.hidden = !(state.params.corrector === "sd" && hasDiffusion(state.info));
       promptField.value = state.prompt ?? "";
+      // One that a request names stays in sight where the service has it no longer.
+      const loras = [...new Set([...(state.info?.loras ?? []), ...(state.lora ? [state.lora] : [])])];
+      loraField.hidden = loras.length === 0;
+      lora.options([["", "none"], ...loras.map((name) => [name, name])]);
+      lora.update(state.lora ?? "");
       slow.element.hidden = painted.hidden && state.params.perceptual !== "lpips";
       slow.update(state.allow_slow);
       auto.update(state.autoPreview);
       repair.update(state.draftOnRelease);
       const others = Object.keys(state.params).filter((name) => !params.shows(name));
       if (state.prompt && painted.hidden) others.push(`prompt “${state.prompt}”`);
+      if (state.lora && painted.hidden) others.push(`adapter “${state.lora}”`);
       also.hidden = others.length === 0;
       text(also, `Also set, by the imported request: ${others.join(", ")}`);
     },
@@ -239,7 +253,7 @@ export function buildRequestPanel(editor) {
   store.watch(
     [
       ...["handles", "selection", "previewing", "submitting", "problem", "preview", "estimate", "scene", "version"],
-      ...["region", "mode", "preset", "crumbs", "shadow", "settle", "attach", "params", "prompt", "allow_slow"],
+      ...["region", "mode", "preset", "crumbs", "shadow", "settle", "attach", "params", "prompt", "lora", "allow_slow"],
     ],
     (state) => {
       const ready = state.scene !== null && isStated(state);
@@ -253,7 +267,7 @@ export function buildRequestPanel(editor) {
       const here = (...parts) => (state.problem && parts.includes(at.part) ? state.problem.error : null);
       showProblem(regionProblem, here("region"));
       showProblem(paramProblem, here("param", "mode", "preset", "crumbs", "shadow", "settle"));
-      showProblem(problem, here("request", "handles", "prompt", "negative_prompt", "allow_slow"));
+      showProblem(problem, here("request", "handles", "prompt", "negative_prompt", "lora", "allow_slow"));
       if (here("region") || here("param", "preset", "crumbs", "shadow", "settle")) settings.open = true;
       if (here("handle") && !state.handles[at.index]) showProblem(problem, state.problem.error);
       answer.replaceChildren(...answers(editor, state));

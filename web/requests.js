@@ -16,7 +16,7 @@ export function requestOf(state) {
   // Where nothing moves, what is healed is removed: then all that a run does is to heal it.
   if (onlyHeals(state)) return requestOf({ ...state, mode: "remove", selection: state.heal });
   const { scene, version, mode, preset, prompt, handles, selection = [], heal = [], attach, region, params } = state;
-  const { negative_prompt, allow_slow, crumbs, shadow, settle } = state;
+  const { negative_prompt, lora, allow_slow, crumbs, shadow, settle } = state;
   const goes = mode !== "remove"; // else targets stay on the screen, for when the mode changes back
   const leaves = selection.length > 0 && mode !== "extend"; // what goes along with it is asked for there alone
   const given = Object.entries(params ?? {}).filter(
@@ -29,6 +29,7 @@ export function requestOf(state) {
     ...(preset ? { preset } : {}),
     ...(prompt ? { prompt } : {}),
     ...(negative_prompt ? { negative_prompt } : {}),
+    ...(lora ? { lora } : {}),
     ...(allow_slow ? { allow_slow } : {}),
     handles: handles.map((handle) => ({
       source: handle.source,
@@ -90,7 +91,7 @@ export function partOf(where = "") {
   const param = /^params\.(\w+)/.exec(where);
   if (param) return { part: "param", name: param[1] };
   if (/^region\b/.test(where)) return { part: "region" };
-  if (/^(mode|preset|handles|prompt|negative_prompt|allow_slow|crumbs|shadow|settle)$/.test(where)) return { part: where };
+  if (/^(mode|preset|handles|prompt|negative_prompt|lora|allow_slow|crumbs|shadow|settle)$/.test(where)) return { part: where };
   return { part: "request" };
 }
 
@@ -174,7 +175,7 @@ function nameAmong(names, value, where) {
 }
 
 const FIELDS =
-  "scene version mode preset prompt negative_prompt allow_slow handles selection heal attach crumbs shadow settle region params".split(" ");
+  "scene version mode preset prompt negative_prompt lora allow_slow handles selection heal attach crumbs shadow settle region params".split(" ");
 
 function readRequest(document, where) {
   known(document, FIELDS, where);
@@ -209,6 +210,7 @@ function readRequest(document, where) {
     preset: document.preset ?? null,
     prompt: document.prompt ?? null,
     negative_prompt: document.negative_prompt ?? null,
+    lora: document.lora ?? null,
     allow_slow: document.allow_slow ?? false,
     handles,
     selection,
@@ -268,6 +270,7 @@ function readReleased(document, where) {
     preset: null,
     prompt: null,
     negative_prompt: null,
+    lora: null,
     allow_slow: false,
     handles,
     selection: [],

@@ -39,14 +39,16 @@ Tensor Layer::shown(Tensor out) const {
 
 Tensor linear(const Layer& layer, const Tensor& x) {
   Tensor out = at::linear(x, layer.tensor("weight"), bias_of(layer));
-  if (const Adapter* adapter = layer.adapter()) out = out + adapter->of_linear(layer.name(), x);
+  for (const Adapter& adapter : layer.adapters())
+    if (adapter.adapts(layer.name())) out = out + adapter.of_linear(layer.name(), x);
   return layer.shown(std::move(out));
 }
 
 Tensor convolution(const Layer& layer, const Tensor& x, int stride, int padding) {
   const std::array<std::int64_t, 2> strides{stride, stride}, paddings{padding, padding};
   Tensor out = at::conv2d(x, layer.tensor("weight"), bias_of(layer), strides, paddings);
-  if (const Adapter* adapter = layer.adapter()) out = out + adapter->of_convolution(layer.name(), x, stride, padding);
+  for (const Adapter& adapter : layer.adapters())
+    if (adapter.adapts(layer.name())) out = out + adapter.of_convolution(layer.name(), x, stride, padding);
   return layer.shown(std::move(out));
 }
 

@@ -4,6 +4,7 @@
 #include <functional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "engine/diffusion/adapter.h"
 #include "engine/diffusion/parameters.h"
@@ -17,7 +18,7 @@ using Probe = std::function<void(const std::string& layer, const Tensor& out)>;
 /// A network as it is used: its tensors, and what is added to them.
 struct Model {
   Parameters parameters;
-  const Adapter* adapter = nullptr;  ///< Null: none.
+  std::vector<Adapter> adapters = {};  ///< Each adds to what the layers that it adapts make of the same input.
   Probe probe = {};
   /// Called before each block, on the way back as well; what it throws ends the computation. May be empty.
   std::function<void()> before_block = {};
@@ -39,10 +40,7 @@ class Layer {
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] const Tensor& tensor(const char* part) const { return model_->parameters.at(name_ + "." + part); }
   [[nodiscard]] bool has(const char* part) const { return model_->parameters.contains(name_ + "." + part); }
-  /// The model's adapter, if there is one and it adapts this layer.
-  [[nodiscard]] const Adapter* adapter() const {
-    return model_->adapter != nullptr && model_->adapter->adapts(name_) ? model_->adapter : nullptr;
-  }
+  [[nodiscard]] const std::vector<Adapter>& adapters() const { return model_->adapters; }  ///< Of any layer.
   /// A block of the network begins here.
   void begin_block() const {
     if (model_->before_block) model_->before_block();

@@ -1,7 +1,8 @@
-// What all copies of a StableDiffusion share. For this room alone.
+// What copies of a StableDiffusion share. For this room alone.
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "engine/core/result.h"
 #include "engine/diffusion/adapter.h"
@@ -15,15 +16,15 @@ namespace engine::diffusion {
 
 struct StableDiffusion::Networks {
   weights::Configs configs;
-  std::string digest;  ///< Of all that was read of the checkpoint.
   Tokenizer tokenizer;
   Parameters unet, autoencoder, text_encoder;
 
   /// What the UNet attends to of a prompt: [1, 77, width].
-  ///   name     of the option that the prompt is, for errors
-  ///   adapter  of the text encoder; null: none
-  ///   errors   those of Tokenizer::encode()
-  [[nodiscard]] Result<Tensor> context_of(const std::string& prompt, const char* name, const Adapter* adapter) const;
+  ///   name      of the option that the prompt is, for errors
+  ///   adapters  of the text encoder
+  ///   errors    those of Tokenizer::encode()
+  [[nodiscard]] Result<Tensor> context_of(const std::string& prompt, const char* name,
+                                          const std::vector<Adapter>& adapters) const;
 };
 
 }  // namespace engine::diffusion

@@ -174,11 +174,12 @@ Result<void> StableDiffusionRepainter::fine_tune(std::span<const correct::Histor
                                            options_);
     Going going(advance);
     const Model autoencoder{.parameters = networks.autoencoder, .before_block = going.asked()};
-    const Model unet{.parameters = networks.unet, .adapter = &learned_->adapter, .before_block = going.asked()};
+    // Without an adapter of the model's own: one that was distilled to take few steps would be taught to take many.
+    const Model unet{.parameters = networks.unet, .adapters = {learned_->adapter}, .before_block = going.asked()};
     Result<Tensor> context = fail(ErrorCode::internal, "");
     {
       const at::NoGradGuard no_gradients;
-      context = networks.context_of(options_.prompt, "prompt", nullptr);
+      context = networks.context_of(options_.prompt, "prompt", {});
     }
     if (!context) return propagate(context);
     // A picture is encoded when it is first drawn: 50 views of 1.5's size are 13 MB of moments, and hours less.
@@ -246,7 +247,7 @@ Result<std::vector<scene::Image>> StableDiffusionRepainter::repaint(std::span<co
 }
 
 std::string StableDiffusionRepainter::state() const {
-  const std::string& model = model_.networks().digest;
+  const std::string& model = model_.digest();
   if (!learned_) return weights::encode_tensors({}, {{model_key, model}});
   std::map<std::string, weights::FloatTensor> tensors;
   const AdamW::Moments moments = learned_->optimiser.moments();
@@ -268,7 +269,7 @@ Result<void> StableDiffusionRepainter::restore(std::string_view state) {
   auto file = weights::TensorFile::parse(std::move(bytes), "checkpoint");
   if (!file) return fail(ErrorCode::corrupt_data, file.error().message, "checkpoint");
   const auto model = file->metadata().find(model_key);
-  if (model == file->metadata().end() || model->second != model_.networks().digest)
+  if (model == file->metadata().end() || model->second != model_.digest())
     return fail(ErrorCode::conflict,
                 "the files of the diffusion model have changed since the edit began: what it has painted so far does "
                 "not go with what they would paint; submit it again",

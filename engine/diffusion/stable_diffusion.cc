@@ -8,8 +8,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <utility>
+#include <vector>
 
 #include "engine/core/finite.h"
 #include "engine/core/rng.h"
@@ -36,18 +36,17 @@ void fill_normal(std::span<float> values, std::uint64_t seed, Stream stream, std
 }  // namespace
 
 Result<Tensor> StableDiffusion::Networks::context_of(const std::string& prompt, const char* name,
-                                                     const Adapter* adapter) const {
+                                                     const std::vector<Adapter>& adapters) const {
   auto pieces = tokenizer.encode(prompt, std::size_t(configs.text_encoder.positions));
   if (!pieces) return fail(pieces.error().code, std::move(pieces.error().message), name);
   Tensor numbers = at::empty({1, std::int64_t(pieces->size())}, at::kLong);
   std::ranges::copy(*pieces, numbers.data_ptr<std::int64_t>());
-  return encode_text({text_encoder, adapter}, configs.text_encoder, numbers);
+  return encode_text({text_encoder, adapters}, configs.text_encoder, numbers);
 }
 
+/// Of both networks.
 struct StableDiffusion::Adapters {
-  std::optional<Adapter> unet, text_encoder;
-
-  static const Adapter* pointer(const std::optional<Adapter>& adapter) { return adapter ? &*adapter : nullptr; }
+  std::vector<Adapter> unet, text_encoder;
 };
 
 Result<StableDiffusion> StableDiffusion::open(const std::filesystem::path& path) {
@@ -64,21 +63,30 @@ Result<StableDiffusion> StableDiffusion::open(const std::filesystem::path& path)
   if (!text_encoder) return propagate(text_encoder);
   const auto of_tensors = checkpoint->digest();
   if (!of_tensors) return propagate(of_tensors);
-  std::string digest = *of_tensors + vocabulary->digest;
   StableDiffusion opened;
-  opened.networks_ = std::make_shared<const Networks>(Networks{
-      checkpoint->configs(), std::move(digest), Tokenizer(std::move(*vocabulary)), *unet, *autoencoder, *text_encoder});
-  opened.adapters_ = std::make_shared<const Adapters>();
+  opened.digest_ = *of_tensors + vocabulary->digest;
+  opened.networks_ = std::make_shared<const Networks>(
+      Networks{checkpoint->configs(), Tokenizer(std::move(*vocabulary)), *unet, *autoencoder, *text_encoder});
+  opened.staying_ = opened.adapters_ = std::make_shared<const Adapters>();
   return opened;
+}
+
+Result<StableDiffusion> StableDiffusion::with(const weights::AdapterWeights& weights) const {
+  StableDiffusion adapted = *this;
+  adapted.adapters_ = staying_;
+  if (const auto put = adapted.adapt(weights); !put) return propagate(put);
+  adapted.staying_ = adapted.adapters_;
+  adapted.digest_ += weights::digest_of(weights);
+  return adapted;
 }
 
 Result<void> StableDiffusion::adapt(const weights::AdapterWeights& weights, double factor) {
   if (!std::isfinite(factor)) return fail(ErrorCode::invalid_argument, "expected a finite number", "factor");
   if (const auto checked = weights::check_adapter(weights, networks_->configs); !checked) return propagate(checked);
   return guarded("adapter", [&]() -> Result<void> {
-    auto adapters = std::make_shared<Adapters>();
-    if (!weights.unet.empty()) adapters->unet.emplace(weights.unet).scale_by(factor);
-    if (!weights.text_encoder.empty()) adapters->text_encoder.emplace(weights.text_encoder).scale_by(factor);
+    auto adapters = std::make_shared<Adapters>(*staying_);
+    if (!weights.unet.empty()) adapters->unet.emplace_back(weights.unet).scale_by(factor);
+    if (!weights.text_encoder.empty()) adapters->text_encoder.emplace_back(weights.text_encoder).scale_by(factor);
     adapters_ = std::move(adapters);
     return {};
   });
@@ -130,16 +138,14 @@ Result<scene::Image> StableDiffusion::repaint(const scene::Image& picture, const
     const at::NoGradGuard no_gradients;
     const auto scheduler = make_scheduler(all.noise, options.sampling);
     if (scheduler->timesteps().empty()) return picture;
-    const Adapter* text_adapter = Adapters::pointer(adapters_->text_encoder);
-    const auto negative = networks_->context_of(options.negative_prompt, "negative_prompt", text_adapter);
+    const auto negative = networks_->context_of(options.negative_prompt, "negative_prompt", adapters_->text_encoder);
     if (!negative) return propagate(negative);
-    const auto positive = networks_->context_of(options.prompt, "prompt", text_adapter);
+    const auto positive = networks_->context_of(options.prompt, "prompt", adapters_->text_encoder);
     if (!positive) return propagate(positive);
 
     Going going(advance);
     const Model autoencoder{.parameters = networks_->autoencoder, .before_block = going.asked()};
-    const Model unet{
-        .parameters = networks_->unet, .adapter = Adapters::pointer(adapters_->unet), .before_block = going.asked()};
+    const Model unet{.parameters = networks_->unet, .adapters = adapters_->unet, .before_block = going.asked()};
     // Encoding and decoding take about as long as a call of the UNet does.
     const double calls = double(scheduler->timesteps().size()) + 2;
     const auto after = [&](double done) { return going.at(done / calls); };

@@ -40,7 +40,10 @@ class StableDiffusion {
   ///         vocabulary has more pieces than the text encoder
   [[nodiscard]] static Result<StableDiffusion> open(const std::filesystem::path& path);
 
-  /// Puts an adapter on the networks, or takes it off (no layers).
+  /// The same networks with an adapter on them that stays, beside whatever adapt() puts on.
+  ///   errors  those of weights::check_adapter(); too_large
+  [[nodiscard]] Result<StableDiffusion> with(const weights::AdapterWeights& weights) const;
+  /// Puts an adapter on the networks in place of the one before, or takes that off (no layers).
   ///   factor  multiplies its scales; finite
   ///   errors  those of weights::check_adapter(); invalid_argument ("factor"); too_large. The adapter of before stays
   [[nodiscard]] Result<void> adapt(const weights::AdapterWeights& weights, double factor = 1);
@@ -48,6 +51,8 @@ class StableDiffusion {
   /// Sides of pictures are multiples of this: 64 for Stable Diffusion 1.x and 2.x.
   [[nodiscard]] int side_multiple() const;
   [[nodiscard]] const weights::Configs& configs() const;
+  /// Of all that was read of the checkpoint and of adapters that stay.
+  [[nodiscard]] const std::string& digest() const { return digest_; }
 
   /// The picture as the prompt describes it; the less strength, the nearer to what it was. Without a step (little
   /// strength) it is given back as it is.
@@ -71,7 +76,8 @@ class StableDiffusion {
   struct Adapters;
   [[nodiscard]] Result<void> check(const scene::Image& picture) const;
   std::shared_ptr<const Networks> networks_;
-  std::shared_ptr<const Adapters> adapters_;
+  std::shared_ptr<const Adapters> staying_, adapters_;  ///< The second with that of adapt().
+  std::string digest_;
 };
 
 }  // namespace engine::diffusion

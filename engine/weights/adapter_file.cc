@@ -13,6 +13,7 @@
 #include "engine/core/finite.h"
 #include "engine/io/json_fields.h"
 #include "engine/io/read_bytes.h"
+#include "engine/weights/digest.h"
 
 namespace engine::weights {
 namespace {
@@ -324,6 +325,31 @@ Result<void> check_adapter(const AdapterWeights& weights, const Configs& configs
     }
   }
   return {};
+}
+
+std::uint64_t AdapterWeights::bytes() const {
+  std::uint64_t numbers = 0;
+  for (const auto* layers : {&unet, &text_encoder})
+    for (const auto& [layer, pair] : *layers) numbers += pair.down.values.size() + pair.up.values.size();
+  return sizeof(float) * numbers;
+}
+
+std::string digest_of(const AdapterWeights& weights) {
+  Digest digest;
+  const auto add = [&](const FloatTensor& tensor) {
+    digest.add(std::as_bytes(std::span(tensor.shape)));
+    digest.add(std::as_bytes(std::span(tensor.values)));
+  };
+  for (const auto* layers : {&weights.unet, &weights.text_encoder}) {
+    digest.add(std::to_string(layers->size()));
+    for (const auto& [layer, pair] : *layers) {
+      digest.add(layer);
+      add(pair.down);
+      add(pair.up);
+      digest.add(std::as_bytes(std::span(&pair.scale, 1)));
+    }
+  }
+  return digest.text();
 }
 
 std::string encode_adapter(const AdapterWeights& weights) {

@@ -2,6 +2,7 @@
 // Source: Hu et al. 2021, "LoRA: low-rank adaptation of large language models", eq. 3: W x + (alpha / r) B A x.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -25,6 +26,8 @@ struct LowRank {
 /// Layers by the names of their networks: "mid_block.attentions.0.transformer_blocks.0.attn1.to_q".
 struct AdapterWeights {
   std::map<std::string, LowRank> unet, text_encoder;
+
+  [[nodiscard]] std::uint64_t bytes() const;  ///< Of its numbers, in memory.
 };
 
 /// What peft's configuration says of an adapter's layers.
@@ -51,9 +54,11 @@ struct AdapterSettings {
 
 /// May these layers be put on the networks? What decode_adapter() gives may.
 ///   errors  invalid_argument: a layer that the networks do not have, shapes that do not fit it, or a number that is
-///   not
-///           finite; `where` names the layer
+///           not finite; `where` names the layer
 [[nodiscard]] Result<void> check_adapter(const AdapterWeights& weights, const Configs& configs);
+
+/// Of all that is used of it: names, shapes, numbers and scales.
+[[nodiscard]] std::string digest_of(const AdapterWeights& weights);
 
 /// The file that diffusers' training scripts write today ("unet.LAYER.lora.down.weight"). It has no place for a scale:
 /// one other than 1 is multiplied into B.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <system_error>
 
@@ -40,11 +41,8 @@ Result<std::vector<std::pair<std::string, std::string>>> parse_merges(std::strin
   return merges;
 }
 
-Result<void> read_numbers(const std::filesystem::path& path, int pieces, Vocabulary& vocabulary, Digest& digest) {
-  const auto bytes = io::read_bytes(path, max_vocabulary_bytes);
-  if (!bytes) return propagate(bytes);
-  digest.add(*bytes);
-  const auto document = io::parse_json(*bytes, "vocab.json");
+Result<void> parse_numbers(std::span<const std::byte> json, int pieces, Vocabulary& vocabulary) {
+  const auto document = io::parse_json(json, "vocab.json");
   if (!document) return propagate(document);
   if (!document->is_object()) return fail(ErrorCode::corrupt_data, "expected an object", "vocab.json");
   for (const auto& [piece, number] : document->items()) {
@@ -64,11 +62,8 @@ Result<void> read_numbers(const std::filesystem::path& path, int pieces, Vocabul
 }
 
 /// "pad_token" of special_tokens_map.json: a text, or an object with one as its content.
-Result<int> read_filler(const std::filesystem::path& path, const Vocabulary& vocabulary, Digest& digest) {
-  const auto bytes = io::read_bytes(path, max_vocabulary_bytes);
-  if (!bytes) return propagate(bytes);
-  digest.add(*bytes);
-  const auto document = io::parse_json(*bytes, "special_tokens_map.json");
+Result<int> parse_filler(std::span<const std::byte> json, const Vocabulary& vocabulary) {
+  const auto document = io::parse_json(json, "special_tokens_map.json");
   if (!document) return propagate(document);
   std::optional<Error> error;
   const io::JsonFields fields(*document, "special_tokens_map.json:", error);
@@ -116,20 +111,37 @@ Vocabulary clip_vocabulary(std::vector<std::pair<std::string, std::string>> merg
 }
 
 Result<Vocabulary> read_vocabulary(const std::filesystem::path& folder, bool open_clip, int pieces) {
-  Vocabulary vocabulary;
-  Digest digest;
-  if (const auto read = read_numbers(folder / "vocab.json", pieces, vocabulary, digest); !read) return propagate(read);
-  const auto bytes = io::read_bytes(folder / "merges.txt", max_vocabulary_bytes);
-  if (!bytes) return propagate(bytes);
-  digest.add(*bytes);
-  auto merges = parse_merges({reinterpret_cast<const char*>(bytes->data()), bytes->size()}, "merges.txt");
-  if (!merges) return propagate(merges);
-  vocabulary.merges = std::move(*merges);
+  VocabularyFiles files;
+  for (const auto& [name, bytes] :
+       {std::pair("vocab.json", &files.vocab_json), std::pair("merges.txt", &files.merges_txt)}) {
+    auto read = io::read_bytes(folder / name, max_vocabulary_bytes);
+    if (!read) return propagate(read);
+    *bytes = std::move(*read);
+  }
   const auto special = folder / "special_tokens_map.json";
   std::error_code ignored;
-  vocabulary.filler = open_clip ? 0 : vocabulary.end;
   if (std::filesystem::is_regular_file(special, ignored)) {
-    const auto filler = read_filler(special, vocabulary, digest);
+    auto read = io::read_bytes(special, max_vocabulary_bytes);
+    if (!read) return propagate(read);
+    files.special_tokens_map_json = std::move(*read);
+  }
+  return parse_vocabulary(files, open_clip, pieces);
+}
+
+Result<Vocabulary> parse_vocabulary(const VocabularyFiles& files, bool open_clip, int pieces) {
+  Vocabulary vocabulary;
+  Digest digest;
+  digest.add(files.vocab_json);
+  if (const auto parsed = parse_numbers(files.vocab_json, pieces, vocabulary); !parsed) return propagate(parsed);
+  digest.add(files.merges_txt);
+  auto merges =
+      parse_merges({reinterpret_cast<const char*>(files.merges_txt.data()), files.merges_txt.size()}, "merges.txt");
+  if (!merges) return propagate(merges);
+  vocabulary.merges = std::move(*merges);
+  vocabulary.filler = open_clip ? 0 : vocabulary.end;
+  if (files.special_tokens_map_json) {
+    digest.add(*files.special_tokens_map_json);
+    const auto filler = parse_filler(*files.special_tokens_map_json, vocabulary);
     if (!filler) return propagate(filler);
     vocabulary.filler = *filler;
   }

@@ -1,7 +1,9 @@
 // The vocabulary of a text encoder: pieces of words, their numbers, and how letters merge into pieces.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <utility>
@@ -33,5 +35,13 @@ struct Vocabulary {
 ///   errors     not_found: a file is missing; corrupt_data: not as such files are, a mark is missing, or a number is
 ///              none of a piece; `where` is "FILE:PLACE"
 [[nodiscard]] Result<Vocabulary> read_vocabulary(const std::filesystem::path& folder, bool open_clip, int pieces);
+
+/// The bytes of those files.
+struct VocabularyFiles {
+  std::vector<std::byte> vocab_json, merges_txt;
+  std::optional<std::vector<std::byte>> special_tokens_map_json;  ///< Null: there is none.
+};
+/// The same of files in memory.
+[[nodiscard]] Result<Vocabulary> parse_vocabulary(const VocabularyFiles& files, bool open_clip, int pieces);
 
 }  // namespace engine::weights

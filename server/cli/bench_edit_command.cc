@@ -176,7 +176,7 @@ Result<void> run(const BenchOptions& options, Terminal& terminal) {
   apply(options, any);
   const bool by_lpips = any.params.perceptual == proto::Perceptual::lpips && !options.model_dir.empty();
   if (!by_lpips)  // else lpips_of() says so
-    if (auto all = edits::available(any.params, nullptr); !all) return all;
+    if (auto all = edits::available({}, any.params, nullptr); !all) return all;
   if (auto made = make_folder(path(options.out) / "results"); !made) return made;
   return compute(options.compute, [&](const Machine& machine) -> Result<void> {
     if (options.captures.on) return run_captures(options, machine, terminal);

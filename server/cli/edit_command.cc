@@ -80,7 +80,7 @@ Result<BothRequests> load_request(const EditOptions& options, const models::Mode
   if (!file) return propagate(file);
   auto request = edits::to_engine(file->request);
   if (request)
-    if (const auto all = edits::available(request->params, &models); !all) request = propagate(all);
+    if (const auto all = edits::available(file->request, request->params, &models); !all) request = propagate(all);
   if (request && !file->request.selection)  // else it is whole only once that has been carried out
     if (const auto valid = edit::validate(*request); !valid) request = propagate(valid);
   if (!request) {

@@ -51,10 +51,10 @@ edit::Tools Toolbox::tools() const {
   return {corrector.get(), perceptual.get(), repainter.get(), repaint_time, perceptual_pixel_seconds};
 }
 
-models::Costs costs_of(const edit::Params& params, const models::Models* models) {
+models::Costs costs_of(const proto::EditRequest& request, const edit::Params& params, const models::Models* models) {
   models::Costs costs;
   if (models == nullptr) return costs;
-  if (uses_diffusion(params)) costs.repainter = models->cost(params);
+  if (uses_diffusion(params)) costs.repainter = models->cost(params, request.lora.value_or(""));
   if (uses_lpips(params)) costs.perceptual = models->lpips_cost();
   return costs;
 }
@@ -65,12 +65,13 @@ edit::RepaintTime repaint_time_of(const models::RepainterCost& cost) {
 
 engine::Result<Toolbox> make_toolbox(const proto::EditRequest& request, const edit::Params& params,
                                      const models::Models* models) {
-  if (auto all = available(params, models); !all) return engine::propagate(all);
+  if (auto all = available(request, params, models); !all) return engine::propagate(all);
   Toolbox box;
   // What a diffusion model repaints is completed by patches before.
   if (params.corrector != proto::Corrector::none) box.corrector = std::make_unique<engine::correct::SceneCorrector>();
   if (uses_diffusion(params)) {
-    auto repainter = models->repainter(params, {request.prompt.value_or(""), request.negative_prompt.value_or("")});
+    auto repainter = models->repainter(
+        params, {request.prompt.value_or(""), request.negative_prompt.value_or(""), request.lora.value_or("")});
     if (!repainter) return engine::propagate(repainter);
     box.repainter = std::move(*repainter);
   }
@@ -79,13 +80,14 @@ engine::Result<Toolbox> make_toolbox(const proto::EditRequest& request, const ed
     if (!loss) return engine::propagate(loss);
     box.perceptual = std::move(*loss);
   }
-  const models::Costs costs = costs_of(params, models);
+  const models::Costs costs = costs_of(request, params, models);
   if (costs.repainter) box.repaint_time = repaint_time_of(*costs.repainter);
   if (costs.perceptual) box.perceptual_pixel_seconds = costs.perceptual->pixel_seconds;
   return box;
 }
 
-engine::Result<void> available(const edit::Params& params, const models::Models* models) {
+engine::Result<void> available(const proto::EditRequest& request, const edit::Params& params,
+                               const models::Models* models) {
   const auto unsupported = [](const std::string& message, const char* where) {
     return engine::fail(engine::ErrorCode::unsupported, message, where);
   };
@@ -95,6 +97,14 @@ engine::Result<void> available(const edit::Params& params, const models::Models*
     return unsupported("there is no corrector \"sd\" here: " + there_are.no_sd() +
                            "; available: \"scene\", which is the default, and \"none\"",
                        "params.corrector");
+  if (uses_diffusion(params) && request.lora) {
+    const std::vector<std::string> loras = there_are.loras();
+    if (std::ranges::find(loras, *request.lora) == loras.end()) {
+      std::string names;
+      for (const std::string& name : loras) names += (names.empty() ? "\"" : ", \"") + name + '"';
+      return unsupported("there is no such adapter here; available: " + (names.empty() ? "none" : names), "lora");
+    }
+  }
   if (params.perceptual == proto::Perceptual::lpips && !there_are.no_lpips().empty())
     return unsupported("there is no perceptual loss \"lpips\" here: " + there_are.no_lpips() +
                            "; available: \"msssim\", which is the default",
@@ -167,6 +177,7 @@ std::vector<std::string> fields_without_effect(const proto::EditRequest& request
   const bool paints = uses_diffusion(params), corrects = uses_corrector(params);
   if (!paints && request.prompt) fields.emplace_back("prompt");
   if (!paints && request.negative_prompt) fields.emplace_back("negative_prompt");
+  if (!paints && request.lora) fields.emplace_back("lora");
   if (request.attach && request.mode == proto::Mode::remove) fields.emplace_back("attach");  // nothing of it stays
   if (!corrects && request.heal) fields.emplace_back("heal");
   proto::Params given = request.params;

@@ -60,16 +60,20 @@ struct Toolbox {
 [[nodiscard]] engine::Result<Toolbox> make_toolbox(const proto::EditRequest& request,
                                                    const engine::edit::Params& params, const models::Models* models);
 
-/// What the models that these parameters name take.
+/// What the models that the request names take.
+///   params  of to_engine(request)
 ///   models  null: there are none
-[[nodiscard]] models::Costs costs_of(const engine::edit::Params& params, const models::Models* models);
+[[nodiscard]] models::Costs costs_of(const proto::EditRequest& request, const engine::edit::Params& params,
+                                     const models::Models* models);
 /// How long a repainter takes, for plans.
 [[nodiscard]] engine::edit::RepaintTime repaint_time_of(const models::RepainterCost& cost);
 
-/// Are the corrector and the perceptual loss that these parameters name to be had?
+/// Are the corrector, its adapter and the perceptual loss that the request names to be had?
+///   params  of to_engine(request)
 ///   models  null: there are none
 ///   errors  unsupported: no (`where` is "params.corrector", say), and what it takes
-[[nodiscard]] engine::Result<void> available(const engine::edit::Params& params, const models::Models* models);
+[[nodiscard]] engine::Result<void> available(const proto::EditRequest& request, const engine::edit::Params& params,
+                                             const models::Models* models);
 
 /// The engine's request, with what was left open filled in from the preset. Of a selection it says nothing yet, and
 /// radii that are left to one are 0: see hand_over(). Whether models that it names are there says available().

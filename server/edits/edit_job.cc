@@ -114,7 +114,7 @@ class Run {
     auto request = to_engine(asked_);
     if (!request) return propagate(request);
     request_ = std::move(*request);
-    if (auto all = available(request_.params, workshop_.models); !all) return all;
+    if (auto all = available(asked_, request_.params, workshop_.models); !all) return all;
     const auto about = workshop_.scenes.find(scene_id());
     if (!about) return propagate(about);
     if (about->up) request_.up = *about->up;

@@ -127,7 +127,7 @@ Result<Checked> check(scenes::SceneStore& scenes, Selections& selections, const 
                       const proto::EditRequest& asked) {
   auto request = to_engine(asked);
   if (!request) return propagate(request);
-  if (auto all = available(request->params, models); !all) return propagate(all);
+  if (auto all = available(asked, request->params, models); !all) return propagate(all);
   if (!asked.selection)  // else the request is whole only once that has been carried out
     if (const auto valid = edit::validate(*request); !valid) return propagate(valid);
   auto version = scenes.load(*asked.scene, std::to_string(*asked.version));
@@ -227,7 +227,7 @@ struct EditService::Impl {
     const auto cameras = cameras_of(dataset->get());
     const auto& [request, version, preview, warnings] = out.checked;
     const bool corrected = uses_corrector(request.params);
-    const models::Costs costs = costs_of(request.params, options.models);
+    const models::Costs costs = costs_of(asked, request.params, options.models);
     out.work = memory_workload_of(version.cloud, request, preview, cameras, corrected, options.pictured_views);
     add_models(out.work, costs);
     // Before frames are rendered to see how long they take.

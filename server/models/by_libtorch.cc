@@ -9,6 +9,7 @@
 #include "engine/diffusion/lpips.h"
 #include "engine/diffusion/repainter.h"
 #include "engine/diffusion/stable_diffusion.h"
+#include "engine/weights/adapter_file.h"
 #include "engine/weights/checkpoint.h"
 #include "server/models/lpips_folder.h"
 #include "server/models/models.h"
@@ -46,10 +47,10 @@ diffusion::Sampler sampler_of(params::Sampler sampler) {
   return diffusion::Sampler::dpmpp2m;
 }
 
-diffusion::RepainterOptions options_of(const params::Params& params, const Prompts& prompts, int threads) {
+diffusion::RepainterOptions options_of(const params::Params& params, const Wishes& wishes, int threads) {
   diffusion::RepainterOptions options;
-  if (!prompts.prompt.empty()) options.prompt = prompts.prompt;
-  options.negative_prompt = prompts.negative;
+  if (!wishes.prompt.empty()) options.prompt = wishes.prompt;
+  options.negative_prompt = wishes.negative_prompt;
   options.guidance = params.guidance;
   options.sampling.sampler = sampler_of(params.sampler);
   options.sampling.steps = params.sampling_steps;
@@ -79,7 +80,7 @@ bool Models::has_libtorch() { return true; }
 std::shared_ptr<Models::Loaded> Models::nothing_loaded() { return std::make_shared<Loaded>(); }
 
 Result<std::unique_ptr<engine::correct::Repainter>> Models::repainter(const params::Params& params,
-                                                                      const Prompts& prompts) const {
+                                                                      const Wishes& wishes) const {
   if (!no_sd_.empty()) return fail(ErrorCode::unsupported, no_sd_, "params.corrector");
   std::optional<diffusion::StableDiffusion> model;
   {
@@ -91,12 +92,21 @@ Result<std::unique_ptr<engine::correct::Repainter>> Models::repainter(const para
     }
     model = loaded_->sd;
   }
-  auto made = diffusion::StableDiffusionRepainter::create(std::move(*model), options_of(params, prompts, threads_));
+  if (!wishes.lora.empty()) {
+    const auto lora = loras_.find(wishes.lora);
+    if (lora == loras_.end()) return fail(ErrorCode::unsupported, "there is no such adapter", "lora");
+    const auto adapter = engine::weights::read_adapter(lora->second.file, model->configs());
+    if (!adapter) return propagate(adapter);
+    auto adapted = model->with(*adapter);
+    if (!adapted) return propagate(adapted);
+    model = std::move(*adapted);
+  }
+  auto made = diffusion::StableDiffusionRepainter::create(std::move(*model), options_of(params, wishes, threads_));
   if (!made) return about_parameter(made.error());
   return std::unique_ptr<engine::correct::Repainter>(std::move(*made));
 }
 
-RepainterCost Models::cost(const params::Params& params) const {
+RepainterCost Models::cost(const params::Params& params, const std::string& lora) const {
   if (!no_sd_.empty()) return {};
   const auto checkpoint = engine::weights::Checkpoint::open(checkpoint_);
   if (!checkpoint) return {};  // it was there when it was looked at; making the repainter will say what is wrong
@@ -104,10 +114,11 @@ RepainterCost Models::cost(const params::Params& params) const {
   const auto one_thread = diffusion::seconds_of(checkpoint->configs(), options);
   const auto bytes = diffusion::bytes_of(checkpoint->configs(), options);
   const double faster = faster_on(threads_);
+  const auto adapter = loras_.find(lora);
   return {one_thread.training_step / faster,
           one_thread.picture / faster,
           one_thread.full_strength / faster,
-          bytes.networks,
+          bytes.networks + (adapter == loras_.end() ? 0 : adapter->second.bytes),
           bytes.painting,
           bytes.learning};
 }

@@ -1,8 +1,10 @@
 #include "server/models/models.h"
 
+#include <map>
 #include <system_error>
 #include <utility>
 
+#include "engine/weights/adapter_file.h"
 #include "engine/weights/checkpoint.h"
 #include "engine/weights/vocabulary.h"
 #include "server/models/lpips_folder.h"
@@ -62,6 +64,20 @@ Finding look_at_lpips(const fs::path& folder) {
   return {"lpips", true, (folder / "lpips").string()};
 }
 
+/// Files of adapters below the model folder, by name. What is there under two names of files is taken by the first.
+std::map<std::string, fs::path> adapter_files(const fs::path& folder) {
+  std::map<std::string, fs::path> files;
+  std::error_code unreachable;  // then there are none
+  for (const auto& entry : fs::directory_iterator(folder / "lora", unreachable)) {
+    const fs::path& path = entry.path();
+    if (path.extension() == ".safetensors") files.emplace(path.stem().string(), path);
+    // As diffusers and peft publish them.
+    for (const char* name : {"pytorch_lora_weights.safetensors", "adapter_model.safetensors"})
+      if (is_there(path / name)) files.emplace(path.filename().string(), path / name);
+  }
+  return files;
+}
+
 }  // namespace
 
 Models::Models(fs::path folder, int threads)
@@ -74,6 +90,7 @@ Models::Models(fs::path folder, int threads)
       if (checkpoint_.empty() && is_there(folder_ / name)) checkpoint_ = folder_ / name;
     findings_ = {look_at_checkpoint(folder_, checkpoint_), look_at_lpips(folder_)};
   }
+  if (findings_[0].usable) look_at_adapters();
   const auto why_not = [&](Finding& finding, const std::string& what) -> std::string {
     if (!has_libtorch()) {
       finding = {finding.name, false, without_libtorch + std::string(finding.usable ? "; its files are there" : ""),
@@ -86,6 +103,24 @@ Models::Models(fs::path folder, int threads)
   };
   no_sd_ = why_not(findings_[0], "no checkpoint of Stable Diffusion that can be used is installed");
   no_lpips_ = why_not(findings_[1], "the networks of LPIPS are not installed");
+}
+
+void Models::look_at_adapters() {
+  const auto checkpoint = weights::Checkpoint::open(checkpoint_);
+  if (!checkpoint) return;  // it was there a moment ago: whoever uses it is told
+  for (const auto& [name, file] : adapter_files(folder_)) {
+    const auto adapter = weights::read_adapter(file, checkpoint->configs());
+    if (adapter) loras_.emplace(name, Lora{file, adapter->bytes()});
+    findings_.push_back(
+        {"lora " + name, adapter.has_value(), file.string() + (adapter ? "" : ": " + described(adapter.error()))});
+  }
+}
+
+std::vector<std::string> Models::loras() const {
+  std::vector<std::string> names;
+  if (no_sd_.empty())
+    for (const auto& [name, lora] : loras_) names.push_back(name);
+  return names;
 }
 
 }  // namespace server::models

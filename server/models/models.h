@@ -1,6 +1,7 @@
 // Pre-trained networks below the model folder (--model-dir): which there are, and what edits use of them.
 //   DIR/stable-diffusion/              a checkpoint of Stable Diffusion 1.x or 2.x-base as diffusers writes it, or
 //   DIR/stable-diffusion.safetensors   one in the first authors' layout, with DIR/tokenizer/
+//   DIR/lora/NAME.safetensors          adapters of low rank for it, or folders DIR/lora/NAME/ as they are published
 //   DIR/lpips/vgg16.safetensors        VGG16 of torchvision
 //   DIR/lpips/vgg_v0.1.safetensors     LPIPS's own weights
 // docs/stable-diffusion.md says where they come from.
@@ -8,6 +9,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -24,16 +26,17 @@ using engine::Result;
 
 /// What was found of one model.
 struct Finding {
-  std::string name;  ///< As a request names it: "sd", "lpips".
+  std::string name;  ///< As a request names it: "sd", "lpips"; of an adapter "lora NAME".
   bool usable = false;
   std::string message;  ///< Of a usable one: what it is. Else what is missing and where it goes; names folders.
   bool absent = false;  ///< None of its files is there.
 };
 
 /// What a repainter is asked for beside the parameters.
-struct Prompts {
-  std::string prompt;    ///< Empty: diffusion::default_prompt.
-  std::string negative;  ///< What should not be seen.
+struct Wishes {
+  std::string prompt = {};           ///< Empty: diffusion::default_prompt.
+  std::string negative_prompt = {};  ///< What should not be seen.
+  std::string lora = {};             ///< The adapter that it paints with, one of Models::loras(). Empty: none.
 };
 
 /// What a repainter takes on this machine as it usually is; guessed from the sizes of the networks.
@@ -64,16 +67,21 @@ class Models {
   /// Why an edit cannot have it, in words for clients: they name no folder of this machine. Empty: it can.
   [[nodiscard]] const std::string& no_sd() const { return no_sd_; }
   [[nodiscard]] const std::string& no_lpips() const { return no_lpips_; }
-  /// Each model, for who installs them. Opens their files and looks at the shape of every tensor, but at no numbers.
+  /// Names of the adapters that `sd` can paint with, ascending.
+  [[nodiscard]] std::vector<std::string> loras() const;
+  /// Each model, for who installs them. Their files were opened, and every tensor's shape was looked at; of adapters
+  /// the numbers as well.
   [[nodiscard]] const std::vector<Finding>& findings() const { return findings_; }
 
   /// The corrector `sd`. The networks are opened when they are first asked for, and shared from then on.
   ///   params  guidance, sampler and the like
-  ///   errors  unsupported: no_sd(); those of StableDiffusion::open() and of diffusion::validate()
+  ///   errors  unsupported: no_sd(), or no such adapter ("lora"); those of StableDiffusion::open(), of read_adapter()
+  ///           and of diffusion::validate()
   [[nodiscard]] Result<std::unique_ptr<engine::correct::Repainter>> repainter(const engine::params::Params& params,
-                                                                              const Prompts& prompts) const;
+                                                                              const Wishes& wishes) const;
   /// What that will take. Zero where there is none.
-  [[nodiscard]] RepainterCost cost(const engine::params::Params& params) const;
+  ///   lora  of the wishes
+  [[nodiscard]] RepainterCost cost(const engine::params::Params& params, const std::string& lora) const;
   /// The loss `lpips`. Its files are read each time.
   ///   errors  unsupported: no_lpips(); those of weights::LpipsFiles::open() and Lpips::create()
   [[nodiscard]] Result<std::unique_ptr<engine::optim::PerceptualLoss>> lpips() const;
@@ -85,7 +93,16 @@ class Models {
   [[nodiscard]] static bool has_libtorch();
   [[nodiscard]] static std::shared_ptr<Loaded> nothing_loaded();
 
+  /// An adapter that can be used.
+  struct Lora {
+    std::filesystem::path file;
+    std::uint64_t bytes = 0;  ///< In memory.
+  };
+
+  void look_at_adapters();
+
   std::filesystem::path folder_, checkpoint_;
+  std::map<std::string, Lora> loras_;  ///< By name.
   int threads_;
   std::string no_sd_, no_lpips_;
   std::vector<Finding> findings_;

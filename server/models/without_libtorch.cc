@@ -12,11 +12,11 @@ bool Models::has_libtorch() { return false; }
 std::shared_ptr<Models::Loaded> Models::nothing_loaded() { return nullptr; }
 
 Result<std::unique_ptr<engine::correct::Repainter>> Models::repainter(const engine::params::Params& /*params*/,
-                                                                      const Prompts& /*prompts*/) const {
+                                                                      const Wishes& /*wishes*/) const {
   return fail(ErrorCode::unsupported, no_sd_, "params.corrector");
 }
 
-RepainterCost Models::cost(const engine::params::Params& /*params*/) const { return {}; }
+RepainterCost Models::cost(const engine::params::Params& /*params*/, const std::string& /*lora*/) const { return {}; }
 
 PerceptualCost Models::lpips_cost() const { return {}; }
 

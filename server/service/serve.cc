@@ -38,6 +38,7 @@ proto::ServiceInfo service_info(const ServeOptions& options, const models::Model
   info.threads = options.threads_here;
   info.correctors = {{"none", true, ""}, {"scene", true, ""}, {"sd", models.no_sd().empty(), models.no_sd()}};
   info.perceptual = {{"msssim", true, ""}, {"lpips", models.no_lpips().empty(), models.no_lpips()}};
+  info.loras = models.loras();
   for (const auto& format : engine::names<engine::io::SceneFormat>) info.read_formats.emplace_back(format.text);
   info.write_formats = info.read_formats;
   info.picture_formats = {"png", "jpeg", "exr"};

@@ -1,8 +1,9 @@
-// Files of tensors: the header, a checkpoint in one file, an adapter, and a network's configuration.
+// Files of tensors: the header, a checkpoint in one file, an adapter, LPIPS, and a network's configuration.
 #include <vector>
 
 #include "engine/weights/adapter_file.h"
 #include "engine/weights/checkpoint.h"
+#include "engine/weights/lpips_files.h"
 #include "engine/weights/networks.h"
 #include "tests/engine/weights/samples.h"
 #include "tests/fuzz/fuzz.h"
@@ -41,7 +42,9 @@ void fuzz::run(std::span<const std::byte> bytes) {
     demand(check_adapter(*adapter, tiny_configs()).has_value(), "an adapter that is accepted fits");
     demand(TensorFile::parse(bytes_of(encode_adapter(*adapter)), "a.safetensors").has_value(),
            "an adapter that is accepted can be written");
+    demand(digest_of(*adapter).size() == 16, "it has a digest");
   }
+  if (const LpipsFiles lpips{*file, *file}; lpips.check()) (void)lpips.digest();
   if (const auto checkpoint = Checkpoint::of_file(std::move(*file), tiny_configs())) (void)checkpoint->check();
 }
 

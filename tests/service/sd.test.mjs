@@ -5,7 +5,9 @@ import { existsSync } from 'node:fs';
 import { chmod, copyFile, cp, mkdir, readFile, symlink, truncate, writeFile } from 'node:fs/promises';
 import path from 'node:path';
 import { after, before, test } from 'node:test';
+import { launch } from './support/browser.mjs';
 import { summary } from './support/contract.mjs';
+import { openDesk, violations } from './support/desk.mjs';
 import { environment, root, run, Service, temporaryFolder } from './support/program.mjs';
 import { datasetZip, demoScene } from './support/scenes.mjs';
 
@@ -60,6 +62,8 @@ before(async () => {
       sampling_steps: 8, lora_rank: 2 } };
   if (skip) return;
   await symlink(path.join(golden, 'tiny_sd'), path.join(models, 'stable-diffusion'));
+  await mkdir(path.join(models, 'lora'));
+  await copyFile(path.join(golden, 'lora/diffusers_current.safetensors'), path.join(models, 'lora/few.safetensors'));
   await mkdir(path.join(models, 'lpips'));
   await writeFile(path.join(models, 'lpips/vgg16.safetensors'), vgg16());
   await copyFile(path.join(golden, 'lpips_lin/vgg_v0.1.safetensors'), path.join(models, 'lpips/vgg_v0.1.safetensors'));
@@ -109,7 +113,9 @@ test('models are listed with what is missing and where it goes', { skip }, async
   await assert.rejects(run('models', '--model-dir', damaged), ({ stdout: text }) => /lpips: .*vgg16\.safetensors:/.test(text));
   const empty = temporaryFolder();
   await assert.rejects(run('models', '--model-dir', empty), ({ stdout: text }) => text.includes(path.join(empty, 'stable-diffusion')) && text.includes('vgg16.safetensors'));
-  const { correctors, perceptual } = (await service.client.get('/v1/info')).json();
+  const { correctors, perceptual, loras } = (await service.client.get('/v1/info')).json();
+  assert.deepEqual(loras, ['few']);
+  assert.match(stdout, /\nlora few: ready, /);
   for (const [list, name] of [[correctors, 'sd'], [perceptual, 'lpips']]) assert.deepEqual(list.find((part) => part.name === name), { name, available: true, reason: null });
 });
 
@@ -133,10 +139,54 @@ test('the same request gives the same bytes, and prompt, seed and training make 
   const expected = await made();
   assert.deepEqual(await made(), expected);
   for (const [what, params, more] of [['seed', { seed: 1 }], ['training', { tuning_steps: 0 }], ['rank', { lora_rank: 1 }], ['prompt', {}, { prompt: 'a hat' }],
-    ['negative prompt', {}, { negative_prompt: 'a hat' }], ['guidance', { guidance: 1 }], ['sampler', { sampler: 'ddim' }], ['corrector', { corrector: 'scene' }]])
+    ['negative prompt', {}, { negative_prompt: 'a hat' }], ['guidance', { guidance: 1 }], ['sampler', { sampler: 'ddim' }], ['adapter', {}, { lora: 'few' }], ['corrector', { corrector: 'scene' }]])
     assert.notDeepEqual(await made(params, more), expected, what);
   const moved = await made({}, { mode: 'move' }); // what it has left is closed in space, and seeded
   assert.deepEqual(await made({}, { mode: 'move' }), moved);
+});
+
+test('an adapter that is not there is refused with those that are', { skip }, async () => {
+  const asked = { ...request, scene: scene.id, lora: '../few' };
+  const refused = await service.client.request('POST', '/v1/edits', { json: asked, expect: [422, 501] });
+  assert.equal(refused.json().where, 'lora');
+  assert.match(refused.json().detail, /available: "few"/);
+  const idle = { ...asked, params: { ...request.params, corrector: 'scene' } };
+  const { warnings } = (await service.client.post('/v1/edits', idle, { query: { validate_only: true } })).json();
+  assert.ok(warnings.some((warning) => /without effect.* lora/.test(warning)), warnings);
+});
+
+test('the page offers the adapters that are there, and asks with the one that is chosen', { skip }, async () => {
+  const browser = await launch();
+  try {
+    const { page, id, complaints } = await openDesk({ room: { browser }, service, scene: scene.id });
+    const exported = async () => {
+      const [download] = await Promise.all([page.waitForEvent('download'), id('export').click()]);
+      return JSON.parse(await readFile(await download.path(), 'utf8'));
+    };
+    const { params, ...wish } = request;
+    const file = JSON.stringify({ ...wish, scene: undefined, lora: 'gone', params: { ...params, corrector: 'scene' } });
+    await id('import-file').setInputFiles({ name: 'wish.json', mimeType: 'application/json', buffer: Buffer.from(file) });
+    await id('settings').locator('summary').click();
+    await id('other-params').getByText('adapter “gone”').waitFor();
+    await id('param-corrector').selectOption('sd');
+    assert.deepEqual(await id('lora').locator('option').allTextContents(), ['none', 'few', 'gone']);
+    assert.equal(await id('lora').inputValue(), 'gone');
+    await id('estimate').click();
+    await id('run-problem').getByText('available: "few"').waitFor();
+    await id('lora').selectOption('few');
+    assert.equal((await exported()).lora, 'few');
+    await id('estimate').click();
+    await id('estimate-answer').waitFor();
+    await page.keyboard.press('Control+z');
+    assert.equal(await id('lora').inputValue(), 'gone');
+    await id('lora').selectOption('');
+    assert.equal((await exported()).lora, undefined);
+    assert.deepEqual(await violations(page), []);
+    assert.deepEqual(complaints.filter((text) => !text.includes('422') && !text.includes('501')), []);
+    await page.context().close();
+  } finally {
+    await browser.close();
+  }
 });
 
 test('killed while it learns and while it paints, an edit ends with the same bytes', { skip }, async () => {

@@ -58,14 +58,14 @@ TEST_F(AdapterGolden, AddsWhatTheReferenceAddsInEveryLayoutAndScale) {
                                                       {"kohya_alpha8", "scale2"}};
   for (const int t : {1, 261, 741}) {
     const std::string prefix = "t" + std::to_string(t) + ".";
-    models->unet.adapter = nullptr;
+    models->unet.adapters.clear();
     EXPECT_TRUE(near(out(t), as_tensor(file.at(prefix + "base")), 2e-5));
     for (const auto& [layout, scaled] : layouts) {
       const auto weights =
           weights::read_adapter(support::golden_dir() / "lora" / (layout + ".safetensors"), models->configs());
       ASSERT_TRUE(weights) << weights.error().where;
       Adapter adapter(weights->unet);
-      models->unet.adapter = &adapter;
+      models->unet.adapters = {adapter};
       EXPECT_TRUE(near(out(t), as_tensor(file.at(prefix + scaled)), 2e-5)) << layout;
       if (layout != "diffusers_current") continue;
       EXPECT_TRUE(near(out(t), as_tensor(file.at(prefix + "merged_scale1")), 2e-5));
@@ -95,7 +95,7 @@ TEST_F(AdapterGolden, MergedWeightsAreTheSumOfBoth) {
 /// Twenty steps from one start: "B0" has B = 0, "Bn" has not.
 void train(TinyModels& models, const support::TensorFile& file, const std::string& start) {
   const Adapter adapter(layers_of(file, start + ".init.", 1));
-  models.unet.adapter = &adapter;
+  models.unet.adapters = {adapter};
   std::vector<Tensor> trained;
   adapter.collect(trained);
   ASSERT_EQ(trained.size(), 256u);
@@ -150,7 +150,7 @@ TEST_F(AdapterGolden, TrainingFromElsewhereIsTheReferences) { train(*models, gol
 TEST_F(AdapterGolden, OnTheTextEncoderWithGradientsThroughBothNetworks) {
   const auto file = golden("lora_text_encoder.safetensors"), train_file = golden("lora_train.safetensors");
   const Adapter adapter(layers_of(file, "lora.", 2));
-  models->text_encoder.adapter = &adapter;
+  models->text_encoder.adapters = {adapter};
   std::vector<Tensor> trained;
   adapter.collect(trained);
   ASSERT_EQ(trained.size(), 8u);

@@ -93,7 +93,7 @@ TEST(Training, LowersTheLossOnWhatItLearnsFromAndRefusesPoison) {
   ASSERT_TRUE(checkpoint);
   const Adapter adapter =
       Adapter::fresh(weights::tensors_of(configs.unet), {"to_q", "to_k", "to_v", "to_out.0"}, 2, 8, 1);
-  const Model unet{Parameters::load(*checkpoint, weights::Network::unet).value(), &adapter};
+  const Model unet{Parameters::load(*checkpoint, weights::Network::unet).value(), {adapter}};
   Tensor latents = at::empty({2, 4, 8, 8}), noise = at::empty({2, 4, 8, 8}), context = at::empty({2, 77, 6});
   std::uint64_t stream = 0;
   for (Tensor* tensor : {&latents, &noise, &context}) {

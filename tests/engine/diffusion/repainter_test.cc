@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "engine/core/rng.h"
+#include "engine/weights/safetensors.h"
 #include "tests/engine/diffusion/tiny_folder.h"
 
 namespace engine::diffusion {
@@ -119,6 +121,34 @@ TEST(StableDiffusionRepainter, WhatItLearnsChangesWhatItPaintsAndGoesOnFromItsSt
   EXPECT_EQ(another->state(), after) << "the optimiser goes on as well";
   ASSERT_TRUE(another->restore(nothing));
   EXPECT_EQ(another->repaint(tasks, 1, 1, go_on).value()[0], blank);
+}
+
+TEST(StableDiffusionRepainter, LearnsWithoutTheAdapterThatItPaintsWith) {
+  const TinyFolder folder;
+  const StableDiffusion model = StableDiffusion::open(folder.path()).value();
+  weights::AdapterWeights few;
+  few.unet["mid_block.attentions.0.transformer_blocks.0.attn1.to_q"] = {
+      {{1, 8}, std::vector<float>(8, 1.0f)}, {{8, 1}, {1, -1, 2, -2, 3, -3, 4, -4}}, 1.0};
+  const auto plain = StableDiffusionRepainter::create(model, quick).value(),
+             adapted = StableDiffusionRepainter::create(model.with(few).value(), quick).value();
+  for (const auto* repainter : {&plain, &adapted}) ASSERT_TRUE((*repainter)->fine_tune(history(), 3, 5, go_on));
+  const auto learned = [](const StableDiffusionRepainter& repainter) {
+    const std::string state = repainter.state();
+    const auto bytes = std::as_bytes(std::span(state.data(), state.size()));
+    const auto file = weights::TensorFile::parse({bytes.begin(), bytes.end()}, "state").value();
+    std::vector<float> numbers;
+    for (const auto& [name, tensor] : file.tensors()) {
+      std::vector<float> values(tensor.elements());
+      EXPECT_TRUE(weights::read_floats(tensor, name, values));
+      numbers.insert(numbers.end(), values.begin(), values.end());
+    }
+    return numbers;
+  };
+  EXPECT_EQ(learned(*adapted), learned(*plain));
+  EXPECT_NE(adapted->state(), plain->state()) << "its digest is another";
+  EXPECT_NE(adapted->repaint(std::vector{task(7)}, 1, 1, go_on).value(),
+            plain->repaint(std::vector{task(7)}, 1, 1, go_on).value());
+  EXPECT_EQ(adapted->restore(plain->state()).error().code, ErrorCode::conflict);
 }
 
 TEST(StableDiffusionRepainter, LearnsByItsSeedAndByAllOfTheHistory) {

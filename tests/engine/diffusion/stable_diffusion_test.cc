@@ -103,6 +103,44 @@ TEST(StableDiffusion, AnAdapterIsPutOnAndTakenOff) {
   EXPECT_EQ(sd->repaint(picture(), few_steps).value(), without);
 }
 
+TEST(StableDiffusion, AnAdapterThatStaysPaintsBesideTheOneThatIsPutOn) {
+  const TinyFolder folder;
+  const auto plain = StableDiffusion::open(folder.path());
+  ASSERT_TRUE(plain);
+  const auto adapter_of = [](const char* layer) {
+    weights::AdapterWeights weights;
+    weights.unet[layer] = {{{1, 8}, std::vector<float>(8, 1.0f)}, {{8, 1}, {1, -1, 2, -2, 3, -3, 4, -4}}, 1.0};
+    return weights;
+  };
+  const auto queries = adapter_of("mid_block.attentions.0.transformer_blocks.0.attn1.to_q");
+  const auto values = adapter_of("mid_block.attentions.0.transformer_blocks.0.attn1.to_v");
+  auto staying = plain->with(queries);
+  ASSERT_TRUE(staying) << staying.error().message;
+  EXPECT_NE(staying->digest(), plain->digest());
+  EXPECT_NE(staying->digest(), plain->with(values).value().digest());
+  auto put_on = *plain;
+  ASSERT_TRUE(put_on.adapt(queries));
+  EXPECT_EQ(put_on.digest(), plain->digest());
+  const scene::Image with_queries = put_on.repaint(picture(), few_steps).value();
+  EXPECT_EQ(staying->repaint(picture(), few_steps).value(), with_queries);
+
+  weights::AdapterWeights both = queries;
+  both.unet.insert(values.unet.begin(), values.unet.end());
+  ASSERT_TRUE(put_on.adapt(both));
+  ASSERT_TRUE(staying->adapt(values));
+  EXPECT_EQ(staying->repaint(picture(), few_steps).value(), put_on.repaint(picture(), few_steps).value());
+  EXPECT_NE(staying->repaint(picture(), few_steps).value(), with_queries);
+  // On the same layer they add up.
+  ASSERT_TRUE(staying->adapt(queries));
+  ASSERT_TRUE(put_on.adapt(queries, 2));
+  const scene::Image sum = staying->repaint(picture(), few_steps).value(),
+                     twice = put_on.repaint(picture(), few_steps).value();
+  for (std::size_t i = 0; i < sum.data.size(); ++i) ASSERT_NEAR(sum.data[i], twice.data[i], 1e-4) << i;
+  ASSERT_TRUE(staying->adapt({}));
+  EXPECT_EQ(staying->repaint(picture(), few_steps).value(), with_queries) << "it stays";
+  EXPECT_EQ(plain->with(adapter_of("nowhere")).error().where, "nowhere");
+}
+
 TEST(StableDiffusion, WhatIsNotFiniteNeverBecomesAPicture) {
   const TinyFolder folder;
   const auto error = [&] {

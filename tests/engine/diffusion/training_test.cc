@@ -25,7 +25,7 @@ struct Student {
   std::vector<Tensor> trained;
   Tensor latents = at::randn({2, 4, 8, 8}), noise = at::randn({2, 4, 8, 8}), timesteps = at::full({2}, 300, at::kLong);
   Tensor context = at::randn({2, 77, 6});
-  Model unet{.parameters = Parameters::load(checkpoint, weights::Network::unet).value(), .adapter = &adapter};
+  Model unet{.parameters = Parameters::load(checkpoint, weights::Network::unet).value(), .adapters = {adapter}};
 
   Student() {
     adapter.collect(trained);

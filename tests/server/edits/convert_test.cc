@@ -218,7 +218,7 @@ TEST(Convert, RefusesTheCorrectorWhoseModelIsNotThereAndNamesThoseThereAre) {
   for (const auto preset : every_preset) {
     asked.preset = preset;
     const edit::Params params = value(to_engine(asked)).params;
-    const auto there = available(params, nullptr);
+    const auto there = available(asked, params, nullptr);
     ASSERT_FALSE(there);
     EXPECT_EQ(there.error().code, engine::ErrorCode::unsupported);
     EXPECT_EQ(there.error().where, "params.corrector");
@@ -231,7 +231,7 @@ TEST(Convert, RefusesTheCorrectorWhoseModelIsNotThereAndNamesThoseThereAre) {
 TEST(Convert, RefusesALossWhoseModelIsNotThereAndABackgroundThisBuildHasNot) {
   proto::EditRequest asked = full_request();
   asked.params.perceptual = proto::Perceptual::lpips;
-  const auto there = available(value(to_engine(asked)).params, nullptr);
+  const auto there = available(asked, value(to_engine(asked)).params, nullptr);
   ASSERT_FALSE(there);
   EXPECT_EQ(there.error().code, engine::ErrorCode::unsupported);
   EXPECT_EQ(there.error().where, "params.perceptual");
@@ -314,10 +314,10 @@ TEST(Convert, ListsFieldsThatHaveNoEffect) {
   EXPECT_EQ(fields_without_effect(asked), Fields{"prompt"});
   asked.prompt = std::nullopt;
   proto::EditRequest painted = full_request();
-  painted.prompt = "a ball", painted.negative_prompt = "a hat";
+  painted.prompt = "a ball", painted.negative_prompt = "a hat", painted.lora = "few";
   painted.params.guidance = 1, painted.params.tuning_steps = 5;
   EXPECT_EQ(fields_without_effect(painted),
-            (Fields{"prompt", "negative_prompt", "params.guidance", "params.tuning_steps"}));
+            (Fields{"prompt", "negative_prompt", "lora", "params.guidance", "params.tuning_steps"}));
   painted.params.corrector = proto::Corrector::sd;
   EXPECT_EQ(fields_without_effect(painted), Fields{}) << "which reads them";
   const Fields of_strength = {"params.strength_initial", "params.strength_final", "params.annealing"};

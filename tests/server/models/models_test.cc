@@ -47,7 +47,8 @@ TEST(Models, WithoutAFolderNothingIsThereAndBothSayWhatItTakes) {
   EXPECT_EQ(none.repainter({}, {}).error().code, engine::ErrorCode::unsupported);
   EXPECT_EQ(none.repainter({}, {}).error().where, "params.corrector");
   EXPECT_EQ(none.lpips().error().where, "params.perceptual");
-  EXPECT_EQ(none.cost({}).training_step, 0);
+  EXPECT_EQ(none.cost({}, "").training_step, 0);
+  EXPECT_TRUE(none.loras().empty());
   EXPECT_EQ(none.lpips_cost().pixel_seconds, 0);
 }
 
@@ -78,16 +79,51 @@ TEST(Models, ACheckpointIsFoundLookedAtAndUsed) {
   engine::params::Params params;
   const auto repainter = models.repainter(params, {"a hat", ""});
   ASSERT_TRUE(repainter) << repainter.error().message;
-  const RepainterCost usual = models.cost(params);
+  const RepainterCost usual = models.cost(params, "");
   EXPECT_GT(usual.training_step, 0);
   EXPECT_GT(usual.network_bytes, std::uint64_t{1} << 20);
   EXPECT_LT(usual.network_bytes + usual.learning_bytes, std::uint64_t{100} << 20) << "it is a tiny one";
   params.lora_rank = 64;
-  EXPECT_GT(models.cost(params).network_bytes, usual.network_bytes) << "the adapter is of a higher rank";
+  EXPECT_GT(models.cost(params, "").network_bytes, usual.network_bytes) << "the adapter is of a higher rank";
   params.sampling_steps = 40;
-  EXPECT_NEAR(models.cost(params).full_strength, 2 * usual.full_strength, 1e-9);
+  EXPECT_NEAR(models.cost(params, "").full_strength, 2 * usual.full_strength, 1e-9);
   params.sampling_steps = 501;
   EXPECT_EQ(models.repainter(params, {}).error().where, "params.sampling_steps");
+}
+
+TEST(Models, AdaptersAreFoundByTheirNamesAndTheDamagedOneIsTold) {
+  REQUIRE_SHARED(support::golden_dir() / "tiny_sd");
+  const ModelFolder folder;
+  const fs::path adapters = folder.path() / "lora";
+  fs::create_directories(adapters / "published");
+  const fs::path golden = support::golden_dir() / "lora";
+  const std::string whole = support::read_file(golden / "diffusers_current.safetensors");
+  support::write_file(adapters / "few.safetensors", whole);
+  support::write_file(adapters / "published/pytorch_lora_weights.safetensors",
+                      support::read_file(golden / "kohya_alpha8.safetensors"));
+  support::write_file(adapters / "cut.safetensors", whole.substr(0, whole.size() / 2));
+  support::write_file(adapters / "notes.txt", "no adapter");
+  const Models models(folder.path(), /*threads=*/1);
+  std::map<std::string, Finding> found;
+  for (const Finding& finding : models.findings()) found[finding.name] = finding;
+  ASSERT_EQ(found.size(), 5u) << "sd, lpips, and three adapters";
+  EXPECT_TRUE(found["lora few"].usable);
+  EXPECT_TRUE(found["lora published"].usable);
+  EXPECT_FALSE(found["lora cut"].usable);
+  EXPECT_NE(found["lora cut"].message.find("cut.safetensors"), std::string::npos) << found["lora cut"].message;
+  if (models.no_sd().find("libtorch") != std::string::npos) GTEST_SKIP() << models.no_sd();
+  EXPECT_EQ(models.loras(), (std::vector<std::string>{"few", "published"}));
+
+  const engine::params::Params params;
+  const auto state = [&](const std::string& lora) {
+    const auto made = models.repainter(params, {.lora = lora});
+    return made ? (*made)->state() : made.error().where;
+  };
+  EXPECT_EQ(state("cut"), "lora");
+  EXPECT_EQ(state("none"), "lora");
+  EXPECT_NE(state("few"), state("")) << "a resume with another is refused by it";
+  EXPECT_NE(state("few"), state("published"));
+  EXPECT_GT(models.cost(params, "few").network_bytes, models.cost(params, "").network_bytes);
 }
 
 TEST(Models, LpipsIsReadyOnlyIfItsFilesHaveEveryTensor) {
