@@ -159,7 +159,7 @@ export class Editor {
       // Version 0 does not differ from itself.
       if (layer === "mask" && version === 0 && !preview) store.set({ layer: "color" });
     });
-    const ofRequest = ["handles", "selection", "version", "region", "mode", "preset", "crumbs", "shadow", "settle", "attach", "params"];
+    const ofRequest = PLACED_KEYS.filter((key) => key !== "heal");
     store.watch([...ofRequest, "autoPreview", "dragging", "selectMode"], () => this.#requestChanged());
     store.watch([...PLACED_KEYS], () => this.#draftOutdated());
     store.watch(STORED_KEYS, () => this.#saveSoon());

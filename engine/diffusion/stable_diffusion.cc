@@ -73,7 +73,6 @@ Result<StableDiffusion> StableDiffusion::open(const std::filesystem::path& path)
 
 Result<StableDiffusion> StableDiffusion::with(const weights::AdapterWeights& weights) const {
   StableDiffusion adapted = *this;
-  adapted.adapters_ = staying_;
   if (const auto put = adapted.adapt(weights); !put) return propagate(put);
   adapted.staying_ = adapted.adapters_;
   adapted.digest_ += weights::digest_of(weights);

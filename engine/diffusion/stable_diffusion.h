@@ -40,7 +40,8 @@ class StableDiffusion {
   ///         vocabulary has more pieces than the text encoder
   [[nodiscard]] static Result<StableDiffusion> open(const std::filesystem::path& path);
 
-  /// The same networks with an adapter on them that stays, beside whatever adapt() puts on.
+  /// The same networks with an adapter on them that stays, beside whatever adapt() puts on from then on: what it had
+  /// put on is left off.
   ///   errors  those of weights::check_adapter(); too_large
   [[nodiscard]] Result<StableDiffusion> with(const weights::AdapterWeights& weights) const;
   /// Puts an adapter on the networks in place of the one before, or takes that off (no layers).

@@ -29,7 +29,7 @@ void add_models_command(CLI::App& program, Action& action) {
   CLI::App* const command =
       program.add_subcommand("models", "Checks the pre-trained networks below a folder, and says what is missing");
   const auto folder = std::make_shared<std::filesystem::path>();
-  command->add_option("--model-dir", *folder, "Folder of pre-trained networks: stable-diffusion/ and lpips/")
+  command->add_option("--model-dir", *folder, "Folder of pre-trained networks: stable-diffusion/, lora/ and lpips/")
       ->required()
       ->check(CLI::ExistingDirectory)
       ->type_name("DIR");

@@ -97,12 +97,14 @@ engine::Result<void> available(const proto::EditRequest& request, const edit::Pa
     return unsupported("there is no corrector \"sd\" here: " + there_are.no_sd() +
                            "; available: \"scene\", which is the default, and \"none\"",
                        "params.corrector");
-  if (uses_diffusion(params) && request.lora) {
+  if (uses_diffusion(params) && !request.lora.value_or("").empty()) {
     const std::vector<std::string> loras = there_are.loras();
     if (std::ranges::find(loras, *request.lora) == loras.end()) {
       std::string names;
       for (const std::string& name : loras) names += (names.empty() ? "\"" : ", \"") + name + '"';
-      return unsupported("there is no such adapter here; available: " + (names.empty() ? "none" : names), "lora");
+      return unsupported(names.empty() ? "there is no adapter here, neither of this name nor of another"
+                                       : "there is no adapter of this name here; available: " + names,
+                         "lora");
     }
   }
   if (params.perceptual == proto::Perceptual::lpips && !there_are.no_lpips().empty())

@@ -115,10 +115,13 @@ RepainterCost Models::cost(const params::Params& params, const std::string& lora
   const auto bytes = diffusion::bytes_of(checkpoint->configs(), options);
   const double faster = faster_on(threads_);
   const auto adapter = loras_.find(lora);
+  const std::uint64_t adapter_bytes = adapter == loras_.end() ? 0 : adapter->second.bytes;
+  // What it adds to a layer's output goes with its numbers, as the layer's own does.
+  const double more = 1 + double(adapter_bytes) / double(bytes.networks);
   return {one_thread.training_step / faster,
           one_thread.picture / faster,
-          one_thread.full_strength / faster,
-          bytes.networks + (adapter == loras_.end() ? 0 : adapter->second.bytes),
+          more * one_thread.full_strength / faster,
+          bytes.networks + adapter_bytes,
           bytes.painting,
           bytes.learning};
 }

@@ -1,5 +1,6 @@
 #include "server/models/models.h"
 
+#include <algorithm>
 #include <map>
 #include <system_error>
 #include <utility>
@@ -64,17 +65,39 @@ Finding look_at_lpips(const fs::path& folder) {
   return {"lpips", true, (folder / "lpips").string()};
 }
 
-/// Files of adapters below the model folder, by name. What is there under two names of files is taken by the first.
-std::map<std::string, fs::path> adapter_files(const fs::path& folder) {
-  std::map<std::string, fs::path> files;
-  std::error_code unreachable;  // then there are none
-  for (const auto& entry : fs::directory_iterator(folder / "lora", unreachable)) {
-    const fs::path& path = entry.path();
-    if (path.extension() == ".safetensors") files.emplace(path.stem().string(), path);
+/// A file of an adapter, or why there is none.
+struct AdapterFile {
+  fs::path path;
+  std::string problem = {};
+};
+
+/// Requests and answers are in UTF-8, and people type names.
+bool is_plain(const std::string& name) {
+  return std::ranges::all_of(name, [](char letter) { return letter >= ' ' && letter <= '~'; });
+}
+
+/// Those below the model folder, by name.
+std::map<std::string, AdapterFile> adapter_files(const fs::path& folder) {
+  std::map<std::string, AdapterFile> files;
+  const fs::path adapters = folder / "lora";
+  std::error_code unreadable;
+  fs::directory_iterator entry(adapters, unreadable);
+  for (; !unreadable && entry != fs::directory_iterator(); entry.increment(unreadable)) {
+    const fs::path& path = entry->path();
+    std::vector<std::pair<std::string, fs::path>> found;
+    if (path.extension() == ".safetensors") found.emplace_back(path.stem().string(), path);
     // As diffusers and peft publish them.
     for (const char* name : {"pytorch_lora_weights.safetensors", "adapter_model.safetensors"})
-      if (is_there(path / name)) files.emplace(path.filename().string(), path / name);
+      if (is_there(path / name)) found.emplace_back(path.filename().string(), path / name);
+    for (const auto& [name, file] : found) {
+      if (!is_plain(name))
+        files["?"] = {adapters, "a name there has other characters than ASCII's printable ones: rename it"};
+      else if (const auto [at, is_new] = files.emplace(name, AdapterFile{file}); !is_new)
+        at->second.problem = "two files are of this name: it would be for chance to choose";
+    }
   }
+  if (unreadable && unreadable != std::errc::no_such_file_or_directory)
+    files["?"] = {adapters, "it cannot be read: " + unreadable.message()};
   return files;
 }
 
@@ -109,10 +132,18 @@ void Models::look_at_adapters() {
   const auto checkpoint = weights::Checkpoint::open(checkpoint_);
   if (!checkpoint) return;  // it was there a moment ago: whoever uses it is told
   for (const auto& [name, file] : adapter_files(folder_)) {
-    const auto adapter = weights::read_adapter(file, checkpoint->configs());
-    if (adapter) loras_.emplace(name, Lora{file, adapter->bytes()});
+    std::string problem = file.problem;
+    if (problem.empty()) {
+      const auto adapter = weights::read_adapter(file.path, checkpoint->configs());
+      if (adapter)
+        loras_.emplace(name, Lora{file.path, adapter->bytes()});
+      else
+        problem = described(adapter.error());
+    }
+    const bool is_usable = problem.empty() && has_libtorch();
     findings_.push_back(
-        {"lora " + name, adapter.has_value(), file.string() + (adapter ? "" : ": " + described(adapter.error()))});
+        {"lora " + name, is_usable,
+         problem.empty() ? (is_usable ? file.path.string() : without_libtorch) : file.path.string() + ": " + problem});
   }
 }
 

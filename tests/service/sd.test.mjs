@@ -141,16 +141,20 @@ test('the same request gives the same bytes, and prompt, seed and training make 
   for (const [what, params, more] of [['seed', { seed: 1 }], ['training', { tuning_steps: 0 }], ['rank', { lora_rank: 1 }], ['prompt', {}, { prompt: 'a hat' }],
     ['negative prompt', {}, { negative_prompt: 'a hat' }], ['guidance', { guidance: 1 }], ['sampler', { sampler: 'ddim' }], ['adapter', {}, { lora: 'few' }], ['corrector', { corrector: 'scene' }]])
     assert.notDeepEqual(await made(params, more), expected, what);
+  const { request: kept } = await succeeded(await submit({ ...short, intervals: 1 }, { lora: 'few' }));
+  assert.equal(kept.lora, 'few');
   const moved = await made({}, { mode: 'move' }); // what it has left is closed in space, and seeded
   assert.deepEqual(await made({}, { mode: 'move' }), moved);
 });
 
 test('an adapter that is not there is refused with those that are', { skip }, async () => {
   const asked = { ...request, scene: scene.id, lora: '../few' };
-  const refused = await service.client.request('POST', '/v1/edits', { json: asked, expect: [422, 501] });
+  const refused = await service.client.request('POST', '/v1/edits', { json: asked, expect: 422 });
   assert.equal(refused.json().where, 'lora');
   assert.match(refused.json().detail, /available: "few"/);
   const idle = { ...asked, params: { ...request.params, corrector: 'scene' } };
+  const none = await service.client.post('/v1/edits', { ...asked, lora: '' }, { query: { validate_only: true } });
+  assert.equal(none.status, 200);
   const { warnings } = (await service.client.post('/v1/edits', idle, { query: { validate_only: true } })).json();
   assert.ok(warnings.some((warning) => /without effect.* lora/.test(warning)), warnings);
 });
@@ -174,6 +178,7 @@ test('the page offers the adapters that are there, and asks with the one that is
     await id('estimate').click();
     await id('run-problem').getByText('available: "few"').waitFor();
     await id('lora').selectOption('few');
+    await id('run-problem').waitFor({ state: 'hidden' });
     assert.equal((await exported()).lora, 'few');
     await id('estimate').click();
     await id('estimate-answer').waitFor();
@@ -210,7 +215,7 @@ test('killed, and the files of a model changed, an edit says so and does not go 
   // Copies: what is shared is not to be written to.
   const own = temporaryFolder();
   await cp(path.join(golden, 'tiny_sd'), path.join(own, 'stable-diffusion'), { recursive: true });
-  await cp(path.join(models, 'lpips'), path.join(own, 'lpips'), { recursive: true });
+  for (const folder of ['lpips', 'lora']) await cp(path.join(models, folder), path.join(own, folder), { recursive: true });
   const writable = async (file) => {
     for (const name of [path.dirname(file), file]) await chmod(path.join(own, name), 0o755);
     return path.join(own, file);
@@ -220,8 +225,8 @@ test('killed, and the files of a model changed, an edit says so and does not go 
     const { id: there } = await changed.client.upload((await demoScene({ gaussians: 4000, views: 5, size: '96x72', photos: false })).ply);
     // Without training, too: a repainter that has learned nothing still goes by its files.
     const long = { ...request.params, intervals: 3, iterations: 3, sampling_steps: 200, tuning_steps: 0, tuning_steps_later: 0, perceptual: 'lpips', max_image_side: 32 };
-    for (const file of ['stable-diffusion/unet/diffusion_pytorch_model.safetensors', 'lpips/vgg_v0.1.safetensors']) {
-      const { id } = await changed.client.submit({ ...request, scene: there, params: long });
+    for (const file of ['stable-diffusion/unet/diffusion_pytorch_model.safetensors', 'lpips/vgg_v0.1.safetensors', 'lora/few.safetensors']) {
+      const { id } = await changed.client.submit({ ...request, scene: there, lora: 'few', params: long });
       await changed.client.until(id, (edit) => edit.ended !== null || edit.finished_intervals.length > 0, { every: 5, ...patient });
       await changed.kill();
       const place = await writable(file);

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
 
 #include "engine/core/rng.h"
 #include "engine/weights/safetensors.h"
@@ -133,9 +132,7 @@ TEST(StableDiffusionRepainter, LearnsWithoutTheAdapterThatItPaintsWith) {
              adapted = StableDiffusionRepainter::create(model.with(few).value(), quick).value();
   for (const auto* repainter : {&plain, &adapted}) ASSERT_TRUE((*repainter)->fine_tune(history(), 3, 5, go_on));
   const auto learned = [](const StableDiffusionRepainter& repainter) {
-    const std::string state = repainter.state();
-    const auto bytes = std::as_bytes(std::span(state.data(), state.size()));
-    const auto file = weights::TensorFile::parse({bytes.begin(), bytes.end()}, "state").value();
+    const auto file = weights::TensorFile::parse(weights::bytes_of(repainter.state()), "state").value();
     std::vector<float> numbers;
     for (const auto& [name, tensor] : file.tensors()) {
       std::vector<float> values(tensor.elements());

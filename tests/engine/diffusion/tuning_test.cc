@@ -7,15 +7,18 @@
 
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "engine/core/rng.h"
+#include "engine/diffusion/adapter.h"
 #include "engine/diffusion/autoencoder.h"
 #include "engine/diffusion/networks.h"
 #include "engine/diffusion/pictures.h"
 #include "engine/diffusion/pretraining.h"
 #include "engine/diffusion/repainter.h"
 #include "engine/diffusion/training.h"
+#include "engine/weights/safetensors.h"
 #include "tests/engine/weights/samples.h"
 #include "tests/support/data.h"
 

@@ -103,15 +103,21 @@ TEST(Models, AdaptersAreFoundByTheirNamesAndTheDamagedOneIsTold) {
                       support::read_file(golden / "kohya_alpha8.safetensors"));
   support::write_file(adapters / "cut.safetensors", whole.substr(0, whole.size() / 2));
   support::write_file(adapters / "notes.txt", "no adapter");
+  for (const char* of_both : {"twice.safetensors", "twice/adapter_model.safetensors", "\xff.safetensors"}) {
+    fs::create_directories((adapters / of_both).parent_path());
+    support::write_file(adapters / of_both, whole);
+  }
   const Models models(folder.path(), /*threads=*/1);
   std::map<std::string, Finding> found;
   for (const Finding& finding : models.findings()) found[finding.name] = finding;
-  ASSERT_EQ(found.size(), 5u) << "sd, lpips, and three adapters";
-  EXPECT_TRUE(found["lora few"].usable);
-  EXPECT_TRUE(found["lora published"].usable);
+  ASSERT_EQ(found.size(), 7u) << "sd, lpips, and four adapters; and a name that cannot be asked for";
+  EXPECT_FALSE(found["lora twice"].usable);
+  EXPECT_NE(found["lora ?"].message.find("rename"), std::string::npos) << found["lora ?"].message;
   EXPECT_FALSE(found["lora cut"].usable);
   EXPECT_NE(found["lora cut"].message.find("cut.safetensors"), std::string::npos) << found["lora cut"].message;
   if (models.no_sd().find("libtorch") != std::string::npos) GTEST_SKIP() << models.no_sd();
+  EXPECT_TRUE(found["lora few"].usable);
+  EXPECT_TRUE(found["lora published"].usable);
   EXPECT_EQ(models.loras(), (std::vector<std::string>{"few", "published"}));
 
   const engine::params::Params params;
@@ -123,7 +129,10 @@ TEST(Models, AdaptersAreFoundByTheirNamesAndTheDamagedOneIsTold) {
   EXPECT_EQ(state("none"), "lora");
   EXPECT_NE(state("few"), state("")) << "a resume with another is refused by it";
   EXPECT_NE(state("few"), state("published"));
-  EXPECT_GT(models.cost(params, "few").network_bytes, models.cost(params, "").network_bytes);
+  const RepainterCost with = models.cost(params, "few"), without = models.cost(params, "");
+  EXPECT_GT(with.network_bytes, without.network_bytes);
+  EXPECT_GT(with.full_strength, without.full_strength);
+  EXPECT_EQ(with.training_step, without.training_step) << "which goes without it";
 }
 
 TEST(Models, LpipsIsReadyOnlyIfItsFilesHaveEveryTensor) {
