@@ -21,6 +21,9 @@ constexpr std::size_t grown_kept = 4;
 /// as much as is ever looked at.
 constexpr int farther_reaches = 2;
 
+/// Where nearly all of a whole ends nearer to its reach than this, the reach may have cut it, and no border.
+constexpr double near_reach = 0.65, nearly_all = 0.99;
+
 /// What selecting reads of a scene has to be finite: a NaN would be on no side of anything.
 Result<void> check_finite(const scene::GaussianCloud& cloud) {
   const auto bad = scene::first_not_finite(cloud);
@@ -65,6 +68,18 @@ bool is_empty(const RowSet& rows) { return std::find(rows.begin(), rows.end(), s
 
 }  // namespace
 
+bool Selector::comes_near_reach(const Array3& mean, const Found& found) {
+  std::vector<double> squared;
+  for (const std::uint32_t row : found.grown.rows) {
+    const DVec3 offset = DVec3(mean.get(row)) - found.surroundings.middle;
+    squared.push_back(glm::dot(offset, offset));
+  }
+  if (squared.empty()) return false;
+  const auto last = squared.begin() + std::ptrdiff_t(nearly_all * double(squared.size() - 1));
+  std::ranges::nth_element(squared, last);
+  return std::sqrt(*last) > near_reach * found.surroundings.reach;
+}
+
 const Neighbourhood& Selector::neighbourhood(const Surroundings& surroundings) {
   const auto kept = std::find_if(neighbourhoods_.begin(), neighbourhoods_.end(),
                                  [&](const auto& one) { return one->surroundings() == surroundings; });
@@ -77,11 +92,42 @@ const Neighbourhood& Selector::neighbourhood(const Surroundings& surroundings) {
   return *neighbourhoods_.back();
 }
 
+Result<const Selector::Found*> Selector::whole_of(Grow grow) {
+  grow.wider = 0;
+  const auto kept = std::ranges::find(wholes_, grow, &Found::grow);
+  if (kept != wholes_.end()) {
+    std::rotate(kept, kept + 1, wholes_.end());
+    return &wholes_.back();
+  }
+  Surroundings surroundings = surroundings_of(cloud_.mean, grow);
+  auto found = neighbourhood(surroundings).grow(cloud_, grow);
+  if (!found) return propagate(found);
+  Found whole{grow, *std::move(found), surroundings};
+  for (int reaches = 0; reaches < farther_reaches && comes_near_reach(cloud_.mean, whole); ++reaches) {
+    const Neighbourhood& before = neighbourhood(surroundings);
+    if (before.is_cut_short() || before.rows().size() == cloud_.size()) break;
+    surroundings.reach *= 2;
+    auto farther = neighbourhood(surroundings).grow(cloud_, grow);
+    if (!farther) break;
+    Found larger{grow, *std::move(farther), surroundings};
+    if (!comes_near_reach(cloud_.mean, larger)) {
+      whole = std::move(larger);
+      break;
+    }
+  }
+  if (wholes_.size() == grown_kept) wholes_.erase(wholes_.begin());
+  wholes_.push_back(std::move(whole));
+  return &wholes_.back();
+}
+
 Result<Grown> Selector::grown_anywhere(const Grow& grow, Surroundings& surroundings) {
   surroundings = surroundings_of(cloud_.mean, grow);
+  if (!grow.whole || grow.reach) return neighbourhood(surroundings).grow(cloud_, grow);
+  const auto whole = whole_of(grow);
+  if (!whole) return propagate(whole);
+  surroundings = (*whole)->surroundings;
   const Neighbourhood* around = &neighbourhood(surroundings);
-  auto out = around->grow(cloud_, grow);
-  if (!grow.whole || grow.reach) return out;
+  Result<Grown> out = grow.wider == 0 ? Result<Grown>((*whole)->grown) : around->grow(cloud_, grow);
   int reaches = 0;
   const auto is_more_to_look_at = [&] {
     return reaches < farther_reaches && !around->is_cut_short() && around->rows().size() < cloud_.size();
@@ -100,9 +146,9 @@ Result<Grown> Selector::grown_anywhere(const Grow& grow, Surroundings& surroundi
   return out;
 }
 
-Result<const Selector::InsideAlone*> Selector::by_inside_alone(Grow grow) {
+Result<const Selector::Found*> Selector::by_inside_alone(Grow grow) {
   grow.outside.clear();
-  const auto kept = std::ranges::find(inside_alone_, grow, &InsideAlone::grow);
+  const auto kept = std::ranges::find(inside_alone_, grow, &Found::grow);
   if (kept != inside_alone_.end()) {
     std::rotate(kept, kept + 1, inside_alone_.end());
   } else {
@@ -126,7 +172,7 @@ Result<Grown> Selector::grown(const Grow& grow) {
   // In their own surroundings, inside points may be too far from each other: nobody has seen them without the others.
   if (!out || !alone || out->rows.size() <= (*alone)->grown.rows.size()) return out;
   // Whoever clicks outside on what is taken wants less of it.
-  const InsideAlone& before = **alone;
+  const Found& before = **alone;
   surroundings.reach = std::max(surroundings.reach, before.surroundings.reach);
   auto left = neighbourhood(surroundings).left_of(cloud_, grow, before.grown.rows);
   if (!left) return propagate(left);

@@ -65,17 +65,24 @@ class Selector {
   [[nodiscard]] Result<RowSet> rows_of(const Grow& grow, const std::string& where, Selected& so_far);
   /// Grows; where an outside point is on what the inside points alone take, no more than that.
   [[nodiscard]] Result<Grown> grown(const Grow& grow);
-  /// Of a whole without a reach: where its surroundings have no border farther out, the next ones are looked for in
-  /// twice the reach, and again.
-  ///   surroundings  set to those that were looked at last
-  [[nodiscard]] Result<Grown> grown_anywhere(const Grow& grow, Surroundings& surroundings);
-  struct InsideAlone {
+  struct Found {
     Grow grow;
     Grown grown;
     Surroundings surroundings;
   };
+  /// Does what was found come so near to the reach that this may have cut it?
+  [[nodiscard]] static bool comes_near_reach(const Array3& mean, const Found& found);
+  /// The whole, without a reach and whatever `wider` says. The scene says how far its surroundings reach: by half of
+  /// its rows, of which a thing in the middle of a capture may have most. Where the whole comes near to the reach and
+  /// in twice the reach, or four times, ends well before it, that counts. Stays until the next call.
+  ///   errors  those of Neighbourhood::grow()
+  [[nodiscard]] Result<const Found*> whole_of(Grow grow);
+  /// Of a whole without a reach: where its surroundings have no border farther out, the next ones are looked for in
+  /// twice the reach, and again.
+  ///   surroundings  set to those that were looked at last
+  [[nodiscard]] Result<Grown> grown_anywhere(const Grow& grow, Surroundings& surroundings);
   /// What a person sees who has not clicked beside the thing yet. Stays until the next call.
-  [[nodiscard]] Result<const InsideAlone*> by_inside_alone(Grow grow);
+  [[nodiscard]] Result<const Found*> by_inside_alone(Grow grow);
   [[nodiscard]] RowSet rows_of(const Masks& masks, const std::string& where, Selected& so_far);
   [[nodiscard]] const Neighbourhood& neighbourhood(const Surroundings& surroundings);
 
@@ -83,7 +90,8 @@ class Selector {
   bool is_checked_ = false;  ///< Are all values finite?
   render::Workspace workspace_;
   std::vector<std::unique_ptr<const Neighbourhood>> neighbourhoods_;  ///< The latest, latest last.
-  std::vector<InsideAlone> inside_alone_;  ///< The latest, latest last: outside clicks come one after the other.
+  std::vector<Found> wholes_;        ///< The latest, latest last: the same one is narrowed and widened.
+  std::vector<Found> inside_alone_;  ///< The latest, latest last: outside clicks come one after the other.
 };
 
 /// The same, for a single selection.

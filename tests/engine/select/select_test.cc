@@ -208,5 +208,27 @@ TEST(Select, GivesTheSameWhateverWasSelectedBefore) {
   }
 }
 
+TEST(Select, AWholeThatHasMostOfASceneIsNotCutWhereHalfOfTheRowsEnd) {
+  scene::GaussianCloud cloud;
+  add_sheet(cloud, {0, 0, 0}, 40, 0.5f, {0.6f, 0.4f, 0.2f});
+  const auto table = std::uint32_t(cloud.size());
+  // A bar six long, of more rows than its surroundings have: half of all lie within 1.7 of its middle.
+  for (int along = -10; along < 10; ++along)
+    add_sheet(cloud, {0.3f * float(along) + 0.15f, 0, 1}, 15, 0.02f, {0.5f, 0.05f, 0.05f});
+  Grow bar{{{0.14, 0, 1}}, {}, {}};
+  bar.whole = true;
+  Selector selector(cloud);
+  const auto found = selector.select({{Op::add, bar}});
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_EQ(found->count, cloud.size() - table);
+  EXPECT_EQ(std::accumulate(found->rows.begin(), found->rows.begin() + table, 0), 0) << "nothing of the table";
+  // What is kept of it makes no difference, nor does another question in between.
+  bar.wider = -1;
+  ASSERT_TRUE(selector.select({{Op::add, bar}}));
+  bar.wider = 0;
+  EXPECT_EQ(selector.select({{Op::add, bar}})->rows, found->rows);
+  EXPECT_EQ(select(cloud, {{Op::add, bar}})->rows, found->rows);
+}
+
 }  // namespace
 }  // namespace engine::select
