@@ -21,8 +21,11 @@ constexpr std::size_t grown_kept = 4;
 /// as much as is ever looked at.
 constexpr int farther_reaches = 2;
 
-/// Where nearly all of a whole ends nearer to its reach than this, the reach may have cut it, and no border.
+// Where nearly all of a whole ends only beyond this share of its reach, the reach may have cut it, and no border.
 constexpr double near_reach = 0.65, nearly_all = 0.99;
+// Times the rows of a whole that was cut: more is another thing, as the board beneath the fox's head. Chosen on random
+// clicks (ADR 69): what was cut had up to 2.5 times as many, other things from 3.5 on.
+constexpr double more_beyond_reach = 3;
 
 /// What selecting reads of a scene has to be finite: a NaN would be on no side of anything.
 Result<void> check_finite(const scene::GaussianCloud& cloud) {
@@ -103,17 +106,19 @@ Result<const Selector::Found*> Selector::whole_of(Grow grow) {
   auto found = neighbourhood(surroundings).grow(cloud_, grow);
   if (!found) return propagate(found);
   Found whole{grow, *std::move(found), surroundings};
-  for (int reaches = 0; reaches < farther_reaches && comes_near_reach(cloud_.mean, whole); ++reaches) {
+  const bool has_most = 2 * whole.grown.rows.size() > neighbourhood(surroundings).rows().size();
+  const bool may_be_cut = has_most && comes_near_reach(cloud_.mean, whole);
+  for (int reaches = 0; may_be_cut && reaches < farther_reaches; ++reaches) {
     const Neighbourhood& before = neighbourhood(surroundings);
     if (before.is_cut_short() || before.rows().size() == cloud_.size()) break;
     surroundings.reach *= 2;
     auto farther = neighbourhood(surroundings).grow(cloud_, grow);
     if (!farther) break;
     Found larger{grow, *std::move(farther), surroundings};
-    if (!comes_near_reach(cloud_.mean, larger)) {
+    if (comes_near_reach(cloud_.mean, larger)) continue;
+    if (double(larger.grown.rows.size()) <= more_beyond_reach * double(whole.grown.rows.size()))
       whole = std::move(larger);
-      break;
-    }
+    break;
   }
   if (wholes_.size() == grown_kept) wholes_.erase(wholes_.begin());
   wholes_.push_back(std::move(whole));

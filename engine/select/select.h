@@ -73,8 +73,9 @@ class Selector {
   /// Does what was found come so near to the reach that this may have cut it?
   [[nodiscard]] static bool comes_near_reach(const Array3& mean, const Found& found);
   /// The whole, without a reach and whatever `wider` says. The scene says how far its surroundings reach: by half of
-  /// its rows, of which a thing in the middle of a capture may have most. Where the whole comes near to the reach and
-  /// in twice the reach, or four times, ends well before it, that counts. Stays until the next call.
+  /// its rows, of which a thing in the middle of a capture may have most. Where the whole has most of those within the
+  /// reach and comes near to it, and in twice the reach, or four times, ends well before it, that counts. Stays until
+  /// the next call.
   ///   errors  those of Neighbourhood::grow()
   [[nodiscard]] Result<const Found*> whole_of(Grow grow);
   /// Of a whole without a reach: where its surroundings have no border farther out, the next ones are looked for in

@@ -102,8 +102,9 @@ engine::Result<void> available(const proto::EditRequest& request, const edit::Pa
     if (std::ranges::find(loras, *request.lora) == loras.end()) {
       std::string names;
       for (const std::string& name : loras) names += (names.empty() ? "\"" : ", \"") + name + '"';
-      return unsupported(names.empty() ? "there is no adapter here, neither of this name nor of another"
-                                       : "there is no adapter of this name here; available: " + names,
+      return unsupported("there is no adapter \"" + *request.lora + "\" that can be used here" +
+                             (names.empty() ? "" : "; available: " + names) +
+                             "; \"splatdrag models\" says which files go where, and what is wrong with them",
                          "lora");
     }
   }

@@ -89,6 +89,11 @@ std::map<std::string, AdapterFile> adapter_files(const fs::path& folder) {
     // As diffusers and peft publish them.
     for (const char* name : {"pytorch_lora_weights.safetensors", "adapter_model.safetensors"})
       if (is_there(path / name)) found.emplace_back(path.filename().string(), path / name);
+    if (found.empty() && is_plain(path.filename().string()))
+      files[path.filename().string()] = {
+          path,
+          "not a .safetensors file, nor a folder with pytorch_lora_weights.safetensors or "
+          "adapter_model.safetensors"};
     for (const auto& [name, file] : found) {
       if (!is_plain(name))
         files["?"] = {adapters, "a name there has other characters than ASCII's printable ones: rename it"};

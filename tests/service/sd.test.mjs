@@ -151,7 +151,7 @@ test('an adapter that is not there is refused with those that are', { skip }, as
   const asked = { ...request, scene: scene.id, lora: '../few' };
   const refused = await service.client.request('POST', '/v1/edits', { json: asked, expect: 422 });
   assert.equal(refused.json().where, 'lora');
-  assert.match(refused.json().detail, /available: "few"/);
+  assert.match(refused.json().detail, /no adapter "..\/few" .*available: "few"; "splatdrag models"/);
   const idle = { ...asked, params: { ...request.params, corrector: 'scene' } };
   const none = await service.client.post('/v1/edits', { ...asked, lora: '' }, { query: { validate_only: true } });
   assert.equal(none.status, 200);

@@ -48,6 +48,21 @@ TEST(GrowOnTheFox, TakesWhatTheClicksSpan) {
   EXPECT_LT(whole_head, 13000u) << "no more of it for a page, which means the whole (46,000)";
 }
 
+TEST(GrowOnTheFox, OneClickOnTheHeadTakesNeitherHalfOfItNorItsBoard) {
+  const auto file = support::data_dir() / "fox" / "point_cloud.ply";
+  REQUIRE_SHARED(file);
+  const auto whole_by = [&](DVec3 click) {
+    Grow whole{{click}, {}, {}};
+    whole.whole = true;
+    return grown(file, whole);
+  };
+  const std::size_t neck = whole_by({2.727, 0.262, 2.141}), cheek = whole_by({1.649, -0.163, 1.816});
+  EXPECT_GT(neck, 19000u) << "with the ear farther away, not as far as the reach (15,500)";
+  EXPECT_LT(neck, 26000u);
+  EXPECT_GT(cheek, 7000u);
+  EXPECT_LT(cheek, 13000u) << "not the board and the wall, where the next border lies (46,000)";
+}
+
 TEST(GrowOnTheDoll, LeavesTheBedThatItSitsOn) {
   const auto file = support::data_dir() / "plush" / "point_cloud.ply";
   REQUIRE_SHARED(file);

@@ -110,7 +110,8 @@ TEST(Models, AdaptersAreFoundByTheirNamesAndTheDamagedOneIsTold) {
   const Models models(folder.path(), /*threads=*/1);
   std::map<std::string, Finding> found;
   for (const Finding& finding : models.findings()) found[finding.name] = finding;
-  ASSERT_EQ(found.size(), 7u) << "sd, lpips, and four adapters; and a name that cannot be asked for";
+  ASSERT_EQ(found.size(), 8u) << "sd, lpips, four adapters, a name that cannot be asked for, and what is no adapter";
+  EXPECT_NE(found["lora notes.txt"].message.find("not a .safetensors file"), std::string::npos);
   EXPECT_FALSE(found["lora twice"].usable);
   EXPECT_NE(found["lora ?"].message.find("rename"), std::string::npos) << found["lora ?"].message;
   EXPECT_FALSE(found["lora cut"].usable);
