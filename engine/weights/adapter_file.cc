@@ -249,7 +249,9 @@ Result<AdapterWeights> decode_adapter(const TensorFile& file, const Configs& con
   for (const auto& [name, tensor] : file.tensors()) {
     const auto address = reader.address_of(name);
     if (!address)
-      return fail(ErrorCode::unsupported, "these networks have no such layer: it was made for other ones, or is no LoRA", file.name() + ":" + name);
+      return fail(ErrorCode::unsupported,
+                  "these networks have no such layer: it was made for other ones, or is no LoRA",
+                  file.name() + ":" + name);
     if (name.starts_with(peft_beginning) && !settings)
       return fail(ErrorCode::not_found, "the scale of peft's adapters is in adapter_config.json, which is not there",
                   file.name() + ":" + name);
