@@ -95,48 +95,64 @@ const Neighbourhood& Selector::neighbourhood(const Surroundings& surroundings) {
   return *neighbourhoods_.back();
 }
 
+bool Selector::is_more_beyond(const Neighbourhood& around) const {
+  return !around.is_cut_short() && around.rows().size() < cloud_.size();
+}
+
+template <class Find>
+Result<const Selector::Found*> Selector::kept_or_found(std::vector<Found>& kept, const Grow& grow, Find&& find) {
+  const auto at = std::ranges::find(kept, grow, &Found::grow);
+  if (at != kept.end()) {
+    std::rotate(at, at + 1, kept.end());
+  } else {
+    Result<Found> found = find();
+    if (!found) return propagate(found);
+    if (kept.size() == grown_kept) kept.erase(kept.begin());
+    kept.push_back(*std::move(found));
+  }
+  return &kept.back();
+}
+
+Result<Selector::Found> Selector::found_within(const Grow& grow, const Surroundings& surroundings) {
+  auto grown = neighbourhood(surroundings).grow(cloud_, grow);
+  if (!grown) return propagate(grown);
+  return Found{grow, *std::move(grown), surroundings};
+}
+
+Result<Selector::Found> Selector::find_whole(const Grow& grow) {
+  Surroundings surroundings = surroundings_of(cloud_.mean, grow);
+  auto whole = found_within(grow, surroundings);
+  if (!whole) return whole;
+  const bool has_most = 2 * whole->grown.rows.size() > neighbourhood(surroundings).rows().size();
+  if (!has_most || !comes_near_reach(cloud_.mean, *whole)) return whole;
+  for (int reaches = 0; reaches < farther_reaches && is_more_beyond(neighbourhood(surroundings)); ++reaches) {
+    surroundings.reach *= 2;
+    auto larger = found_within(grow, surroundings);
+    if (!larger) break;
+    if (comes_near_reach(cloud_.mean, *larger)) continue;
+    const double most_rows = more_beyond_reach * double(whole->grown.rows.size());
+    return double(larger->grown.rows.size()) <= most_rows ? larger : whole;
+  }
+  return whole;
+}
+
 Result<const Selector::Found*> Selector::whole_of(Grow grow) {
   grow.wider = 0;
-  const auto kept = std::ranges::find(wholes_, grow, &Found::grow);
-  if (kept != wholes_.end()) {
-    std::rotate(kept, kept + 1, wholes_.end());
-    return &wholes_.back();
-  }
-  Surroundings surroundings = surroundings_of(cloud_.mean, grow);
-  auto found = neighbourhood(surroundings).grow(cloud_, grow);
-  if (!found) return propagate(found);
-  Found whole{grow, *std::move(found), surroundings};
-  const bool has_most = 2 * whole.grown.rows.size() > neighbourhood(surroundings).rows().size();
-  const bool may_be_cut = has_most && comes_near_reach(cloud_.mean, whole);
-  for (int reaches = 0; may_be_cut && reaches < farther_reaches; ++reaches) {
-    const Neighbourhood& before = neighbourhood(surroundings);
-    if (before.is_cut_short() || before.rows().size() == cloud_.size()) break;
-    surroundings.reach *= 2;
-    auto farther = neighbourhood(surroundings).grow(cloud_, grow);
-    if (!farther) break;
-    Found larger{grow, *std::move(farther), surroundings};
-    if (comes_near_reach(cloud_.mean, larger)) continue;
-    if (double(larger.grown.rows.size()) <= more_beyond_reach * double(whole.grown.rows.size()))
-      whole = std::move(larger);
-    break;
-  }
-  if (wholes_.size() == grown_kept) wholes_.erase(wholes_.begin());
-  wholes_.push_back(std::move(whole));
-  return &wholes_.back();
+  return kept_or_found(wholes_, grow, [&] { return find_whole(grow); });
 }
 
 Result<Grown> Selector::grown_anywhere(const Grow& grow, Surroundings& surroundings) {
-  surroundings = surroundings_of(cloud_.mean, grow);
-  if (!grow.whole || grow.reach) return neighbourhood(surroundings).grow(cloud_, grow);
+  if (!grow.whole || grow.reach) {
+    surroundings = surroundings_of(cloud_.mean, grow);
+    return neighbourhood(surroundings).grow(cloud_, grow);
+  }
   const auto whole = whole_of(grow);
   if (!whole) return propagate(whole);
   surroundings = (*whole)->surroundings;
   const Neighbourhood* around = &neighbourhood(surroundings);
   Result<Grown> out = grow.wider == 0 ? Result<Grown>((*whole)->grown) : around->grow(cloud_, grow);
   int reaches = 0;
-  const auto is_more_to_look_at = [&] {
-    return reaches < farther_reaches && !around->is_cut_short() && around->rows().size() < cloud_.size();
-  };
+  const auto is_more_to_look_at = [&] { return reaches < farther_reaches && is_more_beyond(*around); };
   for (; out && out->wider < grow.wider && is_more_to_look_at(); ++reaches) {
     surroundings.reach *= 2;
     around = &neighbourhood(surroundings);
@@ -153,17 +169,12 @@ Result<Grown> Selector::grown_anywhere(const Grow& grow, Surroundings& surroundi
 
 Result<const Selector::Found*> Selector::by_inside_alone(Grow grow) {
   grow.outside.clear();
-  const auto kept = std::ranges::find(inside_alone_, grow, &Found::grow);
-  if (kept != inside_alone_.end()) {
-    std::rotate(kept, kept + 1, inside_alone_.end());
-  } else {
+  return kept_or_found(inside_alone_, grow, [&]() -> Result<Found> {
     Surroundings surroundings;
-    auto found = grown_anywhere(grow, surroundings);
-    if (!found) return propagate(found);
-    if (inside_alone_.size() == grown_kept) inside_alone_.erase(inside_alone_.begin());
-    inside_alone_.push_back({std::move(grow), *std::move(found), surroundings});
-  }
-  return &inside_alone_.back();
+    auto grown = grown_anywhere(grow, surroundings);
+    if (!grown) return propagate(grown);
+    return Found{grow, *std::move(grown), surroundings};
+  });
 }
 
 Result<Grown> Selector::grown(const Grow& grow) {

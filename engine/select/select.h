@@ -70,6 +70,13 @@ class Selector {
     Grown grown;
     Surroundings surroundings;
   };
+  /// What is kept of a question, as the latest from now on; else what find() answers, which is kept.
+  template <class Find>
+  [[nodiscard]] static Result<const Found*> kept_or_found(std::vector<Found>& kept, const Grow& grow, Find&& find);
+  /// What grows there. errors  those of Neighbourhood::grow()
+  [[nodiscard]] Result<Found> found_within(const Grow& grow, const Surroundings& surroundings);
+  /// Has the scene rows that these surroundings leave out, and may they be looked at?
+  [[nodiscard]] bool is_more_beyond(const Neighbourhood& around) const;
   /// Does what was found come so near to the reach that this may have cut it?
   [[nodiscard]] static bool comes_near_reach(const Array3& mean, const Found& found);
   /// The whole, without a reach and whatever `wider` says. The scene says how far its surroundings reach: by half of
@@ -78,6 +85,7 @@ class Selector {
   /// the next call.
   ///   errors  those of Neighbourhood::grow()
   [[nodiscard]] Result<const Found*> whole_of(Grow grow);
+  [[nodiscard]] Result<Found> find_whole(const Grow& grow);
   /// Of a whole without a reach: where its surroundings have no border farther out, the next ones are looked for in
   /// twice the reach, and again.
   ///   surroundings  set to those that were looked at last
