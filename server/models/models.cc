@@ -1,6 +1,8 @@
 #include "server/models/models.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <iterator>
 #include <map>
 #include <system_error>
 #include <utility>
@@ -65,45 +67,61 @@ Finding look_at_lpips(const fs::path& folder) {
   return {"lpips", true, (folder / "lpips").string()};
 }
 
-/// A file of an adapter, or why there is none.
-struct AdapterFile {
-  fs::path path;
-  std::string problem = {};
-};
-
 /// Requests and answers are in UTF-8, and people type names.
 bool is_plain(const std::string& name) {
   return std::ranges::all_of(name, [](char letter) { return letter >= ' ' && letter <= '~'; });
 }
 
-/// Those below the model folder, by name.
-std::map<std::string, AdapterFile> adapter_files(const fs::path& folder) {
-  std::map<std::string, AdapterFile> files;
+/// What lies below the model folder for adapters.
+struct AdapterFiles {
+  std::map<std::string, std::vector<fs::path>> by_name;  ///< Those that can be asked for.
+  std::vector<Finding> useless;                          ///< What else is there, but for hidden files.
+};
+
+AdapterFiles adapter_files(const fs::path& folder) {
+  AdapterFiles files;
   const fs::path adapters = folder / "lora";
+  const auto unnamed = [&](const std::string& problem) {
+    files.useless.push_back({"lora ?", false, adapters.string() + ": " + problem});
+  };
   std::error_code unreadable;
   fs::directory_iterator entry(adapters, unreadable);
   for (; !unreadable && entry != fs::directory_iterator(); entry.increment(unreadable)) {
     const fs::path& path = entry->path();
-    std::vector<std::pair<std::string, fs::path>> found;
-    if (path.extension() == ".safetensors") found.emplace_back(path.stem().string(), path);
-    // As diffusers and peft publish them.
-    for (const char* name : {"pytorch_lora_weights.safetensors", "adapter_model.safetensors"})
-      if (is_there(path / name)) found.emplace_back(path.filename().string(), path / name);
-    if (found.empty() && is_plain(path.filename().string()))
-      files[path.filename().string()] = {
-          path,
-          "not a .safetensors file, nor a folder with pytorch_lora_weights.safetensors or "
-          "adapter_model.safetensors"};
-    for (const auto& [name, file] : found) {
-      if (!is_plain(name))
-        files["?"] = {adapters, "a name there has other characters than ASCII's printable ones: rename it"};
-      else if (const auto [at, is_new] = files.emplace(name, AdapterFile{file}); !is_new)
-        at->second.problem = "two files are of this name: it would be for chance to choose";
+    const bool is_file = path.extension() == ".safetensors";
+    const std::string name = (is_file ? path.stem() : path.filename()).string();
+    if (name.starts_with('.')) continue;
+    if (!is_plain(name)) {
+      unnamed("a name there has other characters than ASCII's printable ones: rename it");
+      continue;
     }
+    // As diffusers and peft publish them; a folder that has both is none to choose for anybody.
+    std::vector<fs::path> found;
+    if (is_file) found.push_back(path);
+    for (const char* published : {"pytorch_lora_weights.safetensors", "adapter_model.safetensors"})
+      if (is_there(path / published)) found.push_back(path / published);
+    if (found.empty())
+      files.useless.push_back({"lora " + name, false,
+                               path.string() + ": not a .safetensors file, nor a folder with "
+                                               "pytorch_lora_weights.safetensors or adapter_model.safetensors"});
+    else
+      files.by_name[name].insert(files.by_name[name].end(), found.begin(), found.end());
   }
   if (unreadable && unreadable != std::errc::no_such_file_or_directory)
-    files["?"] = {adapters, "it cannot be read: " + unreadable.message()};
+    unnamed("it cannot be read: " + unreadable.message());
   return files;
+}
+
+///   bytes  set to what it takes in memory if it can be used
+Finding look_at_adapter(const std::string& name, const std::vector<fs::path>& files, const weights::Configs& configs,
+                        std::uint64_t& bytes) {
+  const std::string path = files.front().string();
+  if (files.size() > 1)
+    return {"lora " + name, false, path + ": two files are of this name: it would be for chance to choose"};
+  const auto adapter = weights::read_adapter(files.front(), configs);
+  if (!adapter) return {"lora " + name, false, path + ": " + described(adapter.error())};
+  bytes = adapter->bytes();
+  return {"lora " + name, true, path};
 }
 
 }  // namespace
@@ -136,20 +154,15 @@ Models::Models(fs::path folder, int threads)
 void Models::look_at_adapters() {
   const auto checkpoint = weights::Checkpoint::open(checkpoint_);
   if (!checkpoint) return;  // it was there a moment ago: whoever uses it is told
-  for (const auto& [name, file] : adapter_files(folder_)) {
-    std::string problem = file.problem;
-    if (problem.empty()) {
-      const auto adapter = weights::read_adapter(file.path, checkpoint->configs());
-      if (adapter)
-        loras_.emplace(name, Lora{file.path, adapter->bytes()});
-      else
-        problem = described(adapter.error());
-    }
-    const bool is_usable = problem.empty() && has_libtorch();
-    findings_.push_back(
-        {"lora " + name, is_usable,
-         problem.empty() ? (is_usable ? file.path.string() : without_libtorch) : file.path.string() + ": " + problem});
+  AdapterFiles files = adapter_files(folder_);
+  for (const auto& [name, paths] : files.by_name) {
+    std::uint64_t bytes = 0;
+    Finding finding = look_at_adapter(name, paths, checkpoint->configs(), bytes);
+    if (finding.usable) loras_.emplace(name, Lora{paths.front(), bytes});
+    if (finding.usable && !has_libtorch()) finding.usable = false, finding.message = without_libtorch;
+    findings_.push_back(std::move(finding));
   }
+  std::ranges::move(files.useless, std::back_inserter(findings_));
 }
 
 std::vector<std::string> Models::loras() const {

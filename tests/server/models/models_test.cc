@@ -103,6 +103,8 @@ TEST(Models, AdaptersAreFoundByTheirNamesAndTheDamagedOneIsTold) {
                       support::read_file(golden / "kohya_alpha8.safetensors"));
   support::write_file(adapters / "cut.safetensors", whole.substr(0, whole.size() / 2));
   support::write_file(adapters / "notes.txt", "no adapter");
+  support::write_file(adapters / ".DS_Store", "of a desktop");
+  fs::create_directory(adapters / "published.old");
   for (const char* of_both : {"twice.safetensors", "twice/adapter_model.safetensors", "\xff.safetensors"}) {
     fs::create_directories((adapters / of_both).parent_path());
     support::write_file(adapters / of_both, whole);
@@ -110,7 +112,7 @@ TEST(Models, AdaptersAreFoundByTheirNamesAndTheDamagedOneIsTold) {
   const Models models(folder.path(), /*threads=*/1);
   std::map<std::string, Finding> found;
   for (const Finding& finding : models.findings()) found[finding.name] = finding;
-  ASSERT_EQ(found.size(), 8u) << "sd, lpips, four adapters, a name that cannot be asked for, and what is no adapter";
+  ASSERT_EQ(found.size(), 9u) << "sd, lpips, four adapters, a name that cannot be asked for, two that are no adapter";
   EXPECT_NE(found["lora notes.txt"].message.find("not a .safetensors file"), std::string::npos);
   EXPECT_FALSE(found["lora twice"].usable);
   EXPECT_NE(found["lora ?"].message.find("rename"), std::string::npos) << found["lora ?"].message;
