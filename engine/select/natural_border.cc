@@ -67,6 +67,12 @@ Terrain terrain_of(const neighbours::NeighbourGraph& graph, std::span<const floa
   return out;
 }
 
+/// What leaves a piece by the root of what it holds, or of all else if that is less: for a piece of a surface, the same
+/// at any size if its border is as good as elsewhere on the surface.
+double ratio_of(double leaving, double lesser) {
+  return lesser > 0 ? (least_border + std::max(leaving, 0.0)) / std::sqrt(lesser) : 0.0;
+}
+
 /// Pieces of a graph whose nodes come one by one, and what the borders of those that clicks are on cost.
 class GrowingPieces {
  public:
@@ -121,13 +127,11 @@ class GrowingPieces {
       sum += terrain_.volume(node, edge);
     return sum;
   }
-  /// What leaves a piece by the root of what it holds: for a piece of a surface, the same at any size if its border is
-  /// as good as elsewhere on the surface.
   [[nodiscard]] double border_ratio(const Piece& piece) const {
     if (piece.clicks == 0) return 0;
     // All there is is a thing that stands alone.
     const double lesser = taken_ == is_in_.size() ? piece.volume : std::min(piece.volume, all_ - piece.volume);
-    return lesser > 0 ? double(piece.clicks) * (least_border + std::max(piece.leaving, 0.0)) / std::sqrt(lesser) : 0.0;
+    return double(piece.clicks) * ratio_of(piece.leaving, lesser);
   }
 
   const Terrain& terrain_;
@@ -268,6 +272,21 @@ NaturalBorder natural_border(const neighbours::NeighbourGraph& graph, std::span<
   }
   for (std::size_t i = 0; i < levels[chosen].taken; ++i) out.inside[order[i]] = 1;
   return out;
+}
+
+double border_ratio(const neighbours::NeighbourGraph& graph, std::span<const float> weight,
+                    std::span<const std::uint8_t> inside) {
+  const Terrain terrain = terrain_of(graph, weight, true);
+  double leaving = 0, volume = 0, all = 0;
+  for (std::uint32_t node = 0; node < graph.size(); ++node)
+    for (std::uint32_t edge = graph.begin[node]; edge < graph.begin[node + 1]; ++edge) {
+      const double held = terrain.volume(node, edge);
+      all += held;
+      if (inside[node] == 0) continue;
+      volume += held;
+      if (inside[graph.to[edge]] == 0) leaving += terrain.border(node, edge);
+    }
+  return ratio_of(leaving, std::min(volume, all - volume));
 }
 
 }  // namespace engine::select

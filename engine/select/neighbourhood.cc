@@ -250,6 +250,12 @@ Result<std::vector<std::uint32_t>> Neighbourhood::left_of(const scene::GaussianC
   return rows_where_marked(border_of(*seeds, potential, {.whole = grow.whole}).inside);
 }
 
+double Neighbourhood::border_ratio(std::span<const std::uint32_t> rows) const {
+  std::vector<std::uint8_t> inside(rows_.size());
+  for (std::size_t node = 0; node < rows_.size(); ++node) inside[node] = std::ranges::binary_search(rows, rows_[node]);
+  return select::border_ratio(graph_, weight_, inside);
+}
+
 void Neighbourhood::suppose_extent(Seeds& seeds) const {
   if (distinct(seeds.clicked.outside).size() >= clicks_around) return;
   seeds.leak = leak_beyond(seeds.clicked.inside);

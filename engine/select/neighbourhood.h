@@ -99,6 +99,10 @@ class Neighbourhood {
   [[nodiscard]] std::vector<std::uint32_t> settle(std::span<const Given> given,
                                                   std::span<const std::uint8_t> inclined = {}) const;
 
+  /// How well these rows are a thing of their own, by all that is looked at: the less the better (natural_border.h).
+  ///   rows  [any] ascending; those out of reach do not count
+  [[nodiscard]] double border_ratio(std::span<const std::uint32_t> rows) const;
+
  private:
   /// What a point says of a node. Of several the least one counts: the point that the node covers most, or is nearest
   /// to; the inside one of two alike.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <span>
 #include <type_traits>
 #include <utility>
 #include <variant>
@@ -23,8 +24,8 @@ constexpr int farther_reaches = 2;
 
 // Where nearly all of a whole ends only beyond this share of its reach, the reach may have cut it, and no border.
 constexpr double near_reach = 0.65, nearly_all = 0.99;
-// Times the rows of a whole that was cut: more is another thing, as the board beneath the fox's head. Chosen on random
-// clicks (ADR 69): what was cut had up to 2.5 times as many, other things from 3.5 on.
+// Times the rows of a whole that was cut: more is another thing, as the table beneath an apple. Chosen on random clicks
+// (ADR 69): what was cut had up to 3 times as many, other things from 3.2 on.
 constexpr double more_beyond_reach = 3;
 
 /// What selecting reads of a scene has to be finite: a NaN would be on no side of anything.
@@ -65,6 +66,15 @@ void describe(const Array3& mean, Selected& out) {
 /// What a person should know who meant more than is ever looked at.
 std::string cut_short(const std::string& and_what_now) {
   return "only the " + std::to_string(max_neighbourhood) + " Gaussians were looked at that are nearest " + and_what_now;
+}
+
+/// Is a larger thing the one that was meant, where a smaller one may have been cut? Who clicks on a thing of so many
+/// times the rows is so many times less likely to click where the smaller one is (the size principle, see
+/// natural_border()): the border has to be weaker by as much.
+bool is_worth_it(const Neighbourhood& around, std::span<const std::uint32_t> smaller,
+                 std::span<const std::uint32_t> larger) {
+  const double more = double(larger.size()) / double(smaller.size());
+  return more <= more_beyond_reach && more * around.border_ratio(larger) <= around.border_ratio(smaller);
 }
 
 bool is_empty(const RowSet& rows) { return std::find(rows.begin(), rows.end(), std::uint8_t{1}) == rows.end(); }
@@ -130,8 +140,7 @@ Result<Selector::Found> Selector::find_whole(const Grow& grow) {
     auto larger = found_within(grow, surroundings);
     if (!larger) break;
     if (comes_near_reach(cloud_.mean, *larger)) continue;
-    const double most_rows = more_beyond_reach * double(whole->grown.rows.size());
-    return double(larger->grown.rows.size()) <= most_rows ? larger : whole;
+    return is_worth_it(neighbourhood(surroundings), whole->grown.rows, larger->grown.rows) ? larger : whole;
   }
   return whole;
 }

@@ -81,8 +81,8 @@ class Selector {
   [[nodiscard]] static bool comes_near_reach(const Array3& mean, const Found& found);
   /// The whole, without a reach and whatever `wider` says. The scene says how far its surroundings reach: by half of
   /// its rows, of which a thing in the middle of a capture may have most. Where the whole has most of those within the
-  /// reach and comes near to it, and in twice the reach, or four times, ends well before it, that counts. Stays until
-  /// the next call.
+  /// reach and comes near to it, and in twice the reach, or four times, ends well before it and at a border that is
+  /// worth it, that counts. Stays until the next call.
   ///   errors  those of Neighbourhood::grow()
   [[nodiscard]] Result<const Found*> whole_of(Grow grow);
   [[nodiscard]] Result<Found> find_whole(const Grow& grow);

@@ -56,11 +56,14 @@ TEST(GrowOnTheFox, OneClickOnTheHeadTakesNeitherHalfOfItNorItsBoard) {
     whole.whole = true;
     return grown(file, whole);
   };
-  const std::size_t neck = whole_by({2.727, 0.262, 2.141}), cheek = whole_by({1.649, -0.163, 1.816});
+  const std::size_t neck = whole_by({2.727, 0.262, 2.141}), cheek = whole_by({1.649, -0.163, 1.816}),
+                    ear = whole_by({2.2055, -1.3692, 1.6048});
   EXPECT_GT(neck, 19000u) << "with the ear farther away, not as far as the reach (15,500)";
   EXPECT_LT(neck, 26000u);
   EXPECT_GT(cheek, 7000u);
   EXPECT_LT(cheek, 13000u) << "not the board and the wall, where the next border lies (46,000)";
+  EXPECT_GT(ear, 7000u);
+  EXPECT_LT(ear, 13000u) << "not neck, board and a piece of the wall (26,000), whose border is little better";
 }
 
 TEST(GrowOnTheDoll, LeavesTheBedThatItSitsOn) {

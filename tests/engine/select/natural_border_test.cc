@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <vector>
 
@@ -195,6 +196,22 @@ TEST(NaturalBorder, IsCountedFromWhatIsInsideAlreadyWhereThatIsAsked) {
   EXPECT_FALSE(taken(0).less) << "nothing is known of what was before";
   EXPECT_TRUE(taken(1).less) << "what was given is farther in";
   EXPECT_FALSE(taken(60).more);
+}
+
+TEST(BorderRatio, IsWhatLeavesByTheRootOfWhatIsLess) {
+  const WeightedGraph strips = three_strips(0.01f, 1);
+  const auto ratio_of = [&](std::uint32_t nodes) {
+    std::vector<std::uint8_t> inside(strips.graph.size(), 0);
+    std::fill_n(inside.begin(), nodes, std::uint8_t{1});
+    const double ratio = border_ratio(strips.graph, strips.weight, inside);
+    for (std::uint8_t& one : inside) one = 1 - one;
+    EXPECT_NEAR(border_ratio(strips.graph, strips.weight, inside), ratio, 1e-9) << "of all else, the same";
+    return ratio;
+  };
+  // Ten rows of 20 hold 190 edges along them and 180 across, both ways, and end at 20 of a hundredth.
+  EXPECT_NEAR(ratio_of(200), (8 + 0.2) / std::sqrt(2.0 * (190 + 180) + 0.2), 1e-6);
+  EXPECT_GT(ratio_of(220), 2 * ratio_of(200)) << "beyond the joint";
+  EXPECT_EQ(ratio_of(0), 0) << "of none, and of all";
 }
 
 TEST(NaturalBorder, TakesAllThatCanBeReachedWhereNothingIsOutside) {
