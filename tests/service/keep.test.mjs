@@ -96,13 +96,15 @@ describe('versions', () => {
     const first = await draft(90);
     const other = await openDesk(desk);
     await other.hand.shown(first);
-    const second = await draft(110);
+    // Who is looking at it is told what became of it, and goes on: meanwhile, since the message does not stay for long.
+    const goneOn = async () => {
+      const told = other.page.getByTestId('toast').filter({ hasText: `Version ${first} was a draft, and is gone: version ` });
+      await told.waitFor({ timeout: 120_000 });
+      assert.equal(await other.id('version-select').inputValue(), '0');  // its picture may take longer than that is told
+      await told.getByRole('button', { name: 'Show' }).click();
+    };
+    const [second] = await Promise.all([draft(110), goneOn()]);
     await id(`version-${first}`).waitFor({ state: 'detached' });  // in the tree, whether that is seen or not
-    // Who was looking at it is told what became of it, and goes on.
-    const told = other.page.getByTestId('toast').filter({ hasText: `Version ${first} was a draft, and is gone: version ${second}` });
-    await told.waitFor();
-    assert.equal(await other.id('version-select').inputValue(), '0');  // its picture may take longer than that is told
-    await told.getByRole('button', { name: 'Show' }).click();
     await other.hand.shown(second);
     assert.deepEqual(other.complaints, []);
     await other.page.context().close();
