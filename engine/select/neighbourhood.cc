@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <sstream>
@@ -14,6 +15,7 @@
 #include "engine/select/natural_border.h"
 #include "engine/select/random_walk.h"
 #include "engine/select/similarity.h"
+#include "engine/select/thinning.h"
 
 namespace engine::select {
 namespace {
@@ -129,49 +131,45 @@ std::optional<Surroundings> surroundings_of(const Array3& mean, std::span<const 
 }
 
 Neighbourhood::Neighbourhood(const scene::GaussianCloud& cloud, const Surroundings& surroundings)
-    : surroundings_(surroundings), farthest_(surroundings.reach), index_({}, 3) {
+    : surroundings_(surroundings), index_({}, 3) {
+  const auto in_morton_order = [&](std::vector<std::uint32_t>& rows) {
+    rows = in_order(rows, neighbours::morton_order(neighbours::points_of(cloud.mean, rows, surroundings.middle)));
+  };
   const std::vector<double> squared = squared_distances(cloud.mean, surroundings.middle);
   const double limit = surroundings.reach * surroundings.reach;
   for (std::size_t row = 0; row < squared.size(); ++row)
-    if (squared[row] <= limit) rows_.push_back(std::uint32_t(row));
-  if (rows_.size() > max_neighbourhood) {
-    is_cut_short_ = true;
-    const auto nearer = [&](std::uint32_t a, std::uint32_t b) {
-      return squared[a] != squared[b] ? squared[a] < squared[b] : a < b;
-    };
-    std::nth_element(rows_.begin(), rows_.begin() + max_neighbourhood, rows_.end(), nearer);
-    farthest_ = std::sqrt(squared[rows_[max_neighbourhood]]);
-    rows_.resize(max_neighbourhood);
-    std::sort(rows_.begin(), rows_.end());
-  }
-  const std::vector<std::uint32_t> order =
-      neighbours::morton_order(neighbours::points_of(cloud.mean, rows_, surroundings.middle));
-  rows_ = in_order(rows_, order);
-  points_ = neighbours::points_of(cloud.mean, rows_, surroundings.middle);
+    if (squared[row] <= limit) nodes_.push_back(std::uint32_t(row));
+  others_ = thin_out(nodes_, max_nodes);
+  in_morton_order(nodes_);
+  in_morton_order(others_);
+  points_ = neighbours::points_of(cloud.mean, nodes_, surroundings.middle);
   index_ = neighbours::PointIndex(points_, 3);
   graph_ = neighbours::join_nearest(points_, index_, neighbours_joined);
-  weight_ = similarity_of_edges(cloud, rows_, graph_);
+  weight_ = similarity_of_edges(cloud, nodes_, graph_);
   for (float& one : weight_) one = std::max(one, least_weight);
+  node_of_other_.reserve(others_.size());
+  for (const auto& node : index_.nearest(neighbours::points_of(cloud.mean, others_, surroundings.middle), 1))
+    node_of_other_.push_back(node.index);
 }
 
 Result<Neighbourhood::Seeds> Neighbourhood::seeds_of(const scene::GaussianCloud& cloud, const Grow& grow) const {
-  if (rows_.empty())
+  if (nodes_.empty())
     return fail(ErrorCode::unprocessable, "no Gaussian within " + text(surroundings_.reach) + " of the first point",
                 "inside[0]");
   std::map<std::uint32_t, Claim> claims;
   Seeds seeds;
   for (std::size_t i = 0; i < grow.inside.size(); ++i) {
-    if (const double away = distance(grow.inside[i], surroundings_.middle); away > farthest_)
+    if (const double away = distance(grow.inside[i], surroundings_.middle); away > surroundings_.reach)
       return fail(ErrorCode::unprocessable,
-                  "the point lies " + text(away) + " from the first one, beyond the reach of " + text(farthest_) +
-                      ": grow from it in an operation of its own" + (is_cut_short_ ? "" : ", or raise the reach"),
+                  "the point lies " + text(away) + " from the first one, beyond the reach of " +
+                      text(surroundings_.reach) + ": grow from it in an operation of its own, or raise the reach",
                   "inside[" + std::to_string(i) + "]");
     seeds.clicked.inside.push_back(claim(cloud, grow.inside[i], Given::inside, claims));
   }
   for (const DVec3 point : grow.outside)
-    if (distance(point, surroundings_.middle) <= farthest_)
+    if (distance(point, surroundings_.middle) <= surroundings_.reach)
       seeds.clicked.outside.push_back(claim(cloud, point, Given::outside, claims));
-  seeds.given.assign(rows_.size(), Given::no);
+  seeds.given.assign(nodes_.size(), Given::no);
   for (const auto& [node, one] : claims) seeds.given[node] = one.side;
   take_far_nodes(seeds.given);
   const auto belongs_to = [&](Given side) {
@@ -196,7 +194,7 @@ std::uint32_t Neighbourhood::claim(const scene::GaussianCloud& cloud, DVec3 poin
   for (const neighbours::Neighbour& one :
        index_.nearest(neighbours::point_of(point, surroundings_.middle), rows_near_click))
     near.push_back(
-        {cover(cloud, rows_[one.index], double(graph_.spacing[one.index]), point), one.squared_distance, one.index});
+        {cover(cloud, nodes_[one.index], double(graph_.spacing[one.index]), point), one.squared_distance, one.index});
   // Where nothing covers the point, the nearest count, which come first.
   std::stable_sort(near.begin(), near.end(), [](const Covering& a, const Covering& b) { return a.cover > b.cover; });
   near.resize(std::min(near.size(), rows_clicked));
@@ -209,8 +207,8 @@ std::uint32_t Neighbourhood::claim(const scene::GaussianCloud& cloud, DVec3 poin
 }
 
 void Neighbourhood::take_far_nodes(std::vector<Given>& given) const {
-  for (std::uint32_t node = 0; node < rows_.size(); ++node) {
-    const bool is_far = glm::length(place_of(node)) >= far_border * farthest_;
+  for (std::uint32_t node = 0; node < nodes_.size(); ++node) {
+    const bool is_far = glm::length(place_of(node)) >= far_border * surroundings_.reach;
     if (is_far && given[node] == Given::no) given[node] = Given::outside;
   }
 }
@@ -222,37 +220,44 @@ Result<Grown> Neighbourhood::grow(const scene::GaussianCloud& cloud, const Grow&
   NaturalBorder border = grow.whole ? whole_border(*seeds, grow.wider) : border_of(*seeds, {false, grow.wider});
   // Who asks for less is not to get back just what that leaves out.
   if (border.wider >= 0) take_leftovers(*seeds, border.inside);
-  return Grown{rows_where_marked(border.inside), border.wider, border.more, border.less, is_cut_short_};
+  return Grown{rows_of(border.inside), border.wider, border.more, border.less};
 }
 
 Result<Grown> Neighbourhood::grow_beyond(const scene::GaussianCloud& cloud, const Grow& grow,
                                          std::span<const std::uint32_t> rows, int farther) const {
   auto seeds = seeds_of(cloud, grow);
   if (!seeds) return propagate(seeds);
-  for (std::size_t node = 0; node < rows_.size(); ++node)
-    if (std::binary_search(rows.begin(), rows.end(), rows_[node])) seeds->given[node] = Given::inside;
+  for (std::size_t node = 0; node < nodes_.size(); ++node)
+    if (std::binary_search(rows.begin(), rows.end(), nodes_[node])) seeds->given[node] = Given::inside;
   NaturalBorder border = border_of(*seeds, {.wider = farther, .beyond = true});
   if (border.wider > 0) take_leftovers(*seeds, border.inside);
-  return Grown{rows_where_marked(border.inside), border.wider, border.more, border.less, is_cut_short_};
+  // The rows were found among other nodes: in fewer surroundings, more of them have room.
+  std::vector<std::uint32_t> all;
+  std::ranges::set_union(rows, rows_of(border.inside), std::back_inserter(all));
+  return Grown{std::move(all), border.wider, border.more, border.less};
 }
 
 Result<std::vector<std::uint32_t>> Neighbourhood::left_of(const scene::GaussianCloud& cloud, const Grow& grow,
                                                           std::span<const std::uint32_t> rows) const {
   auto seeds = seeds_of(cloud, grow);
   if (!seeds) return propagate(seeds);
-  const auto was_taken = [&](std::uint32_t node) { return std::ranges::binary_search(rows, rows_[node]); };
+  const auto was_taken = [&](std::uint32_t node) { return std::ranges::binary_search(rows, nodes_[node]); };
   if (std::ranges::none_of(seeds->clicked.outside, was_taken)) return std::vector<std::uint32_t>{};
   suppose_extent(*seeds);
   std::vector<double> potential = random_walk(graph_, weight_, seeds->given, seeds->leak);
   // The walk goes where it would; what was not taken is outside wherever it ends.
-  for (std::uint32_t node = 0; node < rows_.size(); ++node)
+  for (std::uint32_t node = 0; node < nodes_.size(); ++node)
     if (seeds->given[node] == Given::no && !was_taken(node)) seeds->given[node] = Given::outside, potential[node] = 0;
-  return rows_where_marked(border_of(*seeds, potential, {.whole = grow.whole}).inside);
+  std::vector<std::uint32_t> left;
+  std::ranges::set_intersection(rows, rows_of(border_of(*seeds, potential, {.whole = grow.whole}).inside),
+                                std::back_inserter(left));
+  return left;
 }
 
 double Neighbourhood::border_ratio(std::span<const std::uint32_t> rows) const {
-  std::vector<std::uint8_t> inside(rows_.size());
-  for (std::size_t node = 0; node < rows_.size(); ++node) inside[node] = std::ranges::binary_search(rows, rows_[node]);
+  std::vector<std::uint8_t> inside(nodes_.size());
+  for (std::size_t node = 0; node < nodes_.size(); ++node)
+    inside[node] = std::ranges::binary_search(rows, nodes_[node]);
   return select::border_ratio(graph_, weight_, inside);
 }
 
@@ -342,18 +347,27 @@ bool Neighbourhood::click_far_end(std::span<const std::uint32_t> inside, Seeds& 
 
 std::vector<std::uint32_t> Neighbourhood::settle(std::span<const Given> given,
                                                  std::span<const std::uint8_t> inclined) const {
-  const std::vector<double> potential = random_walk(graph_, weight_, given);
-  std::vector<std::uint8_t> inside(rows_.size());
-  for (std::size_t node = 0; node < inside.size(); ++node)
-    inside[node] = potential[node] > (!inclined.empty() && inclined[node] != 0 ? inclination : 0.5);
-  return rows_where_marked(inside);
+  std::vector<Given> given_nodes(nodes_.size());
+  std::ranges::transform(nodes_, given_nodes.begin(), [&](std::uint32_t row) { return given[row]; });
+  const std::vector<double> potential = random_walk(graph_, weight_, given_nodes);
+  return rows_where([&](std::uint32_t node, std::uint32_t row) {
+    if (given[row] != Given::no) return given[row] == Given::inside;
+    return potential[node] > (!inclined.empty() && inclined[row] != 0 ? inclination : 0.5);
+  });
 }
 
-std::vector<std::uint32_t> Neighbourhood::rows_where_marked(std::span<const std::uint8_t> nodes) const {
+std::vector<std::uint32_t> Neighbourhood::rows_of(std::span<const std::uint8_t> inside) const {
+  return rows_where([&](std::uint32_t node, std::uint32_t) { return inside[node] != 0; });
+}
+
+template <class Test>
+std::vector<std::uint32_t> Neighbourhood::rows_where(Test&& test) const {
   std::vector<std::uint32_t> rows;
-  for (std::size_t node = 0; node < nodes.size(); ++node)
-    if (nodes[node] != 0) rows.push_back(rows_[node]);
-  std::sort(rows.begin(), rows.end());
+  for (std::uint32_t node = 0; node < nodes_.size(); ++node)
+    if (test(node, nodes_[node])) rows.push_back(nodes_[node]);
+  for (std::size_t i = 0; i < others_.size(); ++i)
+    if (test(node_of_other_[i], others_[i])) rows.push_back(others_[i]);
+  std::ranges::sort(rows);
   return rows;
 }
 

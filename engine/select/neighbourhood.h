@@ -30,9 +30,10 @@ struct Surroundings {
   bool operator==(const Surroundings&) const = default;
 };
 
-/// Rows: the nearest to the middle count. A first click then takes 1.2 s of one core, the next ones 0.35 s; one that
-/// means the whole walks three times. One outside walks once more where it would make more of the thing.
-constexpr std::size_t max_neighbourhood = 250'000;
+/// So many of the rows within reach are nodes at most, and stand for the others. A first click then takes 0.6 s of one
+/// core, and half a second more for each million rows; the next ones 0.15 s; one that means the whole walks three
+/// times. One outside walks once more where it would make more of the thing.
+constexpr std::size_t max_nodes = 100'000;
 
 /// The surroundings of an operation. Without a reach: a quarter of the distance within which half of the scene's rows
 /// lie; or four times as far as the farthest inside point, or as the nearest outside one if that is farther, but not
@@ -49,23 +50,24 @@ constexpr std::size_t max_neighbourhood = 250'000;
 /// What grows.
 struct Grown {
   std::vector<std::uint32_t> rows;  ///< Of the cloud, ascending.
-  int wider = 0;              ///< Grow::wider, or nearer to 0 where there are fewer borders: NaturalBorder::wider.
-  bool more = false;          ///< NaturalBorder::more, within the surroundings.
-  bool less = false;          ///< NaturalBorder::less
-  bool is_cut_short = false;  ///< Neighbourhood::is_cut_short().
+  int wider = 0;      ///< Grow::wider, or nearer to 0 where there are fewer borders: NaturalBorder::wider.
+  bool more = false;  ///< NaturalBorder::more, within the surroundings.
+  bool less = false;  ///< NaturalBorder::less
 };
 
 /// The rows around a point, joined to their neighbours by edges that are the weaker the more likely a border runs
-/// between the two. Immutable.
+/// between the two. Of very many, some drawn by chance are the nodes (thinning.h), and each of the others goes where
+/// the nearest node goes. Immutable.
 class Neighbourhood {
  public:
-  /// About 0.9 s for 250,000 rows on one core, 0.35 s for 100,000 (bench/select_bench).
+  /// About 0.35 s for 100,000 rows on one core, 0.8 s for a million (bench/select_bench). Of the scene's rows, 8 bytes
+  /// each are kept for those that are no nodes.
   Neighbourhood(const scene::GaussianCloud& cloud, const Surroundings& surroundings);
 
   [[nodiscard]] const Surroundings& surroundings() const { return surroundings_; }
-  [[nodiscard]] std::span<const std::uint32_t> rows() const { return rows_; }  ///< In the order of nodes.
-  /// Had the reach to be cut short, so as not to look at more than max_neighbourhood rows?
-  [[nodiscard]] bool is_cut_short() const { return is_cut_short_; }
+  /// How many rows are within reach.
+  [[nodiscard]] std::size_t size() const { return nodes_.size() + others_.size(); }
+  [[nodiscard]] std::size_t nodes() const { return nodes_.size(); }
 
   /// The rows of the thing: those from which a random walk rather ends at the inside points, up to the natural border
   /// (natural_border.h), and its leftovers (leftovers.h) unless outside points are on more than three nodes within
@@ -91,11 +93,10 @@ class Neighbourhood {
   [[nodiscard]] Result<std::vector<std::uint32_t>> left_of(const scene::GaussianCloud& cloud, const Grow& grow,
                                                            std::span<const std::uint32_t> rows) const;
 
-  /// For each node that is not given, the side at which a random walk from it rather ends; where there is no way to
-  /// either, the outside. The rows that are inside, given or not, ascending.
-  ///   given     [rows().size()], by node
-  ///   inclined  [rows().size()] 1 for nodes that are inside unless six of seven walks from them end outside. Empty:
-  ///             none
+  /// Of the rows within reach, ascending, those that are given for the inside, and of those that are not given the ones
+  /// from which a random walk rather ends there. Where there is no way to either side, they are outside.
+  ///   given     [N]
+  ///   inclined  [N] 1 for rows that are inside unless six of seven walks from them end outside. Empty: none
   [[nodiscard]] std::vector<std::uint32_t> settle(std::span<const Given> given,
                                                   std::span<const std::uint8_t> inclined = {}) const;
 
@@ -148,17 +149,19 @@ class Neighbourhood {
   ///   inside  [n] nodes, 1 or more
   ///   ends    of the calls before with these nodes
   bool click_far_end(std::span<const std::uint32_t> inside, Seeds& seeds, FarEnds& ends) const;
-  /// The rows of marked nodes, ascending.
-  [[nodiscard]] std::vector<std::uint32_t> rows_where_marked(std::span<const std::uint8_t> nodes) const;
+  /// The rows that go with nodes that are inside, ascending.
+  [[nodiscard]] std::vector<std::uint32_t> rows_of(std::span<const std::uint8_t> inside) const;
+  /// Those for which test(node that they go with, row) holds, ascending.
+  template <class Test>
+  [[nodiscard]] std::vector<std::uint32_t> rows_where(Test&& test) const;
   /// Gives what lies at the reach to the outside.
   void take_far_nodes(std::vector<Given>& given) const;
 
   Surroundings surroundings_;
-  bool is_cut_short_ = false;
-  std::vector<std::uint32_t> rows_;  ///< By node: in an order in which near ones come together.
-  double farthest_ = 0;              ///< Of the rows, from the middle, if the reach was cut short; else the reach.
-  std::vector<float> points_;        ///< [rows][3] relative to the middle.
-  neighbours::PointIndex index_;     ///< Of these.
+  std::vector<std::uint32_t> nodes_;                   ///< Rows, in an order in which near ones come together.
+  std::vector<std::uint32_t> others_, node_of_other_;  ///< Rows likewise, and the node that each goes with.
+  std::vector<float> points_;                          ///< [nodes][3] relative to the middle.
+  neighbours::PointIndex index_;                       ///< Of these.
   neighbours::NeighbourGraph graph_;
   std::vector<float> weight_;  ///< [edges] 1: the same surface goes on; near 0: a border.
 };

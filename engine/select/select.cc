@@ -18,8 +18,7 @@ constexpr std::size_t neighbourhoods_kept = 4;
 /// The same of what inside points alone take: a megabyte each at most.
 constexpr std::size_t grown_kept = 4;
 
-/// So often the reach of a whole is doubled in search of a border farther out: then it holds nearly all of a scene, or
-/// as much as is ever looked at.
+/// So often the reach of a whole is doubled in search of a border farther out: then it holds nearly all of a scene.
 constexpr int farther_reaches = 2;
 
 // Where nearly all of a whole ends only beyond this share of its reach, the reach may have cut it, and no border.
@@ -63,11 +62,6 @@ void describe(const Array3& mean, Selected& out) {
   if (out.count > 0) out.centre = sum / double(out.count);
 }
 
-/// What a person should know who meant more than is ever looked at.
-std::string cut_short(const std::string& and_what_now) {
-  return "only the " + std::to_string(max_neighbourhood) + " Gaussians were looked at that are nearest " + and_what_now;
-}
-
 /// Is a larger thing the one that was meant, where a smaller one may have been cut? Who clicks on a thing of so many
 /// times the rows is so many times less likely to click where the smaller one is (the size principle, see
 /// natural_border()): the border has to be weaker by as much.
@@ -105,10 +99,6 @@ const Neighbourhood& Selector::neighbourhood(const Surroundings& surroundings) {
   return *neighbourhoods_.back();
 }
 
-bool Selector::is_more_beyond(const Neighbourhood& around) const {
-  return !around.is_cut_short() && around.rows().size() < cloud_.size();
-}
-
 template <class Find>
 Result<const Selector::Found*> Selector::kept_or_found(std::vector<Found>& kept, const Grow& grow, Find&& find) {
   const auto at = std::ranges::find(kept, grow, &Found::grow);
@@ -133,9 +123,9 @@ Result<Selector::Found> Selector::find_whole(const Grow& grow) {
   Surroundings surroundings = surroundings_of(cloud_.mean, grow);
   auto whole = found_within(grow, surroundings);
   if (!whole) return whole;
-  const bool has_most = 2 * whole->grown.rows.size() > neighbourhood(surroundings).rows().size();
+  const bool has_most = 2 * whole->grown.rows.size() > neighbourhood(surroundings).size();
   if (!has_most || !comes_near_reach(cloud_.mean, *whole)) return whole;
-  for (int reaches = 0; reaches < farther_reaches && is_more_beyond(neighbourhood(surroundings)); ++reaches) {
+  for (int reaches = 0; reaches < farther_reaches && neighbourhood(surroundings).size() < cloud_.size(); ++reaches) {
     surroundings.reach *= 2;
     auto larger = found_within(grow, surroundings);
     if (!larger) break;
@@ -161,7 +151,7 @@ Result<Grown> Selector::grown_anywhere(const Grow& grow, Surroundings& surroundi
   const Neighbourhood* around = &neighbourhood(surroundings);
   Result<Grown> out = grow.wider == 0 ? Result<Grown>((*whole)->grown) : around->grow(cloud_, grow);
   int reaches = 0;
-  const auto is_more_to_look_at = [&] { return reaches < farther_reaches && is_more_beyond(*around); };
+  const auto is_more_to_look_at = [&] { return reaches < farther_reaches && around->size() < cloud_.size(); };
   for (; out && out->wider < grow.wider && is_more_to_look_at(); ++reaches) {
     surroundings.reach *= 2;
     around = &neighbourhood(surroundings);
@@ -218,32 +208,18 @@ Result<RowSet> Selector::rows_of(const Grow& grow, const std::string& where, Sel
     so_far.warnings.push_back({"there is no border farther " + std::string(grow.wider > 0 ? "out" : "in") +
                                    " than wider = " + std::to_string(found->wider),
                                where + ".grow.wider"});
-  // A whole without a reach asks for no distance: that less was looked at is no failing of the request.
-  if (found->is_cut_short && !(grow.whole && !grow.reach))
-    so_far.warnings.push_back({cut_short("to the first inside point: lower the reach, or grow larger things in several "
-                                         "operations"),
-                               where});
   return named;
 }
 
-RowSet Selector::rows_of(const Masks& masks, const std::string& where, Selected& so_far) {
+RowSet Selector::rows_of(const Masks& masks, Selected& so_far) {
   MaskedRows masked = rows_in_masks(cloud_, masks, workspace_);
   so_far.undecided += masked.undecided;
   const auto surroundings = surroundings_of(cloud_.mean, masked.inside);
   if (!surroundings) return std::move(masked.shaded);  // all of it lies behind glass, or haze
-  const Neighbourhood& around = neighbourhood(*surroundings);
-  std::vector<Given> given;
-  std::vector<std::uint8_t> shaded;
-  given.reserve(around.rows().size()), shaded.reserve(around.rows().size());
-  for (const std::uint32_t row : around.rows()) {
-    given.push_back(masked.judged[row] == 0 ? Given::no : masked.inside[row] != 0 ? Given::inside : Given::outside);
-    shaded.push_back(masked.shaded[row]);
-  }
-  for (const std::uint32_t row : around.settle(given, shaded)) masked.inside[row] = 1;
-  if (around.is_cut_short())
-    so_far.warnings.push_back({cut_short("to the middle of what the masks show: of those farther away, only what their "
-                                         "views show well is taken"),
-                               where});
+  std::vector<Given> given(cloud_.size(), Given::no);
+  for (std::size_t row = 0; row < given.size(); ++row)
+    if (masked.judged[row] != 0) given[row] = masked.inside[row] != 0 ? Given::inside : Given::outside;
+  for (const std::uint32_t row : neighbourhood(*surroundings).settle(given, masked.shaded)) masked.inside[row] = 1;
   return std::move(masked.inside);
 }
 
@@ -267,7 +243,7 @@ Result<void> Selector::carry_out(const Operation& operation, const std::string& 
             if (!grown) return propagate(grown);
             named = *std::move(grown);
           } else if constexpr (std::is_same_v<Kind, Masks>) {
-            named = rows_of(action, where, so_far);
+            named = rows_of(action, so_far);
           } else if constexpr (std::is_same_v<Kind, Polygon> || std::is_same_v<Kind, Stroke>) {
             named = rows_in(cloud_, action, workspace_);
           } else {

@@ -75,8 +75,6 @@ class Selector {
   [[nodiscard]] static Result<const Found*> kept_or_found(std::vector<Found>& kept, const Grow& grow, Find&& find);
   /// What grows there. errors  those of Neighbourhood::grow()
   [[nodiscard]] Result<Found> found_within(const Grow& grow, const Surroundings& surroundings);
-  /// Has the scene rows that these surroundings leave out, and may they be looked at?
-  [[nodiscard]] bool is_more_beyond(const Neighbourhood& around) const;
   /// Does what was found come so near to the reach that this may have cut it?
   [[nodiscard]] static bool comes_near_reach(const Array3& mean, const Found& found);
   /// The whole, without a reach and whatever `wider` says. The scene says how far its surroundings reach: by half of
@@ -92,7 +90,7 @@ class Selector {
   [[nodiscard]] Result<Grown> grown_anywhere(const Grow& grow, Surroundings& surroundings);
   /// What a person sees who has not clicked beside the thing yet. Stays until the next call.
   [[nodiscard]] Result<const Found*> by_inside_alone(Grow grow);
-  [[nodiscard]] RowSet rows_of(const Masks& masks, const std::string& where, Selected& so_far);
+  [[nodiscard]] RowSet rows_of(const Masks& masks, Selected& so_far);
   [[nodiscard]] const Neighbourhood& neighbourhood(const Surroundings& surroundings);
 
   const scene::GaussianCloud& cloud_;

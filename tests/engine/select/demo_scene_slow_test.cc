@@ -121,14 +121,18 @@ TEST(GrowOnTheDemoScene, GivesTheSameBytesForAnyNumberOfThreads) {
   EXPECT_EQ(one, four);
 }
 
-TEST(Grow, LooksAtNoMoreThanItsLimitAndSaysSo) {
-  scene::GaussianCloud cloud;
-  add_sheet(cloud, {0, 0, 0}, 510, 0.01f, Vec3(0.5f));
-  ASSERT_GT(cloud.size(), max_neighbourhood);
-  const Selected found = select(cloud, {{Op::add, Grow{{{0, 0, 0}}, {{0.5, 0, 0}}, 100.0}}}).value();
-  ASSERT_EQ(found.warnings.size(), 1u);
-  EXPECT_EQ(found.warnings[0].where, "selection[0]");
-  EXPECT_EQ(Neighbourhood(cloud, {{0, 0, 0}, 100.0}).rows().size(), max_neighbourhood);
+TEST(GrowOnALargeScene, TakesThingsThoughMostRowsAreNoNodes) {
+  const procedural::DemoScene large = procedural::make_demo_scene({.gaussians = 1'000'000, .views = 5});
+  ASSERT_GT(large.cloud.size(), 9 * max_nodes);
+  Selector selector(large.cloud);
+  for (const std::size_t object : {apple_on_table, mug, ball})
+    for (const bool whole : {false, true}) {
+      Grow grow = clicks_on(large, object, large.cameras[0], 4);
+      grow.whole = whole;
+      const Agreement found = agreement(large, object, selector.select({{Op::add, grow}}).value().rows);
+      EXPECT_GT(found.recall, 0.98) << large.object_names[object] << whole;
+      EXPECT_GT(found.precision, 0.96) << large.object_names[object] << whole;
+    }
 }
 
 }  // namespace

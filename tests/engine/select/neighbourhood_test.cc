@@ -183,13 +183,6 @@ TEST(Grow, AnOutsideClickOnWhatIsTakenTakesNoMore) {
   EXPECT_GT(less, asked / 2);
 }
 
-/// Node by node, what the rows say.
-std::vector<Given> given_by_row(const Neighbourhood& around, const std::vector<Given>& of_row) {
-  std::vector<Given> given;
-  for (const std::uint32_t row : around.rows()) given.push_back(of_row[row]);
-  return given;
-}
-
 TEST(Settle, GivesEachRowToTheSideThatItHangsTogetherWith) {
   scene::GaussianCloud cloud = two_colors({0.1f, 0.1f, 0.8f});
   add_sheet(cloud, {0, 0, 50}, 5, 0.1f, {0.8f, 0.1f, 0.1f});  // joined to nothing
@@ -200,7 +193,7 @@ TEST(Settle, GivesEachRowToTheSideThatItHangsTogetherWith) {
     else if (cloud.mean.x[row] > 1.8f)
       of_row[row] = Given::outside;
   const Neighbourhood around(cloud, {{0, 0, 0}, 100.0});
-  const std::vector<std::uint32_t> rows = around.settle(given_by_row(around, of_row));
+  const std::vector<std::uint32_t> rows = around.settle(of_row);
   EXPECT_EQ(RowList(rows.begin(), rows.end()), numbers(0, 400));
 }
 
@@ -209,7 +202,7 @@ TEST(Settle, LeavesWhatIsGiven) {
   const Neighbourhood around(cloud, {{0, 0, 0}, 100.0});
   const std::vector<Given> of_row{Given::outside, Given::inside,  Given::outside,
                                   Given::outside, Given::outside, Given::outside};
-  EXPECT_EQ(around.settle(given_by_row(around, of_row)), (std::vector<std::uint32_t>{1}));
+  EXPECT_EQ(around.settle(of_row), (std::vector<std::uint32_t>{1}));
 }
 
 TEST(Settle, TakesWhatIsInclinedToUnlessItIsNearlyAllOutside) {
@@ -217,13 +210,12 @@ TEST(Settle, TakesWhatIsInclinedToUnlessItIsNearlyAllOutside) {
   const Neighbourhood around(cloud, {{5, 0, 0}, 100.0});
   std::vector<Given> of_row(11, Given::no);
   of_row.front() = Given::inside, of_row.back() = Given::outside;
-  const std::vector<Given> given = given_by_row(around, of_row);
-  const std::vector<std::uint32_t> rather = around.settle(given);
-  const std::vector<std::uint32_t> inclined = around.settle(given, std::vector<std::uint8_t>(11, 1));
+  const std::vector<std::uint32_t> rather = around.settle(of_row);
+  const std::vector<std::uint32_t> inclined = around.settle(of_row, std::vector<std::uint8_t>(11, 1));
   EXPECT_TRUE(std::ranges::includes(inclined, rather));
   EXPECT_GE(inclined.size(), rather.size() + 2);
   EXPECT_LT(inclined.back(), 10u) << "what is given stays";
-  EXPECT_EQ(around.settle(given, std::vector<std::uint8_t>(11, 0)), rather);
+  EXPECT_EQ(around.settle(of_row, std::vector<std::uint8_t>(11, 0)), rather);
 }
 
 TEST(SurroundingsOfClicks, OfTwoClicksAtNearlyOnePlaceAreThoseOfOne) {
