@@ -3,8 +3,8 @@
 //   build/release/bench/select_bench
 //
 // The ball of the demo scene, with two points on it and three around it, in scenes of 100,000 and a million Gaussians;
-// the reach is large enough to look at about as many as named (a million: as many as growing ever looks at). On one
-// thread and on two.
+// the reach is large enough to look at about as many as named; of a million, a tenth are nodes. On one thread and on
+// two.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>

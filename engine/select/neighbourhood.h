@@ -30,8 +30,8 @@ struct Surroundings {
   bool operator==(const Surroundings&) const = default;
 };
 
-/// So many of the rows within reach are nodes at most, and stand for the others. A first click then takes 0.6 s of one
-/// core, and half a second more for each million rows; the next ones 0.15 s; one that means the whole walks three
+/// So many of the rows within reach are nodes at most, and stand for the others. A first click then takes 0.8 s of one
+/// core, and half a second more for each million rows; the next ones half as long; one that means the whole walks three
 /// times. One outside walks once more where it would make more of the thing.
 constexpr std::size_t max_nodes = 100'000;
 
@@ -60,8 +60,8 @@ struct Grown {
 /// the nearest node goes. Immutable.
 class Neighbourhood {
  public:
-  /// About 0.35 s for 100,000 rows on one core, 0.8 s for a million (bench/select_bench). Of the scene's rows, 8 bytes
-  /// each are kept for those that are no nodes.
+  /// About 0.4 s for 100,000 rows on one core, 0.8 s for a million (bench/select_bench). Keeps 8 bytes for each row that
+  /// is no node.
   Neighbourhood(const scene::GaussianCloud& cloud, const Surroundings& surroundings);
 
   [[nodiscard]] const Surroundings& surroundings() const { return surroundings_; }

@@ -13,9 +13,10 @@
 namespace engine::select {
 namespace {
 
-/// Kept between selections: of a list that grows several things, and no more than some 100 MB.
+/// Kept between selections: of a list that grows several things, and no more than some 100 MB but for scenes of many
+/// million rows.
 constexpr std::size_t neighbourhoods_kept = 4;
-/// The same of what inside points alone take: a megabyte each at most.
+/// The same of what inside points alone take: four bytes for each row.
 constexpr std::size_t grown_kept = 4;
 
 /// So often the reach of a whole is doubled in search of a border farther out: then it holds nearly all of a scene.
