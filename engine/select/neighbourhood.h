@@ -60,8 +60,8 @@ struct Grown {
 /// the nearest node goes. Immutable.
 class Neighbourhood {
  public:
-  /// About 0.4 s for 100,000 rows on one core, 0.8 s for a million (bench/select_bench). Keeps 8 bytes for each row that
-  /// is no node.
+  /// About 0.4 s for 100,000 rows on one core, 0.8 s for a million (bench/select_bench). Keeps 8 bytes for each row
+  /// that is no node.
   Neighbourhood(const scene::GaussianCloud& cloud, const Surroundings& surroundings);
 
   [[nodiscard]] const Surroundings& surroundings() const { return surroundings_; }
