@@ -231,7 +231,9 @@ NaturalBorder natural_border(const neighbours::NeighbourGraph& graph, std::span<
   const std::vector<double> small = preferences_for_small(terrain, order, choice.smallness);
   const double preference = choice.leaks || !clicked.outside.empty() ? halfway : 0.0;
   std::vector<Level> levels;
-  for (std::size_t taken = 1; taken <= n && given[order[taken - 1]] != Given::outside; ++taken) {
+  // Without an end outside, walks end inside from wherever there is a way: what potentials differ by is the solver's.
+  const bool can_end_outside = choice.leaks || std::ranges::find(given, Given::outside) != given.end();
+  for (std::size_t taken = 1; can_end_outside && taken <= n && given[order[taken - 1]] != Given::outside; ++taken) {
     const double last = potential[order[taken - 1]], next = taken < n ? potential[order[taken]] : 0.0;
     if (last == next || (taken == n && !choice.leaks)) continue;  // both or neither; or nobody knows of an outside
     const double cost =
@@ -239,7 +241,7 @@ NaturalBorder natural_border(const neighbours::NeighbourGraph& graph, std::span<
     if (cost < infinity) levels.push_back({taken, cost});
   }
   NaturalBorder out{std::vector<std::uint8_t>(n, 0)};
-  if (levels.empty()) {  // all are equally far from everything given
+  if (levels.empty()) {  // or all are equally far from everything given
     for (std::size_t node = 0; node < n; ++node) out.inside[node] = potential[node] > 0;
     return out;
   }
@@ -286,7 +288,8 @@ double border_ratio(const neighbours::NeighbourGraph& graph, std::span<const flo
       volume += held;
       if (inside[graph.to[edge]] == 0) leaving += terrain.border(node, edge);
     }
-  return ratio_of(leaving, std::min(volume, all - volume));
+  // All there is is a thing that stands alone, as above.
+  return ratio_of(leaving, volume < all ? std::min(volume, all - volume) : volume);
 }
 
 }  // namespace engine::select

@@ -62,8 +62,7 @@ struct NaturalBorder {
                                            std::span<const double> potential, std::span<const Given> given,
                                            const ClickedNodes& clicked, const BorderChoice& choice = {});
 
-/// The border ratio of these nodes, which count by their size: what their borders cost as a whole. 0 for none, and for
-/// all.
+/// The border ratio of these nodes, which count by their size: what their borders cost as a whole. 0 for none.
 ///   weight  [edges] 0 or more, the same both ways
 ///   inside  [nodes] 1: inside
 [[nodiscard]] double border_ratio(const neighbours::NeighbourGraph& graph, std::span<const float> weight,

@@ -130,26 +130,43 @@ std::optional<Surroundings> surroundings_of(const Array3& mean, std::span<const 
   return Surroundings{middle, by_steps(farthest)};
 }
 
-Neighbourhood::Neighbourhood(const scene::GaussianCloud& cloud, const Surroundings& surroundings)
+Neighbourhood::Neighbourhood(const scene::GaussianCloud& cloud, const Surroundings& surroundings,
+                             std::size_t most_nodes)
     : surroundings_(surroundings), index_({}, 3) {
-  const auto in_morton_order = [&](std::vector<std::uint32_t>& rows) {
-    rows = in_order(rows, neighbours::morton_order(neighbours::points_of(cloud.mean, rows, surroundings.middle)));
-  };
-  const std::vector<double> squared = squared_distances(cloud.mean, surroundings.middle);
-  const double limit = surroundings.reach * surroundings.reach;
-  for (std::size_t row = 0; row < squared.size(); ++row)
-    if (squared[row] <= limit) nodes_.push_back(std::uint32_t(row));
-  others_ = thin_out(nodes_, max_nodes);
-  in_morton_order(nodes_);
-  in_morton_order(others_);
+  divide(cloud.mean, most_nodes);
   points_ = neighbours::points_of(cloud.mean, nodes_, surroundings.middle);
   index_ = neighbours::PointIndex(points_, 3);
   graph_ = neighbours::join_nearest(points_, index_, neighbours_joined);
   weight_ = similarity_of_edges(cloud, nodes_, graph_);
   for (float& one : weight_) one = std::max(one, least_weight);
-  node_of_other_.reserve(others_.size());
-  for (const auto& node : index_.nearest(neighbours::points_of(cloud.mean, others_, surroundings.middle), 1))
-    node_of_other_.push_back(node.index);
+  join_others(cloud.mean);
+}
+
+void Neighbourhood::divide(const Array3& mean, std::size_t most_nodes) {
+  const std::vector<double> squared = squared_distances(mean, surroundings_.middle);
+  const double limit = surroundings_.reach * surroundings_.reach;
+  std::vector<std::uint32_t> rows;
+  for (std::size_t row = 0; row < squared.size(); ++row)
+    if (squared[row] <= limit) rows.push_back(std::uint32_t(row));
+  const Thinned thinned = thin_out(rows, most_nodes);
+  const auto in_morton_order = [&](std::span<const std::uint32_t> of) {
+    return in_order(of, neighbours::morton_order(neighbours::points_of(mean, of, surroundings_.middle)));
+  };
+  nodes_ = in_morton_order(thinned.kept);
+  others_ = in_morton_order(thinned.others);
+  size_ = rows.size();
+}
+
+void Neighbourhood::join_others(const Array3& mean) {
+  const auto nearest = index_.nearest(neighbours::points_of(mean, others_, surroundings_.middle), 1);
+  std::size_t joined = 0;
+  for (std::size_t i = 0; i < others_.size(); ++i) {
+    const float limit = neighbours::joining_spacings * graph_.spacing[nearest[i].index];
+    if (nearest[i].squared_distance > limit * limit) continue;
+    others_[joined++] = others_[i];
+    node_of_other_.push_back(nearest[i].index);
+  }
+  others_.resize(joined);
 }
 
 Result<Neighbourhood::Seeds> Neighbourhood::seeds_of(const scene::GaussianCloud& cloud, const Grow& grow) const {
@@ -227,11 +244,16 @@ Result<Grown> Neighbourhood::grow_beyond(const scene::GaussianCloud& cloud, cons
                                          std::span<const std::uint32_t> rows, int farther) const {
   auto seeds = seeds_of(cloud, grow);
   if (!seeds) return propagate(seeds);
-  for (std::size_t node = 0; node < nodes_.size(); ++node)
-    if (std::binary_search(rows.begin(), rows.end(), nodes_[node])) seeds->given[node] = Given::inside;
+  const auto was_taken = [&](std::uint32_t node) { return std::ranges::binary_search(rows, nodes_[node]); };
+  for (std::uint32_t node = 0; node < nodes_.size(); ++node)
+    if (was_taken(node)) seeds->given[node] = Given::inside;
+  std::erase_if(seeds->clicked.outside, was_taken);
   NaturalBorder border = border_of(*seeds, {.wider = farther, .beyond = true});
-  if (border.wider > 0) take_leftovers(*seeds, border.inside);
-  // The rows were found among other nodes: in fewer surroundings, more of them have room.
+  if (border.wider == 0) return Grown{{rows.begin(), rows.end()}, 0, border.more, border.less};
+  take_leftovers(*seeds, border.inside);
+  // The rows were found among other nodes: what goes with these nodes now has been left out before.
+  for (std::uint32_t node = 0; node < nodes_.size(); ++node)
+    if (was_taken(node)) border.inside[node] = 0;
   std::vector<std::uint32_t> all;
   std::ranges::set_union(rows, rows_of(border.inside), std::back_inserter(all));
   return Grown{std::move(all), border.wider, border.more, border.less};

@@ -62,16 +62,17 @@ class Neighbourhood {
  public:
   /// About 0.4 s for 100,000 rows on one core, 0.8 s for a million (bench/select_bench). Keeps 8 bytes for each row
   /// that is no node.
-  Neighbourhood(const scene::GaussianCloud& cloud, const Surroundings& surroundings);
+  Neighbourhood(const scene::GaussianCloud& cloud, const Surroundings& surroundings,
+                std::size_t most_nodes = max_nodes);
 
   [[nodiscard]] const Surroundings& surroundings() const { return surroundings_; }
   /// How many rows are within reach.
-  [[nodiscard]] std::size_t size() const { return nodes_.size() + others_.size(); }
+  [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] std::size_t nodes() const { return nodes_.size(); }
 
   /// The rows of the thing: those from which a random walk rather ends at the inside points, up to the natural border
   /// (natural_border.h), and its leftovers (leftovers.h) unless outside points are on more than three nodes within
-  /// reach, or less than the natural border was asked for. What lies at the reach is outside unless a point says
+  /// reach, or less than the natural border was asked for. Nodes at the reach are outside unless a point says
   /// otherwise; outside points beyond it count for nothing.
   ///   cloud    that this was made of
   ///   grow     with this object's surroundings
@@ -105,6 +106,10 @@ class Neighbourhood {
   [[nodiscard]] double border_ratio(std::span<const std::uint32_t> rows) const;
 
  private:
+  /// Sets size_, nodes_ and others_.
+  void divide(const Array3& mean, std::size_t most_nodes);
+  /// Sets node_of_other_; others that no node is near are left out.
+  void join_others(const Array3& mean);
   /// What a point says of a node. Of several the least one counts: the point that the node covers most, or is nearest
   /// to; the inside one of two alike.
   struct Claim {
@@ -158,6 +163,7 @@ class Neighbourhood {
   void take_far_nodes(std::vector<Given>& given) const;
 
   Surroundings surroundings_;
+  std::size_t size_ = 0;
   std::vector<std::uint32_t> nodes_;                   ///< Rows, in an order in which near ones come together.
   std::vector<std::uint32_t> others_, node_of_other_;  ///< Rows likewise, and the node that each goes with.
   std::vector<float> points_;                          ///< [nodes][3] relative to the middle.

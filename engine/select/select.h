@@ -42,8 +42,7 @@ struct Selected {
   DVec3 centre{0.0};          ///< Mean of their means, world units; 0 where none is selected.
   std::size_t undecided = 0;  ///< Rows that masks leave nearly even: MaskedRows::undecided, over all operations.
   std::optional<WholeBorder> border;  ///< Of the last operation that grows a whole.
-  std::vector<Warning>
-      warnings;  ///< Nothing is selected; an operation names no row; a reach was cut short; there is no such border.
+  std::vector<Warning> warnings;      ///< Nothing is selected; an operation names no row; there is no such border.
 };
 
 /// Selects in one scene, and keeps what the next selection there can use: a user clicks on, and each click asks for all

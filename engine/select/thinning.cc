@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <span>
 
 #include "engine/core/rng.h"
 
@@ -15,23 +14,18 @@ std::uint64_t drawn(std::uint32_t row) {
   return std::uint64_t(philox4x32({row, 0, 0, 0}, thinning)[0]) << 32 | row;
 }
 
-std::vector<std::uint32_t> rows_of(std::span<const std::uint64_t> draws) {
-  std::vector<std::uint32_t> out(draws.size());
-  std::ranges::transform(draws, out.begin(), [](std::uint64_t one) { return std::uint32_t(one); });
-  std::ranges::sort(out);
-  return out;
-}
-
 }  // namespace
 
-std::vector<std::uint32_t> thin_out(std::vector<std::uint32_t>& rows, std::size_t most) {
-  if (rows.size() <= most) return {};
+Thinned thin_out(std::span<const std::uint32_t> rows, std::size_t most) {
+  if (rows.size() <= most) return {{rows.begin(), rows.end()}, {}};
   std::vector<std::uint64_t> draws(rows.size());
   std::ranges::transform(rows, draws.begin(), drawn);
-  std::ranges::nth_element(draws, draws.begin() + std::ptrdiff_t(most));
-  const std::span<const std::uint64_t> all = draws;
-  rows = rows_of(all.first(most));
-  return rows_of(all.subspan(most));
+  const auto first_other = draws.begin() + std::ptrdiff_t(most);
+  std::ranges::nth_element(draws, first_other);
+  const std::uint64_t limit = *first_other;
+  Thinned out;
+  for (const std::uint32_t row : rows) (drawn(row) < limit ? out.kept : out.others).push_back(row);
+  return out;
 }
 
 }  // namespace engine::select

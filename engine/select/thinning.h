@@ -3,15 +3,21 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace engine::select {
 
-/// Keeps a part of the rows, by chance: of each place about the same share. Which rows come first is drawn once and for
-/// all, by their number: what fewer rows keep of what they share with more, those keep too, or have no room for.
-///   rows     ascending; left with those that are kept, ascending
-///   most     keeps so many, or all
-///   returns  the others, ascending
-[[nodiscard]] std::vector<std::uint32_t> thin_out(std::vector<std::uint32_t>& rows, std::size_t most);
+/// Rows, each either kept or one of the others; both ascending.
+struct Thinned {
+  std::vector<std::uint32_t> kept, others;
+};
+
+/// Keeps all rows, or so many of them: by chance, of each place about the same share. Whose turn it is, is drawn once
+/// and for all, by the row's number: of the rows that two lists share, the one keeps all that the other keeps, or the
+/// other way round.
+///   rows  ascending
+///   most  so many are kept at most
+[[nodiscard]] Thinned thin_out(std::span<const std::uint32_t> rows, std::size_t most);
 
 }  // namespace engine::select

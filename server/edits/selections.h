@@ -32,7 +32,7 @@ struct MadeSelection {
 
 /// How much is kept. Choices: a few people who click at a time, and what they could go back to.
 struct SelectionsOptions {
-  std::size_t max_desks = 3;                          ///< Selectors, of a version each; some 100 MB at most.
+  std::size_t max_desks = 3;  ///< Selectors, of a version each: 100 MB, and up to 8 bytes for each Gaussian.
   std::uint64_t desk_bytes = std::uint64_t{1} << 29;  ///< Of merged clouds, which selectors of later versions need.
   std::size_t max_made = 64;                          ///< Selections.
   std::uint64_t made_bytes = std::uint64_t{1} << 27;  ///< A byte for each Gaussian of the scene.

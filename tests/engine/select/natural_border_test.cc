@@ -203,15 +203,15 @@ TEST(BorderRatio, IsWhatLeavesByTheRootOfWhatIsLess) {
   const auto ratio_of = [&](std::uint32_t nodes) {
     std::vector<std::uint8_t> inside(strips.graph.size(), 0);
     std::fill_n(inside.begin(), nodes, std::uint8_t{1});
-    const double ratio = border_ratio(strips.graph, strips.weight, inside);
-    for (std::uint8_t& one : inside) one = 1 - one;
-    EXPECT_NEAR(border_ratio(strips.graph, strips.weight, inside), ratio, 1e-9) << "of all else, the same";
-    return ratio;
+    return border_ratio(strips.graph, strips.weight, inside);
   };
   // Ten rows of 20 hold 190 edges along them and 180 across, both ways, and end at 20 of a hundredth.
   EXPECT_NEAR(ratio_of(200), (8 + 0.2) / std::sqrt(2.0 * (190 + 180) + 0.2), 1e-6);
   EXPECT_GT(ratio_of(220), 2 * ratio_of(200)) << "beyond the joint";
-  EXPECT_EQ(ratio_of(0), 0) << "of none, and of all";
+  EXPECT_NEAR(ratio_of(1000), (8 + 20) / std::sqrt(2.0 * (190 + 180) + 20), 1e-6) << "the lesser part is outside";
+  EXPECT_EQ(ratio_of(0), 0);
+  const double all = 2.0 * (60 * 19 + 59 * 20) - 2 * 20 * 0.99;
+  EXPECT_NEAR(ratio_of(1200), 8 / std::sqrt(all), 1e-6) << "all there is is a thing that stands alone";
 }
 
 TEST(NaturalBorder, TakesAllThatCanBeReachedWhereNothingIsOutside) {

@@ -5,9 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "engine/core/parallel.h"
+#include "engine/core/rng.h"
 #include "tests/engine/select/clicks.h"
 #include "tests/engine/select/small_scenes.h"
 
@@ -216,6 +220,102 @@ TEST(Settle, TakesWhatIsInclinedToUnlessItIsNearlyAllOutside) {
   EXPECT_GE(inclined.size(), rather.size() + 2);
   EXPECT_LT(inclined.back(), 10u) << "what is given stays";
   EXPECT_EQ(around.settle(of_row, std::vector<std::uint8_t>(11, 0)), rather);
+}
+
+/// A red and a blue sheet of 2,500 rows each, of which a fifth are nodes.
+struct ThinnedSheets {
+  static constexpr std::size_t nodes = 1000, rows = 5000;
+  scene::GaussianCloud cloud;
+  Neighbourhood around;
+
+  ThinnedSheets() : cloud(sheets()), around(cloud, {{-1.2, 0, 0}, 100.0}, nodes) {}
+
+  static scene::GaussianCloud sheets() {
+    scene::GaussianCloud out;
+    add_sheet(out, {-1, 0, 0}, 50, 0.04f, {0.8f, 0.1f, 0.1f});
+    add_sheet(out, {1, 0, 0}, 50, 0.04f, {0.1f, 0.1f, 0.8f});
+    return out;
+  }
+  /// How many of the red rows these are, less those that are not red.
+  [[nodiscard]] static long red(std::span<const std::uint32_t> found) {
+    const auto blue = std::ranges::count_if(found, [](std::uint32_t row) { return row >= rows / 2; });
+    return long(found.size()) - 2 * blue;
+  }
+};
+
+TEST(GrowAmongThinnedRows, HasNoMoreNodesThanItMayAndLooksAtAll) {
+  const ThinnedSheets scene;
+  EXPECT_EQ(scene.around.nodes(), ThinnedSheets::nodes);
+  EXPECT_EQ(scene.around.size(), ThinnedSheets::rows);
+}
+
+TEST(GrowAmongThinnedRows, TakesRowsThatAreNoNodesAlong) {
+  const ThinnedSheets scene;
+  const Grown found = scene.around.grow(scene.cloud, {{{-1.2, 0, 0}}, {{0.9, 0, 0}}, 100.0}).value();
+  EXPECT_GT(ThinnedSheets::red(found.rows), 2400) << "but for a few at the border";
+  EXPECT_TRUE(std::ranges::is_sorted(found.rows));
+}
+
+TEST(GrowAmongThinnedRows, IsTheSameForAnyNumberOfThreads) {
+  const auto found = [] {
+    const ThinnedSheets scene;
+    return scene.around.grow(scene.cloud, {{{-1.2, 0, 0}}, {{0.9, 0, 0}}, 100.0}).value().rows;
+  };
+  std::vector<std::uint32_t> one, four;
+  WorkArena(1).run([&] { one = found(); });
+  WorkArena(4).run([&] { four = found(); });
+  EXPECT_EQ(one, four);
+}
+
+TEST(GrowAmongThinnedRows, BeyondKeepsJustWhatWasThereWhereNoBorderIsWanted) {
+  const ThinnedSheets scene;
+  const Grow click{{{-1.2, 0, 0}}, {{0.9, 0, 0}}, 100.0};
+  std::vector<std::uint32_t> rows;
+  for (std::uint32_t row = 0; row < ThinnedSheets::rows / 2; row += 2) rows.push_back(row);  // every other red one
+  EXPECT_EQ(scene.around.grow_beyond(scene.cloud, click, rows, 0).value().rows, rows);
+}
+
+TEST(GrowAmongThinnedRows, AClickOnWhatWasTakenLeavesAPartOfItAndNothingElse) {
+  const ThinnedSheets scene;
+  std::vector<std::uint32_t> all(ThinnedSheets::rows);
+  std::iota(all.begin(), all.end(), 0u);
+  std::erase_if(all, [](std::uint32_t row) { return row % 10 == 0; });
+  const auto left = scene.around.left_of(scene.cloud, {{{-1.2, 0, 0}}, {{0.9, 0, 0}}, 100.0}, all).value();
+  EXPECT_GT(ThinnedSheets::red(left), 2000) << "of 2,250";
+  EXPECT_TRUE(std::ranges::includes(all, left));
+}
+
+TEST(GrowAmongThinnedRows, LeavesOutWhatNoNodeIsNear) {
+  scene::GaussianCloud cloud = ThinnedSheets::sheets();
+  add_at(cloud, {-1.2f, 0, 3});  // floats before the middle of the red sheet: no node, at a distance of some 50 rows
+  const Neighbourhood around(cloud, {{-1.2, 0, 0}, 100.0}, 100);
+  const Grown found = around.grow(cloud, {{{-1.2, 0, 0}}, {{0.9, 0, 0}}, 100.0}).value();
+  EXPECT_GT(found.rows.size(), 2000u);
+  EXPECT_FALSE(std::ranges::binary_search(found.rows, std::uint32_t(ThinnedSheets::rows)));
+}
+
+TEST(SettleAmongThinnedRows, LeavesWhatIsGivenAndTakesTheOthersWithTheirNodes) {
+  const ThinnedSheets scene;
+  std::vector<Given> given(ThinnedSheets::rows, Given::no);
+  for (std::uint32_t row = 0; row < ThinnedSheets::rows; row += 3)
+    given[row] = row % 2 == 0 ? (row < ThinnedSheets::rows / 2 ? Given::inside : Given::outside) : Given::no;
+  given[1] = Given::outside, given[ThinnedSheets::rows - 2] = Given::inside;  // against all around, and nodes or not
+  const std::vector<std::uint32_t> rows = scene.around.settle(given);
+  EXPECT_GT(ThinnedSheets::red(rows), 2400);
+  for (std::uint32_t row = 0; row < ThinnedSheets::rows; ++row) {
+    const bool is_inside = std::ranges::binary_search(rows, row);
+    EXPECT_TRUE(given[row] == Given::no || is_inside == (given[row] == Given::inside)) << row;
+  }
+}
+
+TEST(Grow, TakesAllOfARaggedSheetWhereNothingElseIs) {
+  scene::GaussianCloud cloud;
+  Rng rng(5);
+  for (int row = 0; row < 30'000; ++row) {
+    const float x = rng.uniform(-1, 1), y = rng.uniform(-1, 1);
+    add_at(cloud, {x, y, 0}, 4, -5);
+  }
+  EXPECT_EQ(grown(cloud, {{{0.2, 0.1, 0}}, {}, 20.0}).size(), cloud.size()) << "all is as near to the click";
 }
 
 TEST(SurroundingsOfClicks, OfTwoClicksAtNearlyOnePlaceAreThoseOfOne) {
