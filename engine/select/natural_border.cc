@@ -241,16 +241,22 @@ NaturalBorder natural_border(const neighbours::NeighbourGraph& graph, std::span<
     if (cost < infinity) levels.push_back({taken, cost});
   }
   NaturalBorder out{std::vector<std::uint8_t>(n, 0)};
-  if (levels.empty()) {  // or all are equally far from everything given
+  const auto given_inside = std::size_t(std::ranges::count(given, Given::inside));
+  if (levels.empty()) {  // or all are equally far from everything given: what can be reached has one border
     for (std::size_t node = 0; node < n; ++node) out.inside[node] = potential[node] > 0;
+    if (!choice.beyond) return out;
+    const bool is_beyond = std::size_t(std::ranges::count(out.inside, std::uint8_t{1})) > given_inside;
+    out.less = is_beyond && choice.wider > 0, out.more = is_beyond && choice.wider == 0;
+    out.wider = out.less ? 1 : 0;
+    if (choice.wider == 0)
+      for (std::size_t node = 0; node < n; ++node) out.inside[node] = given[node] == Given::inside;
     return out;
   }
   std::size_t chosen = weakest(levels);
   const std::vector<std::size_t> borders = weaker_than_others(levels);
   if (choice.beyond) {
-    const double given_inside = double(std::count(given.begin(), given.end(), Given::inside));
     const auto first = std::find_if(borders.begin(), borders.end(), [&](std::size_t level) {
-      return double(levels[level].taken) > apart * given_inside;
+      return double(levels[level].taken) > apart * double(given_inside);
     });
     const auto wanted = std::min<std::ptrdiff_t>(choice.wider, borders.end() - first);
     out.wider = int(wanted);

@@ -198,6 +198,21 @@ TEST(NaturalBorder, IsCountedFromWhatIsInsideAlreadyWhereThatIsAsked) {
   EXPECT_FALSE(taken(60).more);
 }
 
+TEST(NaturalBorder, BeyondWhatIsInsideIsAllThatCanBeReachedWhereNothingIsOutside) {
+  const WeightedGraph strips = three_strips(0.05f, 0.4f);
+  std::vector<Given> given(strips.graph.size(), Given::no);
+  std::fill_n(given.begin(), 200, Given::inside);
+  const std::vector<double> potential = random_walk(strips.graph, strips.weight, given);
+  const auto taken = [&](int wider) {
+    return natural_border(strips.graph, strips.weight, potential, given, {{10}, {}}, {.wider = wider, .beyond = true});
+  };
+  EXPECT_EQ(std::ranges::count(taken(0).inside, 1), 200);
+  EXPECT_TRUE(taken(0).more && !taken(0).less);
+  EXPECT_EQ(std::ranges::count(taken(2).inside, 1), 1200);
+  EXPECT_EQ(taken(2).wider, 1);
+  EXPECT_TRUE(!taken(2).more && taken(2).less);
+}
+
 TEST(BorderRatio, IsWhatLeavesByTheRootOfWhatIsLess) {
   const WeightedGraph strips = three_strips(0.01f, 1);
   const auto ratio_of = [&](std::uint32_t nodes) {
