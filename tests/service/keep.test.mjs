@@ -101,9 +101,12 @@ describe('versions', () => {
       const told = other.page.getByTestId('toast').filter({ hasText: `Version ${first} was a draft, and is gone: version ` });
       await told.waitFor({ timeout: 120_000 });
       assert.equal(await other.id('version-select').inputValue(), '0');  // its picture may take longer than that is told
+      const text = await told.textContent();
       await told.getByRole('button', { name: 'Show' }).click();
+      return text;
     };
-    const [second] = await Promise.all([draft(110), goneOn()]);
+    const [second, text] = await Promise.all([draft(110), goneOn()]);
+    assert.ok(text.includes(`Version ${first} was a draft, and is gone: version ${second}`), text);
     await id(`version-${first}`).waitFor({ state: 'detached' });  // in the tree, whether that is seen or not
     await other.hand.shown(second);
     assert.deepEqual(other.complaints, []);
