@@ -217,11 +217,33 @@ std::vector<std::size_t> weaker_than_others(std::span<const Level> levels) {
   return out;
 }
 
+/// [nodes] 1 for those that are given for the inside.
+std::vector<std::uint8_t> marked_inside(std::span<const Given> given) {
+  std::vector<std::uint8_t> out(given.size());
+  std::ranges::transform(given, out.begin(), [](Given side) { return std::uint8_t(side == Given::inside); });
+  return out;
+}
+
+/// The border of all that can be reached, where there is no other.
+NaturalBorder around_all(std::span<const double> potential, std::span<const Given> given, const BorderChoice& choice) {
+  NaturalBorder out{std::vector<std::uint8_t>(potential.size())};
+  std::ranges::transform(potential, out.inside.begin(), [](double reached) { return std::uint8_t(reached > 0); });
+  if (!choice.beyond) return out;
+  const bool is_beyond = std::ranges::count(out.inside, std::uint8_t{1}) > std::ranges::count(given, Given::inside);
+  out.less = is_beyond && choice.wider > 0, out.more = is_beyond && choice.wider == 0;
+  out.wider = out.less ? 1 : 0;
+  if (choice.wider == 0) out.inside = marked_inside(given);
+  return out;
+}
+
 }  // namespace
 
 NaturalBorder natural_border(const neighbours::NeighbourGraph& graph, std::span<const float> weight,
                              std::span<const double> potential, std::span<const Given> given,
                              const ClickedNodes& clicked, const BorderChoice& choice) {
+  // Without an end outside, walks end inside from wherever there is a way: what potentials differ by is the solver's.
+  const bool can_end_outside = choice.leaks || std::ranges::find(given, Given::outside) != given.end();
+  if (!can_end_outside) return around_all(potential, given, choice);
   const std::size_t n = graph.size();
   const std::vector<std::uint32_t> order = by_potential(potential, given);
   const std::vector<std::uint32_t> backwards(order.rbegin(), order.rend());
@@ -231,39 +253,28 @@ NaturalBorder natural_border(const neighbours::NeighbourGraph& graph, std::span<
   const std::vector<double> small = preferences_for_small(terrain, order, choice.smallness);
   const double preference = choice.leaks || !clicked.outside.empty() ? halfway : 0.0;
   std::vector<Level> levels;
-  // Without an end outside, walks end inside from wherever there is a way: what potentials differ by is the solver's.
-  const bool can_end_outside = choice.leaks || std::ranges::find(given, Given::outside) != given.end();
-  for (std::size_t taken = 1; can_end_outside && taken <= n && given[order[taken - 1]] != Given::outside; ++taken) {
+  for (std::size_t taken = 1; taken <= n && given[order[taken - 1]] != Given::outside; ++taken) {
     const double last = potential[order[taken - 1]], next = taken < n ? potential[order[taken]] : 0.0;
     if (last == next || (taken == n && !choice.leaks)) continue;  // both or neither; or nobody knows of an outside
     const double cost =
         (inside[taken] + outside[n - taken]) * (1 + preference * squared_log_odds(0.5 * (last + next))) * small[taken];
     if (cost < infinity) levels.push_back({taken, cost});
   }
+  if (levels.empty()) return around_all(potential, given, choice);
   NaturalBorder out{std::vector<std::uint8_t>(n, 0)};
-  const auto given_inside = std::size_t(std::ranges::count(given, Given::inside));
-  if (levels.empty()) {  // or all are equally far from everything given: what can be reached has one border
-    for (std::size_t node = 0; node < n; ++node) out.inside[node] = potential[node] > 0;
-    if (!choice.beyond) return out;
-    const bool is_beyond = std::size_t(std::ranges::count(out.inside, std::uint8_t{1})) > given_inside;
-    out.less = is_beyond && choice.wider > 0, out.more = is_beyond && choice.wider == 0;
-    out.wider = out.less ? 1 : 0;
-    if (choice.wider == 0)
-      for (std::size_t node = 0; node < n; ++node) out.inside[node] = given[node] == Given::inside;
-    return out;
-  }
   std::size_t chosen = weakest(levels);
   const std::vector<std::size_t> borders = weaker_than_others(levels);
   if (choice.beyond) {
+    const double given_inside = double(std::count(given.begin(), given.end(), Given::inside));
     const auto first = std::find_if(borders.begin(), borders.end(), [&](std::size_t level) {
-      return double(levels[level].taken) > apart * double(given_inside);
+      return double(levels[level].taken) > apart * given_inside;
     });
     const auto wanted = std::min<std::ptrdiff_t>(choice.wider, borders.end() - first);
     out.wider = int(wanted);
     out.more = wanted < borders.end() - first;
     out.less = wanted > 0;
     if (wanted == 0) {
-      for (std::size_t node = 0; node < n; ++node) out.inside[node] = given[node] == Given::inside;
+      out.inside = marked_inside(given);
       return out;
     }
     chosen = first[wanted - 1];

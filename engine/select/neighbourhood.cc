@@ -244,16 +244,16 @@ Result<Grown> Neighbourhood::grow_beyond(const scene::GaussianCloud& cloud, cons
                                          std::span<const std::uint32_t> rows, int farther) const {
   auto seeds = seeds_of(cloud, grow);
   if (!seeds) return propagate(seeds);
-  const auto was_taken = [&](std::uint32_t node) { return std::ranges::binary_search(rows, nodes_[node]); };
+  const std::vector<std::uint8_t> was_taken = nodes_among(rows);
   for (std::uint32_t node = 0; node < nodes_.size(); ++node)
-    if (was_taken(node)) seeds->given[node] = Given::inside;
-  std::erase_if(seeds->clicked.outside, was_taken);
+    if (was_taken[node] != 0) seeds->given[node] = Given::inside;
+  std::erase_if(seeds->clicked.outside, [&](std::uint32_t node) { return was_taken[node] != 0; });
   NaturalBorder border = border_of(*seeds, {.wider = farther, .beyond = true});
   if (border.wider == 0) return Grown{{rows.begin(), rows.end()}, 0, border.more, border.less};
   take_leftovers(*seeds, border.inside);
   // The rows were found among other nodes: what goes with these nodes now has been left out before.
   for (std::uint32_t node = 0; node < nodes_.size(); ++node)
-    if (was_taken(node)) border.inside[node] = 0;
+    if (was_taken[node] != 0) border.inside[node] = 0;
   std::vector<std::uint32_t> all;
   std::ranges::set_union(rows, rows_of(border.inside), std::back_inserter(all));
   return Grown{std::move(all), border.wider, border.more, border.less};
@@ -263,13 +263,15 @@ Result<std::vector<std::uint32_t>> Neighbourhood::left_of(const scene::GaussianC
                                                           std::span<const std::uint32_t> rows) const {
   auto seeds = seeds_of(cloud, grow);
   if (!seeds) return propagate(seeds);
-  const auto was_taken = [&](std::uint32_t node) { return std::ranges::binary_search(rows, nodes_[node]); };
-  if (std::ranges::none_of(seeds->clicked.outside, was_taken)) return std::vector<std::uint32_t>{};
+  const std::vector<std::uint8_t> was_taken = nodes_among(rows);
+  const auto is_on_it = [&](std::uint32_t node) { return was_taken[node] != 0; };
+  if (std::ranges::none_of(seeds->clicked.outside, is_on_it)) return std::vector<std::uint32_t>{};
   suppose_extent(*seeds);
   std::vector<double> potential = random_walk(graph_, weight_, seeds->given, seeds->leak);
   // The walk goes where it would; what was not taken is outside wherever it ends.
   for (std::uint32_t node = 0; node < nodes_.size(); ++node)
-    if (seeds->given[node] == Given::no && !was_taken(node)) seeds->given[node] = Given::outside, potential[node] = 0;
+    if (seeds->given[node] == Given::no && was_taken[node] == 0)
+      seeds->given[node] = Given::outside, potential[node] = 0;
   std::vector<std::uint32_t> left;
   std::ranges::set_intersection(rows, rows_of(border_of(*seeds, potential, {.whole = grow.whole}).inside),
                                 std::back_inserter(left));
@@ -277,10 +279,7 @@ Result<std::vector<std::uint32_t>> Neighbourhood::left_of(const scene::GaussianC
 }
 
 double Neighbourhood::border_ratio(std::span<const std::uint32_t> rows) const {
-  std::vector<std::uint8_t> inside(nodes_.size());
-  for (std::size_t node = 0; node < nodes_.size(); ++node)
-    inside[node] = std::ranges::binary_search(rows, nodes_[node]);
-  return select::border_ratio(graph_, weight_, inside);
+  return select::border_ratio(graph_, weight_, nodes_among(rows));
 }
 
 void Neighbourhood::suppose_extent(Seeds& seeds) const {
@@ -376,6 +375,13 @@ std::vector<std::uint32_t> Neighbourhood::settle(std::span<const Given> given,
     if (given[row] != Given::no) return given[row] == Given::inside;
     return potential[node] > (!inclined.empty() && inclined[row] != 0 ? inclination : 0.5);
   });
+}
+
+std::vector<std::uint8_t> Neighbourhood::nodes_among(std::span<const std::uint32_t> rows) const {
+  std::vector<std::uint8_t> out(nodes_.size());
+  std::ranges::transform(nodes_, out.begin(),
+                         [&](std::uint32_t row) { return std::uint8_t(std::ranges::binary_search(rows, row)); });
+  return out;
 }
 
 std::vector<std::uint32_t> Neighbourhood::rows_of(std::span<const std::uint8_t> inside) const {

@@ -154,6 +154,8 @@ class Neighbourhood {
   ///   inside  [n] nodes, 1 or more
   ///   ends    of the calls before with these nodes
   bool click_far_end(std::span<const std::uint32_t> inside, Seeds& seeds, FarEnds& ends) const;
+  /// [nodes] 1 for those whose row is one of these, which ascend.
+  [[nodiscard]] std::vector<std::uint8_t> nodes_among(std::span<const std::uint32_t> rows) const;
   /// The rows that go with nodes that are inside, ascending.
   [[nodiscard]] std::vector<std::uint32_t> rows_of(std::span<const std::uint8_t> inside) const;
   /// Those for which test(node that they go with, row) holds, ascending.
