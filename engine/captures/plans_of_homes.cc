@@ -1,5 +1,6 @@
 // Things as they stand about in people's homes: of several parts and materials, clicked at one of them and moved as a
 // whole. Figures are world units, and part of the definition of the cases.
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <utility>

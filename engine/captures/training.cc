@@ -1,5 +1,6 @@
 #include "engine/captures/training.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstddef>

@@ -1,5 +1,6 @@
 #include "engine/correct/harmonic.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <cstdint>

@@ -1,5 +1,6 @@
 #include "engine/io/splat.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>

@@ -3,6 +3,8 @@
 // their own, made for their inner loops: 2^x in place of e^x, and dL/dT in place of `behind`.
 #pragma once
 
+#include <algorithm>
+
 #include "engine/render/project_vjp.h"
 
 namespace engine::render {

@@ -1,5 +1,6 @@
 #include "engine/select/shown.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <numeric>

@@ -1,6 +1,7 @@
 // Files of a scene, packed here: within a zip file, hardly a change would pass the checksum.
 #include "engine/io/sog.h"
 
+#include <algorithm>
 #include <array>
 
 #include "engine/core/byte_reader.h"

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <functional>
 #include <optional>
+#include <regex>
 #include <sstream>
 #include <string_view>
 #include <utility>
@@ -115,6 +116,20 @@ std::string check_library_include(const std::string& room, bool in_header, const
   return {};
 }
 
+/// Name that a line calls of <algorithm>, with or without `ranges`; "" if none. Comments do not count.
+std::string algorithm_called(const std::string& line) {
+  static const std::regex call(
+      R"(\bstd::(ranges::)?(adjacent_find|all_of|any_of|binary_search|clamp|copy(_if|_n)?|count(_if)?|equal(_range)?|)"
+      R"(fill(_n)?|find(_if(_not)?|_first_of|_end)?|for_each(_n)?|generate(_n)?|includes|inplace_merge|is_sorted(_until)?|)"
+      R"(is_permutation|lexicographical_compare|lower_bound|upper_bound|make_heap|push_heap|pop_heap|sort_heap|)"
+      R"((min|max|minmax)(_element)?|merge|mismatch|none_of|nth_element|partial_sort|partition(_point)?|remove(_if|_copy)?|)"
+      R"(replace(_if)?|reverse|rotate|search|set_(difference|intersection|union)|shuffle|sort|stable_(sort|partition)|)"
+      R"(transform|unique)[(<])");
+  const std::string code = line.substr(0, line.find("//"));
+  std::smatch found;
+  return std::regex_search(code, found, call) ? found[2].str() : std::string();
+}
+
 }  // namespace
 
 Arrows parse_arrows(const std::string& text) {
@@ -195,6 +210,22 @@ std::vector<std::string> violations(const Arrows& arrows, const std::map<std::st
   for (const auto& [file, source] : files)
     if (file.ends_with(".inc") && !checked.contains(file)) found.push_back(file + ": nobody includes it");
   return found;
+}
+
+std::vector<std::string> lacks_includes(const std::string& file, const std::string& source) {
+  std::string first;
+  int number = 0;
+  std::istringstream lines(source);
+  for (std::string line; std::getline(lines, line);) {
+    ++number;
+    const auto include = included(line);
+    if (include && include->header == "algorithm") return {};
+    if (!first.empty() || include || line.find("std::") == std::string::npos) continue;
+    if (const std::string name = algorithm_called(line); !name.empty())
+      first = file + ":" + std::to_string(number) + ": calls std::" + name + " and does not include <algorithm>";
+  }
+  if (first.empty()) return {};
+  return {first};
 }
 
 }  // namespace house

@@ -30,4 +30,9 @@ using Arrows = std::map<std::string, std::set<std::string>>;
 [[nodiscard]] std::vector<std::string> violations(const Arrows& arrows,
                                                   const std::map<std::string, std::string>& files);
 
+/// What one file calls of <algorithm> without including it, a sentence for its first call: precompiled headers hide
+/// that, and a build without them fails. Of an .inc nothing is asked: those that include it do.
+///   file  path from the project's root
+[[nodiscard]] std::vector<std::string> lacks_includes(const std::string& file, const std::string& source);
+
 }  // namespace house

@@ -19,6 +19,19 @@ std::string contents(const fs::path& path) {
   return bytes.str();
 }
 
+/// Contents, by path from the project's root, of the files in these folders; node_modules holds others' sources.
+std::map<std::string, std::string> files_in(const std::vector<std::string>& tops) {
+  const fs::path root = SPLATDRAG_SOURCE_DIR;
+  std::map<std::string, std::string> files;
+  for (const std::string& top : tops)
+    for (auto entry = fs::recursive_directory_iterator(root / top); entry != fs::recursive_directory_iterator();
+         ++entry) {
+      if (entry->path().filename() == "node_modules") entry.disable_recursion_pending();
+      if (entry->is_regular_file()) files[fs::relative(entry->path(), root).generic_string()] = contents(entry->path());
+    }
+  return files;
+}
+
 const Arrows sample{
     {"engine/core", {}}, {"engine/scene", {"engine/core"}}, {"engine/io", {"engine/scene"}}, {"proto", {}}};
 
@@ -28,14 +41,18 @@ std::size_t complaints(const std::string& file, const std::string& source) {
 }
 
 TEST(House, EverySourceKeepsTheRules) {
-  const fs::path root = SPLATDRAG_SOURCE_DIR;
-  std::map<std::string, std::string> files;
-  for (const char* top : {"engine", "proto", "server"})
-    for (const auto& entry : fs::recursive_directory_iterator(root / top))
-      if (entry.is_regular_file()) files[fs::relative(entry.path(), root).generic_string()] = contents(entry.path());
+  const auto files = files_in({"engine", "proto", "server"});
   EXPECT_GT(files.size(), 50u) << "the sources are not where this test looks for them";
   for (const std::string& violation : violations(parse_arrows(contents(SPLATDRAG_ARROWS_FILE)), files))
     ADD_FAILURE() << violation;
+}
+
+TEST(House, EverySourceIncludesWhatItCalls) {
+  const auto files = files_in({"engine", "proto", "server", "bench", "tests"});
+  EXPECT_GT(files.size(), 500u) << "the sources are not where this test looks for them";
+  for (const auto& [file, source] : files)
+    if (file.ends_with(".cc") || file.ends_with(".h"))
+      for (const std::string& lacking : lacks_includes(file, source)) ADD_FAILURE() << lacking;
 }
 
 TEST(House, ArrowsPointOneWay) {
@@ -143,6 +160,19 @@ TEST(HouseRules, SayWhere) {
   const auto found = violations(sample, "engine/scene/image.cc", "\n\n#include \"engine/io/ply.h\"\n");
   ASSERT_EQ(found.size(), 1u);
   EXPECT_TRUE(found[0].starts_with("engine/scene/image.cc:3: engine/scene includes engine/io")) << found[0];
+}
+
+TEST(HouseRules, SayWhatIsCalledAndNotIncluded) {
+  const auto lacking = [](const std::string& source) { return lacks_includes("engine/core/sum.cc", source); };
+  const auto call = [](const std::string& name) {
+    return "auto a = std::" + name + "(b, c);\n";
+  };  // no call of this file's
+  EXPECT_EQ(lacking("#include <cmath>\n\n" + call("ranges::count_if") + call("max")),
+            std::vector<std::string>{"engine/core/sum.cc:3: calls std::count_if and does not include <algorithm>"});
+  EXPECT_EQ(lacking(call("min<double>")).size(), 1u);
+  EXPECT_TRUE(lacking("#include <algorithm>\n" + call("max")).empty());
+  EXPECT_TRUE(lacking(call("max") + "#include <algorithm>\n").empty()) << "wherever it is included";
+  EXPECT_TRUE(lacking("// " + call("max") + call("maximal") + call("vector")).empty());
 }
 
 TEST(HouseRules, FindACircle) {

@@ -9,6 +9,8 @@
 #include "engine/render/simd/lanes.inc"
 #include "engine/render/simd/shade_rows.inc"
 
+#include <algorithm>
+
 #include "engine/render/backward_stages.h"
 #include "engine/render/project_vjp.h"
 

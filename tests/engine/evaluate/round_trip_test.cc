@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "engine/correct/scene_corrector.h"
 #include "engine/evaluate/cases.h"
 

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "engine/evaluate/trip_trial.h"
 
 namespace engine::evaluate {

@@ -1,6 +1,7 @@
 // One trained scene in the formats of another program (PlayCanvas' splat-transform), and the same in ours.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <numeric>

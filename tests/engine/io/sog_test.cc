@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <zip.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "engine/core/parallel.h"

@@ -1,6 +1,7 @@
 // Gradients against golden/raster: made in double by automatic differentiation of a dense implementation.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 

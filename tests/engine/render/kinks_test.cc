@@ -2,6 +2,7 @@
 // the kink itself it is the one that engine/render/backward.h documents. Both backends.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <utility>

@@ -1,6 +1,7 @@
 // Both backends against golden/raster: made in double by a dense implementation of the same semantics.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "engine/render/forward.h"

@@ -1,6 +1,7 @@
 // Checkpoints of a few kilobytes, made by formula.
 #pragma once
 
+#include <algorithm>
 #include <cstring>
 #include <map>
 #include <string>

@@ -1,6 +1,7 @@
 // What a disk may do to the store: every single damage is named or harmless, none is served, none costs another scene.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <random>

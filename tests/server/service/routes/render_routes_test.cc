@@ -1,5 +1,6 @@
 #include "server/service/routes/render_routes.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 

@@ -1,5 +1,6 @@
 #include "server/service/routes/scene_events.h"
 
+#include <algorithm>
 #include <chrono>
 #include <functional>
 #include <map>
