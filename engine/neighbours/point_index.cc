@@ -48,6 +48,22 @@ class Nearest final : public flann::ResultSet<float> {
   std::size_t found_ = 0;
 };
 
+/// Whether a point lies within a distance. One is enough.
+class AnyWithin final : public flann::ResultSet<float> {
+ public:
+  explicit AnyWithin(float radius) : worst_(std::nextafter(radius * radius, std::numeric_limits<float>::infinity())) {}
+
+  [[nodiscard]] bool found() const { return worst_ == 0; }
+  [[nodiscard]] bool full() const override { return true; }  // the tree never has to look farther than worstDist()
+  [[nodiscard]] float worstDist() const override { return worst_; }
+  void addPoint(float squared_distance, std::size_t) override {
+    if (squared_distance < worst_) worst_ = 0;
+  }
+
+ private:
+  float worst_;
+};
+
 }  // namespace
 
 struct PointIndex::Impl {
@@ -83,6 +99,20 @@ std::vector<Neighbour> PointIndex::nearest(std::span<const float> queries, std::
     }
   });
   return found;
+}
+
+std::vector<std::uint8_t> PointIndex::has_within(std::span<const float> queries, std::span<const float> radii) const {
+  assert(queries.size() == radii.size() * impl_->dimensions);
+  std::vector<std::uint8_t> has(radii.size(), 0);
+  if (impl_->size == 0) return has;
+  parallel_for(radii.size(), queries_per_chunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t q = begin; q < end; ++q) {
+      AnyWithin result(radii[q]);
+      impl_->tree->findNeighbors(result, queries.data() + q * impl_->dimensions, flann::SearchParams());
+      has[q] = result.found();
+    }
+  });
+  return has;
 }
 
 }  // namespace engine::neighbours

@@ -35,6 +35,14 @@ class PointIndex {
   ///   returns  [q][min(k, size())]. The same for any number of threads.
   [[nodiscard]] std::vector<Neighbour> nearest(std::span<const float> queries, std::size_t k) const;
 
+  /// Is there a point within this distance of each query? Where all are far off that is known at once, while the
+  /// nearest of them takes a search among equally far ones.
+  ///   queries  [q][dimensions], finite
+  ///   radii    [q] 0 or more
+  ///   returns  [q] 0 or 1. The same for any number of threads.
+  [[nodiscard]] std::vector<std::uint8_t> has_within(std::span<const float> queries,
+                                                     std::span<const float> radii) const;
+
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;

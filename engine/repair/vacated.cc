@@ -26,14 +26,16 @@ std::vector<std::uint32_t> rows_left_open(const scene::GaussianCloud& original, 
   const std::vector<float> places = interleaved(original.mean, left);
   const std::size_t asked = std::min(left.size(), neighbours_asked + 1);  // the nearest is the row itself
   const auto beside = neighbours::PointIndex(places, 3).nearest(places, asked);
-  const auto now = neighbours::PointIndex(arrived, 3).nearest(places, 1);
-  std::vector<std::uint32_t> open;
+  std::vector<float> within(left.size());
   for (std::size_t k = 0; k < left.size(); ++k) {
     double spacing = 0;
     for (std::size_t n = 1; n < asked; ++n) spacing += std::sqrt(double(beside[k * asked + n].squared_distance));
-    spacing /= double(std::max<std::size_t>(asked - 1, 1));
-    if (std::sqrt(double(now[k].squared_distance)) > taken_within * spacing) open.push_back(left[k]);
+    within[k] = float(taken_within * spacing / double(std::max<std::size_t>(asked - 1, 1)));
   }
+  const std::vector<std::uint8_t> taken = neighbours::PointIndex(arrived, 3).has_within(places, within);
+  std::vector<std::uint32_t> open;
+  for (std::size_t k = 0; k < left.size(); ++k)
+    if (taken[k] == 0) open.push_back(left[k]);
   return open;
 }
 

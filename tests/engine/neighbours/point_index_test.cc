@@ -71,6 +71,27 @@ TEST(PointIndex, HasFewerNeighboursThanAskedForWhereThereAreFewerPoints) {
   EXPECT_TRUE(PointIndex(std::vector<float>{1, 2, 3}, 3).nearest(std::vector<float>{0, 0, 0}, 0).empty());
 }
 
+TEST(PointIndex, SaysWhetherAPointIsWithinADistance) {
+  for (const std::size_t dimensions : {1u, 3u}) {
+    const std::vector<float> points = random_points(500 * dimensions, 4), queries = random_points(60 * dimensions, 5);
+    std::vector<float> radii(60);
+    for (std::size_t q = 0; q < radii.size(); ++q) radii[q] = 0.01f * float(q);
+    const auto has = PointIndex(points, dimensions).has_within(queries, radii);
+    ASSERT_EQ(has.size(), radii.size());
+    for (std::size_t q = 0; q < radii.size(); ++q) {
+      const auto nearest = nearest_by_scan(points, dimensions, queries.data() + q * dimensions, 1);
+      EXPECT_EQ(has[q] != 0, nearest[0].squared_distance <= radii[q] * radii[q]) << "query " << q;
+    }
+  }
+}
+
+TEST(PointIndex, CountsWhatIsExactlyAsFarAsWithin) {
+  const PointIndex index(std::vector<float>{1, 2, 3}, 3);
+  const std::vector<float> queries{1, 2, 3, 1, 2, 3.5f, 1, 2, 3.5f};
+  EXPECT_EQ(index.has_within(queries, std::vector<float>{0, 0.5f, 0.49f}), (std::vector<std::uint8_t>{1, 1, 0}));
+  EXPECT_EQ(PointIndex({}, 3).has_within(queries, std::vector<float>{9, 9, 9}), (std::vector<std::uint8_t>{0, 0, 0}));
+}
+
 TEST(PointIndex, GivesTheSameForAnyNumberOfThreads) {
   const std::vector<float> points = random_points(3 * 2000, 3);
   const PointIndex index(points, 3);
