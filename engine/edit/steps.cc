@@ -387,8 +387,12 @@ Result<double> optimise(State& state, Edit& edit, std::span<const scene::Mask> m
     if (at.iteration == 0) return edit.progress.enter(Stage::optimise, round.interval);
     return edit.progress.advance(double(at.iteration) / at.iterations, before + at.iteration, at.loss);
   };
-  return edit::optimise(state.scene, edit.input, state.views, masks, {picture, corrected.trust}, edit.params(), round,
-                        edit.perceptual, advance);
+  Goal goal{picture, corrected.trust};
+  // What has left is wanted back only where nothing else fills its place.
+  const Rows gone = state.scene.rows_that_left();
+  if (!corrected.trust.empty() && departure_of(edit.request) == Mode::move) goal.gone = gone;
+  return edit::optimise(state.scene, edit.input, state.views, masks, goal, edit.params(), round, edit.perceptual,
+                        advance);
 }
 
 Result<void> relocate_handles(State& state, Edit& edit, int u) {

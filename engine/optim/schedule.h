@@ -40,7 +40,7 @@ struct LearningRates {
   double opacity_logit = 0.05;   ///< Logits.
   double log_scale = 5e-3;       ///< Natural logarithm of world units.
   double rotation = 1e-3;        ///< Quaternion components.
-  double mask_radii = 5;         ///< c of position_scale(): radii of the 3D mask that its extent counts as. A choice.
+  double mask_radii = 5;         ///< c of position_scale(): radii of what is trained that its extent counts as. A choice.
   double most_widths = 0.05;     ///< Largest position rate of a row, in its own widths; may be infinite. A choice.
   double last = 0.01;            ///< Factor of all rates at the end of a correction; above 0, at most 1.
 };
@@ -50,7 +50,7 @@ struct LearningRates {
 /// the whole scene (1.1 times the largest distance of a camera from their centre), at which the Gaussians of a small
 /// object in a large scene would jump by their own size at each step.
 ///   scene_extent  world units; 0 or less: not known, does not limit
-///   mask_radius   largest distance of a mean of the 3D mask from their centre, world units
+///   mask_radius   largest distance of a mean of what is trained from their centre, world units
 [[nodiscard]] inline double position_scale(const LearningRates& rates, double scene_extent, double mask_radius) {
   const double of_mask = rates.mask_radii * mask_radius;
   return scene_extent > 0 ? std::min(scene_extent, of_mask) : of_mask;

@@ -20,6 +20,7 @@
 #include "engine/edit/handles.h"
 #include "engine/edit/preview.h"
 #include "engine/render/forward.h"
+#include "engine/working/mode.h"
 #include "tests/engine/edit/block.h"
 #include "tests/engine/edit/likeness.h"
 #include "tests/engine/repair/shadowed_block.h"
@@ -306,6 +307,26 @@ TEST(EditWithACorrector, WhatWasSeenHardlyMovesInTheOptimisation) {
     moved_with += glm::distance(with[k], deformed[k]), moved_without += glm::distance(without[k], deformed[k]);
   EXPECT_GT(moved_without, 0);
   EXPECT_LT(moved_with, 0.5 * moved_without);
+}
+
+TEST(EditWithACorrector, WhatHasLeftStaysAsFaintAsItWasLeft) {
+  const BlockScene block;
+  const float lowered = working::keep_logit(Mode::move);
+  std::size_t left = 0, lifted = 0;
+  Observer observer;
+  observer.interval_done = [&](const IntervalDone& done) {
+    const working::WorkingScene& scene = done.state.scene;
+    for (const std::uint32_t row : scene.rows_of(working::Role::original)) {
+      ++left;
+      lifted += scene.cloud().opacity_logit[row] != std::min(block.cloud.opacity_logit[row], lowered);
+    }
+    return Result<void>{};
+  };
+  (void)run_with_scene_corrector(block, observer);
+  EXPECT_GT(left, 0u);
+  EXPECT_EQ(lifted, 0u) << "the place is filled by others";
+  (void)run_with(block, nullptr, observer);
+  EXPECT_GT(lifted, 0u) << "nothing else would fill it";
 }
 
 TEST(EditWithACorrector, SeedsNothingBehindAPartThatHangsBeforeAWholeSurface) {

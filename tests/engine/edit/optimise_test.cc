@@ -1,6 +1,7 @@
 // Edits that optimise.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -11,6 +12,7 @@
 #include "engine/core/parallel.h"
 #include "engine/edit/checkpoint.h"
 #include "engine/edit/edit.h"
+#include "engine/edit/optimise.h"
 #include "engine/render/forward.h"
 #include "tests/engine/edit/likeness.h"
 #include "tests/engine/edit/samples.h"
@@ -387,6 +389,86 @@ TEST(Optimise, RelocatesHandlesByWhatTheOptimisationDidToo) {
   const DVec3 a = with->report.handles[0].relocated[0], b = without->report.handles[0].relocated[0];
   EXPECT_NE(a, b);
   EXPECT_LT(glm::distance(a, b), 0.05);
+}
+
+/// A ball that has left: its copies stand beside its place, every other one of them trusted.
+struct Left {
+  scene::GaussianCloud input = ball_before_wall(60);
+  std::vector<scene::Camera> views = arc_of_cameras(3, 64);
+  std::vector<scene::Mask> masks = std::vector<scene::Mask>(3, scene::Mask(64, 64));
+  working::WorkingScene working = left();
+  std::vector<std::uint32_t> gone = working.rows_that_left(), copies = working.dragged_rows();
+  std::vector<float> trust = std::vector<float>(working.size(), 0.0f);
+  Params params;
+  optim::MsSsimLoss perceptual;
+
+  Left() {
+    params.iterations = 6;
+    for (scene::Mask& mask : masks) std::ranges::fill(mask.data, std::uint8_t{1});
+    for (std::size_t k = 0; k < copies.size(); k += 2) trust[copies[k]] = 1;
+  }
+
+  [[nodiscard]] working::WorkingScene left() const {
+    working::HandleColumn handle(input.size(), 0);
+    for (std::size_t row = 0; row < input.size(); ++row) handle[row] = input.mean.z[row] < 1 ? 1 : 0;
+    working::WorkingScene moved(input, working::Frame(), handle);
+    const std::vector<std::uint32_t> rows = moved.dragged_rows();
+    const std::uint32_t first =
+        moved.append(input, rows, std::vector<working::Role>(rows.size(), working::Role::copy), rows);
+    for (std::size_t row = first; row < moved.size(); ++row) moved.gaussians().mean.x[row] += 0.5f;
+    for (const std::uint32_t row : rows) moved.leave_behind(row);
+    return moved;
+  }
+
+  /// What view v shows without these rows.
+  [[nodiscard]] scene::Image without(std::span<const std::uint32_t> rows, std::size_t v) const {
+    render::Layers layers(working.cloud());
+    layers.hidden = rows;
+    return render::forward(layers, views[v]).color;
+  }
+
+  /// Each loss, and after the last one the mean that optimise() returns.
+  std::vector<double> optimised(const Goal& goal) {
+    std::vector<double> losses;
+    const auto advance = [&](const OptimiseProgress& at) {
+      if (at.loss) losses.push_back(*at.loss);
+      return Result<void>{};
+    };
+    losses.push_back(
+        optimise(working, input, views, masks, goal, params, {1, 1, 0.5, true}, perceptual, advance).value());
+    return losses;
+  }
+};
+
+TEST(Optimise, ChangesNeitherWhatIsTrustedNorWhatIsGone) {
+  Left left;
+  const scene::GaussianCloud before = left.working.cloud();
+  const auto grey = [](std::size_t) { return std::optional(scene::Image(64, 64, 3, 0.5f)); };
+  EXPECT_EQ(left.optimised({grey, left.trust, left.gone}).size(), 7u);
+  std::set<std::uint32_t> may_change;
+  for (std::size_t k = 1; k < left.copies.size(); k += 2) may_change.insert(left.copies[k]);
+  for (std::uint32_t row = 0; row < before.size(); ++row)
+    EXPECT_EQ(same_row(left.working.cloud(), row, before, row), !may_change.contains(row)) << row;
+  EXPECT_TRUE(left.working.check());
+}
+
+TEST(Optimise, WhatIsGoneDoesNotShow) {
+  Left left;
+  const auto bare = [&](std::size_t v) { return std::optional(left.without(left.gone, v)); };
+  const double with_gone = Left().optimised({bare, left.trust, {}}).front();
+  const double without = left.optimised({bare, left.trust, left.gone}).front();
+  EXPECT_GT(with_gone, 0.005) << "the ball stands where it was";
+  EXPECT_LT(without, 0.01 * with_gone) << "nothing but the rounding of a picture";
+}
+
+TEST(Optimise, WithNothingThatMayChangeNothingHappens) {
+  Left left;
+  std::ranges::fill(left.trust, 1.0f);
+  const scene::GaussianCloud before = left.working.cloud();
+  const auto grey = [](std::size_t) { return std::optional(scene::Image(64, 64, 3, 0.5f)); };
+  EXPECT_EQ(left.optimised({grey, left.trust, left.gone}), std::vector<double>{0.0});
+  ASSERT_EQ(left.working.size(), before.size());
+  for (std::uint32_t row = 0; row < before.size(); ++row) EXPECT_TRUE(same_row(left.working.cloud(), row, before, row));
 }
 
 }  // namespace
