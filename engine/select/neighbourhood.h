@@ -101,6 +101,15 @@ class Neighbourhood {
   [[nodiscard]] std::vector<std::uint32_t> settle(std::span<const Given> given,
                                                   std::span<const std::uint8_t> inclined = {}) const;
 
+  /// Is an outside point on one of these rows?
+  ///   rows  [any] ascending
+  [[nodiscard]] bool is_any_outside_on(const scene::GaussianCloud& cloud, const Grow& grow,
+                                       std::span<const std::uint32_t> rows) const;
+
+  /// How much of a surface these rows are: the sum of the squares of their nodes' spacings, world units squared.
+  ///   rows  [any] ascending; those out of reach do not count
+  [[nodiscard]] double area(std::span<const std::uint32_t> rows) const;
+
   /// How well these rows are a thing of their own, by all that is looked at: the less the better (natural_border.h).
   ///   rows  [any] ascending; those out of reach do not count
   [[nodiscard]] double border_ratio(std::span<const std::uint32_t> rows) const;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <iterator>
 #include <numeric>
 #include <span>
 #include <type_traits>
@@ -28,6 +29,11 @@ constexpr double near_reach = 0.65, nearly_all = 0.99;
 // Times the rows of a whole that was cut: more is another thing. Chosen on random clicks (ADR 69): what was cut had up
 // to 2.97 times as many, a table with all on it 3.5 times.
 constexpr double more_beyond_reach = 3;
+
+// What the first click means besides joins what all clicks take where the border of both costs at most so many times
+// that of the latter, and they are as much larger: more is another thing than these clicks span (ADR 72). Who asks for
+// the whole asks for the farthest of borders that are nearly as weak (natural_border.cc), however much is within.
+constexpr double alike = 1.05, nearly_as_weak = 1.5, little_more = 1.25;
 
 /// What selecting reads of a scene has to be finite: a NaN would be on no side of anything.
 Result<void> check_finite(const scene::GaussianCloud& cloud) {
@@ -183,13 +189,13 @@ Result<const Selector::Found*> Selector::by_inside_alone(Grow grow) {
   });
 }
 
-Result<Grown> Selector::grown(const Grow& grow) {
+Result<Grown> Selector::grown_by_all(const Grow& grow, Surroundings& surroundings) {
   const auto alone = by_inside_alone(grow);
   if (grow.outside.empty()) {
     if (!alone) return propagate(alone);
+    surroundings = (*alone)->surroundings;
     return (*alone)->grown;
   }
-  Surroundings surroundings;
   auto out = grown_anywhere(grow, surroundings);
   // In their own surroundings, inside points may be too far from each other: nobody has seen them without the others.
   if (!out || !alone || out->rows.size() <= (*alone)->grown.rows.size()) return out;
@@ -201,6 +207,30 @@ Result<Grown> Selector::grown(const Grow& grow) {
   if (left->empty()) return out;
   out->rows = *std::move(left);
   out->wider = before.grown.wider, out->more = before.grown.more, out->less = before.grown.less;
+  return out;
+}
+
+void Selector::join_whole_of_first(const Grow& grow, Surroundings surroundings, Grown& out) {
+  const auto whole = whole_of({.inside = {grow.inside.front()}, .outside = {}, .reach = {}, .whole = true});
+  if (!whole) return;
+  const Grown& first = (*whole)->grown;
+  if (std::ranges::includes(out.rows, first.rows)) return;
+  surroundings.reach = std::max(surroundings.reach, (*whole)->surroundings.reach);
+  const Neighbourhood& around = neighbourhood(surroundings);
+  if (around.is_any_outside_on(cloud_, grow, first.rows)) return;
+  std::vector<std::uint32_t> both;
+  std::ranges::set_union(out.rows, first.rows, std::back_inserter(both));
+  if (around.border_ratio(both) > (grow.whole ? nearly_as_weak : alike) * around.border_ratio(out.rows)) return;
+  if (!grow.whole && around.area(both) > little_more * around.area(out.rows)) return;
+  out.rows = std::move(both);
+}
+
+Result<Grown> Selector::grown(const Grow& grow) {
+  Surroundings surroundings;
+  auto out = grown_by_all(grow, surroundings);
+  const bool is_one_click = grow.inside.size() + grow.outside.size() == 1;
+  // Who asks for a reach, or for less, asks for no more.
+  if (out && !is_one_click && !grow.reach && grow.wider >= 0) join_whole_of_first(grow, surroundings, *out);
   return out;
 }
 

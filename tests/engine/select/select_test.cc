@@ -230,5 +230,44 @@ TEST(Select, AWholeThatHasMostOfASceneIsNotCutWhereHalfOfTheRowsEnd) {
   EXPECT_EQ(select(cloud, {{Op::add, bar}})->rows, found->rows);
 }
 
+/// A red bar six long and 0.3 wide above a table, along x.
+struct BarAboveTable {
+  scene::GaussianCloud cloud;
+  std::size_t table = 0;  ///< Rows of it, which come first.
+
+  BarAboveTable() {
+    add_sheet(cloud, {0, 0, 0}, 40, 0.5f, {0.6f, 0.4f, 0.2f});
+    table = cloud.size();
+    for (int along = -10; along < 10; ++along)
+      add_sheet(cloud, {0.3f * float(along) + 0.15f, 0, 1}, 15, 0.02f, {0.5f, 0.05f, 0.05f});
+  }
+  [[nodiscard]] std::size_t bar() const { return cloud.size() - table; }
+  [[nodiscard]] std::size_t taken(std::vector<DVec3> inside, std::vector<DVec3> outside, bool whole,
+                                  int wider = 0) const {
+    const auto found = select(cloud, {{Op::add, Grow{std::move(inside), std::move(outside), {}, whole, wider}}});
+    if (!found) return ADD_FAILURE() << found.error().message, 0;
+    EXPECT_EQ(std::accumulate(found->rows.begin(), found->rows.begin() + std::ptrdiff_t(table), 0), 0)
+        << "of the table";
+    return found->count;
+  }
+};
+
+TEST(Select, FurtherClicksTakeNothingFromTheWholeThatTheFirstOneMeans) {
+  const BarAboveTable scene;
+  const DVec3 click(-2.0, 0, 1), beside(-1.7, 0.05, 1), on_table(-2.0, 3, 0), far_end(2.5, 0, 1);
+  ASSERT_EQ(scene.taken({click}, {}, true), scene.bar());
+  EXPECT_EQ(scene.taken({click, beside}, {}, true), scene.bar()) << "by what they span it would be a piece";
+  EXPECT_EQ(scene.taken({click, beside}, {on_table}, true), scene.bar());
+  EXPECT_EQ(scene.taken({click}, {on_table}, true), scene.bar());
+  EXPECT_LT(scene.taken({click, beside}, {far_end}, true), scene.bar() * 3 / 4) << "unless they are on it";
+  EXPECT_LT(scene.taken({click, beside}, {on_table}, true, -1), scene.bar()) << "or less is asked for";
+}
+
+TEST(Select, ClicksThatDoNotMeanTheWholeTakeWhatTheySpan) {
+  const BarAboveTable scene;
+  const DVec3 click(-2.0, 0, 1), beside(-1.7, 0.05, 1);
+  EXPECT_LT(scene.taken({click, beside}, {}, false), scene.bar() / 2);
+}
+
 }  // namespace
 }  // namespace engine::select
