@@ -32,13 +32,15 @@ Result<void> correct_and_optimise(State& state, Edit& edit, int u) {
       if (auto shown = show(state, edit, u, "corrected", corrected->pictures); !shown) return shown;
     const auto loss = optimise(state, edit, masks, std::move(*corrected), round);
     if (!loss) return propagate(loss);
-    if (a == corrections) state.report.losses.push_back(*loss);
+    if (*loss) edit.loss = *loss;
   }
+  if (edit.loss) state.report.losses.push_back(*edit.loss);
   return show(state, edit, u, "optimised");
 }
 
 /// Steps 3 to 9 of interval u.
 Result<void> carry_out_interval(State& state, Edit& edit, int u) {
+  edit.loss.reset();
   if (auto shown = show(state, edit, u, "before"); !shown) return shown;
   const auto motion = deform(state, edit, u);
   if (!motion) return propagate(motion);
@@ -64,10 +66,8 @@ Result<void> hand_out(State& state, Edit& edit, Clock::time_point begun) {
   std::vector<DVec3> in_world;
   for (const DVec3& position : state.positions) in_world.push_back(state.scene.frame().world_from_edit(position));
   const double seconds = std::chrono::duration<double>(Clock::now() - begun).count();
-  std::optional<double> loss;
-  if (!state.report.losses.empty()) loss = state.report.losses.back();
   return edit.observer.interval_done(
-      {state.interval, state.report.resolved.intervals, seconds, loss, std::move(in_world), state});
+      {state.interval, state.report.resolved.intervals, seconds, edit.loss, std::move(in_world), state});
 }
 
 Result<State> next_interval(State state, Edit& edit) {

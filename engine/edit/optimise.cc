@@ -59,12 +59,13 @@ void take_over(const train::Trainer& trainer, std::span<const std::uint32_t> row
 
 }  // namespace
 
-Result<double> optimise(working::WorkingScene& working, const scene::GaussianCloud& input,
-                        std::span<const scene::Camera> views, std::span<const scene::Mask> masks, const Goal& goal,
-                        const Params& params, const repair::Round& round, optim::PerceptualLoss& perceptual,
-                        const std::function<Result<void>(const OptimiseProgress&)>& advance) {
-  const std::vector<std::uint32_t> members = working.member_rows(), rows = rows_to_train(members, goal);
-  if (rows.empty()) return 0.0;
+Result<std::optional<double>> optimise(working::WorkingScene& working, const scene::GaussianCloud& input,
+                                       std::span<const scene::Camera> views, std::span<const scene::Mask> masks,
+                                       const Goal& goal, const Params& params, const repair::Round& round,
+                                       optim::PerceptualLoss& perceptual,
+                                       const std::function<Result<void>(const OptimiseProgress&)>& advance) {
+  const std::vector<std::uint32_t> rows = rows_to_train(working.member_rows(), goal);
+  if (rows.empty()) return std::nullopt;
   std::vector<std::uint32_t> hidden;
   std::ranges::set_union(rows, goal.gone, std::back_inserter(hidden));
   const scene::GaussianCloud originals = working.unedited(input, rows);
@@ -78,7 +79,7 @@ Result<double> optimise(working::WorkingScene& working, const scene::GaussianClo
     }
     if (auto going = advance({.set_up = double(v + 1) / double(views.size())}); !going) return propagate(going);
   }
-  if (trainer.views() == 0) return 0.0;
+  if (trainer.views() == 0) return std::nullopt;
 
   std::vector<double> losses(trainer.views(), 0.0);
   trainer.begin_correction({params.seed, round.interval, round.correction}, params.iterations);

@@ -58,7 +58,7 @@ struct Report {
   std::size_t copies = 0;      ///< New rows in the output: deformed copies, and children that the optimisation added.
   std::size_t seeds = 0;       ///< Of those, as they were made: placed where a surface goes on that nobody has seen.
   std::size_t removed = 0;     ///< Input rows that are not in the output.
-  std::vector<double> losses;  ///< Per interval: mean over the views of the last epoch. Empty without optimisation.
+  std::vector<double> losses;  ///< Per interval that was optimised: mean over the views of the last epoch.
   std::vector<std::string> warnings;
   std::vector<StageTime> times;
 };

@@ -373,8 +373,8 @@ Result<void> repaint(State& state, Edit& edit, std::span<const scene::Mask> mask
   return {};
 }
 
-Result<double> optimise(State& state, Edit& edit, std::span<const scene::Mask> masks, repair::Corrected corrected,
-                        const repair::Round& round) {
+Result<std::optional<double>> optimise(State& state, Edit& edit, std::span<const scene::Mask> masks,
+                                       repair::Corrected corrected, const repair::Round& round) {
   if (auto going = edit.progress.enter(Stage::set_up, round.interval); !going) return propagate(going);
   std::optional<Uncorrected> uncorrected;
   if (edit.corrector == nullptr) uncorrected.emplace(state, departure_of(edit.request));
@@ -387,10 +387,10 @@ Result<double> optimise(State& state, Edit& edit, std::span<const scene::Mask> m
     if (at.iteration == 0) return edit.progress.enter(Stage::optimise, round.interval);
     return edit.progress.advance(double(at.iteration) / at.iterations, before + at.iteration, at.loss);
   };
-  Goal goal{picture, corrected.trust};
-  // What has left is wanted back only where nothing else fills its place.
-  const Rows gone = state.scene.rows_that_left();
-  if (!corrected.trust.empty() && departure_of(edit.request) == Mode::move) goal.gone = gone;
+  // What has left is wanted back only where nobody has completed its place.
+  Rows gone;
+  if (!corrected.trust.empty() && departure_of(edit.request) == Mode::move) gone = state.scene.rows_that_left();
+  const Goal goal{picture, corrected.trust, gone};
   return edit::optimise(state.scene, edit.input, state.views, masks, goal, edit.params(), round, edit.perceptual,
                         advance);
 }

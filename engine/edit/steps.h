@@ -45,6 +45,7 @@ struct Edit {
   std::vector<scene::Camera> candidates = {};  ///< That views are chosen from; they have seen the scene.
   std::optional<repair::Repair> repair = {};   ///< What the unedited scene looks like to a corrector.
   Rows masked_rows = {};                       ///< Those that the masks were last united with.
+  std::optional<double> loss = {};             ///< Of the interval at hand: of its last correction that was optimised.
 
   [[nodiscard]] const Params& params() const { return request.params; }
   /// Step 8 takes place, and so step 7 where there is a corrector.
@@ -95,10 +96,10 @@ struct Edit {
                                    const repair::Round& round, std::vector<scene::Image>& pictures);
 
 /// Step 8. Optimise: M towards the corrected views inside the masks, towards the unedited scene outside.
-///   returns  the mean loss over the views of the last epoch
+///   returns  the mean loss over the views of the last epoch; none where nothing may change
 ///   errors   internal: a value is not finite; `where` names it by the input's row. Those of the perceptual loss
-[[nodiscard]] Result<double> optimise(State& state, Edit& edit, std::span<const scene::Mask> masks,
-                                      repair::Corrected corrected, const repair::Round& round);
+[[nodiscard]] Result<std::optional<double>> optimise(State& state, Edit& edit, std::span<const scene::Mask> masks,
+                                                     repair::Corrected corrected, const repair::Round& round);
 
 /// Step 9. Relocate: each handle to where its Gaussians have gone.
 [[nodiscard]] Result<void> relocate_handles(State& state, Edit& edit, int u);

@@ -642,7 +642,7 @@ Result<Corrected> Repair::walk(WorkingScene& working, std::span<const scene::Mas
     backgrounds[v] = {};
     if (auto going = advance_by(shown_views); !going) return propagate(going);
   }
-  corrected.trust = std::move(trust_);  // seeds, trails and originals are what the optimisation is to change
+  corrected.trust = std::move(trust_);  // seeds, and trails and originals of an extend, are free to change
   for (std::size_t i = 0; i < working.size(); ++i)
     if (!working::is_dragged(working.role()[i]) && working.role()[i] != Role::continued &&
         working.role()[i] != Role::relit && (opens || working.role()[i] != Role::seed))

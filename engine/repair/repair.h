@@ -45,7 +45,8 @@ struct Uncovered {
 /// What the optimisation should reach.
 struct Corrected {
   std::vector<scene::Image> pictures;  ///< I_e of each view, in its size. Empty: there was no corrector.
-  /// [rows of the working scene] 0 to 1: the more, the slower a row may change. Empty: all may as they are drawn.
+  /// [rows of the working scene] 0 to 1: the more, the slower a row may change; at 1 not at all. Empty: all may as they
+  /// are drawn.
   std::vector<float> trust;
   std::size_t seeds = 0;             ///< Rows that the correction appended.
   std::vector<Uncovered> uncovered;  ///< Of each view; empty where nothing has left its place since it was last told.

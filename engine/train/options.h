@@ -33,8 +33,8 @@ struct TrainOptions {
   /// rounding in float.
   double dead_zone = 0.501 / 255.0;
   DensifyOptions densify = {};
-  /// A child is a floater when it stands nearer to a camera than M did, by more than this part of M's radius: see
-  /// Trainer::step(). A choice.
+  /// A child is a floater when it stands nearer to a camera than its like did, by more than this part of their radius:
+  /// see Trainer::step(). A choice.
   double floater_distance = 0.1;
   /// Bytes that views keep of the frozen Gaussians. Beyond this the views used last let go of theirs and make them anew
   /// when they are needed: slower by a pass over the scene, the same bytes. A choice.

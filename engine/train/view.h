@@ -16,7 +16,7 @@ namespace engine::train {
 /// The Gaussians that stay as they are.
 struct FrozenScene {
   const scene::GaussianCloud* base = nullptr;
-  std::span<const std::uint32_t> hidden = {};  ///< Rows of the base that are not frozen, ascending.
+  std::span<const std::uint32_t> hidden = {};  ///< Rows of the base that do not show: trained, or gone. Ascending.
 
   [[nodiscard]] render::Layers layers() const {
     render::Layers layers(*base);

@@ -415,7 +415,7 @@ struct Left {
     const std::vector<std::uint32_t> rows = moved.dragged_rows();
     const std::uint32_t first =
         moved.append(input, rows, std::vector<working::Role>(rows.size(), working::Role::copy), rows);
-    for (std::size_t row = first; row < moved.size(); ++row) moved.gaussians().mean.x[row] += 0.5f;
+    for (std::size_t row = first; row < moved.size(); ++row) moved.gaussians().mean.x[row] += 1.0f;
     for (const std::uint32_t row : rows) moved.leave_behind(row);
     return moved;
   }
@@ -427,24 +427,27 @@ struct Left {
     return render::forward(layers, views[v]).color;
   }
 
-  /// Each loss, and after the last one the mean that optimise() returns.
-  std::vector<double> optimised(const Goal& goal) {
-    std::vector<double> losses;
+  struct Losses {
+    std::vector<double> each;
+    std::optional<double> mean;
+  };
+  Losses optimised(const Goal& goal) {
+    Losses losses;
     const auto advance = [&](const OptimiseProgress& at) {
-      if (at.loss) losses.push_back(*at.loss);
+      if (at.loss) losses.each.push_back(*at.loss);
       return Result<void>{};
     };
-    losses.push_back(
-        optimise(working, input, views, masks, goal, params, {1, 1, 0.5, true}, perceptual, advance).value());
+    losses.mean = optimise(working, input, views, masks, goal, params, {1, 1, 0.5, true}, perceptual, advance).value();
     return losses;
   }
 };
 
+std::optional<scene::Image> grey(std::size_t) { return scene::Image(64, 64, 3, 0.5f); }
+
 TEST(Optimise, ChangesNeitherWhatIsTrustedNorWhatIsGone) {
   Left left;
   const scene::GaussianCloud before = left.working.cloud();
-  const auto grey = [](std::size_t) { return std::optional(scene::Image(64, 64, 3, 0.5f)); };
-  EXPECT_EQ(left.optimised({grey, left.trust, left.gone}).size(), 7u);
+  EXPECT_EQ(left.optimised({grey, left.trust, left.gone}).each.size(), 6u);
   std::set<std::uint32_t> may_change;
   for (std::size_t k = 1; k < left.copies.size(); k += 2) may_change.insert(left.copies[k]);
   for (std::uint32_t row = 0; row < before.size(); ++row)
@@ -455,20 +458,47 @@ TEST(Optimise, ChangesNeitherWhatIsTrustedNorWhatIsGone) {
 TEST(Optimise, WhatIsGoneDoesNotShow) {
   Left left;
   const auto bare = [&](std::size_t v) { return std::optional(left.without(left.gone, v)); };
-  const double with_gone = Left().optimised({bare, left.trust, {}}).front();
-  const double without = left.optimised({bare, left.trust, left.gone}).front();
+  const double with_gone = Left().optimised({bare, left.trust, {}}).each.front();
+  const double without = left.optimised({bare, left.trust, left.gone}).each.front();
   EXPECT_GT(with_gone, 0.005) << "the ball stands where it was";
   EXPECT_LT(without, 0.01 * with_gone) << "nothing but the rounding of a picture";
+}
+
+TEST(Optimise, NothingIsPulledAtWhereWhatIsGoneWas) {
+  Left left;
+  for (std::size_t v = 0; v < left.views.size(); ++v) {  // masks of the right side: of the copies, not of their place
+    const scene::Camera& view = left.views[v];
+    const double between = view.pixel_from_cam(view.cam_from_world(DVec3(0.5, 0, 0))).x;
+    for (int y = 0; y < 64; ++y)
+      for (int x = 0; x < 64; ++x) left.masks[v].at(x, y) = x > between ? 1 : 0;
+  }
+  const scene::GaussianCloud before = left.working.cloud();
+  const auto as_it_is = [](std::size_t) { return std::optional<scene::Image>(); };
+  for (const double loss : left.optimised({as_it_is, left.trust, left.gone}).each) EXPECT_LT(loss, 1e-6);
+  for (const std::uint32_t row : left.copies)
+    EXPECT_LT(glm::distance(left.working.cloud().mean.get(row), before.mean.get(row)), 1e-4f) << row;
 }
 
 TEST(Optimise, WithNothingThatMayChangeNothingHappens) {
   Left left;
   std::ranges::fill(left.trust, 1.0f);
   const scene::GaussianCloud before = left.working.cloud();
-  const auto grey = [](std::size_t) { return std::optional(scene::Image(64, 64, 3, 0.5f)); };
-  EXPECT_EQ(left.optimised({grey, left.trust, left.gone}), std::vector<double>{0.0});
+  const Left::Losses losses = left.optimised({grey, left.trust, left.gone});
+  EXPECT_TRUE(losses.each.empty());
+  EXPECT_FALSE(losses.mean);
   ASSERT_EQ(left.working.size(), before.size());
   for (std::uint32_t row = 0; row < before.size(); ++row) EXPECT_TRUE(same_row(left.working.cloud(), row, before, row));
+}
+
+TEST(Optimise, ARowThatIsTrainedAloneStaysAtItsPlace) {  // its radius is 0
+  Left left;
+  std::ranges::fill(left.trust, 1.0f);
+  const std::uint32_t alone = left.copies[left.copies.size() / 2];
+  left.trust[alone] = 0;
+  const Vec3 mean = left.working.cloud().mean.get(alone);
+  EXPECT_TRUE(left.optimised({grey, left.trust, left.gone}).mean);
+  EXPECT_EQ(left.working.cloud().mean.get(alone), mean);
+  EXPECT_FALSE(scene::first_not_finite(left.working.cloud()));
 }
 
 }  // namespace
