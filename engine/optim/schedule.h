@@ -40,9 +40,9 @@ struct LearningRates {
   double opacity_logit = 0.05;   ///< Logits.
   double log_scale = 5e-3;       ///< Natural logarithm of world units.
   double rotation = 1e-3;        ///< Quaternion components.
-  double mask_radii = 5;         ///< c of position_scale(): radii of what is trained that its extent counts as. A choice.
-  double most_widths = 0.05;     ///< Largest position rate of a row, in its own widths; may be infinite. A choice.
-  double last = 0.01;            ///< Factor of all rates at the end of a correction; above 0, at most 1.
+  double mask_radii = 5;      ///< c of position_scale(): radii of what is trained that its extent counts as. A choice.
+  double most_widths = 0.05;  ///< Largest position rate of a row, in its own widths; may be infinite. A choice.
+  double last = 0.01;         ///< Factor of all rates at the end of a correction; above 0, at most 1.
 };
 [[nodiscard]] Result<void> validate(const LearningRates& rates);
 
