@@ -27,10 +27,6 @@ constexpr double least_border = 8.0;
 // demo scene's ball 1.15 leaves one border per stripe.
 constexpr double apart = 1.15;
 
-// So much may the border of the whole cost, by the weakest one's. From a click on the demo scene's ball, the whole ball
-// costs 1.01 to 1.26 of its cheapest stripes. With 2 a click on the mug takes all that is around it.
-constexpr double nearly_as_weak = 1.5;
-
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 // Of the usual spacing, and the most of it, that a node counts for: one whose neighbours are all at its place would
@@ -307,6 +303,14 @@ double border_ratio(const neighbours::NeighbourGraph& graph, std::span<const flo
     }
   // All there is is a thing that stands alone, as above.
   return ratio_of(leaving, volume < all ? std::min(volume, all - volume) : volume);
+}
+
+double area_of(const neighbours::NeighbourGraph& graph, std::span<const std::uint8_t> inside) {
+  const Terrain terrain = terrain_of(graph, {}, true);
+  double area = 0;
+  for (std::uint32_t node = 0; node < graph.size(); ++node)
+    if (inside[node] != 0) area += terrain.area(node);
+  return area;
 }
 
 }  // namespace engine::select

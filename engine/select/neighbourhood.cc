@@ -278,20 +278,17 @@ Result<std::vector<std::uint32_t>> Neighbourhood::left_of(const scene::GaussianC
   return left;
 }
 
-bool Neighbourhood::is_any_outside_on(const scene::GaussianCloud& cloud, const Grow& grow,
-                                      std::span<const std::uint32_t> rows) const {
+bool Neighbourhood::may_be_on(const scene::GaussianCloud& cloud, const Grow& grow,
+                              std::span<const std::uint32_t> rows) const {
+  if (grow.outside.empty()) return false;
   const auto seeds = seeds_of(cloud, grow);
-  if (!seeds) return false;
+  if (!seeds) return true;
   const std::vector<std::uint8_t> is_among = nodes_among(rows);
   return std::ranges::any_of(seeds->clicked.outside, [&](std::uint32_t node) { return is_among[node] != 0; });
 }
 
 double Neighbourhood::area(std::span<const std::uint32_t> rows) const {
-  const std::vector<std::uint8_t> is_among = nodes_among(rows);
-  double sum = 0;
-  for (std::uint32_t node = 0; node < nodes_.size(); ++node)
-    if (is_among[node] != 0) sum += double(graph_.spacing[node]) * double(graph_.spacing[node]);
-  return sum;
+  return select::area_of(graph_, nodes_among(rows));
 }
 
 double Neighbourhood::border_ratio(std::span<const std::uint32_t> rows) const {

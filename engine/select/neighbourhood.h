@@ -101,12 +101,12 @@ class Neighbourhood {
   [[nodiscard]] std::vector<std::uint32_t> settle(std::span<const Given> given,
                                                   std::span<const std::uint8_t> inclined = {}) const;
 
-  /// Is an outside point on one of these rows?
+  /// Is an outside point on one of these rows, or can nobody tell?
   ///   rows  [any] ascending
-  [[nodiscard]] bool is_any_outside_on(const scene::GaussianCloud& cloud, const Grow& grow,
-                                       std::span<const std::uint32_t> rows) const;
+  [[nodiscard]] bool may_be_on(const scene::GaussianCloud& cloud, const Grow& grow,
+                               std::span<const std::uint32_t> rows) const;
 
-  /// How much of a surface these rows are: the sum of the squares of their nodes' spacings, world units squared.
+  /// How much of a surface these rows are (natural_border.h).
   ///   rows  [any] ascending; those out of reach do not count
   [[nodiscard]] double area(std::span<const std::uint32_t> rows) const;
 

@@ -66,7 +66,7 @@ struct Stroke {
 
 /// Rows of the thing that the inside points lie on, up to its natural border: see Neighbourhood.
 struct Grow {
-  std::vector<DVec3> inside;    ///< One or more, on the thing; several say about how large it is.
+  std::vector<DVec3> inside;    ///< One or more, on the thing; several say about how large it is (ADRs 41, 54, 72).
   std::vector<DVec3> outside;   ///< On what is not meant; may be empty.
   std::optional<double> reach;  ///< No row farther than this from inside[0] is taken. Above 0.
   bool whole = false;           ///< Rather all of the thing than a part of it that ends as sharply: see BorderChoice.

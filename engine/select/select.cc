@@ -18,8 +18,9 @@ namespace {
 /// Kept between selections: of a list that grows several things. 25 MB each for the graph, and 8 bytes for each row
 /// that is no node: of those, so many in all, but for the latest.
 constexpr std::size_t neighbourhoods_kept = 4, rows_kept = 4'000'000;
-/// The same of what inside points alone take: four bytes for each row.
-constexpr std::size_t grown_kept = 4;
+/// The same of what inside points alone take, and of wholes, of which a thing of several clicks has two: four bytes for
+/// each row.
+constexpr std::size_t grown_kept = 8;
 
 /// So often the reach of a whole is doubled in search of a border farther out: then it holds nearly all of a scene.
 constexpr int farther_reaches = 2;
@@ -31,9 +32,9 @@ constexpr double near_reach = 0.65, nearly_all = 0.99;
 constexpr double more_beyond_reach = 3;
 
 // What the first click means besides joins what all clicks take where the border of both costs at most so many times
-// that of the latter, and they are as much larger: more is another thing than these clicks span (ADR 72). Who asks for
-// the whole asks for the farthest of borders that are nearly as weak (natural_border.cc), however much is within.
-constexpr double alike = 1.05, nearly_as_weak = 1.5, little_more = 1.25;
+// that of the latter, and they are at most so much larger: more is another thing than these clicks span (ADR 72). Who
+// asks for the whole asks for the farthest of borders that are nearly as weak, however much is within.
+constexpr double alike = 1.05, little_more = 1.25;
 
 /// What selecting reads of a scene has to be finite: a NaN would be on no side of anything.
 Result<void> check_finite(const scene::GaussianCloud& cloud) {
@@ -179,59 +180,69 @@ Result<Grown> Selector::grown_anywhere(const Grow& grow, Surroundings& surroundi
   return out;
 }
 
+bool Selector::join_first(const Grow& grow, int wider, Surroundings& surroundings, Grown& out) {
+  Grow first{.inside = {grow.inside.front()}, .outside = {}, .reach = {}, .whole = true, .wider = wider};
+  Surroundings of_first;
+  const auto meant = grown_anywhere(first, of_first);
+  if (!meant) return false;
+  surroundings.reach = std::max(surroundings.reach, of_first.reach);
+  const Neighbourhood& around = neighbourhood(surroundings);
+  if (around.may_be_on(cloud_, grow, meant->rows)) return false;
+  std::vector<std::uint32_t> both;
+  std::ranges::set_union(out.rows, meant->rows, std::back_inserter(both));
+  if (around.border_ratio(both) > (grow.whole ? nearly_as_weak : alike) * around.border_ratio(out.rows)) return false;
+  if (!grow.whole && around.area(both) > little_more * around.area(out.rows)) return false;
+  out = {std::move(both), meant->wider, meant->more, meant->less};
+  return true;
+}
+
+void Selector::keep_first(const Grow& grow, Surroundings& surroundings, Grown& out) {
+  const bool is_one_click = grow.inside.size() + grow.outside.size() == 1;
+  if (is_one_click || grow.reach) return;
+  // Where an outside point is on what lies farther out, the whole stays all the same.
+  if (!join_first(grow, grow.wider, surroundings, out) && grow.wider > 0) join_first(grow, 0, surroundings, out);
+}
+
 Result<const Selector::Found*> Selector::by_inside_alone(Grow grow) {
   grow.outside.clear();
   return kept_or_found(inside_alone_, grow, [&]() -> Result<Found> {
     Surroundings surroundings;
     auto grown = grown_anywhere(grow, surroundings);
     if (!grown) return propagate(grown);
+    keep_first(grow, surroundings, *grown);
     return Found{grow, *std::move(grown), surroundings};
   });
 }
 
-Result<Grown> Selector::grown_by_all(const Grow& grow, Surroundings& surroundings) {
+Result<Grown> Selector::grown(const Grow& grow) {
   const auto alone = by_inside_alone(grow);
   if (grow.outside.empty()) {
     if (!alone) return propagate(alone);
-    surroundings = (*alone)->surroundings;
     return (*alone)->grown;
   }
+  Surroundings surroundings;
   auto out = grown_anywhere(grow, surroundings);
   // In their own surroundings, inside points may be too far from each other: nobody has seen them without the others.
-  if (!out || !alone || out->rows.size() <= (*alone)->grown.rows.size()) return out;
+  if (!out || !alone) return out;
+  const Grown before = (*alone)->grown;
+  surroundings.reach = std::max(surroundings.reach, (*alone)->surroundings.reach);
+  if (!neighbourhood(surroundings).may_be_on(cloud_, grow, before.rows)) {
+    keep_first(grow, surroundings, *out);
+    return out;
+  }
   // Whoever clicks outside on what is taken wants less of it.
-  const Found& before = **alone;
-  surroundings.reach = std::max(surroundings.reach, before.surroundings.reach);
-  auto left = neighbourhood(surroundings).left_of(cloud_, grow, before.grown.rows);
-  if (!left) return propagate(left);
-  if (left->empty()) return out;
-  out->rows = *std::move(left);
-  out->wider = before.grown.wider, out->more = before.grown.more, out->less = before.grown.less;
-  return out;
-}
-
-void Selector::join_whole_of_first(const Grow& grow, Surroundings surroundings, Grown& out) {
-  const auto whole = whole_of({.inside = {grow.inside.front()}, .outside = {}, .reach = {}, .whole = true});
-  if (!whole) return;
-  const Grown& first = (*whole)->grown;
-  if (std::ranges::includes(out.rows, first.rows)) return;
-  surroundings.reach = std::max(surroundings.reach, (*whole)->surroundings.reach);
-  const Neighbourhood& around = neighbourhood(surroundings);
-  if (around.is_any_outside_on(cloud_, grow, first.rows)) return;
-  std::vector<std::uint32_t> both;
-  std::ranges::set_union(out.rows, first.rows, std::back_inserter(both));
-  if (around.border_ratio(both) > (grow.whole ? nearly_as_weak : alike) * around.border_ratio(out.rows)) return;
-  if (!grow.whole && around.area(both) > little_more * around.area(out.rows)) return;
-  out.rows = std::move(both);
-}
-
-Result<Grown> Selector::grown(const Grow& grow) {
-  Surroundings surroundings;
-  auto out = grown_by_all(grow, surroundings);
-  const bool is_one_click = grow.inside.size() + grow.outside.size() == 1;
-  // Who asks for a reach, or for less, asks for no more.
-  if (out && !is_one_click && !grow.reach && grow.wider >= 0) join_whole_of_first(grow, surroundings, *out);
-  return out;
+  if (out->rows.size() > before.rows.size()) {
+    auto left = neighbourhood(surroundings).left_of(cloud_, grow, before.rows);
+    if (!left) return propagate(left);
+    if (!left->empty()) out = Grown{*std::move(left), before.wider, before.more, before.less};
+  }
+  Grown kept = *out;
+  keep_first(grow, surroundings, kept);
+  std::vector<std::uint32_t> of_before;
+  std::ranges::set_intersection(kept.rows, before.rows, std::back_inserter(of_before));
+  kept.rows.clear();
+  std::ranges::set_union(out->rows, of_before, std::back_inserter(kept.rows));
+  return kept;
 }
 
 Result<RowSet> Selector::rows_of(const Grow& grow, const std::string& where, Selected& so_far) {

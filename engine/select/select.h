@@ -62,6 +62,7 @@ class Selector {
  private:
   [[nodiscard]] Result<void> carry_out(const Operation& operation, const std::string& where, Selected& so_far);
   [[nodiscard]] Result<RowSet> rows_of(const Grow& grow, const std::string& where, Selected& so_far);
+  /// Of all clicks; where an outside point is on what the inside points alone take, no more than that.
   [[nodiscard]] Result<Grown> grown(const Grow& grow);
   struct Found {
     Grow grow;
@@ -86,12 +87,13 @@ class Selector {
   /// twice the reach, and again.
   ///   surroundings  set to those that were looked at last
   [[nodiscard]] Result<Grown> grown_anywhere(const Grow& grow, Surroundings& surroundings);
-  /// Of all clicks; where an outside point is on what the inside points alone take, no more than that.
-  ///   surroundings  set to those that were looked at
-  [[nodiscard]] Result<Grown> grown_by_all(const Grow& grow, Surroundings& surroundings);
-  /// Adds the whole that the first click means, where no outside point is on it and it ends about as well: further
-  /// clicks are rarely meant to take anything away from it, unless they are on it.
-  void join_whole_of_first(const Grow& grow, Surroundings surroundings, Grown& out);
+  /// Adds what the first click means as a whole, so many borders farther out, where no outside point is on it and both
+  /// together end about as well: further clicks are rarely meant to take anything away from it, unless they are on it.
+  ///   surroundings  of `out`; widened to those of the whole
+  ///   returns       whether that is so; then borders farther out and in are those of the first click
+  bool join_first(const Grow& grow, int wider, Surroundings& surroundings, Grown& out);
+  /// The same as far out as is asked for, else for the whole as it is; not where a reach is asked for.
+  void keep_first(const Grow& grow, Surroundings& surroundings, Grown& out);
   /// What a person sees who has not clicked beside the thing yet. Stays until the next call.
   [[nodiscard]] Result<const Found*> by_inside_alone(Grow grow);
   [[nodiscard]] RowSet rows_of(const Masks& masks, Selected& so_far);

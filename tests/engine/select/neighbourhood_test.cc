@@ -187,6 +187,29 @@ TEST(Grow, AnOutsideClickOnWhatIsTakenTakesNoMore) {
   EXPECT_GT(less, asked / 2);
 }
 
+TEST(Grow, AnOutsideClickOnWhatTwoClicksHaveTakenTakesNoMore) {
+  const procedural::DemoScene demo = procedural::make_demo_scene({.gaussians = 6'000, .views = 3});
+  Selector selector(demo.cloud);
+  std::size_t asked = 0, more = 0;
+  for (std::size_t object = 0; object < demo.object_names.size(); ++object)
+    for (Grow clicks : {meant(clicks_on(demo, object, demo.cameras[0], 0).inside.at(0), false, 0),
+                        meant(clicks_on(demo, object, demo.cameras[0], 0).inside.at(0), true, 0)}) {
+      const RowList by_one = rows_of(selector.select({{Op::add, clicks}}).value().rows);
+      clicks.inside.emplace_back(demo.cloud.mean.get(by_one[by_one.size() / 2]));
+      const auto by_two = selector.select({{Op::add, clicks}});
+      if (!by_two) continue;  // too far from each other
+      const RowList rows = rows_of(by_two->rows);
+      for (std::size_t k = 0; k < rows.size(); k += rows.size() / 5 + 1) {
+        clicks.outside = {DVec3(demo.cloud.mean.get(rows[k]))};
+        const auto found = selector.select({{Op::add, clicks}});
+        if (!found) continue;  // nearer to an inside point than that point itself
+        ++asked, more += rows_of(found->rows).size() > rows.size();
+      }
+    }
+  EXPECT_GT(asked, 80u);
+  EXPECT_EQ(more, 0u);
+}
+
 TEST(Settle, GivesEachRowToTheSideThatItHangsTogetherWith) {
   scene::GaussianCloud cloud = two_colors({0.1f, 0.1f, 0.8f});
   add_sheet(cloud, {0, 0, 50}, 5, 0.1f, {0.8f, 0.1f, 0.1f});  // joined to nothing

@@ -242,31 +242,54 @@ struct BarAboveTable {
       add_sheet(cloud, {0.3f * float(along) + 0.15f, 0, 1}, 15, 0.02f, {0.5f, 0.05f, 0.05f});
   }
   [[nodiscard]] std::size_t bar() const { return cloud.size() - table; }
-  [[nodiscard]] std::size_t taken(std::vector<DVec3> inside, std::vector<DVec3> outside, bool whole,
+  [[nodiscard]] Selected selected(std::vector<DVec3> inside, std::vector<DVec3> outside, bool whole,
                                   int wider = 0) const {
-    const auto found = select(cloud, {{Op::add, Grow{std::move(inside), std::move(outside), {}, whole, wider}}});
-    if (!found) return ADD_FAILURE() << found.error().message, 0;
+    auto found = select(cloud, {{Op::add, Grow{std::move(inside), std::move(outside), {}, whole, wider}}});
+    if (!found) return ADD_FAILURE() << found.error().message, Selected();
     EXPECT_EQ(std::accumulate(found->rows.begin(), found->rows.begin() + std::ptrdiff_t(table), 0), 0)
         << "of the table";
-    return found->count;
+    return *std::move(found);
+  }
+  [[nodiscard]] std::size_t taken(std::vector<DVec3> inside, std::vector<DVec3> outside, bool whole) const {
+    return selected(std::move(inside), std::move(outside), whole).count;
   }
 };
 
+constexpr DVec3 on_bar(-2.0, 0, 1), beside_it(-1.7, 0.05, 1), on_table(-2.0, 3, 0), far_end(2.5, 0, 1);
+
 TEST(Select, FurtherClicksTakeNothingFromTheWholeThatTheFirstOneMeans) {
   const BarAboveTable scene;
-  const DVec3 click(-2.0, 0, 1), beside(-1.7, 0.05, 1), on_table(-2.0, 3, 0), far_end(2.5, 0, 1);
-  ASSERT_EQ(scene.taken({click}, {}, true), scene.bar());
-  EXPECT_EQ(scene.taken({click, beside}, {}, true), scene.bar()) << "by what they span it would be a piece";
-  EXPECT_EQ(scene.taken({click, beside}, {on_table}, true), scene.bar());
-  EXPECT_EQ(scene.taken({click}, {on_table}, true), scene.bar());
-  EXPECT_LT(scene.taken({click, beside}, {far_end}, true), scene.bar() * 3 / 4) << "unless they are on it";
-  EXPECT_LT(scene.taken({click, beside}, {on_table}, true, -1), scene.bar()) << "or less is asked for";
+  ASSERT_EQ(scene.taken({on_bar}, {}, true), scene.bar());
+  EXPECT_EQ(scene.taken({on_bar, beside_it}, {}, true), scene.bar()) << "by what they span it would be a piece";
+  EXPECT_EQ(scene.taken({on_bar, beside_it}, {on_table}, true), scene.bar());
+  EXPECT_EQ(scene.taken({on_bar}, {on_table}, true), scene.bar());
+  EXPECT_LT(scene.taken({on_bar, beside_it}, {far_end}, true), scene.bar() * 3 / 4) << "unless they are on it";
+}
+
+TEST(Select, WhereTheWholeOfTheFirstClickIsKeptBordersAreCountedFromIt) {
+  const BarAboveTable scene;
+  for (int wider = -2; wider <= 0; ++wider) {
+    const Selected first = scene.selected({on_bar}, {}, true, wider),
+                   both = scene.selected({on_bar, beside_it}, {on_table}, true, wider);
+    ASSERT_TRUE(first.border && both.border);
+    EXPECT_EQ(both.border->wider, first.border->wider) << wider;
+    EXPECT_EQ(both.border->more, first.border->more) << wider;
+    EXPECT_EQ(both.border->less, first.border->less) << wider;
+    for (std::size_t row = 0; row < first.rows.size(); ++row) ASSERT_GE(both.rows[row], first.rows[row]) << wider;
+  }
+  EXPECT_LT(scene.selected({on_bar, beside_it}, {}, true, -1).count, scene.bar()) << "less is less";
+}
+
+TEST(Select, AReachKeepsTheWholeOfTheFirstClickOut) {
+  const BarAboveTable scene;
+  const auto within = select(scene.cloud, {{Op::add, Grow{{on_bar, beside_it}, {}, 1.0, true, 0}}});
+  ASSERT_TRUE(within) << within.error().message;
+  EXPECT_LT(within->count, scene.bar() / 2);
 }
 
 TEST(Select, ClicksThatDoNotMeanTheWholeTakeWhatTheySpan) {
   const BarAboveTable scene;
-  const DVec3 click(-2.0, 0, 1), beside(-1.7, 0.05, 1);
-  EXPECT_LT(scene.taken({click, beside}, {}, false), scene.bar() / 2);
+  EXPECT_LT(scene.taken({on_bar, beside_it}, {}, false), scene.bar() / 2);
 }
 
 }  // namespace
