@@ -16,7 +16,7 @@ using namespace std::chrono_literals;
 Workload corrected_work() {
   Workload work;
   work.gaussians = 150'000, work.dragged = 4000, work.covered = 0.05;
-  work.intervals = 3, work.corrections = 2, work.iterations = 100;
+  work.intervals = 3, work.corrections = 2, work.iterations = 150;
   work.corrected = true, work.kept = true;
   work.candidates = 40, work.views = 20, work.view_pixels = 200'000;
   work.frame = {3e-3, 1e-8};
