@@ -29,6 +29,9 @@ constexpr double hanging = 0.075;
 // size. Between them the way goes with the firmness: a lamp before a wall has 0.128 if rows of the wall were taken with
 // it, and goes by nine tenths of its size (docs/adr/0062-the-looser-the-sooner-it-goes.md).
 constexpr double nudge = 0.2, firmly = 0.2;
+// Of a border, where the surface goes on across it: enough to hold a part that somebody asks to be held. Of a doll's
+// shoe on a quilt that is its leg, with a sixth of it. Seen on that shoe alone.
+constexpr double holding = 0.1;
 
 /// Does each handle turn and grow as it asks for?
 bool turns_as_asked(std::span<const Drag> drags, int group, const RigidMotion& motion) {
@@ -115,7 +118,8 @@ Attachment attach(std::span<const Drag> drags, int group, const Contact& contact
   const bool hangs = !touches_by_little(contact) && goes_on(contact, hanging);
   if (asked == Attach::held)
     return {
-        group, touches ? How::held : How::free, false, grows_out || hangs,
+        group, touches ? How::held : How::free, false,
+        touches && double(contact.goes_on) >= holding * double(contact.touches),
         touches ? "the request asks for it" : "the request asks for it to be held, but it touches nothing that stays"};
   if (asked == Attach::free)
     return {group, is_one_piece ? How::one_piece : How::free, scales, grows_out, "the request asks for it to be free"};
@@ -125,14 +129,20 @@ Attachment attach(std::span<const Drag> drags, int group, const Contact& contact
     return {group, How::one_piece, scales, grows_out, "one motion takes all its handles to their targets"};
   // It is half of a thing that somebody means to take away, or was selected with a piece of what it stands on.
   if (is_one_piece && grows_out && places.longest > bends_by(contact))
-    return {group, How::one_piece, scales, grows_out,
-            "it goes farther than a part that is held like this bends (attach \"held\" keeps it)"};
+    return {group,
+            How::one_piece,
+            scales,
+            grows_out,
+            "it goes farther than a part that is held like this bends (attach \"held\" keeps it)",
+            true};
   if (grows_out) return {group, How::held, false, grows_out, "its surface goes on into what stays"};
   if (hangs && is_nudged(drags, group, contact))
     return {group, How::held, false, true, "it hangs on to what stays, and is nudged"};
   if (is_one_piece)
     return {group, How::one_piece, scales, grows_out,
-            touches ? "it only stands next to what stays" : "it touches nothing that stays"};
+            hangs     ? "it hangs on to what stays by little, and is taken away (attach \"held\" keeps it)"
+            : touches ? "it only stands next to what stays"
+                      : "it touches nothing that stays"};
   if (places.anchors > 0) return {group, How::free, false, grows_out, "its anchors hold it"};
   if (touches) return {group, How::held, false, grows_out, "its handles bend it, and it stands on what stays"};
   return {group, How::free, false, grows_out, "its handles bend it, and it touches nothing that stays"};

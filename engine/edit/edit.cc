@@ -126,6 +126,12 @@ Result<Outcome> finish(State state, Edit& edit) {
   if (report.output_gaussians == 0) return tl::make_unexpected(leaves_nothing());
   if (std::string open = left_open(report.uncovered); !open.empty()) report.warnings.push_back(std::move(open));
   if (published.faint > 0) report.warnings.push_back(faint_left_out(published.faint));
+  if (state.interval == report.resolved.intervals) {
+    std::vector<DVec3> positions;
+    for (const DVec3& position : state.positions) positions.push_back(state.scene.frame().world_from_edit(position));
+    for (std::string& warning : handles_stop_short(edit.request, positions))
+      report.warnings.push_back(std::move(warning));
+  }
   std::vector<scene::Mask> masks = dilated(state.masks);
   for (std::size_t v = 0; v < state.views.size(); ++v)
     report.views.push_back({state.views[v].name, double(masks[v].area()) / double(masks[v].data.size())});

@@ -9,6 +9,25 @@ namespace {
 
 /// Part of what is uncovered that may stay open unsaid: rims leave a few pixels everywhere. A choice.
 constexpr double worth_saying = 0.1;
+/// Of a handle's way, what may be left of it unsaid. A choice.
+constexpr double overlooked = 0.1;
+
+std::string anchor_is_idle(std::size_t handle) {
+  return "handle " + std::to_string(handle + 1) +
+         " is an anchor that holds nothing: nothing that moves is within its radius of it";
+}
+
+std::string handle_is_astray(std::size_t handle, double away) {
+  std::ostringstream distance;
+  distance << away;
+  return "handle " + std::to_string(handle + 1) + " lies " + distance.str() +
+         " from the nearest Gaussian that it moves, farther than all of them are apart: is it where it should be?";
+}
+
+std::string comes_off(const deform::Attachment& part) {
+  const std::string which = part.group == 0 ? "the part" : "the part of group " + std::to_string(part.group);
+  return which + " comes off what it grows out of, as " + part.why;
+}
 
 }  // namespace
 
@@ -23,16 +42,28 @@ std::string handle_lost(std::size_t handle, int interval) {
          std::to_string(interval) + " and stays where it is";
 }
 
-std::string anchor_is_idle(std::size_t handle) {
-  return "handle " + std::to_string(handle + 1) +
-         " is an anchor that holds nothing: nothing that moves is within its radius of it";
+std::vector<std::string> warnings_of(const Parts& parts) {
+  std::vector<std::string> warnings;
+  for (const std::size_t anchor : parts.idle) warnings.push_back(anchor_is_idle(anchor));
+  for (const auto& [handle, away] : parts.astray) warnings.push_back(handle_is_astray(handle, away));
+  for (const deform::Attachment& part : parts.attachments)
+    if (part.comes_off) warnings.push_back(comes_off(part));
+  return warnings;
 }
 
-std::string handle_is_astray(std::size_t handle, double away) {
-  std::ostringstream distance;
-  distance << away;
-  return "handle " + std::to_string(handle + 1) + " lies " + distance.str() +
-         " from the nearest Gaussian that it moves, farther than all of them are apart: is it where it should be?";
+std::vector<std::string> handles_stop_short(const Request& request, std::span<const DVec3> positions) {
+  std::vector<std::string> warnings;
+  if (request.params.interpolation != Interpolation::arap) return warnings;
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    const Handle& handle = request.handles[i];
+    const double way = glm::distance(handle.source, handle.end());
+    const double left = glm::distance(positions[i], handle.end());
+    if (way == 0 || !(left > overlooked * way)) continue;  // an anchor, or a turn in place
+    warnings.push_back("handle " + std::to_string(i + 1) + " came within " +
+                       std::to_string(std::lround(100 * left / way)) +
+                       " % of its way of its target, no nearer: what holds its part does not let it go farther");
+  }
+  return warnings;
 }
 
 std::string left_open(std::span<const Uncovered> views) {

@@ -5,9 +5,13 @@
 #include <cstddef>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "engine/core/result.h"
+#include "engine/core/vec.h"
+#include "engine/edit/parts.h"
 #include "engine/edit/report.h"
+#include "engine/edit/request.h"
 
 namespace engine::edit {
 
@@ -23,10 +27,13 @@ namespace engine::edit {
 /// What could not be completed of what a part has left. Empty: hardly anything.
 [[nodiscard]] std::string left_open(std::span<const Uncovered> views);
 
-/// An anchor of an elastic body that grips nothing of it.
-[[nodiscard]] std::string anchor_is_idle(std::size_t handle);
-/// A handle of one that lies far from all of it.
-///   away  world units
-[[nodiscard]] std::string handle_is_astray(std::size_t handle, double away);
+/// What people should know of the parts before they move: anchors that hold nothing, handles far from all that they
+/// move, and parts that come off what they grow out of.
+[[nodiscard]] std::vector<std::string> warnings_of(const Parts& parts);
+
+/// Handles of elastic bodies that end farther from where they were to go than anyone overlooks: what is held stretches
+/// only so far.
+///   positions  of the handles at the end, world units
+[[nodiscard]] std::vector<std::string> handles_stop_short(const Request& request, std::span<const DVec3> positions);
 
 }  // namespace engine::edit

@@ -71,9 +71,10 @@ Result<PreviewOutcome> preview(const scene::LayeredCloud& scene, const Request& 
     outcome.positions.push_back(drag.working.frame().world_from_edit(position));
   outcome.changeable = published.changeable;
   if (!moves) outcome.warnings.push_back(nothing_moves());
-  for (const std::size_t anchor : parts.idle) outcome.warnings.push_back(anchor_is_idle(anchor));
-  for (const auto& [handle, away] : parts.astray) outcome.warnings.push_back(handle_is_astray(handle, away));
+  for (std::string& warning : warnings_of(parts)) outcome.warnings.push_back(std::move(warning));
   for (std::string& warning : drag.warnings) outcome.warnings.push_back(std::move(warning));
+  for (std::string& warning : handles_stop_short(request, outcome.positions))
+    outcome.warnings.push_back(std::move(warning));
   if (published.faint > 0) outcome.warnings.push_back(faint_left_out(published.faint));
   return outcome;
 }

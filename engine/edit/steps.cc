@@ -259,8 +259,7 @@ Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Cam
     warnings.push_back(nothing_moves());
   else if (choice->views.empty())
     warnings.push_back(no_view_sees_it());
-  for (const std::size_t anchor : edit.parts.idle) warnings.push_back(anchor_is_idle(anchor));
-  for (const auto& [handle, away] : edit.parts.astray) warnings.push_back(handle_is_astray(handle, away));
+  for (std::string& warning : warnings_of(edit.parts)) warnings.push_back(std::move(warning));
   state.views = std::move(choice->views);
   if (Workload work = edit.progress.workload(); work.views != state.views.size()) {
     work.views = state.views.size();

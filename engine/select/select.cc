@@ -259,6 +259,14 @@ Result<RowSet> Selector::rows_of(const Grow& grow, const std::string& where, Sel
   return named;
 }
 
+void Selector::warn_of_nearly_all(const Grow& grow, const RowSet& named, const std::string& where, Selected& so_far) {
+  const auto count = std::size_t(std::ranges::count(named, std::uint8_t(1)));
+  if (!grow.outside.empty() || 2 * count <= named.size()) return;
+  so_far.warnings.push_back({"that is " + std::to_string(100 * count / named.size()) +
+                                 " % of the scene: a point outside, on what is not meant, bounds it",
+                             where + ".grow"});
+}
+
 RowSet Selector::rows_of(const Masks& masks, Selected& so_far) {
   MaskedRows masked = rows_in_masks(cloud_, masks, workspace_);
   so_far.undecided += masked.undecided;
@@ -290,6 +298,7 @@ Result<void> Selector::carry_out(const Operation& operation, const std::string& 
             auto grown = rows_of(action, where, so_far);
             if (!grown) return propagate(grown);
             named = *std::move(grown);
+            warn_of_nearly_all(action, named, where, so_far);
           } else if constexpr (std::is_same_v<Kind, Masks>) {
             named = rows_of(action, so_far);
           } else if constexpr (std::is_same_v<Kind, Polygon> || std::is_same_v<Kind, Stroke>) {

@@ -9,6 +9,7 @@
 #include "engine/edit/drag.h"
 #include "engine/edit/edit.h"
 #include "engine/edit/handles.h"
+#include "engine/edit/messages.h"
 #include "engine/edit/preview.h"
 #include "tests/engine/edit/samples.h"
 
@@ -87,6 +88,40 @@ TEST(PartsOf, CrumbsFarAwayMakeAPartNoLonger) {
     add_disc(cloud, Vec3(far));
   }
   EXPECT_EQ(parts_of(cloud, assign(cloud, request)->handle, request).attachments.at(0).how, How::one_piece);
+}
+
+TEST(PartsOf, SayWhenAPartComesOffWhatItGrowsOutOf) {
+  const auto cloud = wall();
+  const auto warnings = [&](DVec3 by, Attach attach) {
+    Request request = pulled(cloud, by);
+    request.attach = attach;
+    return warnings_of(parts_of(cloud, assign(cloud, request)->handle, request));
+  };
+  const auto off = warnings({0, 0, 3}, Attach::automatic);
+  ASSERT_EQ(off.size(), 1u);
+  EXPECT_EQ(off[0],
+            "the part comes off what it grows out of, as it goes farther than a part that is held like this bends "
+            "(attach \"held\" keeps it)");
+  EXPECT_TRUE(warnings({0, 0, 1}, Attach::automatic).empty()) << "it bends";
+  EXPECT_TRUE(warnings({0, 0, 3}, Attach::held).empty());
+  EXPECT_TRUE(warnings({0, 0, 3}, Attach::free).empty()) << "as asked";
+}
+
+TEST(HandlesStopShort, SaysWhatIsLeftOfTheirWays) {
+  Request request;
+  request.params.interpolation = Interpolation::arap;
+  request.handles = {{DVec3(0.0), DVec3(2, 0, 0), 0.1}, {DVec3(0, 1, 0), std::nullopt, 0.1}};
+  const auto at = [&](double x) { return handles_stop_short(request, std::vector<DVec3>{{x, 0, 0}, {0.3, 1, 0}}); };
+  EXPECT_TRUE(at(2).empty());
+  EXPECT_TRUE(at(1.85).empty());
+  ASSERT_EQ(at(1.6).size(), 1u) << "nor of an anchor";
+  EXPECT_EQ(at(1.6)[0],
+            "handle 1 came within 20 % of its way of its target, no nearer: what holds its part does not let it go "
+            "farther");
+  request.handles[0].target = DVec3(0.0), request.handles[0].scale = 2;
+  EXPECT_TRUE(at(1e-7).empty()) << "it grows in place";
+  request.handles[0].target = DVec3(2, 0, 0), request.params.interpolation = Interpolation::paper;
+  EXPECT_TRUE(at(1.6).empty()) << "its rows go their ways with it in part, as that interpolation has it";
 }
 
 TEST(PartsOf, AreNoneForOtherInterpolations) {
