@@ -31,7 +31,7 @@ constexpr double hanging = 0.075;
 constexpr double nudge = 0.2, firmly = 0.2;
 // Of a border, where the surface goes on across it: enough to hold a part that somebody asks to be held. Of a doll's
 // shoe on a quilt that is its leg, with a sixth of it. Seen on that shoe alone.
-constexpr double holding = 0.1;
+constexpr double holding = 0.15;
 
 /// Does each handle turn and grow as it asks for?
 bool turns_as_asked(std::span<const Drag> drags, int group, const RigidMotion& motion) {

@@ -37,7 +37,7 @@ struct Attachment {
   bool scales = false;     ///< One piece that grows or shrinks as its handles do.
   bool grows_out = false;  ///< Its surface goes on into what stays: that is where it is held, if it is.
   std::string why;         ///< For people, as the end of "it moves as one piece, because ...".
-  bool comes_off = false;  ///< Nobody asked for it to be free, it grows out of what stays, and goes all the same.
+  bool comes_off = false;  ///< It grows out of what stays, and goes as it goes too far to bend.
   double settled = 0;      ///< So far from where its handles ask it is set down on what it stands on, world units.
 };
 constexpr auto names_of(Attachment::How) {

@@ -129,7 +129,7 @@ Result<Outcome> finish(State state, Edit& edit) {
   if (state.interval == report.resolved.intervals) {
     std::vector<DVec3> positions;
     for (const DVec3& position : state.positions) positions.push_back(state.scene.frame().world_from_edit(position));
-    for (std::string& warning : handles_stop_short(edit.request, positions))
+    for (std::string& warning : handles_stop_short(edit.request, edit.parts, positions))
       report.warnings.push_back(std::move(warning));
   }
   std::vector<scene::Mask> masks = dilated(state.masks);

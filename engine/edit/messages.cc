@@ -51,17 +51,25 @@ std::vector<std::string> warnings_of(const Parts& parts) {
   return warnings;
 }
 
-std::vector<std::string> handles_stop_short(const Request& request, std::span<const DVec3> positions) {
+std::vector<std::string> handles_stop_short(const Request& request, const Parts& parts,
+                                            std::span<const DVec3> positions) {
   std::vector<std::string> warnings;
-  if (request.params.interpolation != Interpolation::arap) return warnings;
-  for (std::size_t i = 0; i < positions.size(); ++i) {
-    const Handle& handle = request.handles[i];
-    const double way = glm::distance(handle.source, handle.end());
-    const double left = glm::distance(positions[i], handle.end());
-    if (way == 0 || !(left > overlooked * way)) continue;  // an anchor, or a turn in place
-    warnings.push_back("handle " + std::to_string(i + 1) + " came within " +
-                       std::to_string(std::lround(100 * left / way)) +
-                       " % of its way of its target, no nearer: what holds its part does not let it go farther");
+  for (const deform::Attachment& part : parts.attachments) {
+    if (part.how != deform::Attachment::How::held && part.how != deform::Attachment::How::drawn_out) continue;
+    double longest = 0;
+    for (const Handle& handle : request.handles)
+      if (handle.group == part.group) longest = std::max(longest, glm::distance(handle.source, handle.end()));
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+      const Handle& handle = request.handles[i];
+      // What is around a handle that turns or grows goes elsewhere than the handle itself.
+      if (handle.group != part.group || !handle.target || handle.rotation || handle.scale) continue;
+      if (positions[i] == handle.source) continue;  // it has lost its Gaussians, which is said
+      const double left = glm::distance(positions[i], handle.end());
+      if (!(left > overlooked * longest)) continue;
+      warnings.push_back("handle " + std::to_string(i + 1) + " stops " +
+                         std::to_string(std::lround(100 * left / longest)) +
+                         " % of the way short of its target, as its part is held");
+    }
   }
   return warnings;
 }

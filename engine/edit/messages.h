@@ -31,9 +31,10 @@ namespace engine::edit {
 /// move, and parts that come off what they grow out of.
 [[nodiscard]] std::vector<std::string> warnings_of(const Parts& parts);
 
-/// Handles of elastic bodies that end farther from where they were to go than anyone overlooks: what is held stretches
-/// only so far.
+/// Handles of parts that are held which end farther from their targets than anyone overlooks, in parts of the longest
+/// way of their group: what is held stretches only so far. Those that turn or scale are passed over.
 ///   positions  of the handles at the end, world units
-[[nodiscard]] std::vector<std::string> handles_stop_short(const Request& request, std::span<const DVec3> positions);
+[[nodiscard]] std::vector<std::string> handles_stop_short(const Request& request, const Parts& parts,
+                                                          std::span<const DVec3> positions);
 
 }  // namespace engine::edit

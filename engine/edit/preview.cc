@@ -73,7 +73,7 @@ Result<PreviewOutcome> preview(const scene::LayeredCloud& scene, const Request& 
   if (!moves) outcome.warnings.push_back(nothing_moves());
   for (std::string& warning : warnings_of(parts)) outcome.warnings.push_back(std::move(warning));
   for (std::string& warning : drag.warnings) outcome.warnings.push_back(std::move(warning));
-  for (std::string& warning : handles_stop_short(request, outcome.positions))
+  for (std::string& warning : handles_stop_short(request, parts, outcome.positions))
     outcome.warnings.push_back(std::move(warning));
   if (published.faint > 0) outcome.warnings.push_back(faint_left_out(published.faint));
   return outcome;

@@ -22,6 +22,8 @@ constexpr std::size_t neighbourhoods_kept = 4, rows_kept = 4'000'000;
 /// each row.
 constexpr std::size_t grown_kept = 8;
 
+/// Of a scene, more is hardly ever what people mean by points inside alone. A choice.
+constexpr double most_meant = 0.5;
 /// So often the reach of a whole is doubled in search of a border farther out: then it holds nearly all of a scene.
 constexpr int farther_reaches = 2;
 
@@ -259,14 +261,6 @@ Result<RowSet> Selector::rows_of(const Grow& grow, const std::string& where, Sel
   return named;
 }
 
-void Selector::warn_of_nearly_all(const Grow& grow, const RowSet& named, const std::string& where, Selected& so_far) {
-  const auto count = std::size_t(std::ranges::count(named, std::uint8_t(1)));
-  if (!grow.outside.empty() || 2 * count <= named.size()) return;
-  so_far.warnings.push_back({"that is " + std::to_string(100 * count / named.size()) +
-                                 " % of the scene: a point outside, on what is not meant, bounds it",
-                             where + ".grow"});
-}
-
 RowSet Selector::rows_of(const Masks& masks, Selected& so_far) {
   MaskedRows masked = rows_in_masks(cloud_, masks, workspace_);
   so_far.undecided += masked.undecided;
@@ -298,7 +292,6 @@ Result<void> Selector::carry_out(const Operation& operation, const std::string& 
             auto grown = rows_of(action, where, so_far);
             if (!grown) return propagate(grown);
             named = *std::move(grown);
-            warn_of_nearly_all(action, named, where, so_far);
           } else if constexpr (std::is_same_v<Kind, Masks>) {
             named = rows_of(action, so_far);
           } else if constexpr (std::is_same_v<Kind, Polygon> || std::is_same_v<Kind, Stroke>) {
@@ -332,6 +325,12 @@ Result<Selected> Selector::select(const Selection& selection) {
     if (auto done = carry_out(selection[i], address(i), out); !done) return propagate(done);
   describe(cloud_.mean, out);
   if (out.count == 0) out.warnings.push_back({"nothing is selected", "selection"});
+  if (double(out.count) > most_meant * double(cloud_.size()))
+    for (std::size_t i = 0; i < selection.size(); ++i)
+      if (const auto* grow = std::get_if<Grow>(&selection[i].action);
+          grow != nullptr && selection[i].op == Op::add && grow->outside.empty())
+        out.warnings.push_back(
+            {"most of the scene is selected: a point outside, on what is not meant, takes less", address(i) + ".grow"});
   return out;
 }
 

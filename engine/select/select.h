@@ -96,8 +96,6 @@ class Selector {
   void keep_first(const Grow& grow, Surroundings& surroundings, Grown& out);
   /// What a person sees who has not clicked beside the thing yet. Stays until the next call.
   [[nodiscard]] Result<const Found*> by_inside_alone(Grow grow);
-  /// People who click without a point outside hardly ever mean most of a scene.
-  static void warn_of_nearly_all(const Grow& grow, const RowSet& named, const std::string& where, Selected& so_far);
   [[nodiscard]] RowSet rows_of(const Masks& masks, Selected& so_far);
   [[nodiscard]] const Neighbourhood& neighbourhood(const Surroundings& surroundings);
 

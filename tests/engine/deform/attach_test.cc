@@ -100,8 +100,8 @@ TEST(Attach, WhatIsAskedToBeHeldIsHeldWhereItsSurfaceGoesOnIfThatIsSomeOfIt) {
                   Attach::held)
         .grows_out;
   };
-  EXPECT_TRUE(grows_out(10)) << "a shoe, by its leg, not by the quilt it lies on";
-  EXPECT_FALSE(grows_out(9)) << "a mug, by all that it stands on";
+  EXPECT_TRUE(grows_out(15)) << "a shoe, by its leg, not by the quilt it lies on";
+  EXPECT_FALSE(grows_out(14)) << "a mug, by all that it stands on";
   EXPECT_FALSE(attach(shifted(0.8), 0, nothing, Attach::held).grows_out);
 }
 

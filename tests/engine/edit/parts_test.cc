@@ -107,21 +107,24 @@ TEST(PartsOf, SayWhenAPartComesOffWhatItGrowsOutOf) {
   EXPECT_TRUE(warnings({0, 0, 3}, Attach::free).empty()) << "as asked";
 }
 
-TEST(HandlesStopShort, SaysWhatIsLeftOfTheirWays) {
+TEST(HandlesStopShort, SaysByHowMuchWherePartsAreHeld) {
   Request request;
-  request.params.interpolation = Interpolation::arap;
   request.handles = {{DVec3(0.0), DVec3(2, 0, 0), 0.1}, {DVec3(0, 1, 0), std::nullopt, 0.1}};
-  const auto at = [&](double x) { return handles_stop_short(request, std::vector<DVec3>{{x, 0, 0}, {0.3, 1, 0}}); };
+  Parts parts;
+  parts.attachments.push_back({0, How::held, false, true, "it is"});
+  const auto at = [&](double x) {
+    return handles_stop_short(request, parts, std::vector<DVec3>{{x, 0, 0}, {0.3, 1, 0}});
+  };
   EXPECT_TRUE(at(2).empty());
   EXPECT_TRUE(at(1.85).empty());
+  EXPECT_TRUE(at(0).empty()) << "it has lost its Gaussians";
   ASSERT_EQ(at(1.6).size(), 1u) << "nor of an anchor";
-  EXPECT_EQ(at(1.6)[0],
-            "handle 1 came within 20 % of its way of its target, no nearer: what holds its part does not let it go "
-            "farther");
-  request.handles[0].target = DVec3(0.0), request.handles[0].scale = 2;
-  EXPECT_TRUE(at(1e-7).empty()) << "it grows in place";
-  request.handles[0].target = DVec3(2, 0, 0), request.params.interpolation = Interpolation::paper;
-  EXPECT_TRUE(at(1.6).empty()) << "its rows go their ways with it in part, as that interpolation has it";
+  EXPECT_EQ(at(1.6)[0], "handle 1 stops 20 % of the way short of its target, as its part is held");
+  request.handles[0].rotation = DQuat(1, 0, 0, 0);
+  EXPECT_TRUE(at(1.6).empty()) << "what is around it turns";
+  request.handles[0].rotation.reset();
+  parts.attachments[0].how = How::one_piece;
+  EXPECT_TRUE(at(1.6).empty()) << "nothing holds it";
 }
 
 TEST(PartsOf, AreNoneForOtherInterpolations) {

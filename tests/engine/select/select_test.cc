@@ -292,9 +292,13 @@ TEST(Select, SaysWhenPointsInsideAloneTakeMostOfAScene) {
   const Selected most = scene.selected({on_bar}, {}, true);
   ASSERT_EQ(most.warnings.size(), 1u);
   EXPECT_EQ(most.warnings[0].where, "selection[0].grow");
-  EXPECT_EQ(most.warnings[0].message, "that is 73 % of the scene: a point outside, on what is not meant, bounds it");
+  EXPECT_EQ(most.warnings[0].message,
+            "most of the scene is selected: a point outside, on what is not meant, takes less");
   EXPECT_TRUE(scene.selected({on_bar}, {on_table}, true).warnings.empty()) << "who clicked outside knows";
   EXPECT_TRUE(scene.selected({on_bar, beside_it}, {}, false).warnings.empty()) << "less than half";
+  const auto rest = select(scene.cloud, {{Op::add, Grow{{on_bar}, {}, {}, true, 0}}, {Op::add, Invert{}}});
+  ASSERT_TRUE(rest) << rest.error().message;
+  EXPECT_TRUE(rest->warnings.empty()) << "what is meant is what is left";
 }
 
 TEST(Select, ClicksThatDoNotMeanTheWholeTakeWhatTheySpan) {
