@@ -29,9 +29,6 @@ constexpr double hanging = 0.075;
 // size. Between them the way goes with the firmness: a lamp before a wall has 0.128 if rows of the wall were taken with
 // it, and goes by nine tenths of its size (docs/adr/0062-the-looser-the-sooner-it-goes.md).
 constexpr double nudge = 0.2, firmly = 0.2;
-// Of a border, where the surface goes on across it: enough to hold a part that somebody asks to be held. Of a doll's
-// shoe on a quilt that is its leg, with a sixth of it. Seen on that shoe alone.
-constexpr double holding = 0.15;
 
 /// Does each handle turn and grow as it asks for?
 bool turns_as_asked(std::span<const Drag> drags, int group, const RigidMotion& motion) {
@@ -118,8 +115,7 @@ Attachment attach(std::span<const Drag> drags, int group, const Contact& contact
   const bool hangs = !touches_by_little(contact) && goes_on(contact, hanging);
   if (asked == Attach::held)
     return {
-        group, touches ? How::held : How::free, false,
-        touches && double(contact.goes_on) >= holding * double(contact.touches),
+        group, touches ? How::held : How::free, false, grows_out || hangs,
         touches ? "the request asks for it" : "the request asks for it to be held, but it touches nothing that stays"};
   if (asked == Attach::free)
     return {group, is_one_piece ? How::one_piece : How::free, scales, grows_out, "the request asks for it to be free"};
@@ -140,7 +136,7 @@ Attachment attach(std::span<const Drag> drags, int group, const Contact& contact
     return {group, How::held, false, true, "it hangs on to what stays, and is nudged"};
   if (is_one_piece)
     return {group, How::one_piece, scales, grows_out,
-            hangs     ? "it hangs on to what stays by little, and is taken away (attach \"held\" keeps it)"
+            hangs     ? "it hangs on to what stays by little, and is more than nudged (attach \"held\" keeps it)"
             : touches ? "it only stands next to what stays"
                       : "it touches nothing that stays"};
   if (places.anchors > 0) return {group, How::free, false, grows_out, "its anchors hold it"};

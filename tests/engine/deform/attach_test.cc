@@ -94,17 +94,6 @@ TEST(Attach, TheLooserItIsHeldTheSoonerItGoes) {
   EXPECT_NEAR(longest_bend(0.9), 2, 0.02);
 }
 
-TEST(Attach, WhatIsAskedToBeHeldIsHeldWhereItsSurfaceGoesOnIfThatIsSomeOfIt) {
-  const auto grows_out = [](std::size_t goes_on) {
-    return attach(shifted(0.8), 0, {.shown = 1000, .touches = 100, .goes_on = goes_on, .firmness = 0.04, .size = 2},
-                  Attach::held)
-        .grows_out;
-  };
-  EXPECT_TRUE(grows_out(15)) << "a shoe, by its leg, not by the quilt it lies on";
-  EXPECT_FALSE(grows_out(14)) << "a mug, by all that it stands on";
-  EXPECT_FALSE(attach(shifted(0.8), 0, nothing, Attach::held).grows_out);
-}
-
 TEST(Attach, SaysWhatComesOffUnasked) {
   const auto comes_off = [](double way, const Contact& contact, Attach asked = Attach::automatic) {
     return attach(shifted(way), 0, contact, asked).comes_off;
@@ -113,6 +102,7 @@ TEST(Attach, SaysWhatComesOffUnasked) {
   EXPECT_FALSE(comes_off(0.3, grows_there));
   EXPECT_FALSE(comes_off(2.5, grows_there, Attach::free));
   EXPECT_FALSE(comes_off(2.5, hangs_there)) << "a doll that is taken off its quilt";
+  EXPECT_EQ(attach(shifted(2.5), 0, hangs_there, Attach::automatic).why.find("it hangs on"), 0u);
   EXPECT_FALSE(comes_off(2.5, stands_there));
 }
 
