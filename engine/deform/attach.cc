@@ -125,12 +125,12 @@ Attachment attach(std::span<const Drag> drags, int group, const Contact& contact
     return {group, How::one_piece, scales, grows_out, "one motion takes all its handles to their targets"};
   // It is half of a thing that somebody means to take away, or was selected with a piece of what it stands on.
   if (is_one_piece && grows_out && places.longest > bends_by(contact))
-    return {group,
-            How::one_piece,
-            scales,
-            grows_out,
-            "it goes farther than a part that is held like this bends (attach \"held\" keeps it)",
-            true};
+    return {.group = group,
+            .how = How::one_piece,
+            .scales = scales,
+            .grows_out = grows_out,
+            .why = "it goes farther than a part that is held like this bends (attach \"held\" keeps it)",
+            .comes_off = true};
   if (grows_out) return {group, How::held, false, grows_out, "its surface goes on into what stays"};
   if (hangs && is_nudged(drags, group, contact))
     return {group, How::held, false, true, "it hangs on to what stays, and is nudged"};

@@ -1,11 +1,14 @@
 #include "engine/edit/edit.h"
 
+#include <algorithm>
 #include <cassert>
 #include <chrono>
+#include <iterator>
 #include <string>
 #include <utility>
 
 #include "engine/edit/annealing.h"
+#include "engine/edit/handles.h"
 #include "engine/edit/masks.h"
 #include "engine/edit/messages.h"
 #include "engine/edit/publish.h"
@@ -63,11 +66,9 @@ Result<void> hand_out(State& state, Edit& edit, Clock::time_point begun) {
   if (!edit.observer.interval_done) return {};
   if (auto going = edit.progress.enter(Stage::checkpoint, state.interval); !going) return going;
   state.report.times = edit.progress.times();
-  std::vector<DVec3> in_world;
-  for (const DVec3& position : state.positions) in_world.push_back(state.scene.frame().world_from_edit(position));
   const double seconds = std::chrono::duration<double>(Clock::now() - begun).count();
-  return edit.observer.interval_done(
-      {state.interval, state.report.resolved.intervals, seconds, edit.loss, std::move(in_world), state});
+  return edit.observer.interval_done({state.interval, state.report.resolved.intervals, seconds, edit.loss,
+                                      in_world(state.scene.frame(), state.positions), state});
 }
 
 Result<State> next_interval(State state, Edit& edit) {
@@ -126,12 +127,9 @@ Result<Outcome> finish(State state, Edit& edit) {
   if (report.output_gaussians == 0) return tl::make_unexpected(leaves_nothing());
   if (std::string open = left_open(report.uncovered); !open.empty()) report.warnings.push_back(std::move(open));
   if (published.faint > 0) report.warnings.push_back(faint_left_out(published.faint));
-  if (state.interval == report.resolved.intervals) {
-    std::vector<DVec3> positions;
-    for (const DVec3& position : state.positions) positions.push_back(state.scene.frame().world_from_edit(position));
-    for (std::string& warning : handles_stop_short(edit.request, edit.parts, positions))
-      report.warnings.push_back(std::move(warning));
-  }
+  if (state.interval == report.resolved.intervals)
+    std::ranges::move(handles_stop_short(edit.request, edit.parts, in_world(state.scene.frame(), state.positions)),
+                      std::back_inserter(report.warnings));
   std::vector<scene::Mask> masks = dilated(state.masks);
   for (std::size_t v = 0; v < state.views.size(); ++v)
     report.views.push_back({state.views[v].name, double(masks[v].area()) / double(masks[v].data.size())});

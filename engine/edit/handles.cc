@@ -65,6 +65,12 @@ std::vector<DVec3> handle_sources(const working::Frame& frame, const Request& re
   return positions;
 }
 
+std::vector<DVec3> in_world(const working::Frame& frame, std::span<const DVec3> positions) {
+  std::vector<DVec3> out;
+  for (const DVec3& position : positions) out.push_back(frame.world_from_edit(position));
+  return out;
+}
+
 void give_radii(const scene::Bounds& selected, Request& request) {
   const DVec3 size = DVec3(selected.high) - DVec3(selected.low);
   if (request.mode == Mode::remove && request.handles.empty())

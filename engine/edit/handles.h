@@ -30,6 +30,8 @@ namespace engine::edit {
 
 /// Where the handles are before the first interval.
 [[nodiscard]] std::vector<DVec3> handle_sources(const working::Frame& frame, const Request& request);
+/// Positions in that frame, in the world.
+[[nodiscard]] std::vector<DVec3> in_world(const working::Frame& frame, std::span<const DVec3> positions);
 
 /// What the request asks of its handles, from where they are to where they go: in the world's own frame, or another.
 [[nodiscard]] std::vector<deform::Drag> whole_drags(const Request& request, const working::Frame& frame = {});

@@ -4,12 +4,15 @@
 #include <cmath>
 #include <sstream>
 
+#include "engine/deform/rigid.h"
+#include "engine/edit/handles.h"
+
 namespace engine::edit {
 namespace {
 
 /// Part of what is uncovered that may stay open unsaid: rims leave a few pixels everywhere. A choice.
 constexpr double worth_saying = 0.1;
-/// Of a handle's way, what may be left of it unsaid. A choice.
+/// Of the longest way of its group, by how much a handle may stop short unsaid. A choice.
 constexpr double overlooked = 0.1;
 
 std::string anchor_is_idle(std::size_t handle) {
@@ -53,12 +56,11 @@ std::vector<std::string> warnings_of(const Parts& parts) {
 
 std::vector<std::string> handles_stop_short(const Request& request, const Parts& parts,
                                             std::span<const DVec3> positions) {
+  const std::vector<deform::Drag> drags = whole_drags(request);
   std::vector<std::string> warnings;
   for (const deform::Attachment& part : parts.attachments) {
     if (part.how != deform::Attachment::How::held && part.how != deform::Attachment::How::drawn_out) continue;
-    double longest = 0;
-    for (const Handle& handle : request.handles)
-      if (handle.group == part.group) longest = std::max(longest, glm::distance(handle.source, handle.end()));
+    const double longest = deform::places_of(drags, part.group).longest;
     for (std::size_t i = 0; i < positions.size(); ++i) {
       const Handle& handle = request.handles[i];
       // What is around a handle that turns or grows goes elsewhere than the handle itself.

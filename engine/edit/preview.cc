@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <iterator>
 #include <utility>
 
 #include "engine/edit/drag.h"
@@ -67,14 +68,13 @@ Result<PreviewOutcome> preview(const scene::LayeredCloud& scene, const Request& 
     for (std::uint32_t& row : *list) row = drag.rows[row];
   if (scene.size() == outcome.overlay.removed.size() && outcome.overlay.added() == 0)
     return tl::make_unexpected(leaves_nothing());
-  for (const DVec3& position : drag.positions)
-    outcome.positions.push_back(drag.working.frame().world_from_edit(position));
+  outcome.positions = in_world(drag.working.frame(), drag.positions);
   outcome.changeable = published.changeable;
   if (!moves) outcome.warnings.push_back(nothing_moves());
-  for (std::string& warning : warnings_of(parts)) outcome.warnings.push_back(std::move(warning));
-  for (std::string& warning : drag.warnings) outcome.warnings.push_back(std::move(warning));
-  for (std::string& warning : handles_stop_short(request, parts, outcome.positions))
-    outcome.warnings.push_back(std::move(warning));
+  const auto more = std::back_inserter(outcome.warnings);
+  std::ranges::move(warnings_of(parts), more);
+  std::ranges::move(drag.warnings, more);
+  std::ranges::move(handles_stop_short(request, parts, outcome.positions), more);
   if (published.faint > 0) outcome.warnings.push_back(faint_left_out(published.faint));
   return outcome;
 }

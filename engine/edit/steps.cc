@@ -259,7 +259,7 @@ Result<void> look_for_views(State& state, Edit& edit, std::span<const scene::Cam
     warnings.push_back(nothing_moves());
   else if (choice->views.empty())
     warnings.push_back(no_view_sees_it());
-  for (std::string& warning : warnings_of(edit.parts)) warnings.push_back(std::move(warning));
+  std::ranges::move(warnings_of(edit.parts), std::back_inserter(warnings));
   state.views = std::move(choice->views);
   if (Workload work = edit.progress.workload(); work.views != state.views.size()) {
     work.views = state.views.size();
